@@ -1,0 +1,311 @@
+"""Contact points: which corners face which edges, with their frames and gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .assembly import Assembly
+from .polygons import box_pairs, boxes, expand_ranges
+
+__all__ = ["Contacts", "InterfaceLaw", "Interfaces", "find_contacts", "measure_contacts"]
+
+#: A corner this close to the end of an edge, as a fraction of the shortest edge involved, stands on the corner
+#: there. It has to exceed what one increment leaves of drift along a hinge (second order in the rotation, then
+#: corrected), and stay far below any bearing length that matters.
+CORNER_TOLERANCE = 1e-3
+
+#: The flank of a corner may lean into the edge it faces by this much (sine of the angle) before the corner no
+#: longer counts as facing it: an open joint that may close again leans by its opening angle.
+LARGEST_LEAN = 0.5
+
+#: Penetration up to this fraction of the width of the thinner block is a contact to be corrected; beyond, the
+#: corner belongs to another face behind.
+PENETRATION_FRACTION = 0.1
+
+
+@dataclass(frozen=True)
+class InterfaceLaw:
+    """What an interface resists.
+
+    Attributes
+    ----------
+    friction_coefficient : float
+        Ratio of shear to normal force at sliding, from 0 to anything finite.
+    """
+
+    friction_coefficient: float = 0.6
+
+    def __post_init__(self) -> None:
+        mu = self.friction_coefficient
+        if not (np.isfinite(mu) and mu >= 0):
+            raise ValueError(f"friction_coefficient is {mu:g}; it must be a finite number of at least 0")
+
+
+@dataclass(frozen=True)
+class Interfaces:
+    """The law of every interface: a default, and others for pairs of materials.
+
+    Attributes
+    ----------
+    default : InterfaceLaw
+    pairs : mapping from (material, material) to InterfaceLaw
+        Either order.
+    """
+
+    default: InterfaceLaw = field(default_factory=InterfaceLaw)
+    pairs: Mapping[tuple[str, str], InterfaceLaw] = field(default_factory=dict)
+
+    def friction(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
+        """(n,) array: friction coefficient between the blocks of each pair."""
+        if not self.pairs:
+            return np.full(len(block_a), self.default.friction_coefficient)
+        kinds = sorted({*assembly.materials, *(m for pair in self.pairs for m in pair)})
+        number = {kind: k for k, kind in enumerate(kinds)}
+        table = np.full((len(kinds), len(kinds)), self.default.friction_coefficient)
+        for (first, second), law in self.pairs.items():
+            table[number[first], number[second]] = table[number[second], number[first]] = law.friction_coefficient
+        material = np.array([number[m] for m in assembly.materials])
+        return table[material[block_a], material[block_b]]
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Contact points at one geometry, contact on axis 0.
+
+    Attributes
+    ----------
+    vertex : (n,) int array
+        The corner, of ``block_a``.
+    edge : (n,) int array
+        The edge it faces, of ``block_b``, named by the vertex it starts at.
+    corner : (n,) int array
+        Where a corner stands on a corner: the vertex of ``block_b``; -1 elsewhere.
+    block_a, block_b : (n,) int arrays
+    points : (n, 2) array [m]
+    frames : (n, 2, 2) array
+        Row 0: unit normal from ``block_b`` into ``block_a``; row 1: tangent, a quarter turn counter-clockwise.
+    gaps : (n,) array [m]
+        Positive where open.
+    along : (n,) array [m]
+        Position of the corner along the tangent, from the end of the edge or from the other corner.
+    """
+
+    vertex: np.ndarray
+    edge: np.ndarray
+    corner: np.ndarray
+    block_a: np.ndarray
+    block_b: np.ndarray
+    points: np.ndarray
+    frames: np.ndarray
+    gaps: np.ndarray
+    along: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.vertex)
+
+    def keys(self, assembly: Assembly) -> np.ndarray:
+        """(n,) int array: a number for each contact that stays the same from one geometry to the next."""
+        n = len(assembly.vertices)
+        return np.where(self.corner >= 0, self.corner + n, self.edge) + 2 * n * self.vertex.astype(np.int64)
+
+
+def measure_contacts(
+    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
+) -> Contacts:
+    """Frames and gaps of given pairs of features where the corners now are.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    vertices : (n_vertices, 2) array [m]
+        Current corners of all blocks.
+    vertex, edge, corner : (n,) int arrays
+        As in :class:`Contacts`.
+
+    Notes
+    -----
+    A corner on an edge has the normal of the edge. A corner on a corner has the normal that halves the angle
+    between the two faces that meet there, so that neither block is preferred, and the point half-way.
+    """
+    following = assembly.next_vertex
+    v = vertices[vertex]
+    tangent = _unit(vertices[following[edge]] - vertices[edge])
+    on_corner = corner >= 0
+    if on_corner.any():
+        facing = _facing_edge(assembly, vertex[on_corner], edge[on_corner], corner[on_corner])
+        other = _unit(vertices[following[facing]] - vertices[facing])
+        tangent[on_corner] = _unit(tangent[on_corner] - other)
+    base = vertices[np.where(on_corner, corner, edge)]
+    # The edge runs counter-clockwise around block b: its outward normal is a quarter turn clockwise, and
+    # the tangent a quarter turn counter-clockwise from that normal is the edge's own direction.
+    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    rest = v - base
+    points = np.where(on_corner[:, None], (v + base) / 2.0, v)
+    return Contacts(
+        vertex=vertex,
+        edge=edge,
+        corner=corner,
+        block_a=assembly.block_of_vertex[vertex],
+        block_b=assembly.block_of_vertex[edge],
+        points=points,
+        frames=np.stack([normal, tangent], axis=1),
+        gaps=(rest * normal).sum(axis=1),
+        along=(rest * tangent).sum(axis=1),
+    )
+
+
+def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Contacts:
+    """Finds the points at which blocks touch or may touch within one increment.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    vertices : (n_vertices, 2) array [m]
+        Current corners of all blocks.
+    reach : float [m]
+        Largest gap of a contact point that is kept.
+
+    Returns
+    -------
+    Contacts
+        Sorted by their features, so that the same geometry gives the same order.
+
+    Notes
+    -----
+    Candidates are all pairs of a convex corner and an edge of another block, not both of supports, with the
+    corner in front of the edge (gap at most ``reach``), its block on the outward side and above the edge over
+    some length. Near an end of the edge the corner there and the face that leaves it decide: where the two
+    faces run the same way the pair is a corner on a corner, kept once; where they part, the blocks are
+    diagonal neighbours and do not touch.
+    """
+    pair_a, pair_b = _near_blocks(assembly, vertices, reach)
+    vertex, edge = _vertex_edge_candidates(assembly, vertices, pair_a, pair_b, reach)
+    vertex, edge, corner = _settle_ends(assembly, vertices, vertex, edge, reach)
+    order = np.lexsort((edge, vertex))
+    return measure_contacts(assembly, vertices, vertex[order], edge[order], corner[order])
+
+
+def _near_blocks(assembly: Assembly, vertices: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Ordered pairs of blocks whose boxes come within reach, not both supports."""
+    low, high = boxes(vertices, assembly.offsets)
+    i, j = box_pairs(low - reach / 2.0, high + reach / 2.0)
+    useful = assembly.free[i] | assembly.free[j]
+    i, j = i[useful], j[useful]
+    return np.concatenate([i, j]), np.concatenate([j, i])
+
+
+def _vertex_edge_candidates(
+    assembly: Assembly, vertices: np.ndarray, pair_a: np.ndarray, pair_b: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of block a in front of edges of block b, by distance and direction alone."""
+    offsets, following, previous = assembly.offsets, assembly.next_vertex, assembly.previous_vertex
+    counts = np.diff(offsets)
+    low, high = boxes(vertices, offsets)
+    owner, position = expand_ranges(counts[pair_a])
+    vertex, b = offsets[pair_a][owner] + position, pair_b[owner]
+    p = vertices[vertex]
+    near = assembly.convex_vertex[vertex] & ((p >= low[b] - reach) & (p <= high[b] + reach)).all(axis=1)
+    vertex, b = vertex[near], b[near]
+
+    owner, position = expand_ranges(counts[b])
+    edge, vertex = offsets[b][owner] + position, vertex[owner]
+    p, e0, e1 = vertices[vertex], vertices[edge], vertices[following[edge]]
+    length = assembly.edge_lengths
+    tangent = (e1 - e0) / length[edge, None]
+    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    rest = p - e0
+    gap = (rest * normal).sum(axis=1)
+    along = (rest * tangent).sum(axis=1)
+    width = _widths(assembly)
+    a_block, b_block = assembly.block_of_vertex[vertex], assembly.block_of_vertex[edge]
+    deepest = PENETRATION_FRACTION * np.minimum(width[a_block], width[b_block])
+    end = _end_zone(assembly, vertex, edge)
+    keep = (gap >= -deepest) & (gap <= reach) & (along >= -end) & (along <= length[edge] + end)
+    vertex, edge, normal = vertex[keep], edge[keep], normal[keep]
+
+    p = vertices[vertex]
+    to_next = _unit(vertices[following[vertex]] - p)
+    to_previous = _unit(vertices[previous[vertex]] - p)
+    inward = np.stack([to_previous[:, 1] - to_next[:, 1], to_next[:, 0] - to_previous[:, 0]], axis=1)
+    outside = (
+        ((to_next * normal).sum(axis=1) >= -LARGEST_LEAN)
+        & ((to_previous * normal).sum(axis=1) >= -LARGEST_LEAN)
+        & ((inward * normal).sum(axis=1) > 0.0)
+    )
+    return vertex[outside], edge[outside]
+
+
+def _settle_ends(
+    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sorts out the corners near the end of their edge: on the corner there, or past it."""
+    following = assembly.next_vertex
+    start, stop = edge, following[edge]
+    tangent = _unit(vertices[stop] - vertices[start])
+    along = ((vertices[vertex] - vertices[start]) * tangent).sum(axis=1)
+    end = _end_zone(assembly, vertex, edge)
+    at_start, at_stop = along <= end, along >= assembly.edge_lengths[edge] - end
+    other = np.where(at_start, start, np.where(at_stop, stop, -1))
+    near_end = other >= 0
+    # At a re-entrant corner the edge ends at a wall: a corner that gets there is simply on the edge.
+    near_end &= assembly.convex_vertex[other]
+    corner = np.where(near_end, other, -1)
+
+    k = np.flatnonzero(near_end)
+    facing = _facing_edge(assembly, vertex[k], edge[k], corner[k])
+    sense = np.where(at_start[k], 1.0, -1.0)[:, None]
+    along_edge = sense * tangent[k]
+    along_facing = -sense * _unit(vertices[following[facing]] - vertices[facing])
+    same_way = (along_edge * along_facing).sum(axis=1) > 0.0
+    # Both corners lie within the end zone of the other's face, seen along the half-way direction.
+    halfway = _unit(along_edge + along_facing)
+    offset = np.abs(((vertices[vertex[k]] - vertices[corner[k]]) * halfway).sum(axis=1))
+    paired = same_way & (offset <= end[k])
+    keep = np.ones(len(vertex), dtype=bool)
+    keep[k[~same_way]] = False
+    corner[k[~paired]] = -1
+
+    vertex, edge, corner = vertex[keep], edge[keep], corner[keep]
+    return _once(assembly, vertex, edge, corner)
+
+
+def _once(
+    assembly: Assembly, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Keeps each pair of corners once, seen from the lower numbered vertex."""
+    k = np.flatnonzero(corner >= 0)
+    facing = _facing_edge(assembly, vertex[k], edge[k], corner[k])
+    turn = vertex[k] > corner[k]
+    v, e, c = vertex[k], edge[k], corner[k]
+    vertex, edge, corner = vertex.copy(), edge.copy(), corner.copy()
+    vertex[k], edge[k], corner[k] = np.where(turn, c, v), np.where(turn, facing, e), np.where(turn, v, c)
+    # The pair may have been found from both sides, and two corners may meet along two pairs of faces.
+    table = np.column_stack([vertex, edge, corner])
+    _, first = np.unique(table, axis=0, return_index=True)
+    return vertex[first], edge[first], corner[first]
+
+
+def _facing_edge(assembly: Assembly, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
+    """The edge of the corner's block that lies over ``edge`` where ``vertex`` stands on ``corner``.
+
+    Both outlines run counter-clockwise, so facing edges run against each other: where one starts the other ends.
+    """
+    return np.where(corner == edge, assembly.previous_vertex[vertex], vertex)
+
+
+def _end_zone(assembly: Assembly, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    length = assembly.edge_lengths
+    shortest = np.minimum(length[vertex], length[assembly.previous_vertex[vertex]])
+    return CORNER_TOLERANCE * np.minimum(shortest, length[edge])
+
+
+def _widths(assembly: Assembly) -> np.ndarray:
+    """Width of each block, (n_blocks,) [m]: twice its area over its perimeter, b for a long a × b."""
+    return 2.0 * assembly.areas / np.add.reduceat(assembly.edge_lengths, assembly.offsets[:-1])
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.hypot(vectors[:, 0], vectors[:, 1])[:, None]

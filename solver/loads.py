@@ -1,0 +1,177 @@
+"""Loads on the blocks, and the settlement of the moving supports."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .assembly import Assembly
+from .kinematics import Pose, rotation_matrices
+
+__all__ = ["GRAVITY", "Loads", "Settlement", "self_weight"]
+
+#: Acceleration of gravity [m/s²], as structural codes round it.
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class Loads:
+    """External loads at the centroids; they keep their direction when the blocks turn.
+
+    Attributes
+    ----------
+    dead : (n_blocks, 3) array [N, N, N·m]
+        Forces and counter-clockwise moment on each block, self-weight included.
+    live : (n_blocks, 3) array [N, N, N·m]
+        Loads that the load multiplier scales.
+    """
+
+    dead: np.ndarray
+    live: np.ndarray
+
+    def total(self, multiplier: float = 0.0) -> np.ndarray:
+        """(n_blocks, 3) array: dead load + multiplier · live load."""
+        return self.dead + multiplier * self.live
+
+
+def self_weight(assembly: Assembly) -> Loads:
+    """Self-weight of all blocks as dead load; no live load.
+
+    Examples
+    --------
+    >>> import solver
+    >>> block = solver.Assembly.from_outlines([[[0, 0], [1, 0], [1, 1], [0, 1]]], density=2000.0)
+    >>> float(solver.self_weight(block).dead[0, 1])
+    -19620.0
+    """
+    dead = np.zeros((assembly.n_blocks, 3))
+    dead[:, 1] = -assembly.masses * GRAVITY
+    return Loads(dead, np.zeros_like(dead))
+
+
+@dataclass(frozen=True)
+class Settlement:
+    """One-parameter rigid motion of the moving supports.
+
+    Attributes
+    ----------
+    direction : (2,) sequence, optional
+        Direction of the translation; only its direction counts, the parameter s is the distance [m].
+    rotation_centre : (2,) sequence [m], optional
+        Point about which the supports turn; it travels with the translation.
+    rotation : float
+        Without a direction: 1 for counter-clockwise, -1 for clockwise, and s is the angle [rad].
+        With one: angle per distance [rad/m].
+    increment : float [m or rad]
+        Largest step of s.
+    limit : float [m or rad]
+        Where to stop if nothing has collapsed.
+    tolerance : float, optional [m or rad]
+        Width of the collapse bracket; a hundredth of the increment by default.
+    blocks : sequence of str, optional
+        Names of the moving supports that take part; all by default, the others stand still in this phase.
+    """
+
+    direction: Sequence[float] | None = None
+    rotation_centre: Sequence[float] | None = None
+    rotation: float = 0.0
+    increment: float = 0.01
+    limit: float = 1.0
+    tolerance: float | None = None
+    blocks: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.direction is None and self.rotation_centre is None:
+            raise ValueError("a settlement needs a direction, or a rotation_centre and rotation")
+        for name in ("direction", "rotation_centre"):
+            value = getattr(self, name)
+            if value is not None:
+                pair = np.asarray(value, dtype=float)
+                if pair.shape != (2,) or not np.isfinite(pair).all():
+                    raise ValueError(f"settlement {name} is {value!r}; give two finite numbers [x, y]")
+                object.__setattr__(self, name, (float(pair[0]), float(pair[1])))
+        if self.direction is not None:
+            length = float(np.hypot(*self.direction))
+            if length == 0.0:
+                raise ValueError("settlement direction is [0, 0]; give the direction in which the support moves")
+            object.__setattr__(self, "direction", (self.direction[0] / length, self.direction[1] / length))
+        if self.rotation_centre is not None and not (np.isfinite(self.rotation) and self.rotation != 0.0):
+            raise ValueError(f"settlement rotation is {self.rotation:g}; with a rotation_centre it must not be zero")
+        if self.rotation_centre is None and self.rotation != 0.0:
+            raise ValueError("settlement has a rotation but no rotation_centre")
+        if self.tolerance is None:
+            object.__setattr__(self, "tolerance", self.increment / 100.0)
+        for name in ("increment", "limit", "tolerance"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ValueError(f"settlement {name} is {value:g}; it must be a positive number")
+        if self.rotation_centre is not None and self.direction is None:
+            object.__setattr__(self, "rotation", float(np.sign(self.rotation)))
+
+    @property
+    def unit(self) -> str:
+        """Unit of the parameter s: "m", or "rad" for a pure rotation."""
+        return "rad" if self.direction is None else "m"
+
+    def taking_part(self, assembly: Assembly) -> np.ndarray:
+        """(n_blocks,) bool array: the supports that this settlement moves."""
+        if self.blocks is None:
+            return assembly.moving
+        chosen = np.zeros(assembly.n_blocks, dtype=bool)
+        chosen[[assembly.index(name) for name in self.blocks]] = True
+        return chosen & assembly.moving
+
+    def displaced(self, assembly: Assembly, start: Pose, s: float) -> Pose:
+        """The pose with the moving supports displaced by s from where they are in ``start``.
+
+        Rotations follow the true arc about the (travelling) centre.
+        """
+        part = self.taking_part(assembly)
+        travel, angle, centre = self._motion(s)
+        positions, rotations = start.positions.copy(), start.rotations.copy()
+        turn = rotation_matrices(np.array([angle]))[0]
+        positions[part] = centre + travel + (start.positions[part] - centre) @ turn.T
+        rotations[part] += angle
+        return Pose(positions, rotations)
+
+    def rate(self, assembly: Assembly, start: Pose, s: float) -> np.ndarray:
+        """(n_blocks, 3) array: velocity of each support per unit of s, at s; zero for other blocks."""
+        part = self.taking_part(assembly)
+        travel, angle, centre = self._motion(s)
+        rate = np.zeros((assembly.n_blocks, 3))
+        direction = np.zeros(2) if self.direction is None else np.asarray(self.direction)
+        rate[part, :2] = direction
+        if self.rotation_centre is not None:
+            turn = rotation_matrices(np.array([angle]))[0]
+            arm = (start.positions[part] - centre) @ turn.T
+            rate[part, 0] -= self.rotation * arm[:, 1]
+            rate[part, 1] += self.rotation * arm[:, 0]
+            rate[part, 2] = self.rotation
+        return rate
+
+    def _motion(self, s: float) -> tuple[np.ndarray, float, np.ndarray]:
+        travel = np.zeros(2) if self.direction is None else s * np.asarray(self.direction)
+        if self.rotation_centre is None:
+            return travel, 0.0, np.zeros(2)
+        return travel, self.rotation * s, np.asarray(self.rotation_centre)
+
+    def with_limits(self, **changes: float) -> Settlement:
+        """The same motion with another increment, limit or tolerance."""
+        return replace(self, **changes)
+
+
+def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
+    """Self-weight where no loads are given; otherwise the given ones, checked for shape and finite numbers."""
+    if loads is None:
+        return self_weight(assembly)
+    arrays: list[ArrayLike] = [loads.dead, loads.live]
+    for name, array in zip(("dead", "live"), map(np.asarray, arrays), strict=True):
+        if array.shape != (assembly.n_blocks, 3):
+            raise ValueError(f"{name} loads have shape {array.shape}; give ({assembly.n_blocks}, 3): fx, fy, moment")
+        if not np.isfinite(array).all():
+            block = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+            raise ValueError(f"{name} load on block '{assembly.names[block]}' is {array[block].tolist()}; not finite")
+    return loads

@@ -1,0 +1,194 @@
+"""Linear programs: stated, solved by HiGHS, and checked. The only module that imports highspy."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import highspy
+import numpy as np
+import scipy.sparse as sp
+
+__all__ = ["LPSolution", "LinearProgram", "SolveError", "solve_lp"]
+
+#: HiGHS' smallest feasibility tolerance; the programs are scaled so that it is small against every force.
+FEASIBILITY_TOLERANCE = 1e-10
+
+#: What our own check accepts: violation of rows, bounds and reduced costs, absolute in the scaled program.
+ACCEPTED_VIOLATION = 1e-7
+
+#: Relative difference of the two objectives that our own check accepts.
+ACCEPTED_GAP = 1e-7
+
+#: Above this many rows the interior point methods win over the simplex method (measured, benchmarks/).
+SIMPLEX_ROWS = 400
+
+
+class SolveError(RuntimeError):
+    """No route through HiGHS gave a solution that passes its check. Not a statement about the structure."""
+
+
+@dataclass(frozen=True)
+class LinearProgram:
+    """Minimise cost · x subject to lower ≤ A x ≤ upper and x ≥ 0.
+
+    Attributes
+    ----------
+    cost : (n,) array
+    matrix : (m, n) sparse array, by columns
+    lower, upper : (m,) arrays
+    """
+
+    cost: np.ndarray
+    matrix: sp.csc_array
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+@dataclass(frozen=True)
+class LPSolution:
+    """A solution of a :class:`LinearProgram` together with the measures by which it proves itself.
+
+    Attributes
+    ----------
+    x : (n,) array
+        Primal solution.
+    row_dual : (m,) array
+        Multipliers of the rows.
+    objective, dual_objective : float
+    primal_violation : float
+        Largest violation of a row or of x ≥ 0.
+    dual_violation : float
+        Largest negative reduced cost.
+    route : str
+        How HiGHS found it.
+    iterations : int
+    seconds : float
+    """
+
+    x: np.ndarray
+    row_dual: np.ndarray
+    objective: float
+    dual_objective: float
+    primal_violation: float
+    dual_violation: float
+    route: str
+    iterations: int
+    seconds: float
+
+    @property
+    def gap(self) -> float:
+        """Difference of the two objectives relative to 1 + their size."""
+        return abs(self.objective - self.dual_objective) / (1.0 + abs(self.objective))
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the solution passes our own check, whatever HiGHS says about it."""
+        return max(self.primal_violation, self.dual_violation) <= ACCEPTED_VIOLATION and self.gap <= ACCEPTED_GAP
+
+
+#: Ways through HiGHS: (name, options). Each is judged by our own check, so the order is a matter of speed only.
+ROUTES: dict[str, dict[str, object]] = {
+    "simplex": {"solver": "simplex"},
+    "simplex without presolve": {"solver": "simplex", "presolve": "off"},
+    "hipo": {"solver": "hipo", "run_crossover": "off"},
+    "ipx": {"solver": "ipx", "run_crossover": "off"},
+    "ipx with crossover": {"solver": "ipx", "run_crossover": "on"},
+}
+
+
+def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> LPSolution:
+    """Solves a linear program, trying one route after another until a solution passes its check.
+
+    Parameters
+    ----------
+    program : LinearProgram
+    routes : tuple of str, optional
+        Names out of ``ROUTES``, in the order to try; chosen by size by default.
+
+    Raises
+    ------
+    SolveError
+        If no route gives a solution that passes; the message lists what each of them ended with.
+    """
+    if routes is None:
+        small = program.matrix.shape[0] <= SIMPLEX_ROWS
+        routes = (
+            ("simplex", "simplex without presolve", "ipx with crossover", "hipo")
+            if small
+            else ("hipo", "ipx", "ipx with crossover", "simplex")
+        )
+    outcomes = []
+    for route in routes:
+        solution, status = _run(program, route)
+        if solution is not None and solution.accepted:
+            return solution
+        if solution is not None:
+            status += (
+                f", violation {max(solution.primal_violation, solution.dual_violation):.1e}, gap {solution.gap:.1e}"
+            )
+        outcomes.append(f"{route}: {status}")
+    raise SolveError(
+        f"no solution of the linear program with {program.matrix.shape[0]} rows and {program.matrix.shape[1]} "
+        f"columns passed its check ({'; '.join(outcomes)})"
+    )
+
+
+def _run(program: LinearProgram, route: str) -> tuple[LPSolution | None, str]:
+    started = time.perf_counter()
+    highs = highspy.Highs()
+    options: dict[str, object] = {
+        "output_flag": False,
+        "threads": 1,
+        "random_seed": 0,
+        "primal_feasibility_tolerance": FEASIBILITY_TOLERANCE,
+        "dual_feasibility_tolerance": FEASIBILITY_TOLERANCE,
+        "ipm_optimality_tolerance": FEASIBILITY_TOLERANCE,
+        **ROUTES[route],
+    }
+    for name, value in options.items():
+        if highs.setOptionValue(name, value) == highspy.HighsStatus.kError:
+            return None, f"HiGHS refuses the option {name} = {value}"
+    rows, columns = program.matrix.shape
+    lp = highspy.HighsLp()
+    lp.num_row_, lp.num_col_ = rows, columns
+    lp.col_cost_ = program.cost
+    lp.col_lower_ = np.zeros(columns)
+    lp.col_upper_ = np.full(columns, highspy.kHighsInf)
+    lp.row_lower_, lp.row_upper_ = program.lower, program.upper
+    lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+    lp.a_matrix_.num_row_, lp.a_matrix_.num_col_ = rows, columns
+    lp.a_matrix_.start_ = program.matrix.indptr
+    lp.a_matrix_.index_ = program.matrix.indices
+    lp.a_matrix_.value_ = program.matrix.data
+    if highs.passModel(lp) == highspy.HighsStatus.kError:
+        return None, "HiGHS refuses the program"
+    highs.run()
+    status = highs.modelStatusToString(highs.getModelStatus())
+    found = highs.getSolution()
+    if not (found.value_valid and found.dual_valid):
+        return None, status
+    info = highs.getInfo()
+    iterations = max(info.simplex_iteration_count, 0) + max(info.ipm_iteration_count, 0)
+    # Interior solutions stray below zero by their tolerance; what they gain from it shows up as row violation.
+    x = np.maximum(np.asarray(found.col_value), 0.0)
+    y = np.asarray(found.row_dual)
+    return _checked(program, x, y, route, int(iterations), time.perf_counter() - started), status
+
+
+def _checked(
+    program: LinearProgram, x: np.ndarray, y: np.ndarray, route: str, iterations: int, seconds: float
+) -> LPSolution:
+    activity = program.matrix @ x
+    reduced = program.cost - program.matrix.T @ y
+    return LPSolution(
+        x=x,
+        row_dual=y,
+        objective=float(program.cost @ x),
+        dual_objective=float(np.where(y > 0, y * program.lower, y * program.upper).sum()),
+        primal_violation=float(np.maximum(program.lower - activity, activity - program.upper).max(initial=0.0)),
+        dual_violation=float(np.maximum(-reduced, 0.0).max(initial=0.0)),
+        route=route,
+        iterations=iterations,
+        seconds=seconds,
+    )
