@@ -1,36 +1,30 @@
-"""The increment loop: settle() and what it is made of."""
+"""The increment loop: settle(), and the path it follows from one equilibrium to the next."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 
 from .assembly import Assembly
-from .contact import Contacts, InterfaceLaw, Interfaces, find_contacts, measure_contacts
-from .equilibrium import cone_rays, equilibrium_matrix
+from .contact import InterfaceLaw, Interfaces
+from .correction import Falls, NotConverged, corrected
 from .kinematics import Pose, moved, moved_vertices
 from .loads import Loads, Settlement, checked_loads
-from .lp import LinearProgram, LPSolution, SolveError, solve_lp
+from .lp import SolveError
 from .polygons import overlap_depths
-from .response import Certificate, Collapse, Increment, Response, Status
+from .program import Model, Solved, point_velocities, solve_program
+from .response import Collapse, Increment, Response, Status
 
 __all__ = ["Controls", "Ending", "settle", "settlement_increments"]
 
-#: A free block out of balance by less than this fraction of the total load is in balance. Without it the program
-#: may move a block without friction sideways, for nothing, as far as it is allowed to.
-BALANCE_TOLERANCE = 1e-9
+#: The mechanism has changed within an increment when the velocities before and after differ by this much of their
+#: size, weighted by mass: hinges that move change it by more, the slow turning of the geometry by less.
+EVENT_CHANGE = 0.05
 
-#: A geometry is exact enough when contact points that carry force are closed, and those that stick have
-#: not moved along the joint, to this fraction of the block size.
-GEOMETRY_TOLERANCE = 1e-8
-
-#: Unbalanced force that counts as falling, as a fraction of the total load: well above BALANCE_TOLERANCE and
-#: what HiGHS leaves, and within the residual that a certificate promises.
-FALLING_FRACTION = 5e-9
+#: Step by which a reaction is read off at the last equilibrium, in block sizes.
+PROBE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -42,7 +36,9 @@ class Controls:
     trust_region : float, optional [m]
         Largest movement of a block in one program; a fifth of the block size, or ten increments of translation.
     overlap_tolerance : float, optional [m]
-        Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinner block.
+        Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
+    event_refinement : int
+        Where the mechanism changes, the increment is taken again in steps down to one part in so many.
     correctors : int
         Largest number of corrections within an increment.
     falling_frames : int
@@ -51,6 +47,7 @@ class Controls:
 
     trust_region: float | None = None
     overlap_tolerance: float | None = None
+    event_refinement: int = 8
     correctors: int = 25
     falling_frames: int = 40
 
@@ -64,65 +61,12 @@ class Ending:
     collapse: Collapse | None = None
 
 
-@dataclass(frozen=True)
-class _Model:
-    """What stays the same over all increments."""
-
-    assembly: Assembly
-    interfaces: Interfaces
-    load: np.ndarray
-    length: float
-    force: float
-    trust: float
-    reach: float
-
-    @property
-    def balance(self) -> float:
-        """Unbalanced force that is accepted, in units of the program."""
-        return BALANCE_TOLERANCE * float(np.abs(self.load[self.assembly.free, :2]).sum()) / self.force
-
-
-@dataclass(frozen=True)
-class _Solved:
-    """One solved program at one geometry."""
-
-    contacts: Contacts
-    friction: np.ndarray
-    forces: np.ndarray
-    motion: np.ndarray
-    slip: np.ndarray
-    unbalanced: float
-    certificate: Certificate
-    pose: Pose
-    support_forces: np.ndarray
-
-
-class _NotConverged(Exception):
-    """The corrections of an increment did not come to rest; a smaller increment may do."""
-
-
-class _Falls(Exception):
-    """No equilibrium at the geometry reached."""
-
-    def __init__(self, solved: _Solved) -> None:
-        super().__init__("no equilibrium")
-        self.solved = solved
-
-
-class _TooFar(_Falls):
+class _TooFar(Exception):
     """Blocks move by the whole trust region before the supports have moved by the step."""
 
-
-@dataclass
-class _Counter:
-    programs: int = 0
-    started: float = field(default_factory=time.perf_counter)
-
-    def restart(self) -> tuple[int, float]:
-        now = time.perf_counter()
-        counted = self.programs, now - self.started
-        self.programs, self.started = 0, now
-        return counted
+    def __init__(self, solved: Solved) -> None:
+        super().__init__("the increment is too large")
+        self.solved = solved
 
 
 def settle(
@@ -209,156 +153,191 @@ def settlement_increments(
     controls = controls or Controls()
     _check_input(assembly, phases, controls)
     model = _model(assembly, phases, interfaces, loads, controls)
-    counter = _Counter()
     pose = Pose.initial(assembly)
     try:
-        pose = _at_rest(model, pose, controls, counter)
-    except _Falls as fall:
-        still = phases[0].rate(assembly, pose, 0.0) * 0.0
-        yield _increment(model, fall.solved, still, 1.0, 0.0, 0, Status.FALLING, counter)
+        solved = solve_program(model, pose)
+        if solved.falling:
+            raise Falls(solved)
+        # Gaps and overlaps within the accuracy of the drawing are closed before anything moves.
+        pose = corrected(model, solved, pose, controls.correctors)
+    except Falls as fall:
+        yield _falling_frame(model, fall.solved, 0.0, 0)
         return Ending(Status.NO_INITIAL_EQUILIBRIUM, _no_equilibrium_message(assembly, fall.solved))
-    except (SolveError, _NotConverged) as error:
+    except (SolveError, NotConverged) as error:
         return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
     for number, phase in enumerate(phases):
-        path = _Path(model, phase, number, pose, controls, counter)
+        path = _Path(model, phase, number, pose, controls)
         ending = yield from path.follow()
         if ending.stop is not Status.LIMIT_REACHED:
             return ending
-        pose = path.pose
+        pose = path.here.pose
     return ending
 
 
-class _Path:
-    """The equilibrium path of one settlement phase."""
+@dataclass(frozen=True)
+class _Place:
+    """An equilibrium on the path, and how it was reached."""
 
-    def __init__(
-        self, model: _Model, phase: Settlement, number: int, start: Pose, controls: Controls, counter: _Counter
-    ) -> None:
-        self.model, self.phase, self.number, self.controls, self.counter = model, phase, number, controls, counter
-        self.start = self.pose = start
-        self.s = 0.0
-        # Step by which reactions are read off where the structure stands on the verge of collapse.
-        self.probe = 1e-6 * model.length / _lever(model.assembly, phase, start)
+    s: float
+    pose: Pose
+    step: float = 0.0
+    velocity: np.ndarray | None = None
+
+
+class _Path:
+    """The equilibrium path of one settlement phase.
+
+    The path goes from place to place. It keeps the place before the last, because whether a place really is an
+    equilibrium, and whether the mechanism changed on the way to it, is only known from the program solved there.
+    """
+
+    def __init__(self, model: Model, phase: Settlement, number: int, start: Pose, controls: Controls) -> None:
+        self.model, self.phase, self.number, self.controls, self.start = model, phase, number, controls, start
+        self.here = _Place(0.0, start)
+        self.before: _Place | None = None
+        self.first_without = np.inf
+        self.told = -np.inf
+        self.finest = phase.increment / max(controls.event_refinement, 1)
+        self.tolerance = float(phase.tolerance or phase.increment / 100.0)
+        self.probe = PROBE * model.length / _lever(model.assembly, phase, start)
 
     def follow(self) -> Generator[Increment, None, Ending]:
-        phase, tolerance = self.phase, float(self.phase.tolerance or 0.0)
-        step, first_without = phase.increment, np.inf
-        previous: tuple[float, Pose] | None = None
-        checked, told = False, -np.inf
+        """Yields the increments of the phase, each when it is left behind; returns how the phase ended."""
+        phase = self.phase
+        step, verified = phase.increment, False
         while True:
-            if self.s >= phase.limit * (1.0 - 1e-12):
-                yield self._reading()
+            here = self.here
+            if here.s >= phase.limit * (1.0 - 1e-12):
+                yield from self._tell_last()
                 return Ending(Status.LIMIT_REACHED, f"the settlement reached its limit of {phase.limit:g} {phase.unit}")
-            step = min(step, phase.limit - self.s)
-            if np.isfinite(first_without):
-                rest = first_without - self.s
-                step = rest if rest <= tolerance else min(step, rest / 2.0)
+            step = self._shortened(step)
             try:
-                solved, pose = self._advance(step)
-                if np.isfinite(first_without):
-                    self._verify(self.s + step, pose)
+                predictor = self._predict(here, step)
+                if self._mechanism_changed(predictor, step):
+                    step = self._go_back(here.step)
+                    continue
+                target = phase.displaced(self.model.assembly, self.start, here.s + step)
+                pose = corrected(self.model, predictor, target, self.controls.correctors)
+                if np.isfinite(self.first_without):
+                    self._verify(here.s + step, pose)
             except _TooFar as far:
-                if not checked:
-                    checked = True
+                if not verified:
                     try:
-                        self._verify(self.s, self.pose)
-                    except _Falls as fall:
-                        if previous is None:
-                            return (yield from self._never_stood(fall.solved))
-                        # The last correction ended beyond the last equilibrium; only now has it been noticed.
-                        first_without, (self.s, self.pose) = self.s, previous
-                        step = (first_without - self.s) / 2.0
+                        self._verify(here.s, here.pose)
+                        verified = True
+                    except Falls as fall:
+                        if self.before is None:
+                            yield _falling_frame(self.model, fall.solved, here.s, self.number)
+                            return Ending(
+                                Status.NO_INITIAL_EQUILIBRIUM, _no_equilibrium_message(self.model.assembly, fall.solved)
+                            )
+                        self.first_without = here.s
+                        step = self._go_back(here.step)
                         continue
-                if step <= tolerance:
-                    return (yield from self._collapse(self.s + step, far.solved, told))
+                if step <= self.tolerance:
+                    return (yield from self._collapse(here.s + step, far.solved))
                 step /= 2.0
                 continue
-            except _Falls as fall:
-                first_without = min(first_without, self.s + step)
-                if first_without - self.s <= tolerance * (1.0 + 1e-9):
-                    return (yield from self._collapse(first_without, fall.solved, told))
+            except Falls as fall:
+                self.first_without = min(self.first_without, here.s + step)
+                if self.first_without - here.s <= self.tolerance * (1.0 + 1e-9):
+                    return (yield from self._collapse(self.first_without, fall.solved))
                 step /= 2.0
                 continue
-            except (_NotConverged, SolveError) as error:
+            except (NotConverged, SolveError) as error:
                 step /= 2.0
-                if step < tolerance / 64.0:
-                    yield self._reading()
-                    return Ending(Status.SOLVER_FAILED, f"at a settlement of {self.s:.6g} {phase.unit}: {error}")
+                if step < self.tolerance / 64.0:
+                    yield from self._tell_last()
+                    return Ending(Status.SOLVER_FAILED, f"at a settlement of {here.s:.6g} {phase.unit}: {error}")
                 continue
-            if self.s + step >= first_without:
-                first_without = np.inf
-            if self.s > told:
-                yield self._increment(solved, step)
-                told = self.s
-            previous, checked = (self.s, self.pose), np.isfinite(first_without)
-            self.s, self.pose = self.s + step, pose
+            if here.s + step >= self.first_without:
+                self.first_without = np.inf
+            if here.s > self.told:
+                yield self._increment(predictor, step)
+                self.told = here.s
+            verified = bool(np.isfinite(self.first_without))
+            self.before = here
+            self.here = _Place(here.s + step, pose, step, predictor.motion / step)
             step = min(2.0 * step, phase.increment)
 
-    def _advance(self, step: float) -> tuple[_Solved, Pose]:
-        """Predictor and correctors of one increment: the solved predictor and the pose at s + step."""
-        model, counter = self.model, self.counter
-        rate = self.phase.rate(model.assembly, self.start, self.s)
-        predictor = _solve(model, self.pose, rate * step, counter)
-        if predictor.unbalanced > 0.0:
+    def _shortened(self, step: float) -> float:
+        """The step, not past the limit, and half-way to where equilibrium is known to be lost."""
+        rest = self.first_without - self.here.s
+        if np.isfinite(rest):
+            step = rest if rest <= self.tolerance else min(step, rest / 2.0)
+        return min(step, self.phase.limit - self.here.s)
+
+    def _go_back(self, step: float) -> float:
+        """Returns to the place before; gives the step to try from there."""
+        assert self.before is not None
+        self.here, self.before = self.before, None
+        return step / 2.0
+
+    def _mechanism_changed(self, predictor: Solved, step: float) -> bool:
+        """Whether the last step went past a change of the mechanism and is worth taking again in smaller ones."""
+        here = self.here
+        if here.velocity is None or self.before is None or here.step <= self.finest * (1.0 + 1e-9):
+            return False
+        size = np.sqrt(self.model.assembly.masses)[:, None] * np.array([1.0, 1.0, self.model.length])
+        new, old = predictor.motion / step * size, here.velocity * size
+        return bool(np.linalg.norm(new - old) > EVENT_CHANGE * np.linalg.norm(old))
+
+    def _predict(self, place: _Place, step: float) -> Solved:
+        rate = self.phase.rate(self.model.assembly, self.start, place.s)
+        predictor = solve_program(self.model, place.pose, rate * step)
+        if predictor.falling:
             raise _TooFar(predictor)
-        target = self.phase.displaced(model.assembly, self.start, self.s + step)
-        return predictor, _corrected(model, self.pose, predictor, target, self.controls, counter)
+        return predictor
+
+    def _read(self, s: float, pose: Pose) -> Solved:
+        """The forces at a place, from a program with a step so small that nothing moves."""
+        return solve_program(self.model, pose, self.phase.rate(self.model.assembly, self.start, s) * self.probe)
 
     def _verify(self, s: float, pose: Pose) -> None:
-        """Raises ``_Falls`` where the pose is not in equilibrium: the corrections stop one program short of knowing."""
-        rate = self.phase.rate(self.model.assembly, self.start, s)
-        solved = _solve(self.model, pose, rate * self.probe, self.counter)
-        if solved.unbalanced > 0.0:
-            raise _Falls(solved)
+        solved = self._read(s, pose)
+        if solved.falling:
+            raise Falls(solved)
 
-    def _never_stood(self, falling: _Solved) -> Generator[Increment, None, Ending]:
-        yield self._increment(falling, self.probe)
-        return Ending(Status.NO_INITIAL_EQUILIBRIUM, _no_equilibrium_message(self.model.assembly, falling))
+    def _tell_last(self) -> Iterator[Increment]:
+        if self.here.s > self.told:
+            self.told = self.here.s
+            yield self._increment(self._read(self.here.s, self.here.pose), self.probe)
 
-    def _reading(self) -> Increment:
-        """The increment at the last equilibrium, its reaction read off by a very small step."""
-        rate = self.phase.rate(self.model.assembly, self.start, self.s)
-        solved = _solve(self.model, self.pose, rate * self.probe, self.counter)
-        return self._increment(solved, self.probe)
+    def _increment(self, solved: Solved, step: float) -> Increment:
+        rate = self.phase.rate(self.model.assembly, self.start, self.here.s)
+        return _increment(self.model, solved, rate, step, self.here.s, self.number, Status.EQUILIBRIUM)
 
-    def _increment(self, solved: _Solved, step: float) -> Increment:
-        rate = self.phase.rate(self.model.assembly, self.start, self.s)
-        return _increment(self.model, solved, rate, step, self.s, self.number, Status.EQUILIBRIUM, self.counter)
-
-    def _collapse(self, first_without: float, falling: _Solved, told: float) -> Generator[Increment, None, Ending]:
-        last = self._reading()
-        if self.s > told:
+    def _collapse(self, first_without: float, falling: Solved) -> Generator[Increment, None, Ending]:
+        last = self._increment(self._read(self.here.s, self.here.pose), self.probe)
+        if self.here.s > self.told:
             yield last
-        size = np.abs(falling.motion * [1.0, 1.0, self.model.length]).max()
         collapse = Collapse(
-            displacement=(self.s + first_without) / 2.0,
-            bracket=(self.s, first_without),
+            displacement=(self.here.s + first_without) / 2.0,
+            bracket=(self.here.s, first_without),
             reaction=last.reaction,
-            mechanism=falling.motion / size,
+            mechanism=falling.motion / _largest_movement(self.model, falling.motion),
             unit=self.phase.unit,
         )
         yield from self._fall(first_without, falling)
         return Ending(Status.COLLAPSED, str(collapse), collapse)
 
-    def _fall(self, s: float, solved: _Solved) -> Iterator[Increment]:
+    def _fall(self, s: float, solved: Solved) -> Iterator[Increment]:
         """Pseudo-time frames: the blocks move downhill by a trust region at a time until they rest."""
         model = replace(self.model, trust=self.model.length / 10.0)
-        still = np.zeros((model.assembly.n_blocks, 3))
         for _ in range(self.controls.falling_frames):
-            pose = moved(solved.pose, _limited(model, solved.motion))
+            size = _largest_movement(model, solved.motion)
+            pose = moved(solved.pose, solved.motion * min(1.0, model.trust / size))
             try:
-                solved = _solve(model, pose, still, self.counter)
+                solved = solve_program(model, pose)
             except SolveError:
                 return
-            yield _increment(model, solved, still, 1.0, s, self.number, Status.FALLING, self.counter)
-            if solved.unbalanced == 0.0 and np.abs(solved.motion).max() < 1e-4 * model.trust:
+            yield _falling_frame(model, solved, s, self.number)
+            if not solved.falling and _largest_movement(model, solved.motion) < 1e-3 * model.trust:
                 return
 
 
-def _limited(model: _Model, motion: np.ndarray) -> np.ndarray:
-    """The motion scaled down to the trust region."""
-    size = np.abs(motion * [1.0, 1.0, model.length]).max(initial=0.0)
-    return motion * min(1.0, model.trust / size) if size > 0 else motion
+def _largest_movement(model: Model, motion: np.ndarray) -> float:
+    return max(float(np.abs(motion * [1.0, 1.0, model.length]).max(initial=0.0)), 1e-300)
 
 
 def _check_input(assembly: Assembly, phases: Sequence[Settlement], controls: Controls) -> None:
@@ -370,14 +349,15 @@ def _check_input(assembly: Assembly, phases: Sequence[Settlement], controls: Con
         if not phase.taking_part(assembly).any():
             which = f"settlement phase {number + 1}" if len(phases) > 1 else "the settlement"
             raise ValueError(f"{which} moves no support: give at least one block the role 'moving'")
-    widths = 2.0 * assembly.areas / np.add.reduceat(assembly.edge_lengths, assembly.offsets[:-1])
-    tolerance = 1e-3 * float(widths.min()) if controls.overlap_tolerance is None else controls.overlap_tolerance
+    tolerance = (
+        1e-3 * float(assembly.widths.min()) if controls.overlap_tolerance is None else controls.overlap_tolerance
+    )
     i, j, depth = overlap_depths(assembly.vertices, assembly.offsets, tolerance)
-    real = assembly.free[i] | assembly.free[j]
-    if real.any():
-        k = int(np.flatnonzero(real)[np.argmax(depth[real])])
+    real = np.flatnonzero(assembly.free[i] | assembly.free[j])
+    if len(real):
+        k = int(real[np.argmax(depth[real])])
         a, b = int(i[k]), int(j[k])
-        more = f" ({int(real.sum()) - 1} more pairs overlap)" if real.sum() > 1 else ""
+        more = f" ({len(real) - 1} more pairs overlap)" if len(real) > 1 else ""
         raise ValueError(
             f"block {a} ('{assembly.names[a]}') overlaps block {b} ('{assembly.names[b]}') by {depth[k]:.3g} m{more}; "
             f"move them apart or raise overlap_tolerance ({tolerance:.3g} m)"
@@ -386,262 +366,46 @@ def _check_input(assembly: Assembly, phases: Sequence[Settlement], controls: Con
 
 def _lever(assembly: Assembly, phase: Settlement, start: Pose) -> float:
     """Largest displacement of a moving support per unit of s: 1 for a translation, a radius for a rotation."""
-    rate = phase.rate(assembly, start, 0.0)
-    vertices = moved_vertices(assembly, start)
-    block = assembly.block_of_vertex
-    arm = vertices - start.positions[block]
-    velocity = rate[block, :2] + rate[block, 2:] * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+    points, block = moved_vertices(assembly, start), assembly.block_of_vertex
+    velocity = point_velocities(points, block, start, phase.rate(assembly, start, 0.0))
     return float(np.hypot(*velocity.T).max())
 
 
 def _model(
     assembly: Assembly, phases: Sequence[Settlement], interfaces: Interfaces, loads: Loads, controls: Controls
-) -> _Model:
+) -> Model:
     load = loads.total()
-    length = assembly.block_size
-    magnitude = np.hypot(*load[assembly.free, :2].T)
-    force = float(magnitude.mean())
+    force = float(np.hypot(*load[assembly.free, :2].T).mean())
     if force == 0.0:
         raise ValueError("no load acts on any free block; give them a weight")
+    length = assembly.block_size
     start = Pose.initial(assembly)
     movement = max(phase.increment * _lever(assembly, phase, start) for phase in phases)
     trust = max(length / 5.0, 10.0 * movement) if controls.trust_region is None else controls.trust_region
     reach = min(max(4.0 * movement, 0.02 * length), length / 2.0)
-    return _Model(assembly, interfaces, load, length, force, trust, reach)
+    return Model(assembly, interfaces, load, length, force, trust, reach)
 
 
-def _at_rest(model: _Model, pose: Pose, controls: Controls, counter: _Counter) -> Pose:
-    """The pose in which the drawn blocks rest: gaps and overlaps within the drawing's accuracy closed."""
-    solved = _solve(model, pose, np.zeros((model.assembly.n_blocks, 3)), counter)
-    if solved.unbalanced > 0.0:
-        raise _Falls(solved)
-    return _corrected(model, pose, solved, pose, controls, counter)
-
-
-def _corrected(
-    model: _Model, before: Pose, predictor: _Solved, supports: Pose, controls: Controls, counter: _Counter
-) -> Pose:
-    """Moves the blocks exactly and solves again with the supports at rest until the geometry is exact.
-
-    Slip that the programs did not ask for (the second-order effect of finite rotations) is taken back together
-    with the gaps: contacts that stick return to where they stuck.
-    """
-    assembly = model.assembly
-    free = assembly.free
-    solved, pose = predictor, before
-    tolerance = GEOMETRY_TOLERANCE * model.length
-    origin, asked = _Memory(assembly, predictor.contacts), _Memory(assembly, predictor.contacts, predictor.slip)
-    still = np.zeros((assembly.n_blocks, 3))
-    largest = np.inf
-    for attempt in range(controls.correctors + 1):
-        pose = moved(pose, np.where(free[:, None], solved.motion, 0.0))
-        if attempt == 0:
-            pose = Pose(
-                np.where(free[:, None], pose.positions, supports.positions),
-                np.where(free, pose.rotations, supports.rotations),
-            )
-        vertices = moved_vertices(assembly, pose)
-        contacts = _with_carrying(assembly, find_contacts(assembly, vertices, model.reach), vertices, solved)
-        origin.add(contacts)
-        asked.add(contacts, None)
-        drift = contacts.along - origin.values(contacts) - asked.values(contacts)
-        error = _geometry_error(contacts, solved, drift, assembly)
-        if error <= tolerance:
-            return pose
-        largest = error
-        solved = _solve(model, pose, still, counter, contacts, drift)
-        if solved.unbalanced > 0.0:
-            raise _Falls(solved)
-        asked.increase(solved.contacts, solved.slip + drift)
-    raise _NotConverged(
-        f"after {controls.correctors} corrections a contact point is still off by {largest:.3g} m "
-        f"(accepted: {tolerance:.3g} m)"
-    )
-
-
-class _Memory:
-    """Values of contact points by their key, over the corrections of one increment."""
-
-    def __init__(self, assembly: Assembly, contacts: Contacts, values: np.ndarray | None = None) -> None:
-        self._assembly = assembly
-        self._keys = contacts.keys(assembly)
-        self._values = (contacts.along if values is None else values).copy()
-        self._sort()
-
-    def _sort(self) -> None:
-        order = np.argsort(self._keys, kind="stable")
-        self._keys, self._values = self._keys[order], self._values[order]
-
-    def _places(self, contacts: Contacts) -> tuple[np.ndarray, np.ndarray]:
-        keys = contacts.keys(self._assembly)
-        place = np.searchsorted(self._keys, keys)
-        place = np.minimum(place, max(len(self._keys) - 1, 0))
-        known = self._keys[place] == keys if len(self._keys) else np.zeros(len(keys), dtype=bool)
-        return place, known
-
-    def add(self, contacts: Contacts, values: np.ndarray | None = ...) -> None:  # type: ignore[assignment]
-        """Remembers contacts not seen before: where they are now, or zero."""
-        _, known = self._places(contacts)
-        new = ~known
-        if new.any():
-            added = np.zeros(int(new.sum())) if values is None else contacts.along[new]
-            self._keys = np.concatenate([self._keys, contacts.keys(self._assembly)[new]])
-            self._values = np.concatenate([self._values, added])
-            self._sort()
-
-    def values(self, contacts: Contacts) -> np.ndarray:
-        return self._values[self._places(contacts)[0]]
-
-    def increase(self, contacts: Contacts, values: np.ndarray) -> None:
-        self._values[self._places(contacts)[0]] += values
-
-
-def _with_carrying(assembly: Assembly, found: Contacts, vertices: np.ndarray, solved: _Solved) -> Contacts:
-    """The contacts found, and those that carried force a moment ago, wherever on their edge's line they are now."""
-    carrying = solved.forces[:, 0] > 0.0
-    missing = carrying & ~np.isin(solved.contacts.keys(assembly), found.keys(assembly))
-    if not missing.any():
-        return found
-    both = [
-        np.concatenate([getattr(found, name), getattr(solved.contacts, name)[missing]])
-        for name in ("vertex", "edge", "corner")
-    ]
-    return measure_contacts(assembly, vertices, *both)
-
-
-def _geometry_error(contacts: Contacts, solved: _Solved, drift: np.ndarray, assembly: Assembly) -> float:
-    """Deepest penetration, or largest gap or unasked slip at a contact point that carries force [m]."""
-    error = float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0))
-    carrying = solved.forces[:, 0] > 1e-6 * solved.forces[:, 0].max(initial=0.0)
-    now = np.isin(contacts.keys(assembly), solved.contacts.keys(assembly)[carrying])
-    error = max(error, float(np.abs(contacts.gaps[now]).max(initial=0.0)))
-    return max(error, float(np.abs(drift[now]).max(initial=0.0)))
-
-
-def _solve(
-    model: _Model,
-    pose: Pose,
-    support_motion: np.ndarray,
-    counter: _Counter,
-    contacts: Contacts | None = None,
-    drift: np.ndarray | None = None,
-) -> _Solved:
-    """States and solves the static program of one increment.
-
-    Notes
-    -----
-    Over the multipliers λ ≥ 0 of the rays n ∓ μ t of the friction cones and unbalanced forces r⁺, r⁻ ≥ 0:
-
-        minimise  Σ (g_k n + relative support motion + drift) · ray λ  +  ρ (r⁺ + r⁻)
-        subject to  |A λ + r⁺ - r⁻ + f| ≤ ε        for every free block
-
-    which is the dual of the kinematic program with all movements bounded by the trust region ρ, so that it is
-    always feasible: unbalanced force at the optimum means that blocks move by the whole trust region.
-    """
-    assembly = model.assembly
-    if contacts is None:
-        contacts = find_contacts(assembly, moved_vertices(assembly, pose), model.reach)
-    counter.programs += 1
-    n = len(contacts)
-    friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-    matrix = equilibrium_matrix(contacts, pose, model.length)
-    scale = np.array([model.length, model.length, 1.0])
-    free_rows = np.repeat(assembly.free, 3)
-    distance = matrix.T @ (support_motion / scale).ravel()
-    distance[0::2] += contacts.gaps / model.length
-    if drift is not None:
-        distance[1::2] += drift / model.length
-    rays = cone_rays(friction)
-    balance = sp.csc_array(sp.csr_array(matrix)[free_rows] @ rays)
-    rows = balance.shape[0]
-    identity = sp.identity(rows, format="csc")
-    trust = model.trust / model.length
-    external = (model.load / model.force / np.array([1.0, 1.0, model.length]))[assembly.free].ravel()
-    program = LinearProgram(
-        cost=np.concatenate([rays.T @ distance, np.full(2 * rows, trust)]),
-        matrix=sp.csc_array(sp.hstack([balance, identity, -identity], format="csc")),
-        lower=-external - model.balance,
-        upper=-external + model.balance,
-    )
-    solution = solve_lp(program)
-    return _interpret(model, pose, support_motion, contacts, friction, matrix, rays, distance, program, solution)
-
-
-def _interpret(
-    model: _Model,
-    pose: Pose,
-    support_motion: np.ndarray,
-    contacts: Contacts,
-    friction: np.ndarray,
-    matrix: sp.csc_array,
-    rays: sp.csc_array,
-    distance: np.ndarray,
-    program: LinearProgram,
-    solution: LPSolution,
-) -> _Solved:
-    """Forces, motion and certificate of a solved program, back in m and N."""
-    assembly = model.assembly
-    columns = rays.shape[1]
-    multipliers = solution.x[:columns]
-    scaled_forces = rays @ multipliers
-    unbalanced = float(solution.x[columns:].max(initial=0.0))
-    total = max(float(np.abs(model.load[assembly.free, :2]).sum()) / model.force, 1e-300)
-    motion = support_motion.copy()
-    scale = np.array([model.length, model.length, 1.0])
-    motion[assembly.free] = -solution.row_dual.reshape(-1, 3) * scale
-    relative = matrix.T @ (motion / scale).ravel()
-    resultant = (matrix @ scaled_forces).reshape(-1, 3)
-    out_of_balance = resultant + model.load / model.force / np.array([1.0, 1.0, model.length])
-    moved_by = (matrix.T @ (np.where(assembly.free[:, None], motion, 0.0) / scale).ravel()) + distance
-    room = rays.T @ moved_by
-    certificate = Certificate(
-        equilibrium_residual=float(np.abs(out_of_balance[assembly.free]).max(initial=0.0)) / total,
-        largest_penetration=float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)),
-        duality_gap=solution.gap,
-        complementarity=float(np.abs(multipliers @ room)) / (1.0 + abs(solution.objective)),
-        kinematic_violation=float(np.maximum(-room, 0.0).max(initial=0.0)),
-    )
-    support_forces = np.where(assembly.free[:, None], 0.0, resultant) * model.force * np.array([1, 1, model.length])
-    return _Solved(
-        contacts=contacts,
-        friction=friction,
-        forces=scaled_forces.reshape(-1, 2) * model.force,
-        motion=motion,
-        slip=relative[1::2] * model.length,
-        unbalanced=unbalanced if unbalanced > FALLING_FRACTION * total else 0.0,
-        certificate=certificate,
-        pose=pose,
-        support_forces=support_forces,
-    )
+def _falling_frame(model: Model, solved: Solved, s: float, phase: int) -> Increment:
+    return _increment(model, solved, np.zeros((model.assembly.n_blocks, 3)), 1.0, s, phase, Status.FALLING)
 
 
 def _increment(
-    model: _Model,
-    solved: _Solved,
-    rate: np.ndarray,
-    step: float,
-    s: float,
-    phase: int,
-    status: Status,
-    counter: _Counter,
+    model: Model, solved: Solved, rate: np.ndarray, step: float, s: float, phase: int, status: Status
 ) -> Increment:
-    programs, seconds = counter.restart()
-    velocity = solved.motion / step
-    arms = (
-        solved.contacts.points - solved.pose.positions[b] for b in (solved.contacts.block_a, solved.contacts.block_b)
+    programs, seconds = model.tally.take()
+    contacts, velocity = solved.contacts, solved.motion / step
+    relative = point_velocities(contacts.points, contacts.block_a, solved.pose, velocity) - point_velocities(
+        contacts.points, contacts.block_b, solved.pose, velocity
     )
-    moving = [
-        velocity[b, :2] + velocity[b, 2:] * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
-        for b, arm in zip((solved.contacts.block_a, solved.contacts.block_b), arms, strict=True)
-    ]
     return Increment(
         settlement=s,
         phase=phase,
         load_multiplier=0.0,
         pose=solved.pose,
-        contacts=solved.contacts,
+        contacts=contacts,
         forces=solved.forces,
-        displacements=np.einsum("kij,kj->ki", solved.contacts.frames, moving[0] - moving[1]),
+        displacements=np.einsum("kij,kj->ki", contacts.frames, relative),
         friction=solved.friction,
         velocity=velocity,
         reaction=float((solved.support_forces * rate).sum()),
@@ -653,12 +417,12 @@ def _increment(
     )
 
 
-def _no_equilibrium_message(assembly: Assembly, solved: _Solved) -> str:
+def _no_equilibrium_message(assembly: Assembly, solved: Solved) -> str:
     size = np.abs(solved.motion[:, :2]).max(axis=1)
     falling = np.flatnonzero(assembly.free & (size > 0.5 * size.max()))
     shown = ", ".join(f"'{assembly.names[i]}'" for i in falling[:8])
     more = f" and {len(falling) - 8} more" if len(falling) > 8 else ""
     return (
-        f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall ({shown}{more}); "
-        "look for gaps between blocks (joint_thickness), a missing support or too little friction"
+        f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
+        f"({shown}{more}); look for gaps between blocks (joint_thickness), a missing support or too little friction"
     )

@@ -195,6 +195,11 @@ class Assembly:
         return cross > 0.0
 
     @cached_property
+    def widths(self) -> np.ndarray:
+        """(n_blocks,) array [m]: twice the area over the perimeter of each block, near b for a long a × b."""
+        return 2.0 * self.areas / np.add.reduceat(self.edge_lengths, self.offsets[:-1])
+
+    @cached_property
     def block_size(self) -> float:
         """Square root of the mean area of the free blocks [m]: the length the program is scaled by."""
         chosen = self.areas[self.free] if self.free.any() else self.areas

@@ -219,7 +219,7 @@ def _vertex_edge_candidates(
     rest = p - e0
     gap = (rest * normal).sum(axis=1)
     along = (rest * tangent).sum(axis=1)
-    width = _widths(assembly)
+    width = assembly.widths
     a_block, b_block = assembly.block_of_vertex[vertex], assembly.block_of_vertex[edge]
     deepest = PENETRATION_FRACTION * np.minimum(width[a_block], width[b_block])
     end = _end_zone(assembly, vertex, edge)
@@ -288,6 +288,25 @@ def _once(
     return vertex[first], edge[first], corner[first]
 
 
+def feature_pairs(assembly: Assembly, contacts: Contacts) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the corner-edge pairs that each contact stands for.
+
+    Returns
+    -------
+    own : (n,) int array
+        The corner on the edge.
+    reverse : (n,) int array
+        Where a corner stands on a corner, the other corner on the other face; -1 elsewhere.
+    """
+    n = len(assembly.vertices)
+    own = contacts.vertex.astype(np.int64) * n + contacts.edge
+    reverse = np.full(len(contacts), -1, dtype=np.int64)
+    k = np.flatnonzero(contacts.corner >= 0)
+    facing = _facing_edge(assembly, contacts.vertex[k], contacts.edge[k], contacts.corner[k])
+    reverse[k] = contacts.corner[k].astype(np.int64) * n + facing
+    return own, reverse
+
+
 def _facing_edge(assembly: Assembly, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
     """The edge of the corner's block that lies over ``edge`` where ``vertex`` stands on ``corner``.
 
@@ -300,11 +319,6 @@ def _end_zone(assembly: Assembly, vertex: np.ndarray, edge: np.ndarray) -> np.nd
     length = assembly.edge_lengths
     shortest = np.minimum(length[vertex], length[assembly.previous_vertex[vertex]])
     return CORNER_TOLERANCE * np.minimum(shortest, length[edge])
-
-
-def _widths(assembly: Assembly) -> np.ndarray:
-    """Width of each block, (n_blocks,) [m]: twice its area over its perimeter, b for a long a × b."""
-    return 2.0 * assembly.areas / np.add.reduceat(assembly.edge_lengths, assembly.offsets[:-1])
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

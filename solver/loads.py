@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .assembly import Assembly
 from .kinematics import Pose, rotation_matrices
@@ -94,7 +93,7 @@ class Settlement:
                     raise ValueError(f"settlement {name} is {value!r}; give two finite numbers [x, y]")
                 object.__setattr__(self, name, (float(pair[0]), float(pair[1])))
         if self.direction is not None:
-            length = float(np.hypot(*self.direction))
+            length = float(np.hypot(self.direction[0], self.direction[1]))
             if length == 0.0:
                 raise ValueError("settlement direction is [0, 0]; give the direction in which the support moves")
             object.__setattr__(self, "direction", (self.direction[0] / length, self.direction[1] / length))
@@ -140,7 +139,7 @@ class Settlement:
     def rate(self, assembly: Assembly, start: Pose, s: float) -> np.ndarray:
         """(n_blocks, 3) array: velocity of each support per unit of s, at s; zero for other blocks."""
         part = self.taking_part(assembly)
-        travel, angle, centre = self._motion(s)
+        _, angle, centre = self._motion(s)
         rate = np.zeros((assembly.n_blocks, 3))
         direction = np.zeros(2) if self.direction is None else np.asarray(self.direction)
         rate[part, :2] = direction
@@ -158,17 +157,13 @@ class Settlement:
             return travel, 0.0, np.zeros(2)
         return travel, self.rotation * s, np.asarray(self.rotation_centre)
 
-    def with_limits(self, **changes: float) -> Settlement:
-        """The same motion with another increment, limit or tolerance."""
-        return replace(self, **changes)
-
 
 def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
     """Self-weight where no loads are given; otherwise the given ones, checked for shape and finite numbers."""
     if loads is None:
         return self_weight(assembly)
-    arrays: list[ArrayLike] = [loads.dead, loads.live]
-    for name, array in zip(("dead", "live"), map(np.asarray, arrays), strict=True):
+    for name, given in (("dead", loads.dead), ("live", loads.live)):
+        array = np.asarray(given)
         if array.shape != (assembly.n_blocks, 3):
             raise ValueError(f"{name} loads have shape {array.shape}; give ({assembly.n_blocks}, 3): fx, fy, moment")
         if not np.isfinite(array).all():

@@ -1,0 +1,241 @@
+"""The linear program of one increment: stated at a geometry, solved, and read back in metres and newtons."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from .assembly import Assembly
+from .contact import Contacts, Interfaces, find_contacts
+from .equilibrium import cone_rays, equilibrium_matrix
+from .kinematics import Pose, moved_vertices
+from .lp import LinearProgram, LPSolution, solve_lp
+from .response import Certificate
+
+__all__ = ["Model", "Solved", "Tally", "point_velocities", "solve_program"]
+
+#: A free block out of balance by less than this fraction of the total load is in balance. Without it the program
+#: may move a block without friction sideways, for nothing, as far as it is allowed to.
+BALANCE_TOLERANCE = 1e-9
+
+#: Unbalanced force that counts as falling, as a fraction of the total load: well above BALANCE_TOLERANCE and
+#: what HiGHS leaves, and within the residual that a certificate promises.
+FALLING_FRACTION = 5e-9
+
+
+@dataclass
+class Tally:
+    """Programs solved and seconds spent since the last increment."""
+
+    programs: int = 0
+    started: float = field(default_factory=time.perf_counter)
+
+    def take(self) -> tuple[int, float]:
+        """What has been counted; starts again from zero."""
+        now = time.perf_counter()
+        counted = self.programs, now - self.started
+        self.programs, self.started = 0, now
+        return counted
+
+
+@dataclass(frozen=True)
+class Model:
+    """What stays the same over all increments.
+
+    Attributes
+    ----------
+    assembly : Assembly
+    interfaces : Interfaces
+    load : (n_blocks, 3) array [N, N, N·m]
+    length : float [m]
+    force : float [N]
+        Block size and mean load of a free block: the program is written in these units.
+    trust : float [m]
+        Largest movement of a block in one program.
+    reach : float [m]
+        Largest gap of a contact point that is kept.
+    tally : Tally
+    """
+
+    assembly: Assembly
+    interfaces: Interfaces
+    load: np.ndarray
+    length: float
+    force: float
+    trust: float
+    reach: float
+    tally: Tally = field(default_factory=Tally)
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """(3,) array: divide movements by it, multiply moments' rows by it, to get to the units of the program."""
+        return np.array([self.length, self.length, 1.0])
+
+    @property
+    def scaled_load(self) -> np.ndarray:
+        """(n_blocks, 3) array: the load in units of the program."""
+        return self.load / (self.force * np.array([1.0, 1.0, self.length]))
+
+    @property
+    def total_load(self) -> float:
+        """Sum of the loads on the free blocks in units of the program."""
+        return float(np.abs(self.scaled_load[self.assembly.free, :2]).sum())
+
+
+@dataclass(frozen=True)
+class Solved:
+    """One solved program at one geometry.
+
+    Attributes
+    ----------
+    pose : Pose
+    contacts : Contacts
+    friction : (n_contacts,) array
+    forces : (n_contacts, 2) array [N]
+    motion : (n_blocks, 3) array [m, m, rad]
+        Of the supports as given, of the free blocks as found.
+    slip : (n_contacts,) array [m]
+        Tangential relative displacement of each contact point in that motion.
+    falling : bool
+        Whether blocks move by the whole trust region because no equilibrium holds them.
+    certificate : Certificate
+    support_forces : (n_blocks, 3) array [N, N, N·m]
+    """
+
+    pose: Pose
+    contacts: Contacts
+    friction: np.ndarray
+    forces: np.ndarray
+    motion: np.ndarray
+    slip: np.ndarray
+    falling: bool
+    certificate: Certificate
+    support_forces: np.ndarray
+
+
+def solve_program(
+    model: Model,
+    pose: Pose,
+    support_motion: np.ndarray | None = None,
+    contacts: Contacts | None = None,
+    drift: np.ndarray | None = None,
+) -> Solved:
+    """States and solves the static program of one increment.
+
+    Parameters
+    ----------
+    model : Model
+    pose : Pose
+    support_motion : (n_blocks, 3) array [m, m, rad], optional
+        What the supports do in this program; they stand still by default.
+    contacts : Contacts, optional
+        Found at the pose by default.
+    drift : (n_contacts,) array [m], optional
+        Slip that has already happened without being asked for, and that friction takes back.
+
+    Raises
+    ------
+    SolveError
+        If HiGHS gives no solution that passes its check.
+
+    Notes
+    -----
+    Over the multipliers λ ≥ 0 of the rays n ∓ μ t of the friction cones and unbalanced forces r⁺, r⁻ ≥ 0:
+
+        minimise  Σ (g_k n + relative support motion + drift) · ray λ  +  ρ (r⁺ + r⁻)
+        subject to  |A λ + r⁺ - r⁻ + f| ≤ ε        for every free block
+
+    the dual of the kinematic program N + g ≥ μ |T + drift| with all movements bounded by the trust region ρ, so
+    that it is always feasible: unbalanced force at the optimum means that blocks move by the whole trust region.
+    After Portioli & Cascini (2017), https://doi.org/10.1016/j.engstruct.2017.06.073, with the trust region, the
+    drift and the tolerance ε added.
+    """
+    assembly = model.assembly
+    if contacts is None:
+        contacts = find_contacts(assembly, moved_vertices(assembly, pose), model.reach)
+    if support_motion is None:
+        support_motion = np.zeros((assembly.n_blocks, 3))
+    model.tally.programs += 1
+    friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
+    matrix = equilibrium_matrix(contacts, pose, model.length)
+    distance = matrix.T @ (support_motion / model.lengths).ravel()
+    distance[0::2] += contacts.gaps / model.length
+    if drift is not None:
+        distance[1::2] += drift / model.length
+    rays = cone_rays(friction)
+    balance = sp.csc_array(sp.csr_array(matrix)[np.repeat(assembly.free, 3)] @ rays)
+    rows = balance.shape[0]
+    identity = sp.identity(rows, format="csc")
+    external = model.scaled_load[assembly.free].ravel()
+    tolerance = BALANCE_TOLERANCE * model.total_load
+    program = LinearProgram(
+        cost=np.concatenate([rays.T @ distance, np.full(2 * rows, model.trust / model.length)]),
+        matrix=sp.csc_array(sp.hstack([balance, identity, -identity], format="csc")),
+        lower=-external - tolerance,
+        upper=-external + tolerance,
+    )
+    solution = solve_lp(program)
+    motion = support_motion.copy()
+    motion[assembly.free] = -solution.row_dual.reshape(-1, 3) * model.lengths
+    multipliers, unbalanced = solution.x[: 2 * len(contacts)], solution.x[2 * len(contacts) :]
+    scaled_forces = rays @ multipliers
+    resultant = (matrix @ scaled_forces).reshape(-1, 3)
+    relative = matrix.T @ (motion / model.lengths).ravel()
+    approach = distance + matrix.T @ (np.where(assembly.free[:, None], motion, 0.0) / model.lengths).ravel()
+    certificate = _certificate(model, contacts, resultant, multipliers, rays.T @ approach, solution)
+    on_supports = np.where(assembly.free[:, None], 0.0, resultant)
+    return Solved(
+        pose=pose,
+        contacts=contacts,
+        friction=friction,
+        forces=scaled_forces.reshape(-1, 2) * model.force,
+        motion=motion,
+        slip=relative[1::2] * model.length,
+        falling=float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * model.total_load,
+        certificate=certificate,
+        support_forces=on_supports * model.force * np.array([1.0, 1.0, model.length]),
+    )
+
+
+def _certificate(
+    model: Model,
+    contacts: Contacts,
+    resultant: np.ndarray,
+    multipliers: np.ndarray,
+    room: np.ndarray,
+    solution: LPSolution,
+) -> Certificate:
+    """The measures by which the program proves itself, from its own solution and nothing HiGHS says.
+
+    ``room`` is how far each contact point is from its friction cone's edges after the motion, per ray.
+    """
+    out_of_balance = (resultant + model.scaled_load)[model.assembly.free]
+    return Certificate(
+        equilibrium_residual=float(np.abs(out_of_balance).max(initial=0.0)) / model.total_load,
+        largest_penetration=float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)),
+        duality_gap=solution.gap,
+        complementarity=float(np.abs(multipliers @ room)) / (1.0 + abs(solution.objective)),
+        kinematic_violation=float(np.maximum(-room, 0.0).max(initial=0.0)),
+    )
+
+
+def point_velocities(points: np.ndarray, block: np.ndarray, pose: Pose, velocity: np.ndarray) -> np.ndarray:
+    """Velocity of points that move with blocks.
+
+    Parameters
+    ----------
+    points : (n, 2) array [m]
+    block : (n,) int array
+    pose : Pose
+    velocity : (n_blocks, 3) array
+        Of the centroids, and angular.
+
+    Returns
+    -------
+    (n, 2) array
+    """
+    arm = points - pose.positions[block]
+    return velocity[block, :2] + velocity[block, 2:] * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
