@@ -1,0 +1,377 @@
+"""Meshes of gmsh, .msh 2.2 and 4.1, ASCII and binary: one surface entity is one block.
+
+Read here and not through meshio, which keeps one of two physical groups of an entity, one of two groups of the same
+name in different dimensions, and reserves whatever memory the file asks for. Written down from the format's
+description, https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from blockvis.drawing import Drawing
+from blockvis.formats import Reading
+from blockvis.formats.triangles import cells_of_ring
+from blockvis.outlines import flattened, outlines_of_cells
+
+__all__ = ["read", "write"]
+
+#: Points around a surface element, by gmsh's element type: corners with the points of curved sides between them.
+RINGS = {
+    2: (0, 1, 2),
+    3: (0, 1, 2, 3),
+    9: (0, 3, 1, 4, 2, 5),
+    10: (0, 4, 1, 5, 2, 6, 3, 7),
+    16: (0, 4, 1, 5, 2, 6, 3, 7),
+    21: (0, 3, 4, 1, 5, 6, 2, 7, 8),
+    36: (0, 4, 5, 1, 6, 7, 2, 8, 9, 3, 10, 11),
+}
+
+#: Number of nodes of each element type.
+N_NODES = {
+    1: 2, 2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 8: 3, 9: 6, 10: 9, 11: 10, 12: 27, 13: 18, 14: 14, 15: 1, 16: 8, 17: 20,
+    18: 15, 19: 13, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21, 26: 4, 27: 5, 28: 6, 29: 20, 30: 35, 31: 56, 36: 16,
+    37: 25, 92: 64, 93: 125,
+}  # fmt: skip
+
+#: Section of ours that keeps what physical groups cannot: other programs skip it.
+TABLE = "BlockvisBlocks"
+
+
+@dataclass
+class _Mesh:
+    """What the sections of a file hold; elements of surfaces only."""
+
+    points: dict[int, int] = field(default_factory=dict)
+    coordinates: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    group_names: dict[tuple[int, int], str] = field(default_factory=dict)
+    groups_of_surface: dict[int, list[int]] = field(default_factory=dict)
+    rings: list[np.ndarray] = field(default_factory=list)
+    surfaces: list[np.ndarray] = field(default_factory=list)
+    other_elements: int = 0
+
+
+class _Numbers:
+    """Reads the numbers of a section one after another, ASCII or binary alike."""
+
+    def __init__(self, body: bytes, section: str, path: Path, binary: bool, order: str, wide: str) -> None:
+        self.section, self.path, self.binary = section, path, binary
+        self.types = {"int": np.dtype(f"{order}i4"), "size": np.dtype(wide), "double": np.dtype(f"{order}f8")}
+        self.body: bytes | list[bytes] = body if binary else body.split()
+        self.position = 0
+
+    def take(self, kind: str, n: int) -> np.ndarray:
+        """(n,) array of "int", "size" or "double"."""
+        dtype = self.types[kind]
+        width = dtype.itemsize if self.binary else 1
+        # A count is checked against what the file holds before any memory is reserved for it.
+        if n < 0 or self.position + n * width > len(self.body):
+            raise ValueError(
+                f"'{self.path}' is cut off: its section ${self.section} announces {n} more numbers and holds "
+                f"{max(0, (len(self.body) - self.position) // width)}; export it again"
+            )
+        part = self.body[self.position : self.position + n * width]
+        self.position += n * width
+        if isinstance(part, bytes):
+            return np.frombuffer(part, dtype).astype(float if kind == "double" else np.int64)
+        try:
+            return np.array(part, dtype=float if kind == "double" else np.int64)
+        except (ValueError, OverflowError):
+            raise ValueError(
+                f"'{self.path}': its section ${self.section} holds something that is not a number near "
+                f"{b' '.join(part[:8])!r}; export it again"
+            ) from None
+
+    def one(self, kind: str) -> int:
+        """The next whole number."""
+        return int(self.take(kind, 1)[0])
+
+    def line(self) -> int:
+        """The next whole number, which stands in text even in a binary section."""
+        if not isinstance(self.body, bytes):
+            return self.one("size")
+        end = self.body.find(b"\n", self.position)
+        text = self.body[self.position : end]
+        if end < 0 or not text.strip().isdigit():
+            raise ValueError(f"'{self.path}': its section ${self.section} has no count; export it again")
+        self.position = end + 1
+        return int(text)
+
+
+def read(path: Path, reading: Reading) -> Drawing:
+    """Reads a .msh file; the file does not say its unit."""
+    data = path.read_bytes()
+    mesh, table = _sections(data, path)
+    if not mesh.rings:
+        rest = f" of its {mesh.other_elements} elements" if mesh.other_elements else ""
+        raise ValueError(
+            f"'{path}' has no surface cells: none{rest} is a triangle or quadrangle; "
+            "mesh the surfaces (gmsh -2) and save them (a surface in no physical group is left out of the file)"
+        )
+    surface = np.concatenate(mesh.surfaces)
+    tags, owner = np.unique(surface, return_inverse=True)
+    rings = [ring for block in mesh.rings for ring in block]
+    _check_twice(mesh, tags, path)
+    members = {int(tag): mesh.groups_of_surface.get(int(tag), []) for tag in tags}
+    groups = [mesh.group_names.get((2, g[0]), f"group {g[0]}") if g else "" for g in members.values()]
+    names = _surface_names(groups, tags)
+    flat, note = flattened(mesh.coordinates, f"'{path}'")
+    outlines = outlines_of_cells(flat, rings, owner, names)
+    notes = [f"{len(tags)} blocks, one per meshed surface; a surface in no physical group may be missing from the file"]
+    if "" in groups:
+        notes.append(f"{groups.count('')} of {len(tags)} surfaces are in no physical group")
+    notes += [note] if note else []
+    drawing = Drawing(
+        outlines=tuple(outlines),
+        names=tuple(names),
+        groups=tuple(groups),
+        materials=tuple(groups),
+        unit="",
+        notes=tuple(notes),
+    )
+    return _with_table(drawing, table, tags)
+
+
+def _surface_names(groups: list[str], tags: np.ndarray) -> list[str]:
+    total = {group: groups.count(group) for group in set(groups)}
+    seen: dict[str, int] = {}
+    names = []
+    for group, tag in zip(groups, tags, strict=True):
+        seen[group] = seen.get(group, 0) + 1
+        names.append(f"surface {tag}" if not group else group if total[group] == 1 else f"{group} {seen[group]}")
+    return names
+
+
+def _check_twice(mesh: _Mesh, tags: np.ndarray, path: Path) -> None:
+    for tag in tags:
+        groups = sorted(set(mesh.groups_of_surface.get(int(tag), [])))
+        if len(groups) > 1:
+            listed = " and ".join(f"'{mesh.group_names.get((2, g), str(g))}'" for g in groups)
+            raise ValueError(
+                f"'{path}': surface {tag} is in {len(groups)} physical groups, {listed}; keep it in one of them"
+            )
+
+
+def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, object]]]:
+    head = _section(data, "MeshFormat")
+    words = head.split(b"\n", 1)[0].split() if head else []
+    if len(words) < 3:
+        raise ValueError(f"'{path}' is not a gmsh mesh: it has no section $MeshFormat; export it as .msh 4.1 or 2.2")
+    version, binary, width = words[0].decode("ascii", "replace"), words[1] == b"1", words[2]
+    if version not in ("2", "2.1", "2.2", "4.1"):
+        raise ValueError(f"'{path}' is version {version} of .msh; versions 2.2 and 4.1 are read: gmsh -format msh41")
+    order = "<"
+    if binary and head is not None:
+        order = "<" if head.split(b"\n", 1)[1][:4] == b"\x01\x00\x00\x00" else ">"
+    # Sizes are read as signed: no count of a real file reaches the sign bit, and a hostile one must not wrap.
+    wide = f"{order}i{8 if width == b'8' else 4}"
+    mesh, table = _Mesh(), {}
+
+    def numbers(section: str) -> _Numbers | None:
+        body = _section(data, section)
+        return None if body is None else _Numbers(body, section, path, binary, order, wide)
+
+    names = _section(data, "PhysicalNames")
+    for line in (names or b"").decode("utf-8", "replace").splitlines():
+        parts = line.strip().split(None, 2)
+        if len(parts) == 3 and parts[0].isdigit() and parts[1].lstrip("-").isdigit():
+            mesh.group_names[int(parts[0]), int(parts[1])] = parts[2].strip().strip('"')
+    nodes, elements, entities = numbers("Nodes"), numbers("Elements"), numbers("Entities")
+    if nodes is None or elements is None:
+        missing = "Nodes" if nodes is None else "Elements"
+        raise ValueError(f"'{path}' has no section ${missing}; mesh the surfaces (gmsh -2) and export again")
+    if version == "4.1":
+        if entities is not None:
+            _entities_41(entities, mesh)
+        _nodes_41(nodes, mesh)
+        _elements_41(elements, mesh)
+    else:
+        _nodes_22(nodes, mesh)
+        _elements_22(elements, mesh)
+    own = _section(data, TABLE)
+    if own is not None:
+        try:
+            table = json.loads(own)
+        except ValueError:
+            table = {}
+    return mesh, table if isinstance(table, dict) else {}
+
+
+def _section(data: bytes, name: str) -> bytes | None:
+    start = data.find(f"${name}".encode())
+    if start < 0:
+        return None
+    start = data.find(b"\n", start) + 1
+    end = data.find(f"$End{name}".encode(), start)
+    return data[start : end if end >= 0 else len(data)]
+
+
+def _entities_41(numbers: _Numbers, mesh: _Mesh) -> None:
+    counts = numbers.take("size", 4)
+    for dimension in range(3):
+        for _ in range(counts[dimension]):
+            tag = numbers.one("int")
+            numbers.take("double", 3 if dimension == 0 else 6)
+            groups = numbers.take("int", numbers.one("size"))
+            if dimension:
+                numbers.take("int", numbers.one("size"))
+            if dimension == 2:
+                mesh.groups_of_surface[tag] = [int(abs(group)) for group in groups]
+
+
+def _nodes_41(numbers: _Numbers, mesh: _Mesh) -> None:
+    n_blocks = int(numbers.take("size", 4)[0])
+    parts = []
+    for _ in range(n_blocks):
+        dimension, _tag, parametric = numbers.take("int", 3)
+        n = numbers.one("size")
+        tags = numbers.take("size", n)
+        width = 3 + (int(dimension) if parametric else 0)
+        parts.append(numbers.take("double", n * width).reshape(n, width)[:, :3])
+        for tag in tags:
+            mesh.points[int(tag)] = len(mesh.points)
+    mesh.coordinates = np.concatenate(parts) if parts else mesh.coordinates
+    _check_nodes(mesh, numbers)
+
+
+def _nodes_22(numbers: _Numbers, mesh: _Mesh) -> None:
+    n = numbers.line()
+    if numbers.binary:
+        record = np.dtype([("tag", numbers.types["int"]), ("x", numbers.types["double"], 3)])
+        assert isinstance(numbers.body, bytes)
+        if n * record.itemsize > len(numbers.body) - numbers.position:
+            numbers.take("double", 3 * n)
+        found = np.frombuffer(numbers.body, record, n, numbers.position)
+        tags, mesh.coordinates = found["tag"].astype(np.int64), found["x"].astype(float)
+    else:
+        values = numbers.take("double", 4 * n).reshape(n, 4)
+        tags, mesh.coordinates = values[:, 0].astype(np.int64), values[:, 1:]
+    mesh.points = {int(tag): i for i, tag in enumerate(tags)}
+    _check_nodes(mesh, numbers)
+
+
+def _check_nodes(mesh: _Mesh, numbers: _Numbers) -> None:
+    if len(mesh.points) != len(mesh.coordinates):
+        raise ValueError(
+            f"'{numbers.path}' gives {len(mesh.coordinates)} nodes but {len(mesh.points)} different numbers to them; "
+            "export it again"
+        )
+
+
+def _elements_41(numbers: _Numbers, mesh: _Mesh) -> None:
+    n_blocks = int(numbers.take("size", 4)[0])
+    for _ in range(n_blocks):
+        dimension, tag, kind = map(int, numbers.take("int", 3))
+        n = numbers.one("size")
+        width = _width(kind, numbers)
+        values = numbers.take("size", n * (width + 1)).reshape(n, width + 1)[:, 1:]
+        _add(mesh, numbers, dimension, kind, values, np.full(n, tag))
+
+
+def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
+    n = numbers.line()
+    left = n
+    seen: dict[tuple[int, ...], int] = {}
+    while left > 0:
+        if numbers.binary:
+            kind, follow, n_tags = map(int, numbers.take("int", 3))
+            rows = numbers.take("int", follow * (1 + n_tags + _width(kind, numbers))).reshape(follow, -1)[:, 1:]
+        else:
+            _number, kind, n_tags = map(int, numbers.take("int", 3))
+            follow = 1
+            rows = numbers.take("int", n_tags + _width(kind, numbers)).reshape(1, -1)
+        if follow < 1:
+            raise ValueError(f"'{numbers.path}': its section $Elements has a header of {follow} elements; export again")
+        left -= follow
+        if kind in RINGS:
+            surface = rows[:, 1] if n_tags > 1 else np.zeros(follow, dtype=np.int64)
+            for row, tag in zip(rows, surface, strict=True):
+                group = int(row[0]) if n_tags else 0
+                groups = mesh.groups_of_surface.setdefault(int(tag), [])
+                if group and group not in groups:
+                    groups.append(group)
+                key = (int(tag), *sorted(map(int, row[n_tags:])))
+                seen[key] = seen.get(key, 0) + 1
+            _add(mesh, numbers, 2, kind, rows[:, n_tags:], surface)
+        else:
+            mesh.other_elements += follow
+
+
+def _width(kind: int, numbers: _Numbers) -> int:
+    if kind not in N_NODES:
+        raise ValueError(
+            f"'{numbers.path}' has elements of gmsh's type {kind}, which is not known; mesh with triangles"
+        )
+    return N_NODES[kind]
+
+
+def _add(mesh: _Mesh, numbers: _Numbers, dimension: int, kind: int, nodes: np.ndarray, tags: np.ndarray) -> None:
+    if dimension != 2 or kind not in RINGS:
+        mesh.other_elements += len(nodes)
+        return
+    rings = nodes[:, RINGS[kind]]
+    try:
+        known = [mesh.points[int(node)] for node in rings.ravel()]
+    except KeyError as error:
+        raise ValueError(
+            f"'{numbers.path}': an element uses node {error}, which the file lacks; export again"
+        ) from None
+    mesh.rings.append(np.array(known, dtype=np.int64).reshape(rings.shape))
+    mesh.surfaces.append(tags)
+
+
+def _with_table(drawing: Drawing, table: dict[str, dict[str, object]], tags: np.ndarray) -> Drawing:
+    """What our own writer kept of each block beside its group, where the file still has all of them."""
+    rows = [table.get(str(tag)) for tag in tags]
+    if not all(isinstance(row, dict) for row in rows):
+        return drawing
+    from blockvis.formats.layout_json import with_rows
+
+    return with_rows(drawing, rows)
+
+
+def write(drawing: Drawing, path: Path) -> None:
+    """Writes .msh 4.1 ASCII: one surface per block, its corners as nodes, physical groups kept.
+
+    A block without a group is put into one named after its role, its material, or "blocks". A section of our own,
+    which other programs skip, keeps names, roles, materials, density and thickness.
+    """
+    from blockvis.formats.layout_json import rows_of
+
+    groups = [
+        group or (role if role in ("fixed", "moving") else "") or material or "blocks"
+        for group, role, material in zip(drawing.groups, drawing.roles, drawing.materials, strict=True)
+    ]
+    number = {group: k + 1 for k, group in enumerate(dict.fromkeys(groups))}
+    nodes, elements, entities = [], [], []
+    n_nodes = n_elements = 0
+    for i, ring in enumerate(drawing.outlines):
+        low, high = ring.min(axis=0), ring.max(axis=0)
+        box = f"{low[0]!r} {low[1]!r} 0 {high[0]!r} {high[1]!r} 0".replace("np.float64(", "").replace(")", "")
+        entities.append(f"{i + 1} {box} 1 {number[groups[i]]} 0")
+        nodes.append(f"2 {i + 1} 0 {len(ring)}")
+        nodes += [str(n_nodes + k + 1) for k in range(len(ring))]
+        nodes += [f"{float(x)!r} {float(y)!r} 0" for x, y in ring]
+        cells = cells_of_ring(ring)
+        for kind, width in ((2, 3), (3, 4)):
+            chosen = [cell for cell in cells if len(cell) == width]
+            if chosen:
+                elements.append(f"2 {i + 1} {kind} {len(chosen)}")
+                for cell in chosen:
+                    n_elements += 1
+                    elements.append(" ".join(map(str, [n_elements, *(n_nodes + k + 1 for k in cell)])))
+        n_nodes += len(ring)
+    n_parts = sum(1 for line in elements if line.startswith("2 ") and len(line.split()) == 4)
+    lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat"]
+    lines += ["$PhysicalNames", str(len(number))]
+    lines += [f'2 {k} "{group.replace(chr(34), chr(39))}"' for group, k in number.items()]
+    lines += ["$EndPhysicalNames", "$Entities", f"0 0 {drawing.n_blocks} 0", *entities, "$EndEntities"]
+    lines += ["$Nodes", f"{drawing.n_blocks} {n_nodes} 1 {n_nodes}", *nodes, "$EndNodes"]
+    lines += ["$Elements", f"{n_parts} {n_elements} 1 {n_elements}", *elements, "$EndElements"]
+    table = {str(i + 1): row for i, row in enumerate(rows_of(drawing))}
+    lines += [f"${TABLE}", json.dumps(table), f"$End{TABLE}", ""]
+    path.write_text("\n".join(lines), encoding="utf-8")
