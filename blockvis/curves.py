@@ -1,0 +1,242 @@
+"""The reaction curve: a file of its own, or a panel beside the blocks."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image, ImageDraw
+
+import solver
+
+from . import palette
+
+__all__ = ["CurvePanel", "Event", "draw_curve", "events_of"]
+
+#: Suffixes of the files that draw_curve writes.
+CURVE_SUFFIXES = (".png", ".svg", ".pdf")
+
+#: More changes of hinges than this are not numbered one by one.
+MOST_EVENTS = 12
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happens on the path.
+
+    Attributes
+    ----------
+    settlement : float [m or rad]
+        Over all phases.
+    reaction : float [N or N·m]
+    text : str
+    """
+
+    settlement: float
+    reaction: float
+    text: str
+
+
+def draw_curve(
+    response: solver.Response, path: str | os.PathLike[str], *, size: tuple[float, float] = (8.0, 5.0)
+) -> Path:
+    """Draws the reaction against the settlement, absolute and over the weight, with the events on the way.
+
+    Parameters
+    ----------
+    response : solver.Response
+    path : path
+        Ending in .png, .svg or .pdf.
+    size : (float, float) [inch]
+        Width and height; a PNG has 200 pixels per inch.
+
+    Returns
+    -------
+    pathlib.Path
+    """
+    path = Path(path)
+    if path.suffix.lower() not in CURVE_SUFFIXES:
+        raise ValueError(f"'{path.name}' is no curve that blockvis draws; end its name in {', '.join(CURVE_SUFFIXES)}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.add_subplot()
+    _draw(axes, response, events=True)
+    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
+    figure.savefig(partial, dpi=200)
+    os.replace(partial, path)
+    return path
+
+
+def events_of(response: solver.Response) -> list[Event]:
+    """Where the set of hinges or sliding joints changes along the path.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    path = response.path
+    total = path_settlements(path)
+    found = []
+    for k in range(1, len(path)):
+        text = []
+        for state, word in ((solver.ContactState.HINGING, "hinges"), (solver.ContactState.SLIDING, "sliding joints")):
+            before, after = (_pairs(i, state) for i in (path[k - 1], path[k]))
+            if before != after:
+                text.append(f"{len(after)} {word}" if len(before) != len(after) else f"{word} move")
+        if text:
+            found.append(Event(float(total[k]), path[k].reaction, ", ".join(text)))
+    return found
+
+
+def path_settlements(path: tuple[solver.Increment, ...]) -> np.ndarray:
+    """(n,) array [m or rad]: settlement over all phases, one after another."""
+    total, before, last = np.zeros(len(path)), 0.0, 0.0
+    for k, increment in enumerate(path):
+        if k and increment.phase != path[k - 1].phase:
+            before = last
+        last = total[k] = before + increment.settlement
+    return total
+
+
+class CurvePanel:
+    """The curve beside the blocks, drawn once, with a dot that moves.
+
+    Parameters
+    ----------
+    response : solver.Response
+    size : (int, int)
+        Width and height in pixels.
+    text : int
+        Height of the text in pixels.
+    """
+
+    def __init__(self, response: solver.Response, size: tuple[int, int], text: int) -> None:
+        self._response, self._text = response, text
+        figure = Figure(figsize=(size[0] / 100.0, size[1] / 100.0), dpi=100, layout="constrained")
+        canvas = FigureCanvasAgg(figure)
+        axes = figure.add_subplot()
+        _draw(axes, response, events=False, text=text * 0.62)
+        canvas.draw()
+        self._picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
+        total = path_settlements(response.path)
+        factor, _ = _force_unit(response)
+        reactions = np.array([i.reaction for i in response.path]) / factor
+        places = axes.transData.transform(np.column_stack([total, reactions])) if len(total) else np.zeros((0, 2))
+        self._total = total
+        self._places = np.column_stack([places[:, 0], size[1] - places[:, 1]])
+        self._offsets = {
+            i.phase: float(t - i.settlement) for t, i in zip(total[::-1], response.path[::-1], strict=True)
+        }
+
+    def image(self, increment: solver.Increment) -> Image.Image:
+        """The curve with the dot at an increment; at the end of the curve during the fall."""
+        picture = self._picture.copy()
+        if len(self._total) == 0:
+            return picture
+        falling = increment.status == solver.Status.FALLING
+        at = self._total[-1] if falling else self._offsets.get(increment.phase, 0.0) + increment.settlement
+        x, y = (float(np.interp(at, self._total, self._places[:, k])) for k in (0, 1))
+        r = 0.34 * self._text
+        draw = ImageDraw.Draw(picture)
+        draw.ellipse((x - r, y - r, x + r, y + r), fill=palette.WARNING if falling else palette.SETTLEMENT)
+        return picture
+
+
+def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 11.0) -> None:
+    path = response.path
+    factor, unit = _force_unit(response)
+    moment = any(s.unit == "rad" for s in response.settlements)
+    total = path_settlements(path)
+    reactions = np.array([i.reaction for i in path]) / factor
+    blue = palette.hexadecimal(palette.FORCE)
+    axes.plot(total, reactions, "-", color=blue, linewidth=2.0, zorder=3)
+    if events:
+        axes.plot(total, reactions, "o", color=blue, markersize=3.0, zorder=3)
+    units = sorted({s.unit for s in response.settlements})
+    axes.set_xlabel(f"settlement [{' / '.join(units)}]", fontsize=text)
+    axes.set_ylabel(f"reaction [{unit}]", fontsize=text)
+    axes.tick_params(labelsize=0.9 * text)
+    axes.grid(color="#e4e4e4", linewidth=0.8)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(x=0.02, y=0.12)
+    if not moment and response.total_weight > 0:
+        weight = response.total_weight / factor
+        over_weight = axes.secondary_yaxis(
+            "right", functions=(lambda r: np.asarray(r) / weight, lambda w: np.asarray(w) * weight)
+        )
+        over_weight.set_ylabel("reaction / weight W", fontsize=text)
+        over_weight.tick_params(labelsize=0.9 * text)
+    if len(path):
+        low, high = min(0.0, reactions.min()), max(0.0, reactions.max())
+        axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
+    if events:
+        _mark_events(axes, response, factor, text)
+    if response.collapse is not None and len(path):
+        _mark_collapse(axes, response, total, reactions, text, events)
+
+
+def _mark_collapse(
+    axes: Axes, response: solver.Response, total: np.ndarray, reactions: np.ndarray, text: float, words: bool
+) -> None:
+    collapse = response.collapse
+    assert collapse is not None
+    red = palette.hexadecimal(palette.WARNING)
+    start = total[-1] - collapse.bracket[0]
+    axes.axvspan(start + collapse.bracket[0], start + collapse.bracket[1], color=red, alpha=0.25, linewidth=0)
+    axes.axvline(start + collapse.displacement, color=red, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
+    axes.plot(total[-1:], reactions[-1:], "X", color=red, markersize=9 if words else 6, zorder=4)
+    if words:
+        low, high = collapse.bracket
+        axes.annotate(
+            f"collapse at {collapse.displacement:.5g} {collapse.unit}\n[{low:.6g}, {high:.6g}]",
+            (start + collapse.displacement, 0.04),
+            xycoords=("data", "axes fraction"),
+            xytext=(-6, 0),
+            textcoords="offset points",
+            ha="right",
+            va="bottom",
+            fontsize=0.9 * text,
+            color=red,
+        )
+
+
+def _mark_events(axes: Axes, response: solver.Response, factor: float, text: float) -> None:
+    found = events_of(response)
+    if not found:
+        return
+    ink = palette.hexadecimal(palette.INK)
+    x, y = [e.settlement for e in found], [e.reaction / factor for e in found]
+    axes.plot(x, y, "o", color="white", markeredgecolor=ink, markersize=7, zorder=4, label="hinges or sliding change")
+    if len(found) <= MOST_EVENTS:
+        for number in range(1, len(found) + 1):
+            axes.annotate(
+                str(number), (x[number - 1], y[number - 1]), xytext=(0, 8), textcoords="offset points", ha="center",
+                fontsize=0.8 * text,
+            )  # fmt: skip
+        lines = [f"{n}  {e.text}" for n, e in enumerate(found, 1)]
+        axes.text(
+            0.02, 0.98, "\n".join(lines), transform=axes.transAxes, va="top", fontsize=0.8 * text, linespacing=1.4,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+        )  # fmt: skip
+    else:
+        axes.legend(loc="upper left", fontsize=0.8 * text, frameon=False)
+
+
+def _pairs(increment: solver.Increment, state: solver.ContactState) -> set[tuple[int, int]]:
+    chosen = increment.states == state
+    a, b = increment.contacts.block_a[chosen], increment.contacts.block_b[chosen]
+    return set(zip(np.minimum(a, b).tolist(), np.maximum(a, b).tolist(), strict=True))
+
+
+def _force_unit(response: solver.Response) -> tuple[float, str]:
+    largest = max((abs(i.reaction) for i in response.path), default=0.0)
+    moment = "·m" if response.settlements and response.settlements[0].unit == "rad" else ""
+    for factor, unit in ((1e6, "MN"), (1e3, "kN")):
+        if largest >= factor:
+            return factor, unit + moment
+    return 1.0, "N" + moment

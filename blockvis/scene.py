@@ -1,0 +1,416 @@
+"""The off-screen scene: blocks and marks as VTK layers whose arrays change in place from frame to frame."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import shapely
+from PIL import Image
+
+import solver
+
+from . import marks, palette
+
+__all__ = ["Frame", "RenderingUnavailable", "Scene", "framed", "magnified", "rendering_available"]
+
+#: Drawn at this many times the size and averaged down: cheaper in software OpenGL than its own anti-aliasing.
+SUPERSAMPLING = 2
+
+#: Depths of the layers, back to front.
+DEPTHS = {
+    name: k / 170.0
+    for k, name in enumerate(
+        (
+            "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding", "motion outline",
+            "force line", "force", "hinge", "hinge top", "motion rim", "motion top", "arrow rim", "arrow top",
+        )
+    )
+}  # fmt: skip
+
+_PROBE = """
+from vtkmodules.vtkRenderingCore import vtkRenderWindow, vtkRenderer
+import vtkmodules.vtkRenderingOpenGL2
+window = vtkRenderWindow()
+window.SetOffScreenRendering(1)
+window.SetSize(16, 16)
+renderer = vtkRenderer()
+renderer.SetBackground(1, 0, 0)
+window.AddRenderer(renderer)
+window.Render()
+from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+pixels = vtkUnsignedCharArray()
+window.GetPixelData(8, 8, 8, 8, 0, pixels, 0)
+assert pixels.GetValue(0) == 255, "the window stays black"
+"""
+
+#: Seconds after which the probe counts as failed; a healthy one takes about one.
+_PROBE_PATIENCE = 60.0
+
+
+class RenderingUnavailable(RuntimeError):
+    """No usable OpenGL: pictures of the blocks cannot be drawn; everything else can."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The part of the world that a picture shows.
+
+    Attributes
+    ----------
+    low, high : (2,) arrays [m]
+        Opposite corners.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+
+    @property
+    def size(self) -> np.ndarray:
+        """(2,) array [m]: width and height."""
+        return self.high - self.low
+
+    def fitted(self, width: int, height: int) -> Frame:
+        """The smallest frame around this one with the proportions of a picture of ``width`` × ``height`` pixels."""
+        centre = (self.low + self.high) / 2.0
+        scale = max(self.size[0] / width, self.size[1] / height)
+        half = np.array([width, height]) * scale / 2.0
+        return Frame(centre - half, centre + half)
+
+
+def rendering_available() -> str | None:
+    """None where blocks can be drawn off-screen; otherwise what is missing and how to get it.
+
+    Notes
+    -----
+    VTK ends the whole process where it finds no usable OpenGL, so the question is put to another process.
+    """
+    _prefer_off_screen()
+    return _probed(os.environ.get("VTK_DEFAULT_OPENGL_WINDOW", ""), sys.executable)
+
+
+@cache
+def _probed(window: str, python: str) -> str | None:
+    remedy = (
+        "pictures of the blocks need OpenGL, in software or hardware, and none works here ({}); "
+        "on Debian or Ubuntu: apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
+    )
+    try:
+        done = subprocess.run(
+            [python, "-c", _PROBE], capture_output=True, text=True, timeout=_PROBE_PATIENCE, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return remedy.format(f"the test picture failed: {error}")
+    if done.returncode == 0:
+        return None
+    told = [line for line in done.stderr.strip().splitlines() if line.strip()]
+    why = told[-1].strip() if told else "no message"
+    return remedy.format(f"the test picture ended with code {done.returncode}: {why[:200]}")
+
+
+def _prefer_off_screen() -> None:
+    # VTK asks for an X display first and complains where there is none.
+    if sys.platform.startswith("linux"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+
+def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:
+    """The pose with displacements and rotations since the drawing multiplied."""
+    if magnification == 1.0:
+        return pose
+    start = assembly.centroids
+    return solver.Pose(start + magnification * (pose.positions - start), magnification * pose.rotations)
+
+
+def framed(assembly: solver.Assembly, poses: list[solver.Pose], margin: float = 0.04, supports: float = 0.13) -> Frame:
+    """The frame in which every free block stays over all poses.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    poses : list of solver.Pose
+        As drawn, magnified if they are.
+    margin : float
+        Empty border, as a fraction of the larger dimension.
+    supports : float
+        Supports are shown as far as this fraction of the larger dimension beyond the free blocks; drawings have
+        supports of any extent.
+    """
+    free = assembly.free[assembly.block_of_vertex]
+    corners = [solver.moved_vertices(assembly, pose) for pose in poses]
+    inner = np.concatenate([c[free] for c in corners]) if free.any() else np.concatenate(corners)
+    low, high = inner.min(axis=0), inner.max(axis=0)
+    size = float((high - low).max())
+    outer = np.concatenate([c[~free] for c in corners]) if (~free).any() else inner
+    low = np.minimum(low, np.maximum(outer.min(axis=0), low - supports * size))
+    high = np.maximum(high, np.minimum(outer.max(axis=0), high + supports * size))
+    return Frame(low - margin * size, high + margin * size)
+
+
+class Scene:
+    """Blocks and their marks, drawn off-screen frame after frame.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    frame : Frame
+        What is shown, the same in all frames.
+    size : (int, int)
+        Width and height of the pictures in pixels.
+    block_fill : (n_blocks, 3) uint8 array
+        Colours of the blocks.
+
+    Raises
+    ------
+    RenderingUnavailable
+        Where there is no usable OpenGL.
+    """
+
+    def __init__(self, assembly: solver.Assembly, frame: Frame, size: tuple[int, int], block_fill: np.ndarray) -> None:
+        missing = rendering_available()
+        if missing:
+            raise RenderingUnavailable(missing)
+        import pyvista as pv
+
+        self.assembly, self.size = assembly, size
+        self.frame = frame.fitted(*size)
+        #: Size of a pixel in the world [m].
+        self.pixel = float(self.frame.size[0]) / size[0]
+        self._pv = pv
+        window = [SUPERSAMPLING * size[0], SUPERSAMPLING * size[1]]
+        self._plotter = pv.Plotter(off_screen=True, window_size=window, lighting="none")
+        self._plotter.ren_win.SetMultiSamples(0)
+        self._plotter.set_background([c / 255.0 for c in palette.PAPER])
+        self._layers: dict[str, _Layer] = {}
+        self._block = assembly.block_of_vertex
+        self._shown = solver.Pose.initial(assembly)
+        self._add_blocks(block_fill)
+        self._add_hatch()
+        self._fix_camera()
+
+    def __enter__(self) -> Scene:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Frees the window."""
+        self._plotter.close()
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """Names of the layers drawn so far."""
+        return tuple(self._layers)
+
+    def pose(self, shown: solver.Pose, vertex_colours: np.ndarray | None = None) -> None:
+        """Puts the blocks where they are to be drawn.
+
+        Parameters
+        ----------
+        shown : solver.Pose
+        vertex_colours : (n_vertices, 3) uint8 array, optional
+            New fills.
+        """
+        self._shown = shown
+        corners = solver.moved_vertices(self.assembly, shown)
+        for name in ("fill", "outline"):
+            self._layers[name].move(corners)
+        if vertex_colours is not None:
+            self._layers["fill"].colour(vertex_colours)
+        if "hatch" in self._layers:
+            points, blocks = self._hatch
+            self._layers["hatch"].move(marks.carried(points, blocks, solver.Pose.initial(self.assembly), shown))
+
+    def polygons(self, layer: str, corners: np.ndarray, colour: tuple[int, int, int]) -> None:
+        """Fills convex polygons, (n, k, 2) [m], in one layer; they replace what it held."""
+        n, k = corners.shape[:2] if corners.size else (0, 4)
+        faces = np.column_stack([np.full(n, k), np.arange(n * k).reshape(n, k)]) if n else None
+        self._layer(layer, colour).replace(corners.reshape(-1, 2), faces=faces)
+
+    def lines(self, layer: str, points: np.ndarray, colour: tuple[int, int, int], width: float) -> None:
+        """Draws polylines, (n, k, 2) [m], ``width`` pixels wide; they replace what the layer held."""
+        n, k = points.shape[:2] if points.size else (0, 2)
+        cells = np.column_stack([np.full(n, k), np.arange(n * k).reshape(n, k)]) if n else None
+        target = self._layer(layer, colour)
+        target.width(width * SUPERSAMPLING)
+        target.replace(points.reshape(-1, 2), lines=cells)
+
+    def discs(self, layer: str, centres: np.ndarray, radius: float, colour: tuple[int, int, int]) -> None:
+        """Draws discs, centres (n, 2) [m], ``radius`` in pixels."""
+        angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+        rim = radius * self.pixel * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        self.polygons(layer, centres[:, None, :] + rim[None, :, :], colour)
+
+    def image(self) -> Image.Image:
+        """The picture as it stands."""
+        self._plotter.render()
+        pixels = self._plotter.screenshot(return_img=True)
+        return Image.fromarray(np.ascontiguousarray(pixels[..., :3])).reduce(SUPERSAMPLING)
+
+    def at_pixel(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2) array: pixel (column, row) of points (n, 2) [m]."""
+        place = (np.asarray(points) - self.frame.low) / self.pixel
+        return np.column_stack([place[:, 0], self.size[1] - place[:, 1]])
+
+    def _add_blocks(self, block_fill: np.ndarray) -> None:
+        corners = self.assembly.vertices
+        fill = self._layer("fill", None)
+        fill.replace(corners, faces=_triangles(self.assembly))
+        fill.colour(block_fill[self._block])
+        offsets, counts = self.assembly.offsets, np.diff(self.assembly.offsets)
+        closed = np.insert(np.arange(offsets[-1]), offsets[1:], offsets[:-1])
+        cells = np.insert(closed, np.concatenate([[0], np.cumsum(counts + 1)[:-1]]), counts + 1)
+        outline = self._layer("outline", palette.OUTLINE)
+        outline.width(SUPERSAMPLING * self._outline_width())
+        outline.replace(corners, lines=cells)
+
+    def _outline_width(self) -> float:
+        """Pixels; thinner where the blocks are small, so that a façade does not turn dark."""
+        return float(np.clip(self.assembly.block_size / self.pixel / 25.0, 0.6, self.size[1] / 540.0))
+
+    def _add_hatch(self) -> None:
+        supports = np.flatnonzero(~self.assembly.free)
+        spacing = self.size[1] / 60.0 * self.pixel
+        grown = Frame(self.frame.low - self.frame.size, self.frame.high + self.frame.size)
+        points, blocks = _hatch_lines(self.assembly, supports, grown, spacing)
+        self._hatch = points, blocks
+        if len(points):
+            layer = self._layer("hatch", palette.HATCH)
+            layer.width(SUPERSAMPLING * max(0.7, self.size[1] / 1000.0))
+            cells = np.column_stack([np.full(len(points) // 2, 2), np.arange(len(points)).reshape(-1, 2)])
+            layer.replace(points, lines=cells)
+
+    def _fix_camera(self) -> None:
+        plotter, (x, y) = self._plotter, (self.frame.low + self.frame.high) / 2.0
+        depth = float(self.frame.size.max())
+        plotter.enable_parallel_projection()
+        plotter.camera.position = (x, y, depth)
+        plotter.camera.focal_point = (x, y, 0.0)
+        plotter.camera.up = (0.0, 1.0, 0.0)
+        plotter.camera.parallel_scale = float(self.frame.size[1]) / 2.0
+        plotter.camera.clipping_range = (depth * 0.5, depth * 1.5)
+
+    def _layer(self, name: str, colour: tuple[int, int, int] | None) -> _Layer:
+        if name not in self._layers:
+            depth = DEPTHS[name.split("/")[0]] * float(self.frame.size.max())
+            self._layers[name] = _Layer(self._pv, depth)
+            self._plotter.renderer.AddActor(self._layers[name].actor)
+        if colour is not None:
+            self._layers[name].actor.prop.color = [c / 255.0 for c in colour]
+        return self._layers[name]
+
+
+class _Layer:
+    """One mesh at one depth."""
+
+    def __init__(self, pv: object, depth: float) -> None:
+        self._pv, self._depth = pv, depth
+        self.mesh = pv.PolyData()  # type: ignore[attr-defined]
+        self.actor = pv.Actor(mapper=pv.DataSetMapper(self.mesh))  # type: ignore[attr-defined]
+        self.actor.prop.lighting = False
+        self.actor.mapper.scalar_visibility = False
+
+    def width(self, pixels: float) -> None:
+        self.actor.prop.line_width = pixels
+
+    def replace(self, points: np.ndarray, faces: np.ndarray | None = None, lines: np.ndarray | None = None) -> None:
+        self.actor.visibility = len(points) > 0
+        if len(points) == 0:
+            return
+        cells = {"faces": None if faces is None else faces.ravel(), "lines": None if lines is None else lines.ravel()}
+        self.mesh = self._pv.PolyData(self._lifted(points), **cells)  # type: ignore[attr-defined]
+        self.actor.mapper.dataset = self.mesh
+
+    def move(self, points: np.ndarray) -> None:
+        self.mesh.points[:, :2] = points
+        self.mesh.GetPoints().Modified()
+        self.mesh.Modified()
+
+    def colour(self, colours: np.ndarray) -> None:
+        self.mesh.point_data["colour"] = colours
+        self.mesh.point_data.active_scalars_name = "colour"
+        self.actor.mapper.scalar_visibility = True
+        self.actor.mapper.SetColorModeToDirectScalars()
+
+    def _lifted(self, points: np.ndarray) -> np.ndarray:
+        return np.column_stack([points, np.full(len(points), self._depth)])
+
+
+def _triangles(assembly: solver.Assembly) -> np.ndarray:
+    """(n_triangles, 4) array of VTK cells over the vertices of the assembly; bent outlines included.
+
+    VTK fills a non-convex polygon as if it were convex, so the cutting is done here.
+    """
+    counts, offsets = np.diff(assembly.offsets), assembly.offsets
+    bent = np.zeros(assembly.n_blocks, dtype=bool)
+    bent[assembly.block_of_vertex[~assembly.convex_vertex]] = True
+    fans = []
+    for count in np.unique(counts[~bent]):
+        first = offsets[:-1][~bent & (counts == count)]
+        for k in range(1, count - 1):
+            fans.append(np.column_stack([np.full(len(first), 3), first, first + k, first + k + 1]))
+    for block in np.flatnonzero(bent):
+        fans.append(_ears(assembly.outline(block), int(offsets[block])))
+    return np.concatenate(fans)
+
+
+def _ears(outline: np.ndarray, first: int) -> np.ndarray:
+    """VTK cells of the triangles of one outline, by cutting ears."""
+    left = list(range(len(outline)))
+    cells = []
+    while len(left) > 3:
+        n = len(left)
+        areas, blocked = np.zeros(n), np.zeros(n, dtype=bool)
+        for k in range(n):
+            a, b, c = (outline[left[(k + j) % n]] for j in (-1, 0, 1))
+            areas[k] = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+            others = outline[[left[(k + j) % n] for j in range(2, n - 1)]]
+            blocked[k] = _any_inside(others, a, b, c)
+        # A point where three corners are in line makes an ear without area: cut it, it draws nothing.
+        ears = np.flatnonzero((areas >= -1e-12 * np.abs(areas).max()) & ~blocked)
+        k = int(ears[0]) if len(ears) else int(np.argmax(areas))
+        cells.append([3, *(first + left[(k + j) % n] for j in (-1, 0, 1))])
+        left.pop(k)
+    cells.append([3, *(first + i for i in left)])
+    return np.array(cells)
+
+
+def _any_inside(points: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
+    inside = np.ones(len(points), dtype=bool)
+    for start, stop in ((a, b), (b, c), (c, a)):
+        along, rest = stop - start, points - start
+        inside &= along[0] * rest[:, 1] - along[1] * rest[:, 0] >= 0.0
+    at_corner = [(points == corner).all(axis=1) for corner in (a, b, c)]
+    return bool((inside & ~np.logical_or.reduce(at_corner)).any())
+
+
+def _hatch_lines(
+    assembly: solver.Assembly, supports: np.ndarray, window: Frame, spacing: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the hatch lines inside the supports, (2 n, 2) [m] in the drawing, and the block of each end."""
+    box = shapely.box(*window.low, *window.high)
+    points, blocks = [np.zeros((0, 2))], [np.zeros(0, dtype=int)]
+    for block in supports:
+        area = shapely.intersection(shapely.Polygon(assembly.outline(block)), box)
+        if area.is_empty:
+            continue
+        x0, y0, x1, y1 = area.bounds
+        # Lines x - y = constant at multiples of the spacing, the same over all supports.
+        step = spacing * np.sqrt(2.0)
+        levels = np.arange(np.ceil((x0 - y1) / step), np.floor((x1 - y0) / step) + 1) * step
+        if len(levels) == 0:
+            continue
+        reach = np.array([[y0, y1]])
+        ends = np.stack([levels[:, None] + reach, np.broadcast_to(reach, (len(levels), 2))], axis=2)
+        parts = shapely.get_parts(shapely.intersection(shapely.linestrings(ends), area))
+        parts = parts[shapely.get_type_id(parts) == 1]
+        parts = parts[shapely.get_num_points(parts) == 2]
+        coordinates = shapely.get_coordinates(parts)
+        points.append(coordinates)
+        blocks.append(np.full(len(coordinates), block))
+    return np.concatenate(points), np.concatenate(blocks)

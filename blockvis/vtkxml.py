@@ -1,0 +1,84 @@
+"""VTK files that a viewer can open while the run that writes them goes on."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import pyvista as pv
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+__all__ = ["write_pvd", "write_vtu"]
+
+
+def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str]) -> Path:
+    """Writes a dataset as VTU, whole or not at all.
+
+    Parameters
+    ----------
+    dataset : pyvista.UnstructuredGrid
+    path : path
+        Its folder is made where it does not exist.
+
+    Returns
+    -------
+    pathlib.Path
+
+    Notes
+    -----
+    Inline binary with zlib and 64-bit headers: what ParaView from 5.11 on, pyvista and meshio all read. Appended
+    raw data, VTK's default, fails in ParaView 5.11 above some 10 kB.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = _partial(path)
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(dataset)
+    writer.SetFileName(str(partial))
+    writer.SetDataModeToBinary()
+    writer.SetCompressorTypeToZLib()
+    writer.SetHeaderTypeToUInt64()
+    if writer.Write() != 1:
+        partial.unlink(missing_ok=True)
+        raise OSError(f"could not write {path}: check that the folder is writable and the disk not full")
+    os.replace(partial, path)
+    return path
+
+
+def write_pvd(path: str | os.PathLike[str], entries: Iterable[tuple[float, str | os.PathLike[str]]]) -> Path:
+    """Writes the list of files of a time series, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+    entries : iterable of (time, file)
+        Files as given, relative to the folder of ``path``.
+
+    Returns
+    -------
+    pathlib.Path
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lines = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
+        "  <Collection>",
+        *(
+            f'    <DataSet timestep="{time:.12g}" group="" part="0" file={quoteattr(Path(file).as_posix())}/>'
+            for time, file in entries
+        ),
+        "  </Collection>",
+        "</VTKFile>",
+    ]
+    partial = _partial(path)
+    partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    os.replace(partial, path)
+    return path
+
+
+def _partial(path: Path) -> Path:
+    """A name beside the target, so that replacing it stays on one file system."""
+    return path.with_name(f".{path.name}.partial")
