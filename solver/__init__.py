@@ -12,11 +12,11 @@ Conventions, written once:
 This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 """
 
-from .analysis import Controls, Ending, settle, settlement_increments
+from .analysis import Controls, Ending, check_settlement, settle, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly
 from .contact import Contacts, InterfaceLaw, Interfaces, find_contacts, measure_contacts
 from .kinematics import Pose, moved_vertices
-from .loads import GRAVITY, Loads, Settlement, self_weight
+from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
 from .lp import SolveError
 from .polygons import overlap_depths
 from .response import Certificate, Collapse, ContactState, Increment, Response, Status, total_weight
@@ -43,12 +43,15 @@ __all__ = [
     "Settlement",
     "SolveError",
     "Status",
+    "check_settlement",
     "find_contacts",
     "measure_contacts",
     "moved_vertices",
     "overlap_depths",
+    "point_load",
     "self_weight",
     "settle",
     "settlement_increments",
     "total_weight",
+    "weight_fraction",
 ]

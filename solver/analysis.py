@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from .assembly import Assembly
 from .contact import InterfaceLaw, Interfaces
-from .correction import Falls, NotConverged, corrected
+from .correction import Falls, NotConverged, corrected, solve_again
 from .kinematics import Pose, moved, moved_vertices
 from .loads import Loads, Settlement, checked_loads
 from .lp import SolveError
@@ -17,7 +18,7 @@ from .polygons import overlap_depths
 from .program import Model, Solved, point_velocities, solve_program
 from .response import Collapse, Increment, Response, Status
 
-__all__ = ["Controls", "Ending", "settle", "settlement_increments"]
+__all__ = ["Controls", "Ending", "check_settlement", "settle", "settlement_increments"]
 
 #: The mechanism has changed within an increment when the velocities before and after differ by this much of their
 #: size, weighted by mass: hinges that move change it by more, the slow turning of the geometry by less.
@@ -34,7 +35,7 @@ class Controls:
     Attributes
     ----------
     trust_region : float, optional [m]
-        Largest movement of a block in one program; a fifth of the block size, or ten increments of translation.
+        Largest movement of a block in one program; the block size, or ten increments where that is more.
     overlap_tolerance : float, optional [m]
         Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
     event_refinement : int
@@ -151,8 +152,21 @@ def settlement_increments(
     Parameters are those of :func:`settle`. Everything found so far has been yielded whenever it is interrupted.
     """
     controls = controls or Controls()
-    _check_input(assembly, phases, controls)
-    model = _model(assembly, phases, interfaces, loads, controls)
+    check_settlement(assembly, phases, controls)
+    steps = _increments(_model(assembly, phases, interfaces, loads, controls), phases, controls)
+    while True:
+        started = time.perf_counter()
+        try:
+            increment = next(steps)
+        except StopIteration as stop:
+            ending: Ending = stop.value
+            return ending
+        # Not the time that whoever listens takes between two increments.
+        yield replace(increment, seconds=time.perf_counter() - started)
+
+
+def _increments(model: Model, phases: Sequence[Settlement], controls: Controls) -> Generator[Increment, None, Ending]:
+    assembly = model.assembly
     pose = Pose.initial(assembly)
     try:
         solved = solve_program(model, pose)
@@ -323,12 +337,17 @@ class _Path:
 
     def _fall(self, s: float, solved: Solved) -> Iterator[Increment]:
         """Pseudo-time frames: the blocks move downhill by a trust region at a time until they rest."""
+        if self.controls.falling_frames == 0:
+            return
+        yield _falling_frame(self.model, solved, s, self.number)
         model = replace(self.model, trust=self.model.length / 10.0)
-        for _ in range(self.controls.falling_frames):
+        for _ in range(self.controls.falling_frames - 1):
             size = _largest_movement(model, solved.motion)
-            pose = moved(solved.pose, solved.motion * min(1.0, model.trust / size))
+            part = min(1.0, model.trust / size)
+            solved = replace(solved, motion=solved.motion * part, slip=solved.slip * part)
+            pose = moved(solved.pose, solved.motion)
             try:
-                solved = solve_program(model, pose)
+                solved = solve_again(model, pose, solved)
             except SolveError:
                 return
             yield _falling_frame(model, solved, s, self.number)
@@ -340,7 +359,15 @@ def _largest_movement(model: Model, motion: np.ndarray) -> float:
     return max(float(np.abs(motion * [1.0, 1.0, model.length]).max(initial=0.0)), 1e-300)
 
 
-def _check_input(assembly: Assembly, phases: Sequence[Settlement], controls: Controls) -> None:
+def check_settlement(assembly: Assembly, phases: Sequence[Settlement], controls: Controls | None = None) -> None:
+    """Refuses what cannot be analysed, before anything is solved or written.
+
+    Raises
+    ------
+    ValueError
+        For no settlement, no free block, a phase that moves no support, blocks that overlap (both named, with depth).
+    """
+    controls = controls or Controls()
     if not phases:
         raise ValueError("no settlement was given; give one Settlement, or several phases")
     if not assembly.free.any():
@@ -381,8 +408,8 @@ def _model(
     length = assembly.block_size
     start = Pose.initial(assembly)
     movement = max(phase.increment * _lever(assembly, phase, start) for phase in phases)
-    trust = max(length / 5.0, 10.0 * movement) if controls.trust_region is None else controls.trust_region
-    reach = min(max(4.0 * movement, 0.02 * length), length / 2.0)
+    trust = max(length, 10.0 * movement) if controls.trust_region is None else controls.trust_region
+    reach = max(min(4.0 * movement, length / 2.0), length / 4.0)
     return Model(assembly, interfaces, load, length, force, trust, reach)
 
 
@@ -393,7 +420,6 @@ def _falling_frame(model: Model, solved: Solved, s: float, phase: int) -> Increm
 def _increment(
     model: Model, solved: Solved, rate: np.ndarray, step: float, s: float, phase: int, status: Status
 ) -> Increment:
-    programs, seconds = model.tally.take()
     contacts, velocity = solved.contacts, solved.motion / step
     relative = point_velocities(contacts.points, contacts.block_a, solved.pose, velocity) - point_velocities(
         contacts.points, contacts.block_b, solved.pose, velocity
@@ -412,8 +438,8 @@ def _increment(
         support_forces=solved.support_forces,
         certificate=solved.certificate,
         status=status,
-        programs=programs,
-        seconds=seconds,
+        programs=model.tally.take(),
+        seconds=0.0,
     )
 
 

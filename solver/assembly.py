@@ -107,7 +107,7 @@ class Assembly:
         areas, _, _ = polygon_integrals(vertices, offsets)
         lengths = np.hypot(*(vertices[_next(offsets)] - vertices).T)
         perimeter = np.add.reduceat(lengths, offsets[:-1])
-        for i in np.flatnonzero(np.abs(areas) <= SMALLEST_SHAPE_FACTOR * perimeter**2):
+        for i in np.flatnonzero(np.abs(areas) <= SMALLEST_SHAPE_FACTOR * perimeter**2).tolist():
             raise ValueError(
                 f"block {i} ('{names[i]}') has an area of {abs(areas[i]):.3g} m² for a perimeter of "
                 f"{perimeter[i]:.3g} m; it is a line, not a block: remove it or redraw it"
@@ -267,6 +267,6 @@ def _positive(value: ArrayLike, n: int, what: str, unit: str, names: Sequence[st
     if array.ndim and array.shape != (n,):
         raise ValueError(f"{what} has shape {array.shape}; give one number or {n}, one per block")
     array = np.broadcast_to(array, (n,)).copy()
-    for i in np.flatnonzero(~(np.isfinite(array) & (array > 0))):
+    for i in np.flatnonzero(~(np.isfinite(array) & (array > 0))).tolist():
         raise ValueError(f"block {i} ('{names[i]}') has {what} {array[i]:g} {unit}; it must be a positive number")
     return array

@@ -9,7 +9,7 @@ from .contact import Contacts, feature_pairs, find_contacts, measure_contacts
 from .kinematics import Pose, moved, moved_vertices
 from .program import Model, Solved, solve_program
 
-__all__ = ["Falls", "NotConverged", "corrected"]
+__all__ = ["Falls", "NotConverged", "corrected", "solve_again"]
 
 #: A geometry is exact enough when contact points that carry force are closed, and those that stick have
 #: not moved along the joint, to this fraction of the block size.
@@ -82,6 +82,12 @@ def corrected(model: Model, predictor: Solved, supports: Pose, correctors: int) 
     raise NotConverged(
         f"after {correctors} corrections a contact point is still off by {error:.3g} m (accepted: {tolerance:.3g} m)"
     )
+
+
+def solve_again(model: Model, pose: Pose, solved: Solved) -> Solved:
+    """The program at a pose that another program led to, its contacts and their drift carried over; supports at rest."""
+    contacts = _contacts_after(model, pose, solved)
+    return solve_program(model, pose, contacts=contacts, drift=_drift(model.assembly, contacts, solved))
 
 
 def _contacts_after(model: Model, pose: Pose, solved: Solved) -> Contacts:

@@ -10,7 +10,7 @@ import numpy as np
 from .assembly import Assembly
 from .kinematics import Pose, rotation_matrices
 
-__all__ = ["GRAVITY", "Loads", "Settlement", "self_weight"]
+__all__ = ["GRAVITY", "Loads", "Settlement", "point_load", "self_weight", "weight_fraction"]
 
 #: Acceleration of gravity [m/s²], as structural codes round it.
 GRAVITY = 9.81
@@ -156,6 +156,58 @@ class Settlement:
         if self.rotation_centre is None:
             return travel, 0.0, np.zeros(2)
         return travel, self.rotation * s, np.asarray(self.rotation_centre)
+
+
+def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.ndarray | None = None) -> np.ndarray:
+    """Forces that are a fraction of each block's weight, as an earthquake's static stand-in.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    fraction : (2,) sequence
+        Of the weight, along x and y: (0.1, 0) pushes to the right with a tenth of the weight.
+    blocks : (n,) int or (n_blocks,) bool array, optional
+        The blocks it acts on; all by default.
+
+    Returns
+    -------
+    (n_blocks, 3) array [N, N, N·m]
+    """
+    load = np.zeros((assembly.n_blocks, 3))
+    chosen = slice(None) if blocks is None else blocks
+    load[chosen, :2] = (assembly.masses * GRAVITY)[chosen, None] * np.asarray(fraction, dtype=float)
+    return load
+
+
+def point_load(
+    assembly: Assembly,
+    block: int,
+    force: Sequence[float] = (0.0, 0.0),
+    *,
+    point: Sequence[float] | None = None,
+    moment: float = 0.0,
+) -> np.ndarray:
+    """A force on one block at a point, and a moment.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    block : int
+    force : (2,) sequence [N]
+    point : (2,) sequence [m], optional
+        Where the force acts in the drawing; the centroid by default.
+    moment : float [N·m]
+        Counter-clockwise, besides that of the force.
+
+    Returns
+    -------
+    (n_blocks, 3) array [N, N, N·m]
+    """
+    load = np.zeros((assembly.n_blocks, 3))
+    arm = np.zeros(2) if point is None else np.asarray(point, dtype=float) - assembly.centroids[block]
+    fx, fy = (float(component) for component in force)
+    load[block] = fx, fy, moment + arm[0] * fy - arm[1] * fx
+    return load
 
 
 def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:

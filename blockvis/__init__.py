@@ -1,0 +1,52 @@
+"""Files and pictures for the mechanics in ``solver``: from a drawing of masonry to its collapse.
+
+    import blockvis, solver
+    arch = blockvis.read("arch.msh", roles={"right springer": "moving", "left springer": "fixed"})
+    response = solver.settle(arch, solver.Settlement(direction=(1, 0)), friction_coefficient=0.6)
+    blockvis.write(response, "out/")
+    blockvis.animate(response, "out/collapse.mp4")
+
+Lengths are in m, forces in N, angles in rad; see ``solver`` for the signs.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .case import Case as Case
+    from .case import read_case as read_case
+    from .drawing import read as read
+    from .drawing import save_layout as save_layout
+    from .render import animate as animate
+    from .results import open_results as open_results
+    from .results import write as write
+    from .run import run_case as run_case
+
+#: Public names and where they live; loaded when first used, because VTK takes seconds to import.
+_HOMES = {
+    "Case": "case",
+    "animate": "render",
+    "draw_curve": "curves",
+    "draw_mechanism": "render",
+    "draw_still": "render",
+    "open_results": "results",
+    "read": "drawing",
+    "read_case": "case",
+    "run_case": "run",
+    "save_layout": "drawing",
+    "write": "results",
+}
+
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    raise AttributeError(f"module 'blockvis' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *__all__]

@@ -1,0 +1,376 @@
+"""Case: the TOML case file, read and checked."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solver
+
+from . import drawing
+
+__all__ = ["ANALYSES", "Case", "LoadCase", "case_assembly", "case_interfaces", "case_loads", "parse_case", "read_case"]
+
+ANALYSES = ("settlement",)
+
+
+@dataclass(frozen=True)
+class LoadCase:
+    """One ``[[loads]]`` entry.
+
+    Attributes
+    ----------
+    kind : str
+        "dead" or "live".
+    blocks : str
+        A name or pattern.
+    weight_fraction : (2,) tuple, optional
+    force : (2,) tuple [N]
+    point : (2,) tuple [m], optional
+    moment : float [N·m]
+    """
+
+    kind: str = "dead"
+    blocks: str = "*"
+    weight_fraction: tuple[float, float] | None = None
+    force: tuple[float, float] = (0.0, 0.0)
+    point: tuple[float, float] | None = None
+    moment: float = 0.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A checked case file. The keys are those of the file; see the README.
+
+    Attributes
+    ----------
+    source : Path
+        The case file; paths in it are relative to its folder.
+    text : str
+        The case file as it was read.
+    """
+
+    source: Path
+    text: str
+    file: Path
+    unit: str | None = None
+    thickness: float = 1.0
+    joint_thickness: float | str = 0.0
+    overlap_tolerance: float | None = None
+    roles: Mapping[str, str] = field(default_factory=dict)
+    supports: tuple[Mapping[str, Any], ...] = ()
+    density: float = 2000.0
+    densities: Mapping[str, float] = field(default_factory=dict)
+    friction_coefficient: float = 0.6
+    interfaces: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    settlements: tuple[solver.Settlement, ...] = ()
+    loads: tuple[LoadCase, ...] = ()
+    analysis: str = "settlement"
+    controls: solver.Controls = field(default_factory=solver.Controls)
+    animation: str | None = "collapse.mp4"
+
+
+class _Table:
+    """A table of the case file that knows which of its keys have been asked for."""
+
+    def __init__(self, values: Mapping[str, Any], where: str, source: Path) -> None:
+        if not isinstance(values, Mapping):
+            raise ValueError(f"{source}: [{where}] must be a table of keys, not {values!r}")
+        self.values, self.where, self.source = values, where, source
+        self.known: list[str] = []
+
+    def take(self, key: str, default: Any = None) -> Any:
+        self.known.append(key)
+        return self.values.get(key, default)
+
+    def number(self, key: str, default: float | None = None, *, positive: bool = False) -> Any:
+        value = self.take(key, default)
+        if value is None:
+            return None
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise self.error(key, f"is {value!r}; give a number")
+        if positive and value <= 0.0:
+            raise self.error(key, f"is {value:g}; give a positive number")
+        return float(value)
+
+    def pair(self, key: str, default: tuple[float, float] | None = None) -> Any:
+        value = self.take(key, default)
+        if value is None:
+            return None
+        numbers = isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2
+        if not numbers or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in value):
+            raise self.error(key, f"is {value!r}; give two numbers [x, y]")
+        return float(value[0]), float(value[1])
+
+    def text(self, key: str, default: str | None = None, *, among: Sequence[str] = ()) -> Any:
+        value = self.take(key, default)
+        if value is None:
+            return None
+        if not isinstance(value, str):
+            raise self.error(key, f"is {value!r}; give a text in quotes")
+        if among and value not in among:
+            raise self.error(key, f"is '{value}'{_nearest(value, among)}; choose from {', '.join(among)}")
+        return value
+
+    def table(self, key: str) -> _Table:
+        return _Table(self.take(key, {}), f"{self.where}.{key}" if self.where else key, self.source)
+
+    def tables(self, key: str) -> list[_Table]:
+        value = self.take(key, [])
+        entries = [value] if isinstance(value, Mapping) else value
+        if not isinstance(entries, list):
+            raise self.error(key, f"must be [[{key}]] tables, not {value!r}")
+        return [
+            _Table(entry, f"{key} {i + 1}" if len(entries) > 1 else key, self.source) for i, entry in enumerate(entries)
+        ]
+
+    def error(self, key: str, problem: str) -> ValueError:
+        where = f"[{self.where}] {key}" if self.where else f"[{key}]"
+        return ValueError(f"{self.source}: {where} {problem}")
+
+    def finish(self) -> None:
+        """Refuses keys nobody asked for, naming the nearest one that exists."""
+        for key in self.values:
+            if key not in self.known:
+                raise self.error(key, f"is not a key here{_nearest(key, self.known)}; keys are {', '.join(self.known)}")
+
+
+def _nearest(word: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
+    return f" (did you mean '{near[0]}'?)" if near else ""
+
+
+def read_case(path: str | Path) -> Case:
+    """Reads and checks a case file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    ValueError
+        Names the file, the key and the remedy: a missing file, broken TOML (with its line), an unknown key (with the
+        nearest valid one), a value of the wrong kind.
+    """
+    path = Path(path)
+    if not path.is_file():
+        beside = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
+        near = difflib.get_close_matches(path.name, beside, n=3, cutoff=0.4) or beside[:3]
+        hint = f"; beside it are {', '.join(near)}" if near else ""
+        raise ValueError(f"there is no case file '{path}'{hint}")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: is not a text file ({error.reason} at byte {error.start})") from None
+    return parse_case(text, path)
+
+
+def parse_case(text: str, source: Path) -> Case:
+    """As :func:`read_case`, from the text of a case file; paths in it are relative to the folder of ``source``."""
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"') from None
+    top = _Table(values, "", source)
+    geometry = top.table("geometry")
+    file = geometry.text("file")
+    if file is None:
+        raise geometry.error("file", "is missing; name the layout file")
+    joint = geometry.take("joint_thickness", 0.0)
+    if joint != "auto":
+        joint = geometry.number("joint_thickness", 0.0)
+        if joint < 0.0:
+            raise geometry.error("joint_thickness", f'is {joint:g}; give a thickness in m of at least 0, or "auto"')
+    roles = top.table("roles").values
+    for name, role in roles.items():
+        if role not in solver.ROLES:
+            raise ValueError(f'{source}: [roles] "{name}" is {role!r}; a role is {", ".join(solver.ROLES)}')
+    material = top.table("material")
+    materials = top.table("materials")
+    densities = {}
+    for name in materials.values:
+        one = materials.table(name)
+        densities[name] = one.number("density", positive=True)
+        one.finish()
+    analysis = top.table("analysis")
+    output = top.table("output")
+    animation = output.take("animation", "collapse.mp4")
+    if animation is not False:
+        animation = output.text("animation", "collapse.mp4")
+    case = Case(
+        source=source,
+        text=text,
+        file=source.parent / file,
+        unit=geometry.text("unit"),
+        thickness=geometry.number("thickness", 1.0, positive=True),
+        joint_thickness=joint,
+        overlap_tolerance=geometry.number("overlap_tolerance", positive=True),
+        roles=dict(roles),
+        supports=tuple(_support(entry) for entry in top.tables("supports")),
+        density=material.number("density", 2000.0, positive=True),
+        densities=densities,
+        friction_coefficient=_friction(material),
+        interfaces=dict(_interface(entry) for entry in top.tables("interfaces")),
+        settlements=tuple(_settlement(entry) for entry in top.tables("settlement")),
+        loads=tuple(_load(entry) for entry in top.tables("loads")),
+        analysis=analysis.text("kind", "settlement", among=ANALYSES),
+        controls=_controls(analysis),
+        animation=animation or None,
+    )
+    for table in (geometry, material, analysis, output, top):
+        table.finish()
+    if not case.settlements:
+        raise ValueError(f"{source}: [settlement] is missing; say how the moving supports move, direction = [1, 0]")
+    return case
+
+
+def _friction(table: _Table, default: float | None = 0.6) -> float:
+    value = table.number("friction_coefficient", default)
+    if value is None:
+        raise table.error("friction_coefficient", "is missing")
+    if value < 0.0:
+        raise table.error("friction_coefficient", f"is {value:g}; it must be at least 0")
+    return float(value)
+
+
+def _support(table: _Table) -> Mapping[str, Any]:
+    support = {
+        "name": table.text("name", "support"),
+        "role": table.text("role", solver.FIXED, among=(solver.FIXED, solver.MOVING)),
+        "outline": table.take("outline"),
+    }
+    if not isinstance(support["outline"], list) or len(support["outline"]) < 3:
+        raise table.error("outline", f"is {support['outline']!r}; give at least three corners [[x, y], ...]")
+    material = table.text("material")
+    if material is not None:
+        support["material"] = material
+    table.finish()
+    return support
+
+
+def _interface(table: _Table) -> tuple[tuple[str, str], float]:
+    pair = table.take("materials")
+    if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(name, str) for name in pair)):
+        raise table.error("materials", f'is {pair!r}; name two materials ["stone", "brick"]')
+    friction = _friction(table, None)
+    table.finish()
+    return (pair[0], pair[1]), friction
+
+
+def _settlement(table: _Table) -> solver.Settlement:
+    blocks = table.take("blocks")
+    if blocks is not None:
+        blocks = tuple([blocks] if isinstance(blocks, str) else blocks)
+    keys = {
+        "direction": table.pair("direction"),
+        "rotation_centre": table.pair("rotation_centre"),
+        "rotation": table.number("rotation"),
+        "increment": table.number("increment", 0.01, positive=True),
+        "limit": table.number("limit", 1.0, positive=True),
+        "tolerance": table.number("tolerance", positive=True),
+    }
+    table.finish()
+    if keys["rotation"] is None:
+        keys["rotation"] = 1.0 if keys["rotation_centre"] is not None else 0.0
+    try:
+        return solver.Settlement(**keys, blocks=blocks)
+    except ValueError as error:
+        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
+
+
+def _load(table: _Table) -> LoadCase:
+    load = LoadCase(
+        kind=table.text("kind", "dead", among=("dead", "live")),
+        blocks=table.text("blocks", "*"),
+        weight_fraction=table.pair("weight_fraction"),
+        force=table.pair("force", (0.0, 0.0)),
+        point=table.pair("point"),
+        moment=table.number("moment", 0.0),
+    )
+    table.finish()
+    return load
+
+
+def _controls(table: _Table) -> solver.Controls:
+    default = solver.Controls()
+    counts = {}
+    for key in ("event_refinement", "correctors", "falling_frames"):
+        value = table.number(key, getattr(default, key))
+        if value < (0 if key == "falling_frames" else 1) or value != int(value):
+            raise table.error(key, f"is {value:g}; give a whole number")
+        counts[key] = int(value)
+    return solver.Controls(trust_region=table.number("trust_region", positive=True), **counts)
+
+
+def case_assembly(case: Case) -> solver.Assembly:
+    """The assembly of a case: its layout file with roles, supports and materials applied."""
+    sketch = drawing.read_drawing(case.file, unit=case.unit)
+    if case.densities:
+        sketch = _with_densities(case, sketch)
+    assembly = drawing.assemble(
+        sketch,
+        roles=case.roles,
+        supports=case.supports,
+        density=case.density,
+        thickness=case.thickness,
+        joint_thickness=case.joint_thickness,
+        overlap_tolerance=case.overlap_tolerance,
+    )
+    if not assembly.moving.any():
+        groups = sorted({g for g in sketch.groups if g} | {s["name"] for s in case.supports}) or list(sketch.names[:12])
+        raise ValueError(
+            f'{case.source}: no block is a moving support; give one of these the role "moving" under [roles] or add '
+            f"[[supports]]: {', '.join(groups)}"
+        )
+    return assembly
+
+
+def _with_densities(case: Case, sketch: drawing.Drawing) -> drawing.Drawing:
+    unknown = set(case.densities) - set(sketch.materials)
+    if unknown:
+        name = sorted(unknown)[0]
+        known = sorted(set(sketch.materials))
+        raise ValueError(
+            f"{case.source}: [materials.{name}] matches no block{_nearest(name, known)}; the file has {known}"
+        )
+    density = np.full(sketch.n_blocks, np.nan) if sketch.density is None else sketch.density.copy()
+    for i, material in enumerate(sketch.materials):
+        density[i] = case.densities.get(material, density[i])
+    return replace(sketch, density=density)
+
+
+def case_interfaces(case: Case) -> solver.Interfaces:
+    """The laws of the interfaces of a case."""
+    return solver.Interfaces(
+        solver.InterfaceLaw(case.friction_coefficient),
+        {pair: solver.InterfaceLaw(friction) for pair, friction in case.interfaces.items()},
+    )
+
+
+def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
+    """Self-weight and the loads of a case, in N."""
+    weight = solver.self_weight(assembly)
+    parts = {"dead": weight.dead.copy(), "live": weight.live.copy()}
+    for number, load in enumerate(case.loads):
+        where = f"{case.source}: [loads {number + 1}] blocks"
+        chosen = [i for i, name in enumerate(assembly.names) if fnmatchcase(name, load.blocks)]
+        chosen = [i for i in chosen if assembly.free[i]]
+        if not chosen:
+            raise ValueError(
+                f"{where} '{load.blocks}' matches no free block{_nearest(load.blocks, assembly.names)}; "
+                f"the layout has {', '.join(assembly.names[:12])}"
+            )
+        if load.weight_fraction is not None:
+            parts[load.kind] += solver.weight_fraction(assembly, load.weight_fraction, np.array(chosen))
+        for block in chosen if (load.force != (0.0, 0.0) or load.moment) else ():
+            parts[load.kind] += solver.point_load(assembly, block, load.force, point=load.point, moment=load.moment)
+    return solver.Loads(parts["dead"], parts["live"])

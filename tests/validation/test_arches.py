@@ -1,0 +1,99 @@
+"""Table A of the reference values: circular arches that hinge only (friction coefficient 2).
+
+Reference: exact three-hinge kinematics with exact thrust lines, and energy descent, computed independently of this
+code; two or three codes agree to eight digits. Minimum thickness: Milankovitch (1907).
+"""
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis import layouts
+
+#: embrace [degrees], t/R, n, d_c/R, H/W at the start, H/W at collapse.
+SPREADING = [
+    (180, 0.15, 12, 0.14104982, 0.1771150, 0.2420193),
+    (180, 0.15, 13, 0.15910759, 0.1741342, 0.2459914),
+    (180, 0.15, 24, 0.14034471, 0.175998, 0.240540),
+    (180, 0.20, 16, 0.23555602, 0.153952, 0.278566),
+    (120, 0.10, 12, 0.15286859, 0.302630, 0.556513),
+    (120, 0.10, 13, 0.14352524, 0.301427, 0.596130),
+    (140, 0.10, 12, 0.11619552, 0.259409, 0.418360),
+]
+
+#: embrace, t/R, n, v_c/R, VR/W start, VR/W collapse, H/W start, H/W collapse.
+SINKING = [
+    (180, 0.15, 12, 0.33003942, 0.487901, 0.559286, 0.192939, 0.201949),
+    (140, 0.10, 12, 0.35254631, 0.478934, 0.580438, 0.297661, 0.337135),
+]
+
+
+def _settle(embrace, ratio, n, direction, increment=0.01):
+    arch = layouts.arch(embrace=embrace, thickness_ratio=ratio, voussoirs=n)
+    settlement = solver.Settlement(direction=direction, increment=increment, limit=1.0, tolerance=increment / 1000)
+    return solver.settle(arch, settlement, friction_coefficient=2.0, controls=solver.Controls(falling_frames=0))
+
+
+@pytest.mark.parametrize(("embrace", "ratio", "n", "collapse", "first", "last"), SPREADING)
+def test_spreading(embrace, ratio, n, collapse, first, last):
+    response = _settle(embrace, ratio, n, (1, 0))
+    assert response.stop is solver.Status.COLLAPSED
+    assert response.collapse.displacement == pytest.approx(collapse, rel=1e-3)
+    low, high = response.collapse.bracket
+    assert high - low <= 1.001e-5
+    reaction = response.reaction / response.total_weight
+    assert reaction[0] == pytest.approx(first, abs=1e-6)
+    assert response.collapse.reaction / response.total_weight == pytest.approx(last, rel=1e-3)
+
+
+@pytest.mark.parametrize(("embrace", "ratio", "n", "collapse", "first", "last", "h_first", "h_last"), SINKING)
+def test_sinking(embrace, ratio, n, collapse, first, last, h_first, h_last):
+    response = _settle(embrace, ratio, n, (0, -1))
+    assert response.collapse.displacement == pytest.approx(collapse, rel=1e-3)
+    weight = response.total_weight
+    springer = response.assembly.index("right springer")
+    for increment, v, h, tolerance in (
+        (response.path[0], first, h_first, 1e-6),
+        (response.path[-1], last, h_last, 1e-3),
+    ):
+        assert -increment.support_forces[springer, 1] / weight == pytest.approx(v, abs=tolerance)
+        assert increment.reaction / weight == pytest.approx(v, abs=tolerance)
+        assert increment.support_forces[springer, 0] / weight == pytest.approx(h, abs=tolerance)
+
+
+@pytest.mark.parametrize("increment", [0.02, 0.01, 0.0025])
+def test_collapse_does_not_depend_on_the_increment(increment):
+    """Correctors and the collapse bracket leave no error of the increment: the bracket's width is what remains."""
+    reference = 0.14104982
+    response = _settle(180, 0.15, 12, (1, 0), increment)
+    assert abs(response.collapse.displacement - reference) < increment / 1000 + 2e-6
+
+
+@pytest.mark.parametrize("increment", [0.02, 0.01, 0.0025])
+def test_relocating_hinge_is_met_at_every_increment(increment):
+    """A hinge jumps to the next joint at d = 0.12885; the structure finds its new equilibrium and goes on."""
+    response = _settle(120, 0.10, 13, (1, 0), increment)
+    assert response.collapse.displacement == pytest.approx(0.14352524, rel=5e-4)
+    jump = np.argmax(np.diff(response.reaction) / np.diff(response.settlement))
+    assert response.settlement[jump] <= 0.12885 + 1e-6
+    assert response.settlement[jump + 1] >= 0.12885 - 1e-4
+
+
+def test_odd_number_of_voussoirs_follows_the_stable_asymmetric_path():
+    response = _settle(180, 0.15, 13, (1, 0))
+    assert response.collapse.displacement < 0.17  # the symmetric, unstable path would last to 0.177339
+    turned = response.path[3].pose.rotations[:13]
+    assert np.abs(turned + turned[::-1]).max() > 1e-4
+
+
+@pytest.mark.parametrize(("n", "thinnest"), [(24, 0.107478), (48, 0.107478)])
+def test_minimum_thickness_of_the_semicircle(n, thinnest):
+    """Below Milankovitch's thickness no equilibrium exists; with few voussoirs a little less is enough."""
+    still = solver.Settlement(direction=(1, 0), increment=1e-4, limit=1e-4)
+
+    def stands(ratio):
+        arch = layouts.arch(thickness_ratio=ratio, voussoirs=n)
+        return solver.settle(arch, still, friction_coefficient=2.0).stop is not solver.Status.NO_INITIAL_EQUILIBRIUM
+
+    assert stands(thinnest * 1.005)
+    assert not stands(thinnest * 0.97)
