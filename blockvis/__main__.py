@@ -1,0 +1,5 @@
+"""``python -m blockvis``: the command line."""
+
+from .cli import entry
+
+entry()
