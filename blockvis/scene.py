@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
-import shapely
 from PIL import Image
 
 import solver
 
 from . import marks, palette
+from .fills import hatch_lines, triangles
+from .opengl import RenderingUnavailable, rendering_available
 
-__all__ = ["Frame", "RenderingUnavailable", "Scene", "framed", "magnified", "rendering_available"]
+__all__ = ["Frame", "Scene", "framed", "magnified"]
 
 #: Drawn at this many times the size and averaged down: cheaper in software OpenGL than its own anti-aliasing.
 SUPERSAMPLING = 2
@@ -31,29 +28,6 @@ DEPTHS = {
         )
     )
 }  # fmt: skip
-
-_PROBE = """
-from vtkmodules.vtkRenderingCore import vtkRenderWindow, vtkRenderer
-import vtkmodules.vtkRenderingOpenGL2
-window = vtkRenderWindow()
-window.SetOffScreenRendering(1)
-window.SetSize(16, 16)
-renderer = vtkRenderer()
-renderer.SetBackground(1, 0, 0)
-window.AddRenderer(renderer)
-window.Render()
-from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
-pixels = vtkUnsignedCharArray()
-window.GetPixelData(8, 8, 8, 8, 0, pixels, 0)
-assert pixels.GetValue(0) == 255, "the window stays black"
-"""
-
-#: Seconds after which the probe counts as failed; a healthy one takes about one.
-_PROBE_PATIENCE = 60.0
-
-
-class RenderingUnavailable(RuntimeError):
-    """No usable OpenGL: pictures of the blocks cannot be drawn; everything else can."""
 
 
 @dataclass(frozen=True)
@@ -80,42 +54,6 @@ class Frame:
         scale = max(self.size[0] / width, self.size[1] / height)
         half = np.array([width, height]) * scale / 2.0
         return Frame(centre - half, centre + half)
-
-
-def rendering_available() -> str | None:
-    """None where blocks can be drawn off-screen; otherwise what is missing and how to get it.
-
-    Notes
-    -----
-    VTK ends the whole process where it finds no usable OpenGL, so the question is put to another process.
-    """
-    _prefer_off_screen()
-    return _probed(os.environ.get("VTK_DEFAULT_OPENGL_WINDOW", ""), sys.executable)
-
-
-@cache
-def _probed(window: str, python: str) -> str | None:
-    remedy = (
-        "pictures of the blocks need OpenGL, in software or hardware, and none works here ({}); "
-        "on Debian or Ubuntu: apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
-    )
-    try:
-        done = subprocess.run(
-            [python, "-c", _PROBE], capture_output=True, text=True, timeout=_PROBE_PATIENCE, check=False
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return remedy.format(f"the test picture failed: {error}")
-    if done.returncode == 0:
-        return None
-    told = [line for line in done.stderr.strip().splitlines() if line.strip()]
-    why = told[-1].strip() if told else "no message"
-    return remedy.format(f"the test picture ended with code {done.returncode}: {why[:200]}")
-
-
-def _prefer_off_screen() -> None:
-    # VTK asks for an X display first and complains where there is none.
-    if sys.platform.startswith("linux"):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
 def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:
@@ -260,7 +198,7 @@ class Scene:
     def _add_blocks(self, block_fill: np.ndarray) -> None:
         corners = self.assembly.vertices
         fill = self._layer("fill", None)
-        fill.replace(corners, faces=_triangles(self.assembly))
+        fill.replace(corners, faces=triangles(self.assembly))
         fill.colour(block_fill[self._block])
         offsets, counts = self.assembly.offsets, np.diff(self.assembly.offsets)
         closed = np.insert(np.arange(offsets[-1]), offsets[1:], offsets[:-1])
@@ -276,8 +214,8 @@ class Scene:
     def _add_hatch(self) -> None:
         supports = np.flatnonzero(~self.assembly.free)
         spacing = self.size[1] / 60.0 * self.pixel
-        grown = Frame(self.frame.low - self.frame.size, self.frame.high + self.frame.size)
-        points, blocks = _hatch_lines(self.assembly, supports, grown, spacing)
+        low, high = self.frame.low - self.frame.size, self.frame.high + self.frame.size
+        points, blocks = hatch_lines(self.assembly, supports, low, high, spacing)
         self._hatch = points, blocks
         if len(points):
             layer = self._layer("hatch", palette.HATCH)
@@ -339,78 +277,3 @@ class _Layer:
 
     def _lifted(self, points: np.ndarray) -> np.ndarray:
         return np.column_stack([points, np.full(len(points), self._depth)])
-
-
-def _triangles(assembly: solver.Assembly) -> np.ndarray:
-    """(n_triangles, 4) array of VTK cells over the vertices of the assembly; bent outlines included.
-
-    VTK fills a non-convex polygon as if it were convex, so the cutting is done here.
-    """
-    counts, offsets = np.diff(assembly.offsets), assembly.offsets
-    bent = np.zeros(assembly.n_blocks, dtype=bool)
-    bent[assembly.block_of_vertex[~assembly.convex_vertex]] = True
-    fans = []
-    for count in np.unique(counts[~bent]):
-        first = offsets[:-1][~bent & (counts == count)]
-        for k in range(1, count - 1):
-            fans.append(np.column_stack([np.full(len(first), 3), first, first + k, first + k + 1]))
-    for block in np.flatnonzero(bent):
-        fans.append(_ears(assembly.outline(block), int(offsets[block])))
-    return np.concatenate(fans)
-
-
-def _ears(outline: np.ndarray, first: int) -> np.ndarray:
-    """VTK cells of the triangles of one outline, by cutting ears."""
-    left = list(range(len(outline)))
-    cells = []
-    while len(left) > 3:
-        n = len(left)
-        areas, blocked = np.zeros(n), np.zeros(n, dtype=bool)
-        for k in range(n):
-            a, b, c = (outline[left[(k + j) % n]] for j in (-1, 0, 1))
-            areas[k] = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-            others = outline[[left[(k + j) % n] for j in range(2, n - 1)]]
-            blocked[k] = _any_inside(others, a, b, c)
-        # A point where three corners are in line makes an ear without area: cut it, it draws nothing.
-        ears = np.flatnonzero((areas >= -1e-12 * np.abs(areas).max()) & ~blocked)
-        k = int(ears[0]) if len(ears) else int(np.argmax(areas))
-        cells.append([3, *(first + left[(k + j) % n] for j in (-1, 0, 1))])
-        left.pop(k)
-    cells.append([3, *(first + i for i in left)])
-    return np.array(cells)
-
-
-def _any_inside(points: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
-    inside = np.ones(len(points), dtype=bool)
-    for start, stop in ((a, b), (b, c), (c, a)):
-        along, rest = stop - start, points - start
-        inside &= along[0] * rest[:, 1] - along[1] * rest[:, 0] >= 0.0
-    at_corner = [(points == corner).all(axis=1) for corner in (a, b, c)]
-    return bool((inside & ~np.logical_or.reduce(at_corner)).any())
-
-
-def _hatch_lines(
-    assembly: solver.Assembly, supports: np.ndarray, window: Frame, spacing: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the hatch lines inside the supports, (2 n, 2) [m] in the drawing, and the block of each end."""
-    box = shapely.box(*window.low, *window.high)
-    points, blocks = [np.zeros((0, 2))], [np.zeros(0, dtype=int)]
-    for block in supports:
-        area = shapely.intersection(shapely.Polygon(assembly.outline(block)), box)
-        if area.is_empty:
-            continue
-        x0, y0, x1, y1 = area.bounds
-        # Lines x - y = constant at multiples of the spacing, the same over all supports.
-        step = spacing * np.sqrt(2.0)
-        levels = np.arange(np.ceil((x0 - y1) / step), np.floor((x1 - y0) / step) + 1) * step
-        if len(levels) == 0:
-            continue
-        reach = np.array([[y0, y1]])
-        ends = np.stack([levels[:, None] + reach, np.broadcast_to(reach, (len(levels), 2))], axis=2)
-        parts = shapely.get_parts(shapely.intersection(shapely.linestrings(ends), area))
-        parts = parts[shapely.get_type_id(parts) == 1]
-        parts = parts[shapely.get_num_points(parts) == 2]
-        coordinates = shapely.get_coordinates(parts)
-        points.append(coordinates)
-        blocks.append(np.full(len(coordinates), block))
-    return np.concatenate(points), np.concatenate(blocks)
