@@ -15,6 +15,8 @@ import numpy as np
 import solver
 
 from . import formats
+from .outlines import without_collinear
+from .repair import duplicates, mended
 from .units import chosen_unit, metres_per
 
 __all__ = [
@@ -30,6 +32,10 @@ __all__ = [
 
 #: Coordinates beyond this [m] belong to no building on Earth; double precision leaves less than 0.1 mm there.
 LARGEST_COORDINATE = 1e8
+
+
+#: Corners of one block: more make checks quadratic in them expensive and are never meant.
+MOST_CORNERS = 2000
 
 
 class MissingFile(FileNotFoundError, ValueError):
@@ -153,7 +159,12 @@ def read_drawing(path: str | Path, *, unit: str | None = None, chord_tolerance: 
     sizes = np.sqrt(np.abs(ring_areas(drawing.outlines)))
     chosen, note = chosen_unit(unit, drawing.unit, sizes)
     factor = metres_per(chosen)
-    outlines = tuple(ring * factor for ring in drawing.outlines)
+    outlines = tuple(without_collinear(ring * factor) for ring in drawing.outlines)
+    for name, ring in zip(drawing.names, outlines, strict=True):
+        if len(ring) > MOST_CORNERS:
+            raise ValueError(
+                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
+            )
     largest = max(float(np.abs(ring).max()) for ring in outlines)
     if largest > LARGEST_COORDINATE:
         raise ValueError(
@@ -237,15 +248,39 @@ def assemble(
     ValueError
         For a role that is none, or whose name matches nothing.
     """
+    n_drawn = drawing.n_blocks
+    twins = duplicates(drawing.outlines)
+    if twins:
+        later = {copy for _, copy in twins}
+        listed = ", ".join(f"'{drawing.names[copy]}' = '{drawing.names[first]}'" for first, copy in twins[:20])
+        more = f" and {len(twins) - 20} more" if len(twins) > 20 else ""
+        warnings.warn(
+            f"{len(twins)} of {n_drawn} blocks are drawn twice and were dropped: {listed}{more}", stacklevel=2
+        )
+        drawing = drawing.chosen([i for i in range(n_drawn) if i not in later])
+        n_drawn = drawing.n_blocks
     drawing = _with_supports(drawing, supports)
-    given = _matched_roles(drawing, roles or {})
-    return solver.Assembly.from_outlines(
+    assembly = solver.Assembly.from_outlines(
         drawing.outlines,
         names=drawing.names,
-        roles=given,
+        roles=_matched_roles(drawing, roles or {}),
         density=_filled(drawing.density, density, drawing.n_blocks),
         thickness=_filled(drawing.thickness, thickness, drawing.n_blocks),
         materials=drawing.materials,
+    )
+    outlines, _ = mended(
+        assembly,
+        joint_thickness=joint_thickness,
+        overlap_tolerance=overlap_tolerance,
+        anchored=np.arange(drawing.n_blocks) >= n_drawn,
+    )
+    return solver.Assembly.from_outlines(
+        outlines,
+        names=assembly.names,
+        roles=list(map(str, assembly.roles)),
+        density=assembly.density,
+        thickness=assembly.thickness,
+        materials=assembly.materials,
     )
 
 
@@ -355,9 +390,3 @@ def _unmatched(key: str, drawing: Drawing) -> str:
     more = f" and {len(labels) - 12} more" if len(labels) > 12 else ""
     where = drawing.source or "the drawing"
     return f"roles: '{key}' matches no block, group or layer of {where}; it has {listed}{more}; correct the name"
-
-
-def warn_of(notes: Sequence[str]) -> None:
-    """Issues each note as a warning at the caller's line."""
-    for note in notes:
-        warnings.warn(note, UserWarning, stacklevel=3)

@@ -183,10 +183,15 @@ def without_collinear(ring: np.ndarray, tolerance: float = COLLINEAR) -> np.ndar
     closed = np.vstack([ring, ring[:1]])
     kept, k, n = [0], 0, len(ring)
     while k < n:
-        # The farthest point that one straight edge reaches without leaving a dropped point aside.
-        end = k + 1
-        while end < n and _fits(closed[k], closed[k + 1 : end + 1], closed[end + 1], limit):
-            end += 1
+        # The farthest point that one straight edge reaches without leaving a dropped point aside, by doubling
+        # and halving: a ring of a million points on one line must not take a million squared steps.
+        end, step = k + 1, 1
+        while end + step <= n and _fits(closed[k], closed[k + 1 : end + step], closed[end + step], limit):
+            end, step = end + step, 2 * step
+        while step > 1:
+            step //= 2
+            if end + step <= n and _fits(closed[k], closed[k + 1 : end + step], closed[end + step], limit):
+                end += step
         kept.append(end)
         k = end
     corners = np.sort((np.array(kept[:-1]) + first) % n)

@@ -42,9 +42,58 @@ class Format:
     writes: bool = False
 
 
+_CAD = Format("gmsh_cad")
+_PYVISTA = Format("pyvista_files")
+_SOLID = Format("solids", writes=True)
+_MESHIO = Format("meshio_files")
+
+#: By suffix. Every other suffix that meshio knows goes to meshio.
 FORMATS = {
     ".msh": Format("gmsh_mesh", writes=True),
     ".json": Format("layout_json", writes=True),
+    ".dxf": Format("dxf", writes=True),
+    ".svg": Format("svg", writes=True),
+    ".vtu": Format("pyvista_files", writes=True),
+    ".vtp": Format("pyvista_files", writes=True),
+    ".vtk": Format("pyvista_files", writes=True),
+    ".vtm": _PYVISTA,
+    ".pvd": _PYVISTA,
+    ".stl": _SOLID,
+    ".obj": _SOLID,
+    ".ply": _SOLID,
+    ".off": _SOLID,
+    ".glb": _SOLID,
+    ".geo": _CAD,
+    ".geo_unrolled": _CAD,
+    ".step": _CAD,
+    ".stp": _CAD,
+    ".brep": _CAD,
+    ".inp": _MESHIO,
+    ".bdf": _MESHIO,
+    ".fem": _MESHIO,
+    ".nas": _MESHIO,
+    ".med": _MESHIO,
+    ".mesh": _MESHIO,
+    ".meshb": _MESHIO,
+    ".su2": _MESHIO,
+    ".ugrid": _MESHIO,
+    ".unv": _MESHIO,
+    ".vol": _MESHIO,
+    ".xdmf": _MESHIO,
+    ".xmf": _MESHIO,
+    ".mdpa": _MESHIO,
+    ".avs": _MESHIO,
+    ".cgns": _MESHIO,
+    ".exo": _MESHIO,
+    ".f3grid": _MESHIO,
+    ".tec": _MESHIO,
+    ".dat": _MESHIO,
+    ".wkt": _MESHIO,
+    ".h5m": _MESHIO,
+    ".xml": _MESHIO,
+    ".post": _MESHIO,
+    ".dato": _MESHIO,
+    ".hmf": _MESHIO,
 }
 
 

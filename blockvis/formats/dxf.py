@@ -1,0 +1,249 @@
+"""Drawings, .dxf R12 to R2018: closed outlines, hatches, inserted blocks, loose lines; the layer is the group."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blockvis.drawing import Drawing
+from blockvis.formats import Reading
+from blockvis.formats.layout_json import rows_of, with_rows
+from blockvis.formats.loose_lines import Line, faces_of_lines
+from blockvis.units import metres_per
+
+__all__ = ["read", "write"]
+
+#: Units by the header variable $INSUNITS.
+UNIT_CODES = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 14: "dm"}
+
+#: Application name under which a block's name, role and material stand in the extended data of its outline.
+APPLICATION = "BLOCKVIS"
+
+#: Nesting of inserted blocks beyond this is a loop.
+DEEPEST_INSERT = 16
+
+#: A polyline that misses its own start by less than this fraction of its size is closed.
+CLOSES = 1e-6
+
+_CURVES = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE", "ARC", "LINE", "SOLID", "TRACE", "3DFACE"}
+
+
+@dataclass
+class _Found:
+    """What the entities of a drawing gave so far."""
+
+    rings: list[np.ndarray] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    layers: list[str] = field(default_factory=list)
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    loose: list[Line] = field(default_factory=list)
+    skipped: Counter[str] = field(default_factory=Counter)
+    hidden: Counter[str] = field(default_factory=Counter)
+
+    def add(self, ring: np.ndarray, entity: Any, handle: str) -> None:
+        self.rings.append(ring)
+        self.layers.append(str(entity.dxf.layer))
+        self.names.append(f"block {handle}")
+        self.rows.append(_own_data(entity))
+
+
+def read(path: Path, reading: Reading) -> Drawing:
+    """Reads a .dxf drawing; the header's $INSUNITS names its unit."""
+    import ezdxf
+    from ezdxf import recover
+
+    try:
+        document, _ = recover.readfile(path)
+    except (OSError, ezdxf.DXFError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        raise ValueError(
+            f"'{path}' is not a readable DXF file ({error}); save it again as DXF R2000 or later"
+        ) from None
+    stated = UNIT_CODES.get(int(document.header.get("$INSUNITS", 0) or 0), "")
+    in_metres = metres_per(reading.unit or stated or "m")
+    tolerance = None if reading.chord_tolerance is None else reading.chord_tolerance / in_metres
+    shut = {layer.dxf.name for layer in document.layers if layer.is_off() or layer.is_frozen()}
+    found = _Found()
+    # A small file can ask for any number of copies; more entities than it has bytes are a trap.
+    budget = max(path.stat().st_size, 1000)
+    for entity, handle in _flat(document.modelspace(), 0, path):
+        budget -= 1
+        if budget < 0:
+            raise ValueError(
+                f"'{path}' inserts more entities than it has bytes ({path.stat().st_size}); explode its block references"
+            )
+        if entity.dxf.layer in shut:
+            found.hidden[entity.dxf.layer] += 1
+        elif entity.dxftype() in ("HATCH", "MPOLYGON"):
+            _add_hatch(entity, handle, found, tolerance, path)
+        elif entity.dxftype() in _CURVES:
+            _add_curve(entity, handle, found, tolerance)
+        else:
+            found.skipped[entity.dxftype()] += 1
+    notes = _with_loose(found, path)
+    if not found.rings:
+        seen = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items()) or "nothing"
+        raise ValueError(
+            f"'{path}' has no closed outline in its model space (found: {seen}); draw each block as a closed polyline"
+        )
+    if found.skipped:
+        notes.append("skipped: " + ", ".join(f"{n} {kind}" for kind, n in found.skipped.items()))
+    if found.hidden:
+        notes.append("skipped on layers that are off or frozen: " + _listed(found.hidden))
+    if any(abs(ring[:, 2]).max() > 0 for ring in found.rings):
+        notes.append("elevations were ignored: the drawing was read as seen from above")
+    drawing = Drawing(
+        outlines=tuple(ring[:, :2] for ring in found.rings),
+        names=tuple(found.names),
+        unit=stated,
+        notes=tuple(notes),
+    )
+    rows = [
+        {"group": layer, **({"material": layer} if layer != "0" else {}), "name": name, **row}
+        for layer, name, row in zip(found.layers, found.names, found.rows, strict=True)
+    ]
+    return with_rows(drawing, rows)
+
+
+def _flat(entities: Any, depth: int, path: Path, parent: str = "") -> Iterator[tuple[Any, str]]:
+    """All entities, inserted blocks resolved, with a handle to name each by."""
+    if depth > DEEPEST_INSERT:
+        raise ValueError(f"'{path}' inserts blocks into each other more than {DEEPEST_INSERT} deep; explode them")
+    for number, entity in enumerate(entities):
+        handle = f"{parent}.{number}" if parent else str(entity.dxf.handle or number)
+        if entity.dxftype() != "INSERT":
+            yield entity, handle
+            continue
+        copies = entity.multi_insert() if entity.mcount > 1 else [entity]
+        for k, copy in enumerate(copies):
+            inner = copy.virtual_entities()
+            yield from _flat(inner, depth + 1, path, f"{handle}.{k}" if entity.mcount > 1 else handle)
+
+
+def _points(curve: Any, tolerance: float | None) -> np.ndarray:
+    """(n, 3) array: a path with its arcs turned to chords within the tolerance, ends included."""
+    box = np.array([(p.x, p.y, p.z) for p in curve.control_vertices()])
+    size = float(np.ptp(box, axis=0).max()) if len(box) and np.isfinite(box).all() else 0.0
+    if not curve.has_curves or size == 0.0:
+        return box
+    distance = max(1e-3 * size if tolerance is None else tolerance, 1e-6 * size)
+    return np.array([(p.x, p.y, p.z) for p in curve.flattening(distance, segments=2)])
+
+
+def _add_curve(entity: Any, handle: str, found: _Found, tolerance: float | None) -> None:
+    from ezdxf.path import make_path
+
+    kind = entity.dxftype()
+    if kind in ("SOLID", "TRACE", "3DFACE"):
+        ring = np.array([(p.x, p.y, p.z) for p in entity.wcs_vertices()])
+        found.add(ring, entity, handle)
+        return
+    try:
+        curve = make_path(entity)
+    except TypeError:  # a polyface or mesh POLYLINE
+        found.skipped[kind] += 1
+        return
+    points = _points(curve, tolerance)
+    if len(points) < 2:
+        found.skipped[f"{kind} without length"] += 1
+        return
+    if not np.isfinite(points).all():
+        bad = points[~np.isfinite(points).all(axis=1)][0].tolist()
+        raise ValueError(
+            f"{kind} {handle} on layer '{entity.dxf.layer}' has a point at {bad}; coordinates must be finite numbers"
+        )
+    gap = float(np.abs(points[0] - points[-1]).max())
+    closes = bool(getattr(entity, "is_closed", False) or getattr(entity, "closed", False))
+    if kind not in ("LINE", "ARC") and len(points) > 3 and (closes or gap <= CLOSES * float(np.ptp(points, 0).max())):
+        ring = points[:-1] if gap <= CLOSES * float(np.ptp(points, axis=0).max()) else points
+        found.add(ring, entity, handle)
+        return
+    found.loose.append(Line(points, str(entity.dxf.layer), handle, must_close=kind not in ("LINE", "ARC")))
+
+
+def _add_hatch(entity: Any, handle: str, found: _Found, tolerance: float | None, path: Path) -> None:
+    from ezdxf.path import from_hatch
+
+    rings = [_points(curve, tolerance) for curve in from_hatch(entity)]
+    rings = [ring[:-1] if (ring[0] == ring[-1]).all() else ring for ring in rings if len(ring) > 2]
+    if not rings:
+        found.skipped["HATCH without boundary"] += 1
+        return
+    for k, ring in enumerate(rings):
+        for other in rings[:k]:
+            inner, outer = (ring, other) if np.ptp(ring, 0).max() < np.ptp(other, 0).max() else (other, ring)
+            if (inner.min(0) >= outer.min(0)).all() and (inner.max(0) <= outer.max(0)).all():
+                x, y = inner[:, :2].mean(axis=0)
+                raise ValueError(
+                    f"'{path}': HATCH {handle} on layer '{entity.dxf.layer}' has a hole around ({x:.6g}, {y:.6g}); "
+                    "cut the block in two, or fill the hole with a block"
+                )
+    outlined = [ring for ring in rings if not _drawn_already(ring, found)]
+    for k, ring in enumerate(outlined):
+        found.add(ring, entity, handle if len(rings) == 1 else f"{handle}.{k}")
+
+
+def _drawn_already(ring: np.ndarray, found: _Found) -> bool:
+    """Whether a hatch only fills the outline that stands just before it, as drawing programs do."""
+    if not found.rings or len(found.rings[-1]) != len(ring):
+        return False
+    return bool(np.abs(found.rings[-1].mean(0) - ring.mean(0)).max() <= CLOSES * float(np.ptp(ring, axis=0).max()))
+
+
+def _with_loose(found: _Found, path: Path) -> list[str]:
+    if not found.loose:
+        return []
+    faces, layers, dangling = faces_of_lines(found.loose, path)
+    for k, (ring, layer) in enumerate(zip(faces, layers, strict=True)):
+        found.rings.append(np.column_stack([ring, np.zeros(len(ring))]))
+        found.layers.append(layer)
+        found.names.append(f"face {k}")
+        found.rows.append({})
+    notes = []
+    if faces:
+        notes.append(
+            f"{len(faces)} blocks are faces between {len(found.loose)} loose lines; an opening enclosed by lines counts "
+            "as a block too: erase it or draw closed outlines"
+        )
+    if dangling:
+        notes.append(f"{dangling} loose lines enclose nothing and were dropped")
+    return notes
+
+
+def _listed(counter: Counter[str]) -> str:
+    return ", ".join(f"{n} on '{layer}'" for layer, n in counter.items())
+
+
+def _own_data(entity: Any) -> dict[str, Any]:
+    if not entity.has_xdata(APPLICATION):
+        return {}
+    try:
+        row = json.loads("".join(str(tag.value) for tag in entity.get_xdata(APPLICATION) if tag.code == 1000))
+    except ValueError:
+        return {}
+    return row if isinstance(row, dict) else {}
+
+
+def write(drawing: Drawing, path: Path) -> None:
+    """Writes .dxf R2000 in m: one closed LWPOLYLINE per block on the layer of its group, role or material."""
+    import ezdxf
+
+    document = ezdxf.new("R2000")
+    document.header["$INSUNITS"] = 6
+    document.appids.add(APPLICATION)
+    space = document.modelspace()
+    for i, row in enumerate(rows_of(drawing)):
+        role = drawing.roles[i] if drawing.roles[i] in ("fixed", "moving") else ""
+        layer = drawing.groups[i] or role or drawing.materials[i] or "0"
+        layer = "".join("_" if c in '<>/\\":;?*|=`' or ord(c) < 32 else c for c in layer)[:255]
+        if layer not in document.layers:
+            document.layers.add(layer)
+        outline = space.add_lwpolyline(drawing.outlines[i].tolist(), close=True, dxfattribs={"layer": layer})
+        text = json.dumps(row)
+        outline.set_xdata(APPLICATION, [(1000, text[k : k + 200]) for k in range(0, len(text), 200)])
+    document.saveas(path)
