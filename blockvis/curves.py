@@ -10,13 +10,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from PIL import Image, ImageDraw
 
 import solver
 
 from . import palette
 
-__all__ = ["CurvePanel", "Event", "draw_curve", "events_of"]
+__all__ = ["CurvePanel", "Event", "draw_curve", "events_of", "path_settlements", "settlement_text", "settlement_unit"]
 
 #: Suffixes of the files that draw_curve writes.
 CURVE_SUFFIXES = (".png", ".svg", ".pdf")
@@ -103,6 +104,25 @@ def path_settlements(path: tuple[solver.Increment, ...]) -> np.ndarray:
     return total
 
 
+def settlement_text(settlement: float, response: solver.Response) -> str:
+    """A settlement with its unit, in mm where the whole response stays below a decimetre.
+
+    Parameters
+    ----------
+    settlement : float [m or rad]
+    response : solver.Response
+    """
+    factor, unit = settlement_unit(response)
+    return f"{settlement * factor:.2f} {unit}" if unit == "mm" else f"{settlement * factor:.4f} {unit}"
+
+
+def settlement_unit(response: solver.Response) -> tuple[float, str]:
+    """Factor and unit in which settlements of a response read well."""
+    unit = response.settlements[0].unit if response.settlements else "m"
+    largest = max((abs(i.settlement) for i in response.increments), default=0.0)
+    return (1e3, "mm") if unit == "m" and 0.0 < largest < 0.1 else (1.0, unit)
+
+
 class CurvePanel:
     """The curve beside the blocks, drawn once, with a dot that moves.
 
@@ -123,10 +143,15 @@ class CurvePanel:
         _draw(axes, response, events=False, text=text * 0.62)
         canvas.draw()
         self._picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
+        per_length, _ = settlement_unit(response)
         total = path_settlements(response.path)
         factor, _ = _force_unit(response)
         reactions = np.array([i.reaction for i in response.path]) / factor
-        places = axes.transData.transform(np.column_stack([total, reactions])) if len(total) else np.zeros((0, 2))
+        places = (
+            axes.transData.transform(np.column_stack([total * per_length, reactions]))
+            if len(total)
+            else np.zeros((0, 2))
+        )
         self._total = total
         self._places = np.column_stack([places[:, 0], size[1] - places[:, 1]])
         self._offsets = {
@@ -151,14 +176,15 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
     path = response.path
     factor, unit = _force_unit(response)
     moment = any(s.unit == "rad" for s in response.settlements)
-    total = path_settlements(path)
+    per_length, length_unit = settlement_unit(response)
+    total = path_settlements(path) * per_length
     reactions = np.array([i.reaction for i in path]) / factor
     blue = palette.hexadecimal(palette.FORCE)
     axes.plot(total, reactions, "-", color=blue, linewidth=2.0, zorder=3)
     if events:
         axes.plot(total, reactions, "o", color=blue, markersize=3.0, zorder=3)
-    units = sorted({s.unit for s in response.settlements})
-    axes.set_xlabel(f"settlement [{' / '.join(units)}]", fontsize=text)
+    axes.set_xlabel(f"settlement [{length_unit}]", fontsize=text)
+    axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5))
     axes.set_ylabel(f"reaction [{unit}]", fontsize=text)
     axes.tick_params(labelsize=0.9 * text)
     axes.grid(color="#e4e4e4", linewidth=0.8)
@@ -186,15 +212,18 @@ def _mark_collapse(
     collapse = response.collapse
     assert collapse is not None
     red = palette.hexadecimal(palette.WARNING)
-    start = total[-1] - collapse.bracket[0]
-    axes.axvspan(start + collapse.bracket[0], start + collapse.bracket[1], color=red, alpha=0.25, linewidth=0)
-    axes.axvline(start + collapse.displacement, color=red, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
+    # Phases before the last shift the curve.
+    per_length, _ = settlement_unit(response)
+    low, middle, high = per_length * np.array([collapse.bracket[0], collapse.displacement, collapse.bracket[1]])
+    start = total[-1] - per_length * response.path[-1].settlement
+    axes.axvspan(start + low, start + high, color=red, alpha=0.25, linewidth=0)
+    axes.axvline(start + middle, color=red, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
     axes.plot(total[-1:], reactions[-1:], "X", color=red, markersize=9 if words else 6, zorder=4)
     if words:
-        low, high = collapse.bracket
         axes.annotate(
-            f"collapse at {collapse.displacement:.5g} {collapse.unit}\n[{low:.6g}, {high:.6g}]",
-            (start + collapse.displacement, 0.04),
+            f"collapse at {collapse.displacement:.5g} {collapse.unit}\n"
+            f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]",
+            (start + middle, 0.04),
             xycoords=("data", "axes fraction"),
             xytext=(-6, 0),
             textcoords="offset points",
@@ -210,7 +239,8 @@ def _mark_events(axes: Axes, response: solver.Response, factor: float, text: flo
     if not found:
         return
     ink = palette.hexadecimal(palette.INK)
-    x, y = [e.settlement for e in found], [e.reaction / factor for e in found]
+    per_length, _ = settlement_unit(response)
+    x, y = [e.settlement * per_length for e in found], [e.reaction / factor for e in found]
     axes.plot(x, y, "o", color="white", markeredgecolor=ink, markersize=7, zorder=4, label="hinges or sliding change")
     if len(found) <= MOST_EVENTS:
         for number in range(1, len(found) + 1):

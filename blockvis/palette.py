@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["block_colours", "displacement_colours", "hexadecimal"]
+__all__ = ["block_colours", "displacement_colours", "hexadecimal", "part_colours"]
 
 PAPER = (255, 255, 255)
 INK = (38, 38, 38)
@@ -23,6 +23,14 @@ WARNING = (190, 30, 30)
 #: Fills by material, in the order of their sorted names: sandstone, brick, slate, tuff, moss, ash.
 STONES = np.array(
     [(228, 217, 194), (214, 176, 152), (190, 198, 204), (222, 206, 154), (190, 203, 176), (212, 200, 208)], dtype=float
+)
+
+#: Words in the name of a material that choose its stone; languages of the drawings we have met.
+HINTS = {1: ("brick", "mattone", "backstein", "brique", "ladrillo"), 2: ("slate", "granite"), 3: ("tuff", "tufo")}
+
+#: Tints of the parts of a mechanism, so that neighbours differ: blue, green, violet, ochre, rose, teal.
+PARTS = np.array(
+    [(151, 190, 224), (172, 208, 160), (196, 178, 222), (236, 206, 136), (231, 178, 186), (150, 208, 204)], dtype=float
 )
 
 #: Blocks of one material differ in lightness by up to this fraction, as stones do; it also tells neighbours apart.
@@ -49,12 +57,28 @@ def block_colours(materials: tuple[str, ...], free: np.ndarray) -> np.ndarray:
     """
     # Only materials of free blocks take a stone: a support's own material shall not shift the others.
     kinds = sorted({m for m, is_free in zip(materials, free, strict=True) if is_free})
-    number = {kind: k % len(STONES) for k, kind in enumerate(kinds)}
+    hinted = {kind: k for kind in kinds for k, words in HINTS.items() if any(w in kind.lower() for w in words)}
+    rest = [k for k in range(len(STONES)) if k not in hinted.values()]
+    others = [kind for kind in kinds if kind not in hinted]
+    number = hinted | {kind: rest[k % len(rest)] for k, kind in enumerate(others)}
     colours = STONES[[number.get(m, 0) for m in materials]]
     # A fixed low-discrepancy sequence: the same picture every time, neighbours never alike.
     shade = 1.0 + SHADE * (2.0 * ((np.arange(len(materials)) * 0.6180339887) % 1.0) - 1.0)
     colours = np.where(free[:, None], colours * shade[:, None], SUPPORT)
     return np.clip(np.rint(colours), 0, 255).astype(np.uint8)
+
+
+def part_colours(fill: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """(n_blocks, 3) uint8 array: fills with the parts of a mechanism tinted.
+
+    Parameters
+    ----------
+    fill : (n_blocks, 3) uint8 array
+    parts : (n_blocks,) int array
+        -1 where a block stands still.
+    """
+    tint = PARTS[parts % len(PARTS)]
+    return np.where(parts[:, None] >= 0, np.rint(0.3 * fill + 0.7 * tint), fill).astype(np.uint8)
 
 
 def displacement_colours(fraction: np.ndarray) -> np.ndarray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +11,10 @@ from PIL import Image
 import solver
 
 from .film import write_film
+from .mechanism import rigid_parts, swung, with_motion
 from .opengl import RenderingUnavailable, rendering_available
 from .scene import framed
-from .studio import Look, Studio
+from .studio import MOST_PARTS, Look, Studio
 
 __all__ = ["Look", "RenderingUnavailable", "animate", "draw_mechanism", "draw_still", "rendering_available"]
 
@@ -76,7 +76,8 @@ def draw_mechanism(
 ) -> Path:
     """Draws the last equilibrium, its hinges and sliding joints, and the motion that follows.
 
-    Blocks are filled where they stand; outlines and arrows show, out of scale, where the mechanism takes them.
+    Blocks are filled where they stand, those that move together alike; outlines and arrows show, out of scale,
+    where the mechanism takes them.
 
     Parameters
     ----------
@@ -92,21 +93,19 @@ def draw_mechanism(
     _check_response(response)
     last = response.path[-1] if response.path else response.increments[0]
     motion = last.velocity if response.collapse is None else response.collapse.mechanism
+    last = with_motion(last, motion)
     assembly = response.assembly
     block, free = assembly.block_of_vertex, assembly.free
     arms = solver.moved_vertices(assembly, last.pose) - last.pose.positions[block]
-    speeds = np.hypot(
-        motion[block, 0] - motion[block, 2] * arms[:, 1], motion[block, 1] + motion[block, 2] * arms[:, 0]
-    )
-    fastest = float(speeds[free[block]].max(initial=0.0))
+    velocity = motion[block, :2] + motion[block, 2:] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+    fastest = float(np.hypot(*velocity.T)[free[block]].max(initial=0.0))
     reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
-    shift = motion * (reach / fastest if fastest > 0 else 0.0)
-    displaced = solver.Pose(last.pose.positions + shift[:, :2], last.pose.rotations + shift[:, 2])
-    last = _moving_on(last, motion)
+    displaced = swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
+    parts = rigid_parts(assembly, last)
     with Studio(response, Look(forces="none"), size, (last,), extra=(displaced,)) as studio:
         if fastest > 0:
-            studio.show_motion(last.pose, displaced)
-        return _save(studio.picture(last, note=_mechanism_note(response)), path)
+            studio.show_motion(last.pose, displaced, parts)
+        return _save(studio.picture(last, note=_mechanism_note(response, parts)), path)
 
 
 def animate(
@@ -151,26 +150,16 @@ def animate(
         return write_film(studio.frames(fps, seconds), path, size=size, fps=fps)
 
 
-def _moving_on(increment: solver.Increment, motion: np.ndarray) -> solver.Increment:
-    """The increment with its hinges and sliding joints those of another motion, (n_blocks, 3)."""
-    contacts, pose = increment.contacts, increment.pose
-
-    def velocity(block: np.ndarray) -> np.ndarray:
-        arm = contacts.points - pose.positions[block]
-        return motion[block, :2] + motion[block, 2:] * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
-
-    relative = velocity(contacts.block_a) - velocity(contacts.block_b)
-    return replace(increment, velocity=motion, displacements=np.einsum("kij,kj->ki", contacts.frames, relative))
-
-
-def _mechanism_note(response: solver.Response) -> str:
+def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
+    n = int(parts.max(initial=-1)) + 1
+    bodies = f"{n} moving part{'s' if n != 1 else ''}{', darker where faster' if n > MOST_PARTS else ''}"
     if response.collapse is None:
         if response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM:
-            return "no equilibrium before any settlement"
-        return f"{response.stop}: the motion that would follow"
+            return f"no equilibrium before any settlement   ·   {bodies}"
+        return f"{response.stop}: the motion that would follow   ·   {bodies}"
     low, high = response.collapse.bracket
     unit = response.collapse.unit
-    return f"collapse mechanism   ·   equilibrium at {low:.5g} {unit}, none at {high:.5g} {unit}   ·   true scale"
+    return f"collapse mechanism   ·   equilibrium at {low:.5g} {unit}, none at {high:.5g} {unit}   ·   {bodies}"
 
 
 def _check_response(response: solver.Response) -> None:

@@ -15,9 +15,6 @@ from .opengl import RenderingUnavailable, rendering_available
 
 __all__ = ["Frame", "Scene", "framed", "magnified"]
 
-#: Drawn at this many times the size and averaged down: cheaper in software OpenGL than its own anti-aliasing.
-SUPERSAMPLING = 2
-
 #: Depths of the layers, back to front.
 DEPTHS = {
     name: k / 170.0
@@ -101,6 +98,8 @@ class Scene:
         Width and height of the pictures in pixels.
     block_fill : (n_blocks, 3) uint8 array
         Colours of the blocks.
+    supersampling : int
+        Drawn at this many times the size and averaged down: cheaper in software OpenGL than its own anti-aliasing.
 
     Raises
     ------
@@ -108,18 +107,25 @@ class Scene:
         Where there is no usable OpenGL.
     """
 
-    def __init__(self, assembly: solver.Assembly, frame: Frame, size: tuple[int, int], block_fill: np.ndarray) -> None:
+    def __init__(
+        self,
+        assembly: solver.Assembly,
+        frame: Frame,
+        size: tuple[int, int],
+        block_fill: np.ndarray,
+        supersampling: int = 2,
+    ) -> None:
         missing = rendering_available()
         if missing:
             raise RenderingUnavailable(missing)
         import pyvista as pv
 
-        self.assembly, self.size = assembly, size
+        self.assembly, self.size, self._fine = assembly, size, supersampling
         self.frame = frame.fitted(*size)
         #: Size of a pixel in the world [m].
         self.pixel = float(self.frame.size[0]) / size[0]
         self._pv = pv
-        window = [SUPERSAMPLING * size[0], SUPERSAMPLING * size[1]]
+        window = [self._fine * size[0], self._fine * size[1]]
         self._plotter = pv.Plotter(off_screen=True, window_size=window, lighting="none")
         self._plotter.ren_win.SetMultiSamples(0)
         self._plotter.set_background([c / 255.0 for c in palette.PAPER])
@@ -175,7 +181,7 @@ class Scene:
         n, k = points.shape[:2] if points.size else (0, 2)
         cells = np.column_stack([np.full(n, k), np.arange(n * k).reshape(n, k)]) if n else None
         target = self._layer(layer, colour)
-        target.width(width * SUPERSAMPLING)
+        target.width(width * self._fine)
         target.replace(points.reshape(-1, 2), lines=cells)
 
     def discs(self, layer: str, centres: np.ndarray, radius: float, colour: tuple[int, int, int]) -> None:
@@ -188,7 +194,7 @@ class Scene:
         """The picture as it stands."""
         self._plotter.render()
         pixels = self._plotter.screenshot(return_img=True)
-        return Image.fromarray(np.ascontiguousarray(pixels[..., :3])).reduce(SUPERSAMPLING)
+        return Image.fromarray(np.ascontiguousarray(pixels[..., :3])).reduce(self._fine)
 
     def at_pixel(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array: pixel (column, row) of points (n, 2) [m]."""
@@ -204,7 +210,7 @@ class Scene:
         closed = np.insert(np.arange(offsets[-1]), offsets[1:], offsets[:-1])
         cells = np.insert(closed, np.concatenate([[0], np.cumsum(counts + 1)[:-1]]), counts + 1)
         outline = self._layer("outline", palette.OUTLINE)
-        outline.width(SUPERSAMPLING * self._outline_width())
+        outline.width(self._fine * self._outline_width())
         outline.replace(corners, lines=cells)
 
     def _outline_width(self) -> float:
@@ -219,7 +225,7 @@ class Scene:
         self._hatch = points, blocks
         if len(points):
             layer = self._layer("hatch", palette.HATCH)
-            layer.width(SUPERSAMPLING * max(0.7, self.size[1] / 1000.0))
+            layer.width(self._fine * max(0.7, self.size[1] / 1000.0))
             cells = np.column_stack([np.full(len(points) // 2, 2), np.arange(len(points)).reshape(-1, 2)])
             layer.replace(points, lines=cells)
 

@@ -70,7 +70,7 @@ class Sheet:
         self.header = round(3.6 * self.text)
         self.footer = round(2.9 * self.text)
         self.colour_bar = colour_bar
-        right = beside_width + (round(6.2 * self.text) if colour_bar else 0)
+        right = beside_width + (round(7.6 * self.text) if colour_bar else 0)
         #: Left, top, right, bottom of the blocks' picture, in pixels.
         self.inside = (0, self.header, width - right, height - self.footer)
         self.beside = (width - beside_width, self.header, width, height - self.footer)

@@ -12,13 +12,20 @@ from PIL import Image
 import solver
 
 from . import marks, palette
-from .curves import CurvePanel
+from .curves import CurvePanel, settlement_text
+from .mechanism import part_outlines
 from .scene import Scene, framed, magnified
 from .sheet import ColourBar, Key, Sheet, force_text
 
 __all__ = ["Look", "Studio"]
 
 PSEUDO_TIME = "FALLING · pseudo-time"
+
+#: Up to this many parts of a mechanism are tinted one by one.
+MOST_PARTS = 16
+
+#: Single pictures up to this size [pixels] are drawn at four times their size, so that flat slopes show no steps.
+FINE_UP_TO = 2600
 
 
 @dataclass(frozen=True)
@@ -73,7 +80,10 @@ class Studio:
         self.panel = CurvePanel(response, _size_of(self.sheet.beside), self.sheet.text) if curve else None
         frame = framed(assembly, [solver.Pose.initial(assembly), *poses, *extra])
         fill = palette.block_colours(assembly.materials, assembly.free)
-        self.scene = Scene(assembly, frame, self.sheet.inside_size, fill)
+        self.fill = fill
+        self.tints: np.ndarray | None = None
+        fine = max(size) <= FINE_UP_TO and len(increments) == 1
+        self.scene = Scene(assembly, frame, self.sheet.inside_size, fill, supersampling=4 if fine else 2)
         self.force_scale, self.force_shown = self._force_scale()
         self._show_start()
         self._marked: dict[int, tuple[bool, bool, bool]] = {}
@@ -125,20 +135,35 @@ class Studio:
         if picture is not None:
             yield from (picture for _ in range(round(1.2 * fps)))
 
-    def show_motion(self, pose: solver.Pose, displaced: solver.Pose) -> None:
-        """Outlines and arrows of where a mechanism takes the blocks."""
-        assembly, scene = self.assembly, self.scene
+    def show_motion(self, pose: solver.Pose, displaced: solver.Pose, parts: np.ndarray) -> None:
+        """Tints, outlines and arrows of where a mechanism takes the parts that move as one.
+
+        Where there are many parts the speed is tinted instead, and arrows stand on a grid.
+        """
+        assembly, scene, block = self.assembly, self.scene, self.assembly.block_of_vertex
         before, after = solver.moved_vertices(assembly, pose), solver.moved_vertices(assembly, displaced)
-        travel = np.hypot(*(after - before).T)
-        block = assembly.block_of_vertex
-        largest = np.maximum.reduceat(travel, assembly.offsets[:-1])
-        moves = assembly.free & (largest > 0.02 * largest.max())
-        edges = np.flatnonzero(moves[block])
-        scene.lines("motion outline", _edges(assembly, after)[edges], palette.SETTLEMENT, self.scene.size[1] / 700.0)
-        chosen = np.flatnonzero(moves)
-        if len(chosen) > 60:
-            chosen = chosen[np.linspace(0, len(chosen) - 1, 60).round().astype(int)]
-        self._arrows("motion", pose.positions[chosen], displaced.positions[chosen], 0.5)
+        n = int(parts.max(initial=-1)) + 1
+        if n <= MOST_PARTS:
+            tints = palette.part_colours(self.fill, parts)[block]
+            outlines = part_outlines(assembly, after, parts)
+            scene.lines("motion outline", outlines, palette.SETTLEMENT, self.scene.size[1] / 600.0)
+            chosen = [np.flatnonzero(parts == part) for part in range(n)]
+        else:
+            travel = np.hypot(*(after - before).T)
+            tints = palette.displacement_colours(0.75 * travel / travel[assembly.free[block]].max())
+            tints = np.where(assembly.free[block][:, None], tints, self.fill[block])
+            cell = np.floor(pose.positions / (0.07 * scene.frame.size.max())).astype(np.int64)
+            moves = np.flatnonzero(parts >= 0)
+            _, first = np.unique(cell[moves], axis=0, return_index=True)
+            chosen = [moves[[k]] for k in first]
+        scene.pose(pose, tints)
+        self.tints = tints
+        tails, tips = np.zeros((len(chosen), 2)), np.zeros((len(chosen), 2))
+        for k, blocks in enumerate(chosen):
+            weight = assembly.areas[blocks] / assembly.areas[blocks].sum()
+            tails[k] = weight @ pose.positions[blocks]
+            tips[k] = marks.carried(tails[[k]], blocks[:1], pose, displaced)[0]
+        self._arrows("motion", tails, tips, 0.6)
 
     def keys(self) -> list[Key]:
         """The legend: what is marked anywhere in the increments shown, so that it stands still."""
@@ -166,9 +191,11 @@ class Studio:
 
     def _vertex_colours(self, pose: solver.Pose) -> np.ndarray | None:
         if self.look.colour_by != "displacement":
-            return None
+            return self.tints
         moved = solver.moved_vertices(self.assembly, pose) - self.assembly.vertices
-        return palette.displacement_colours(np.hypot(*moved.T) / (self.largest or 1.0))
+        colours = palette.displacement_colours(np.hypot(*moved.T) / (self.largest or 1.0))
+        block = self.assembly.block_of_vertex
+        return np.where(self.assembly.free[block][:, None], colours, self.fill[block])
 
     def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if not self.look.joints:
@@ -215,14 +242,17 @@ class Studio:
         if self.look.forces == "none":
             return 0.0, 0.0
         path = [i for i in self.increments if i.status != solver.Status.FALLING]
-        largest = max(
-            (float(np.hypot(*_joint_forces(i, self.look.forces)[1].T).max(initial=0.0)) for i in path), default=0.0
-        )
+        sizes = [np.hypot(*_joint_forces(i, self.look.forces)[1].T) for i in path]
+        every = np.concatenate([np.zeros(0), *sizes])
+        largest = float(every.max(initial=0.0))
         if largest == 0.0:
             return 0.0, 0.0
-        longest = min(1.5 * self.assembly.block_size, 0.08 * float(self.scene.frame.size.max()))
-        longest = max(longest, 0.02 * float(self.scene.frame.size.max()))
-        return longest / largest, marks.rounded_length(largest)
+        # What most joints carry is a block long: one corner that carries everything shall not make the rest vanish.
+        usual = float(np.quantile(every[every > marks.SMALLEST_RESULTANT * largest], 0.9))
+        extent = float(self.scene.frame.size.max())
+        scale = max(1.5 * self.assembly.block_size, 0.015 * extent) / usual
+        scale = min(scale, 0.12 * extent / largest)
+        return scale, marks.rounded_length(min(largest, 0.12 * extent / scale))
 
     def _show_start(self) -> None:
         """The first position of the moving supports, behind everything."""
@@ -357,7 +387,7 @@ def _even_motion(
 def _caption(response: solver.Response, increment: solver.Increment, look: Look, s: float | None) -> tuple[str, str]:
     phase = response.settlements[min(increment.phase, len(response.settlements) - 1)]
     settlement = increment.settlement if s is None else s
-    title = f"Settlement {settlement:.4f} {phase.unit}"
+    title = f"Settlement {settlement_text(settlement, response)}"
     if increment.status == solver.Status.FALLING:
         detail = "no equilibrium, no dynamics: the mechanism followed step by step"
     else:
