@@ -145,7 +145,7 @@ class CurvePanel:
         self._picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
         per_length, _ = settlement_unit(response)
         total = path_settlements(response.path)
-        factor, _ = _force_unit(response)
+        factor, _ = force_unit(response)
         reactions = np.array([i.reaction for i in response.path]) / factor
         places = (
             axes.transData.transform(np.column_stack([total * per_length, reactions]))
@@ -174,7 +174,7 @@ class CurvePanel:
 
 def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 11.0) -> None:
     path = response.path
-    factor, unit = _force_unit(response)
+    factor, unit = force_unit(response)
     moment = any(s.unit == "rad" for s in response.settlements)
     per_length, length_unit = settlement_unit(response)
     total = path_settlements(path) * per_length
@@ -263,7 +263,7 @@ def _pairs(increment: solver.Increment, state: solver.ContactState) -> set[tuple
     return set(zip(np.minimum(a, b).tolist(), np.maximum(a, b).tolist(), strict=True))
 
 
-def _force_unit(response: solver.Response) -> tuple[float, str]:
+def force_unit(response: solver.Response) -> tuple[float, str]:
     largest = max((abs(i.reaction) for i in response.path), default=0.0)
     moment = "·m" if response.settlements and response.settlements[0].unit == "rad" else ""
     for factor, unit in ((1e6, "MN"), (1e3, "kN")):

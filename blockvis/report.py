@@ -1,0 +1,342 @@
+"""The page that plays: one self-contained HTML file with the mechanism, the curve, the numbers and the case."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import os
+import zlib
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+import solver
+
+from . import marks, palette
+from .curves import force_unit, path_settlements, settlement_text, settlement_unit
+from .scene import framed
+from .sheet import force_text
+
+__all__ = ["report_html", "write_report"]
+
+#: Increments beyond this many are thinned out evenly; the page stays below 2 MB for a thousand blocks.
+MOST_FRAMES = 160
+
+#: Lengths are stored in this fraction of the extent of the structure, rotations in this many radians.
+FINENESS, TURN_UNIT = 1e-6, 1e-6
+
+#: Forces are stored in this fraction of the largest.
+FORCE_FINENESS = 1e-3
+
+#: Seconds the path takes at even settlement, and each frame of the fall.
+PATH_SECONDS, FALL_SECONDS = 6.0, 0.06
+
+
+def write_report(
+    response: solver.Response, path: str | os.PathLike[str], case_text: str = "", *, title: str = ""
+) -> Path:
+    """Writes the page.
+
+    Parameters
+    ----------
+    response : solver.Response
+    path : path
+    case_text : str
+        The case file, shown as it is.
+    title : str
+        Of the page; what happened, where it is not given.
+
+    Returns
+    -------
+    pathlib.Path
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.partial")
+    partial.write_text(report_html(response, case_text, title=title), encoding="utf-8")
+    os.replace(partial, path)
+    return path
+
+
+def report_html(response: solver.Response, case_text: str = "", *, title: str = "") -> str:
+    """The page as text; parameters as those of :func:`write_report`.
+
+    Notes
+    -----
+    Everything that comes from a file (names, materials, the case) is escaped or goes through ``textContent``; the page
+    forbids itself any request.
+    """
+    if not response.increments:
+        raise ValueError(f"there is no increment to show: {response.message or response.stop}")
+    page = files("blockvis") / "page"
+    # No "<" may survive in the data: a name with "</script>" in it would end the script.
+    model = json.dumps(_model(response), ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
+    return Template((page / "player.html").read_text(encoding="utf-8")).substitute(
+        title=html.escape(title or _title(response)),
+        style=(page / "player.css").read_text(encoding="utf-8"),
+        script=(page / "player.js").read_text(encoding="utf-8"),
+        summary=_rows(_summary(response)),
+        certificate=_rows(_certificate(response)),
+        case=html.escape(case_text or "no case file: the analysis was called from Python"),
+        case_open=" open" if case_text else "",
+        model=model,
+    )
+
+
+def _model(response: solver.Response) -> dict[str, Any]:
+    assembly = response.assembly
+    shown = _thinned(response.increments)
+    frame = framed(assembly, [solver.Pose.initial(assembly), *(i.pose for i in shown)])
+    # Coordinates far from the origin (UTM) would waste the digits.
+    origin = np.round(frame.low, 3)
+    unit = FINENESS * float(frame.size.max())
+    packed = _packed_geometry(assembly, origin, unit)
+    packed |= _packed_motion(assembly, shown, unit)
+    force_arrays, force_unit_, force_length = _packed_forces(shown, origin, unit, assembly.block_size, frame.size.max())
+    shown_force = marks.rounded_length(force_unit_ / FORCE_FINENESS)
+    packed |= force_arrays | _packed_marks(shown, origin, unit)
+    materials = list(assembly.materials)
+    roles = {role: number for number, role in enumerate(solver.ROLES)}
+    fills = palette.block_colours(assembly.materials, assembly.free)
+    return {
+        "unit": unit,
+        "turn_unit": TURN_UNIT,
+        "origin": origin.tolist(),
+        "bounds": [*(frame.low - origin).tolist(), *(frame.high - origin).tolist()],
+        "block_size": assembly.block_size,
+        "smallest_opening": marks.SMALLEST_OPENING * assembly.block_size,
+        "names": list(assembly.names),
+        "materials": materials,
+        "roles": [roles[str(role)] for role in assembly.roles],
+        "fills": [palette.hexadecimal((int(r), int(g), int(b))) for r, g, b in fills],
+        "colours": {
+            name: palette.hexadecimal(getattr(palette, name.upper()))
+            for name in (
+                "ink", "outline", "support", "hatch", "open", "sliding", "force", "hinge", "settlement", "warning",
+            )
+        },
+        "frames": _frames(response, shown),
+        "times": _times(shown),
+        "curve": _curve(response),
+        "force_unit": force_unit_,
+        "force_length": force_length,
+        "force_scale": [shown_force, force_text(shown_force)],
+        "legend": [
+            ["area", "open joint", palette.hexadecimal(palette.OPEN)],
+            ["dot", "hinge", palette.hexadecimal(palette.HINGE)],
+            ["dot", "sliding", palette.hexadecimal(palette.SLIDING)],
+            ["area", "resultant of a joint", palette.hexadecimal(palette.FORCE)],
+        ],
+        "packed": packed,
+    }  # fmt: skip
+
+
+def _thinned(increments: tuple[solver.Increment, ...]) -> list[solver.Increment]:
+    """All increments, or an even choice of them with the last equilibrium kept."""
+    if len(increments) <= MOST_FRAMES:
+        return list(increments)
+    last = max((k for k, i in enumerate(increments) if i.status == solver.Status.EQUILIBRIUM), default=0)
+    chosen = np.unique([*np.linspace(0, len(increments) - 1, MOST_FRAMES - 1).round().astype(int), last])
+    return [increments[k] for k in chosen]
+
+
+def _packed(values: np.ndarray, rows: int) -> dict[str, Any]:
+    """Integers as differences along the first axis, split in planes of bytes, deflated, in base 64."""
+    table = np.asarray(values, dtype=np.int64).reshape(rows, -1) if rows else np.zeros((0, 1), dtype=np.int64)
+    steps = np.diff(table, axis=0, prepend=np.zeros((1, table.shape[1]), dtype=np.int64)).astype("<i4")
+    planes = steps.reshape(-1, 1).view(np.uint8).T
+    data = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
+    return {"rows": rows, "columns": table.shape[1], "data": data}
+
+
+def _rounded(values: np.ndarray, unit: float) -> np.ndarray:
+    return np.rint(np.asarray(values, dtype=float) / unit).astype(np.int64)
+
+
+def _packed_geometry(assembly: solver.Assembly, origin: np.ndarray, unit: float) -> dict[str, Any]:
+    joints = marks.drawn_joints(assembly)
+    n = len(joints.block_a)
+    return {
+        "vertices": _packed(_rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
+        "offsets": _packed(assembly.offsets, len(assembly.offsets)),
+        "centroids": _packed(_rounded(assembly.centroids - origin, unit), assembly.n_blocks),
+        "joint_blocks": _packed(np.stack([joints.block_a, joints.block_b], axis=1), n),
+        "joint_ends": _packed(_rounded(joints.ends - origin, unit), n),
+    }
+
+
+def _packed_motion(assembly: solver.Assembly, shown: list[solver.Increment], unit: float) -> dict[str, Any]:
+    moved = np.stack([i.pose.displacements(assembly) for i in shown])
+    return {
+        "travel": _packed(_rounded(moved[:, :, :2], unit), len(shown)),
+        "turn": _packed(_rounded(moved[:, :, 2], TURN_UNIT), len(shown)),
+    }
+
+
+def _packed_forces(
+    shown: list[solver.Increment], origin: np.ndarray, unit: float, block_size: float, extent: float
+) -> tuple[dict[str, Any], float, float]:
+    """Resultants of the joints, frame after frame; the unit of force [N], and length per force [m/N]."""
+    found = [marks.resultants(i) for i in shown]
+    sizes = [
+        np.hypot(*forces.T) * (i.status != solver.Status.FALLING)
+        for i, (_, forces, _) in zip(shown, found, strict=True)
+    ]
+    largest = max((float(size.max(initial=0.0)) for size in sizes), default=0.0) or 1.0
+    kept = [size > marks.SMALLEST_RESULTANT * largest for size in sizes]
+    places = np.concatenate([np.zeros((0, 2)), *(p[k] for (p, _, _), k in zip(found, kept, strict=True))])
+    vectors = np.concatenate([np.zeros((0, 2)), *(f[k] for (_, f, _), k in zip(found, kept, strict=True))])
+    first = np.concatenate([[0], np.cumsum([int(k.sum()) for k in kept])])
+    usual = float(np.quantile(np.hypot(*vectors.T), 0.9)) if len(vectors) else largest
+    length = min(max(1.5 * block_size, 0.015 * extent) / usual, 0.12 * extent / largest)
+    # A thousandth of the picture is where a force sits; finer places would only fill the file.
+    coarse = round(FORCE_FINENESS / FINENESS / 4.0)
+    places = _rounded(places - origin, unit * coarse) * coarse
+    force = FORCE_FINENESS * largest
+    packed = {
+        "force_first": _packed(first, len(first)),
+        "force_place": _packed(places, len(places)),
+        "force_vector": _packed(_rounded(vectors, force), len(vectors)),
+    }
+    return packed, force, length
+
+
+def _packed_marks(shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
+    """Hinges (1) and sliding points (2), frame after frame."""
+    places, kinds, counts = [np.zeros((0, 2))], [np.zeros(0, dtype=int)], []
+    for increment in shown:
+        states = increment.states
+        hinging, sliding = states == solver.ContactState.HINGING, states == solver.ContactState.SLIDING
+        places += [increment.contacts.points[hinging], increment.contacts.points[sliding]]
+        kinds.append(np.repeat([1, 2], [hinging.sum(), sliding.sum()]))
+        counts.append(int(hinging.sum() + sliding.sum()))
+    first = np.concatenate([[0], np.cumsum(counts)]).astype(int)
+    place, kind = np.concatenate(places), np.concatenate(kinds)
+    return {
+        "mark_first": _packed(first, len(first)),
+        "mark_place": _packed(_rounded(place - origin, unit), len(place)),
+        "mark_kind": _packed(kind, len(kind)),
+    }
+
+
+def _frames(response: solver.Response, shown: list[solver.Increment]) -> list[dict[str, Any]]:
+    place = {id(increment): k for k, increment in enumerate(response.path)}
+    frames = []
+    for increment in shown:
+        falling = increment.status == solver.Status.FALLING
+        caption = f"Settlement {settlement_text(increment.settlement, response)}"
+        if not falling:
+            moment = response.settlements[increment.phase].unit == "rad"
+            caption += f"  ·  reaction {force_text(increment.reaction, moment)}"
+            if not moment and response.total_weight > 0:
+                caption += f" = {increment.reaction / response.total_weight:.4f} W"
+        if len(response.settlements) > 1:
+            caption += f"  ·  phase {increment.phase + 1}"
+        frames.append({"caption": caption, "falling": falling, "curve": place.get(id(increment), len(response.path))})
+    return frames
+
+
+def _times(shown: list[solver.Increment]) -> list[float]:
+    """Seconds at which each frame plays: even settlement, then the fall."""
+    path = path_settlements(tuple(i for i in shown if i.status != solver.Status.FALLING))
+    total = float(path[-1]) if len(path) and path[-1] > 0 else 1.0
+    times: list[float] = []
+    for k in range(len(shown)):
+        if k < len(path):
+            times.append(max(PATH_SECONDS * float(path[k]) / total, times[-1] + 0.02 if times else 0.0))
+        else:
+            pause = 0.6 if k == len(path) and times else FALL_SECONDS
+            times.append((times[-1] + pause) if times else 0.0)
+    return [round(t, 4) for t in times]
+
+
+def _curve(response: solver.Response) -> dict[str, Any]:
+    per_length, length_unit = settlement_unit(response)
+    factor, unit = force_unit(response)
+    x = path_settlements(response.path) * per_length
+    y = np.array([i.reaction for i in response.path]) / factor
+    low, high = min(0.0, float(y.min(initial=0.0))), max(0.0, float(y.max(initial=0.0)))
+    high = high + 0.08 * (high - low) if high > low else 1.0
+    collapse = None
+    if response.collapse is not None and len(x):
+        start = float(x[-1]) - per_length * response.path[-1].settlement
+        collapse = start + per_length * response.collapse.displacement
+    widest = max([float(x.max(initial=0.0)), collapse or 0.0]) * 1.02 or 1.0
+
+    def ticks(low: float, high: float, n: int) -> list[float]:
+        return [float(f"{t:.6g}") for t in MaxNLocator(n).tick_values(low, high) if low <= t <= high]
+
+    return {
+        "settlement": [float(f"{v:.7g}") for v in x],
+        "reaction": [float(f"{v:.7g}") for v in y],
+        "collapse": collapse,
+        "x_max": widest,
+        "y_min": low,
+        "y_max": high,
+        "x_ticks": ticks(0.0, widest, 5),
+        "y_ticks": ticks(low, high, 5),
+        "x_label": f"settlement [{length_unit}]",
+        "y_label": f"reaction [{unit}]",
+    }
+
+
+def _title(response: solver.Response) -> str:
+    if response.collapse is not None:
+        return f"Collapse at a settlement of {response.collapse.displacement:.5g} {response.collapse.unit}"
+    return {
+        solver.Status.LIMIT_REACHED: "Standing at the end of the settlement",
+        solver.Status.NO_INITIAL_EQUILIBRIUM: "No equilibrium before any settlement",
+        solver.Status.SOLVER_FAILED: "The solver failed; the path up to there",
+    }.get(response.stop, "Settling masonry")
+
+
+def _summary(response: solver.Response) -> list[tuple[str, str]]:
+    assembly, path, weight = response.assembly, response.path, response.total_weight
+    moment = bool(response.settlements) and response.settlements[0].unit == "rad"
+
+    def reaction(value: float) -> str:
+        over = "" if moment or weight <= 0 else f" = {value / weight:.4f} W"
+        return force_text(value, moment) + over
+
+    rows = [("status", str(response.stop))]
+    if response.collapse is not None:
+        c = response.collapse
+        rows.append(("collapse displacement", f"{c.displacement:.6g} {c.unit}"))
+        rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))
+    if path:
+        rows.append(("first reaction", reaction(path[0].reaction)))
+        rows.append(("last reaction", reaction(path[-1].reaction)))
+    rows += [
+        ("weight W", force_text(weight)),
+        ("blocks", f"{assembly.n_blocks} ({int(assembly.free.sum())} free)"),
+        ("contact points", str(len(response.increments[0].contacts.points))),
+        ("increments", f"{len(path)} in equilibrium, {len(response.increments) - len(path)} falling"),
+        ("solver time", f"{sum(i.seconds for i in response.increments):.1f} s"),
+    ]
+    if response.message and response.collapse is None:
+        rows.append(("message", response.message))
+    return rows
+
+
+def _certificate(response: solver.Response) -> list[tuple[str, str]]:
+    checked = [i.certificate for i in response.path] or [i.certificate for i in response.increments]
+
+    def largest(name: str) -> float:
+        return max(abs(getattr(c, name)) for c in checked)
+
+    return [
+        ("largest unbalanced force / total load", f"{largest('equilibrium_residual'):.1e}"),
+        ("deepest overlap", f"{largest('largest_penetration'):.1e} m"),
+        ("lower and upper bound differ by", f"{largest('duality_gap'):.1e}"),
+        ("complementarity", f"{largest('complementarity'):.1e}"),
+        ("kinematic violation / block size", f"{largest('kinematic_violation'):.1e}"),
+    ]
+
+
+def _rows(rows: list[tuple[str, str]]) -> str:
+    return "".join(f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>" for name, value in rows)
