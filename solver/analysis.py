@@ -10,12 +10,12 @@ import numpy as np
 
 from .assembly import Assembly
 from .contact import InterfaceLaw, Interfaces
-from .correction import Falls, NotConverged, corrected, solve_again
+from .correction import GEOMETRY_TOLERANCE, Falls, NotConverged, corrected, solve_again
 from .kinematics import Pose, moved, moved_vertices
 from .loads import Loads, Settlement, checked_loads
 from .lp import SolveError
 from .polygons import overlap_depths
-from .program import Model, Solved, point_velocities, solve_program
+from .program import Locked, Model, Solved, point_velocities, solve_program
 from .response import Collapse, Increment, Response, Status
 
 __all__ = ["Controls", "Ending", "check_settlement", "settle", "settlement_increments"]
@@ -258,16 +258,17 @@ class _Path:
                     return (yield from self._collapse(self.first_without, fall.solved))
                 step /= 2.0
                 continue
-            except (NotConverged, SolveError) as error:
+            except (Locked, NotConverged, SolveError) as error:
                 step /= 2.0
                 if step < self.tolerance / 64.0:
                     yield from self._tell_last()
-                    return Ending(Status.SOLVER_FAILED, f"at a settlement of {here.s:.6g} {phase.unit}: {error}")
+                    stop = Status.LOCKED if isinstance(error, Locked) else Status.SOLVER_FAILED
+                    return Ending(stop, f"at a settlement of {here.s:.6g} {phase.unit}: {error}")
                 continue
             if here.s + step >= self.first_without:
                 self.first_without = np.inf
             if here.s > self.told:
-                yield self._increment(predictor, step)
+                yield self._left(predictor, step)
                 self.told = here.s
             verified = bool(np.isfinite(self.first_without))
             self.before = here
@@ -312,10 +313,21 @@ class _Path:
         if solved.falling:
             raise Falls(solved)
 
+    def _left(self, predictor: Solved, step: float) -> Increment:
+        """The increment at the place that is left; its forces are the predictor's unless joints close on the way."""
+        closing = predictor.contacts.gaps > GEOMETRY_TOLERANCE * 100.0 * self.model.length
+        if (predictor.forces[closing, 0] > 0.0).any():
+            return self._increment(self._read(self.here.s, self.here.pose), self.probe)
+        return self._increment(predictor, step)
+
     def _tell_last(self) -> Iterator[Increment]:
         if self.here.s > self.told:
             self.told = self.here.s
-            yield self._increment(self._read(self.here.s, self.here.pose), self.probe)
+            try:
+                yield self._increment(self._read(self.here.s, self.here.pose), self.probe)
+            except Locked:
+                # No finite force belongs to this state: its pose is told, with the forces of the supports at rest.
+                yield self._increment(solve_program(self.model, self.here.pose), self.probe)
 
     def _increment(self, solved: Solved, step: float) -> Increment:
         rate = self.phase.rate(self.model.assembly, self.start, self.here.s)

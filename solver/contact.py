@@ -13,9 +13,9 @@ from .polygons import box_pairs, boxes, expand_ranges
 __all__ = ["Contacts", "InterfaceLaw", "Interfaces", "find_contacts", "measure_contacts"]
 
 #: A corner this close to the end of an edge, as a fraction of the shortest edge involved, stands on the corner
-#: there. It has to exceed what one increment leaves of drift along a hinge (second order in the rotation, then
-#: corrected), and stay far below any bearing length that matters.
-CORNER_TOLERANCE = 1e-3
+#: there. Correctors take drift along a hinge back, so that it need not cover the error of an increment, only of
+#: drawings; a bearing shorter than this is none.
+CORNER_TOLERANCE = 1e-5
 
 #: The flank of a corner may lean into the edge it faces by this much (sine of the angle) before the corner no
 #: longer counts as facing it: an open joint that may close again leans by its opening angle.
@@ -222,8 +222,9 @@ def _vertex_edge_candidates(
     width = assembly.widths
     a_block, b_block = assembly.block_of_vertex[vertex], assembly.block_of_vertex[edge]
     deepest = PENETRATION_FRACTION * np.minimum(width[a_block], width[b_block])
-    end = _end_zone(assembly, vertex, edge)
+    end = end_zone(assembly, vertex, edge)
     keep = (gap >= -deepest) & (gap <= reach) & (along >= -end) & (along <= length[edge] + end)
+    keep[keep] = _through_this_face(assembly, vertices, vertex[keep], edge[keep], gap[keep], end[keep])
     vertex, edge, normal = vertex[keep], edge[keep], normal[keep]
 
     p = vertices[vertex]
@@ -238,6 +239,24 @@ def _vertex_edge_candidates(
     return vertex[outside], edge[outside]
 
 
+def _through_this_face(
+    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, gap: np.ndarray, end: np.ndarray
+) -> np.ndarray:
+    """Whether a corner behind an edge got there through it: not where a neighbouring face is nearer, or in front of it.
+
+    Without it a corner that bears on the last bit of a pier's top counts as deep inside the pier's flank.
+    """
+    through = np.ones(len(vertex), dtype=bool)
+    k = np.flatnonzero(gap < -end)
+    following, previous = assembly.next_vertex, assembly.previous_vertex
+    for neighbour, shared in ((following[edge[k]], following[edge[k]]), (previous[edge[k]], edge[k])):
+        tangent = _unit(vertices[following[neighbour]] - vertices[neighbour])
+        rest = vertices[vertex[k]] - vertices[neighbour]
+        beside = rest[:, 0] * tangent[:, 1] - rest[:, 1] * tangent[:, 0]
+        through[k] &= ~(assembly.convex_vertex[shared] & (beside > gap[k] + end[k]))
+    return through
+
+
 def _settle_ends(
     assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, reach: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -246,7 +265,7 @@ def _settle_ends(
     start, stop = edge, following[edge]
     tangent = _unit(vertices[stop] - vertices[start])
     along = ((vertices[vertex] - vertices[start]) * tangent).sum(axis=1)
-    end = _end_zone(assembly, vertex, edge)
+    end = end_zone(assembly, vertex, edge)
     at_start, at_stop = along <= end, along >= assembly.edge_lengths[edge] - end
     other = np.where(at_start, start, np.where(at_stop, stop, -1))
     near_end = other >= 0
@@ -315,7 +334,8 @@ def _facing_edge(assembly: Assembly, vertex: np.ndarray, edge: np.ndarray, corne
     return np.where(corner == edge, assembly.previous_vertex[vertex], vertex)
 
 
-def _end_zone(assembly: Assembly, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+def end_zone(assembly: Assembly, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    """(n,) array [m]: how near the end of the edge the corner counts as standing on the corner there."""
     length = assembly.edge_lengths
     shortest = np.minimum(length[vertex], length[assembly.previous_vertex[vertex]])
     return CORNER_TOLERANCE * np.minimum(shortest, length[edge])

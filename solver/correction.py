@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .assembly import Assembly
-from .contact import Contacts, feature_pairs, find_contacts, measure_contacts
+from .contact import CORNER_TOLERANCE, Contacts, end_zone, feature_pairs, find_contacts, measure_contacts
 from .kinematics import Pose, moved, moved_vertices
 from .program import Model, Solved, solve_program
 
@@ -17,6 +17,21 @@ GEOMETRY_TOLERANCE = 1e-8
 
 #: Contact points below this fraction of the largest normal force do not decide whether a geometry is exact.
 CARRYING_FRACTION = 1e-6
+
+
+#: Drift of a hinge within an increment, as a fraction of the shortest edge, before it is corrected: second order in
+#: the rotation, which an increment keeps below a few hundredths.
+LARGEST_DRIFT = 1e-2
+
+#: Part of the expected lift that is taken off: all of it could end in penetration, which a wedge locked by friction
+#: cannot give back.
+ALLOWED = 0.999
+
+#: Largest slip per closing of a gap that is extrapolated; beyond, joints are nearly parallel to the motion.
+STEEPEST_CLOSING = 30.0
+
+#: Part of the gap left that the last program must have closed, lest rounding be extrapolated.
+SMALLEST_CLOSING = 0.01
 
 
 class NotConverged(Exception):
@@ -71,11 +86,11 @@ def corrected(model: Model, predictor: Solved, supports: Pose, correctors: int) 
     solved = predictor
     for _ in range(correctors):
         contacts = _contacts_after(model, pose, solved)
-        drift = _drift(assembly, contacts, solved)
+        drift, allowance = _carried(assembly, contacts, solved)
         error = _geometry_error(assembly, contacts, drift, solved)
         if error <= tolerance:
             return pose
-        solved = solve_program(model, pose, contacts=contacts, drift=drift)
+        solved = solve_program(model, pose, contacts=contacts, drift=drift, allowance=allowance)
         if solved.falling:
             raise Falls(solved)
         pose = moved(pose, solved.motion)
@@ -85,9 +100,10 @@ def corrected(model: Model, predictor: Solved, supports: Pose, correctors: int) 
 
 
 def solve_again(model: Model, pose: Pose, solved: Solved) -> Solved:
-    """The program at a pose that another program led to, its contacts and their drift carried over; supports at rest."""
+    """The program at a pose that another led to, supports at rest, its contacts and their drift carried over."""
     contacts = _contacts_after(model, pose, solved)
-    return solve_program(model, pose, contacts=contacts, drift=_drift(model.assembly, contacts, solved))
+    drift, _ = _carried(model.assembly, contacts, solved)
+    return solve_program(model, pose, contacts=contacts, drift=drift)
 
 
 def _contacts_after(model: Model, pose: Pose, solved: Solved) -> Contacts:
@@ -99,8 +115,9 @@ def _contacts_after(model: Model, pose: Pose, solved: Solved) -> Contacts:
     assembly = model.assembly
     vertices = moved_vertices(assembly, pose)
     found = find_contacts(assembly, vertices, model.reach)
-    kept = np.flatnonzero(solved.forces[:, 0] > 0.0)
     before = solved.contacts
+    kept = np.flatnonzero(solved.forces[:, 0] > 0.0)
+    kept = kept[~_slid_off(assembly, vertices, before, kept, solved.sliding[kept] > 0.0)]
     own, reverse = feature_pairs(assembly, before)
     covered = np.concatenate([own[kept], reverse[kept]])
     own, reverse = feature_pairs(assembly, found)
@@ -112,15 +129,41 @@ def _contacts_after(model: Model, pose: Pose, solved: Solved) -> Contacts:
     return measure_contacts(assembly, vertices, vertex, edge, corner)
 
 
-def _drift(assembly: Assembly, contacts: Contacts, solved: Solved) -> np.ndarray:
-    """(n_contacts,) array [m]: how far each point is along its joint from where the last program put it."""
+def _slid_off(
+    assembly: Assembly, vertices: np.ndarray, before: Contacts, kept: np.ndarray, sliding: np.ndarray
+) -> np.ndarray:
+    """Whether corners that carried force have left their edge for good: by sliding, or by more than any drift."""
+    vertex, edge, corner = before.vertex[kept], before.edge[kept], before.corner[kept]
+    now = measure_contacts(assembly, vertices, vertex, edge, corner)
+    far = np.where(corner >= 0, 0.0, assembly.edge_lengths[edge])
+    past = np.maximum(-now.along, now.along - far)
+    drifting = end_zone(assembly, vertex, edge) / CORNER_TOLERANCE * LARGEST_DRIFT
+    return (past > drifting) | (sliding & (corner < 0) & (past > end_zone(assembly, vertex, edge)))
+
+
+def _carried(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
+    """What the last program leaves to the next at each contact point.
+
+    Returns
+    -------
+    drift : (n_contacts,) array [m]
+        How far each point is along its joint from where the last program put it.
+    allowance : (n_contacts,) array [m]
+        Lift to take off in advance. A gap that closes by sliding opens again by μ · slip in the same program, so that
+        gaps would only shrink by a constant factor; a point that closed and slid in the last program is expected
+        to do so again in the same proportion.
+    """
     keys, known = contacts.keys(assembly), solved.contacts.keys(assembly)
     order = np.argsort(known, kind="stable")
     place = np.minimum(np.searchsorted(known[order], keys), len(known) - 1)
     before = order[place]
     same = known[before] == keys
     expected = solved.contacts.along[before] + solved.slip[before]
-    return np.where(same, contacts.along - expected, 0.0)
+    drift = np.where(same, contacts.along - expected, 0.0)
+    closing, slip = -solved.opening[before], solved.sliding[before]
+    again = same & (slip > 0.0) & (closing > SMALLEST_CLOSING * contacts.gaps) & (contacts.gaps > 0.0)
+    ratio = np.minimum(np.divide(slip, closing, out=np.zeros_like(slip), where=again), STEEPEST_CLOSING)
+    return drift, np.where(again, ALLOWED * solved.friction[before] * ratio * contacts.gaps, 0.0)
 
 
 def _geometry_error(assembly: Assembly, contacts: Contacts, drift: np.ndarray, solved: Solved) -> float:

@@ -9,7 +9,7 @@ import highspy
 import numpy as np
 import scipy.sparse as sp
 
-__all__ = ["LPSolution", "LinearProgram", "SolveError", "solve_lp"]
+__all__ = ["LPSolution", "LinearProgram", "SolveError", "Unbounded", "solve_lp"]
 
 #: HiGHS' smallest feasibility tolerance; the programs are scaled so that it is small against every force.
 FEASIBILITY_TOLERANCE = 1e-10
@@ -26,6 +26,20 @@ SIMPLEX_ROWS = 400
 
 class SolveError(RuntimeError):
     """No route through HiGHS gave a solution that passes its check. Not a statement about the structure."""
+
+
+class Unbounded(Exception):
+    """The objective falls without limit, and a ray that we have checked proves it.
+
+    Attributes
+    ----------
+    x : (n,) array
+        The ray: A x = 0, x ≥ 0, cost · x < 0.
+    """
+
+    def __init__(self, x: np.ndarray) -> None:
+        super().__init__("the linear program is unbounded")
+        self.x = x
 
 
 @dataclass(frozen=True)
@@ -108,6 +122,8 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> L
 
     Raises
     ------
+    Unbounded
+        If the program has no minimum, proved by a ray.
     SolveError
         If no route gives a solution that passes; the message lists what each of them ended with.
     """
@@ -165,6 +181,9 @@ def _run(program: LinearProgram, route: str) -> tuple[LPSolution | None, str]:
         return None, "HiGHS refuses the program"
     highs.run()
     status = highs.modelStatusToString(highs.getModelStatus())
+    if highs.getModelStatus() == highspy.HighsModelStatus.kUnbounded:
+        _raise_if_proved(program, highs)
+        return None, status
     found = highs.getSolution()
     if not (found.value_valid and found.dual_valid):
         return None, status
@@ -174,6 +193,20 @@ def _run(program: LinearProgram, route: str) -> tuple[LPSolution | None, str]:
     x = np.maximum(np.asarray(found.col_value), 0.0)
     y = np.asarray(found.row_dual)
     return _checked(program, x, y, route, int(iterations), time.perf_counter() - started), status
+
+
+def _raise_if_proved(program: LinearProgram, highs: highspy.Highs) -> None:
+    """Raises ``Unbounded`` where HiGHS' ray proves it; otherwise its word counts for nothing."""
+    _, has_ray, ray = highs.getPrimalRay()
+    if not has_ray:
+        return
+    x = np.maximum(np.asarray(ray), 0.0)
+    size = float(np.abs(x).max(initial=0.0))
+    if size == 0.0:
+        return
+    x /= size
+    if np.abs(program.matrix @ x).max(initial=0.0) <= 1e-9 and program.cost @ x < -1e-9:
+        raise Unbounded(x)
 
 
 def _checked(

@@ -11,10 +11,10 @@ from .assembly import Assembly
 from .contact import Contacts, Interfaces, find_contacts
 from .equilibrium import cone_rays, equilibrium_matrix
 from .kinematics import Pose, moved_vertices
-from .lp import LinearProgram, LPSolution, solve_lp
+from .lp import LinearProgram, LPSolution, Unbounded, solve_lp
 from .response import Certificate
 
-__all__ = ["Model", "Solved", "Tally", "point_velocities", "solve_program"]
+__all__ = ["Locked", "Model", "Solved", "Tally", "point_velocities", "solve_program"]
 
 #: A free block out of balance by less than this fraction of the total load is in balance. Without it the program
 #: may move a block without friction sideways, for nothing, as far as it is allowed to.
@@ -23,6 +23,23 @@ BALANCE_TOLERANCE = 1e-9
 #: Unbalanced force that counts as falling, as a fraction of the total load: well above BALANCE_TOLERANCE and
 #: what HiGHS leaves, and within the residual that a certificate promises.
 FALLING_FRACTION = 5e-9
+
+
+#: Distance from the edge of the friction cone, in units of the program, at which a contact point is on it.
+AT_LIMIT = 1e-9
+
+#: Penetration and drift below this, in units of the program, are rounding: a wedge that friction locks could not
+#: give way to them.
+ROUNDING = 1e-10
+
+
+class Locked(Exception):
+    """Blocks of infinite strength are wedged between the supports: forces grow without limit."""
+
+    def __init__(self, blocks: tuple[str, ...]) -> None:
+        shown = ", ".join(f"'{name}'" for name in blocks[:6]) + (" ..." if len(blocks) > 6 else "")
+        super().__init__(f"the supports cannot move on: {len(blocks)} blocks are wedged ({shown})")
+        self.blocks = blocks
 
 
 @dataclass
@@ -93,8 +110,10 @@ class Solved:
     forces : (n_contacts, 2) array [N]
     motion : (n_blocks, 3) array [m, m, rad]
         Of the supports as given, of the free blocks as found.
-    slip : (n_contacts,) array [m]
-        Tangential relative displacement of each contact point in that motion.
+    opening, slip : (n_contacts,) arrays [m]
+        Normal and tangential relative displacement of each contact point in that motion.
+    sliding : (n_contacts,) array [m]
+        Slip, drift not counted, of the points whose motion takes them to the edge of their friction cone; else 0.
     falling : bool
         Whether blocks move by the whole trust region because no equilibrium holds them.
     certificate : Certificate
@@ -106,7 +125,9 @@ class Solved:
     friction: np.ndarray
     forces: np.ndarray
     motion: np.ndarray
+    opening: np.ndarray
     slip: np.ndarray
+    sliding: np.ndarray
     falling: bool
     certificate: Certificate
     support_forces: np.ndarray
@@ -118,6 +139,7 @@ def solve_program(
     support_motion: np.ndarray | None = None,
     contacts: Contacts | None = None,
     drift: np.ndarray | None = None,
+    allowance: np.ndarray | None = None,
 ) -> Solved:
     """States and solves the static program of one increment.
 
@@ -131,9 +153,13 @@ def solve_program(
         Found at the pose by default.
     drift : (n_contacts,) array [m], optional
         Slip that has already happened without being asked for, and that friction takes back.
+    allowance : (n_contacts,) array [m], optional
+        Lift of the associative flow rule that is taken off in advance where a contact point slides.
 
     Raises
     ------
+    Locked
+        If the supports cannot move like that: blocks of infinite strength are wedged between them.
     SolveError
         If HiGHS gives no solution that passes its check.
 
@@ -158,9 +184,11 @@ def solve_program(
     friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
     matrix = equilibrium_matrix(contacts, pose, model.length)
     distance = matrix.T @ (support_motion / model.lengths).ravel()
-    distance[0::2] += contacts.gaps / model.length
+    distance[0::2] += _beyond_rounding(contacts.gaps / model.length)
     if drift is not None:
-        distance[1::2] += drift / model.length
+        distance[1::2] += _beyond_rounding(drift / model.length)
+    if allowance is not None:
+        distance[0::2] += allowance / model.length
     rays = cone_rays(friction)
     balance = sp.csc_array(sp.csr_array(matrix)[np.repeat(assembly.free, 3)] @ rays)
     rows = balance.shape[0]
@@ -173,7 +201,12 @@ def solve_program(
         lower=-external - tolerance,
         upper=-external + tolerance,
     )
-    solution = solve_lp(program)
+    try:
+        solution = solve_lp(program)
+    except Unbounded as ray:
+        forces = (rays @ ray.x[: 2 * len(contacts)]).reshape(-1, 2)
+        squeezed = np.unique(contacts.block_a[forces[:, 0] > 1e-6 * forces[:, 0].max(initial=0.0)])
+        raise Locked(tuple(assembly.names[i] for i in squeezed)) from None
     motion = support_motion.copy()
     motion[assembly.free] = -solution.row_dual.reshape(-1, 3) * model.lengths
     multipliers, unbalanced = solution.x[: 2 * len(contacts)], solution.x[2 * len(contacts) :]
@@ -181,7 +214,9 @@ def solve_program(
     resultant = (matrix @ scaled_forces).reshape(-1, 3)
     relative = matrix.T @ (motion / model.lengths).ravel()
     approach = distance + matrix.T @ (np.where(assembly.free[:, None], motion, 0.0) / model.lengths).ravel()
-    certificate = _certificate(model, contacts, resultant, multipliers, rays.T @ approach, solution)
+    room = rays.T @ approach
+    certificate = _certificate(model, contacts, resultant, multipliers, room, solution)
+    at_limit = room.reshape(-1, 2).min(axis=1) <= AT_LIMIT
     on_supports = np.where(assembly.free[:, None], 0.0, resultant)
     return Solved(
         pose=pose,
@@ -189,11 +224,17 @@ def solve_program(
         friction=friction,
         forces=scaled_forces.reshape(-1, 2) * model.force,
         motion=motion,
+        opening=relative[0::2] * model.length,
         slip=relative[1::2] * model.length,
+        sliding=np.where(at_limit, np.abs(approach[1::2]) * model.length, 0.0),
         falling=float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * model.total_load,
         certificate=certificate,
         support_forces=on_supports * model.force * np.array([1.0, 1.0, model.length]),
     )
+
+
+def _beyond_rounding(values: np.ndarray) -> np.ndarray:
+    return np.where(np.abs(values) < ROUNDING, 0.0, values)
 
 
 def _certificate(

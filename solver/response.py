@@ -23,6 +23,7 @@ class Status(StrEnum):
     COLLAPSED = "collapsed"
     LIMIT_REACHED = "limit reached"
     NO_INITIAL_EQUILIBRIUM = "no initial equilibrium"
+    LOCKED = "locked"
     SOLVER_FAILED = "solver failed"
     INTERRUPTED = "interrupted"
 
@@ -192,7 +193,8 @@ class Response:
     increments : tuple of Increment
         The equilibrium path first, then the frames of the fall.
     stop : Status
-        ``COLLAPSED``, ``LIMIT_REACHED``, ``NO_INITIAL_EQUILIBRIUM`` or ``SOLVER_FAILED``.
+        ``COLLAPSED``, ``LIMIT_REACHED``, ``NO_INITIAL_EQUILIBRIUM``, ``LOCKED`` (blocks wedged between supports that
+        close in on them) or ``SOLVER_FAILED``.
     message : str
         Why it stopped, in words.
     collapse : Collapse or None
