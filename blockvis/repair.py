@@ -133,7 +133,7 @@ def _notes(closing: Closing, thickness: float, found: list[tuple[int, int, float
         notes.append(f"{len(found)} overlaps of up to {found[0][2]:.3g} m were resolved to their midline")
     if thickness:
         notes.append(
-            f"{closing.n_joints} stretches of joints of up to {max(closing.largest_gap, 0.0):.3g} m were closed to their "
-            f"midline, {closing.n_cut} of them by cutting one side along the other"
+            f"{closing.n_joints} stretches of joints of up to {max(closing.largest_gap, 0.0):.3g} m were closed to "
+            f"their midline, {closing.n_cut} of them by cutting one side along the other"
         )
     return notes

@@ -75,7 +75,8 @@ def read(path: Path, reading: Reading) -> Drawing:
         budget -= 1
         if budget < 0:
             raise ValueError(
-                f"'{path}' inserts more entities than it has bytes ({path.stat().st_size}); explode its block references"
+                f"'{path}' inserts more entities than it has bytes ({path.stat().st_size}); "
+                "explode its block references"
             )
         if entity.dxf.layer in shut:
             found.hidden[entity.dxf.layer] += 1
@@ -207,8 +208,8 @@ def _with_loose(found: _Found, path: Path) -> list[str]:
     notes = []
     if faces:
         notes.append(
-            f"{len(faces)} blocks are faces between {len(found.loose)} loose lines; an opening enclosed by lines counts "
-            "as a block too: erase it or draw closed outlines"
+            f"{len(faces)} blocks are faces between {len(found.loose)} loose lines; an opening enclosed by lines "
+            "counts as a block too: erase it or draw closed outlines"
         )
     if dangling:
         notes.append(f"{dangling} loose lines enclose nothing and were dropped")

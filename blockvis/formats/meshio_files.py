@@ -1,0 +1,77 @@
+"""Every other mesh that meshio reads and that has surface cells: Abaqus, Nastran, MED, Medit, XDMF, SU2 ..."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blockvis.drawing import Drawing
+from blockvis.formats import Reading
+from blockvis.formats.cells import drawing_of_cells
+
+__all__ = ["read"]
+
+#: Points around a surface cell, by meshio's name; None: all of them in order.
+RINGS: dict[str, tuple[int, ...] | None] = {
+    "triangle": None, "quad": None, "polygon": None, "triangle6": (0, 3, 1, 4, 2, 5), "triangle7": (0, 3, 1, 4, 2, 5),
+    "quad8": (0, 4, 1, 5, 2, 6, 3, 7), "quad9": (0, 4, 1, 5, 2, 6, 3, 7),
+}  # fmt: skip
+
+
+def read(path: Path, reading: Reading) -> Drawing:
+    """Reads a mesh through meshio; it does not say its unit."""
+    import meshio
+
+    said = io.StringIO()
+    try:
+        # meshio prints to the terminal and on some files leaves the program by SystemExit.
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            mesh = meshio.read(path)
+    except (SystemExit, Exception) as error:  # noqa: BLE001
+        reason = " ".join((str(error) or said.getvalue() or type(error).__name__).split())
+        raise ValueError(f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again") from None
+    rings: list[np.ndarray] = []
+    chosen: list[tuple[int, int]] = []
+    for k, block in enumerate(mesh.cells):
+        order = RINGS.get(block.type, ())
+        if order == ():
+            if not block.type.startswith("polygon"):
+                continue
+            order = None
+        for cell in block.data:
+            nodes = np.asarray(cell, dtype=np.int64)
+            rings.append(nodes if order is None else nodes[list(order)])
+        chosen.append((k, len(block.data)))
+    data: dict[str, np.ndarray] = {}
+    for key, arrays in mesh.cell_data.items():
+        data[key] = np.concatenate([np.asarray(arrays[k]) for k, _ in chosen]) if chosen else np.zeros(0)
+    if "block_id" not in data:
+        data.update(_sets(mesh, chosen))
+    return drawing_of_cells(np.asarray(mesh.points, dtype=float), rings, data, path)
+
+
+def _sets(mesh: Any, chosen: list[tuple[int, int]]) -> dict[str, np.ndarray]:
+    """Named cell sets (Abaqus ELSET, XDMF sets) as blocks, where every surface cell is in one of them."""
+    total = sum(n for _, n in chosen)
+    start = dict(zip((k for k, _ in chosen), np.cumsum([0] + [n for _, n in chosen[:-1]]), strict=True)) if chosen else {}
+    owner, names = np.full(total, -1), []
+    for name, parts in mesh.cell_sets.items():
+        members = [
+            start[k] + np.asarray(part, dtype=np.int64)
+            for k, part in enumerate(parts)
+            if k in start and part is not None and len(part)
+        ]
+        if not members:
+            continue
+        index = np.concatenate(members)
+        if (owner[index] >= 0).any():
+            return {}
+        owner[index] = len(names)
+        names.append(str(name))
+    if total == 0 or (owner < 0).any():
+        return {}
+    return {"block_id": owner, "name": np.array(names)[owner]}

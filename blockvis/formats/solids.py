@@ -1,0 +1,293 @@
+"""Bodies in space, .stl .obj .ply .off .glb through trimesh: prismatic ones become outlines with a thickness."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blockvis.drawing import Drawing
+from blockvis.formats import Reading
+from blockvis.formats.cells import components, drawing_of_cells, merged
+from blockvis.formats.layout_json import rows_of, with_rows
+from blockvis.formats.triangles import triangles_of_ring
+from blockvis.outlines import FLAT, outlines_of_cells
+
+__all__ = ["Body", "drawing_of_bodies", "read", "write"]
+
+#: Points closer than this fraction of the drawing are one: single precision leaves 6e-8 of a coordinate.
+SAME_POINT = 2e-6
+
+#: A face whose normal leaves the axis or its plane by more than this (sine) makes a body no prism.
+SQUARE = 1e-3
+
+
+@dataclass(frozen=True)
+class Body:
+    """A closed surface of triangles: name, (n, 3) points, (m, 3) faces."""
+
+    name: str
+    points: np.ndarray
+    faces: np.ndarray
+
+
+def read(path: Path, reading: Reading) -> Drawing:
+    """Reads bodies or a flat mesh; .glb is in metres, the other formats do not say their unit."""
+    import trimesh
+
+    suffix = path.suffix.lower()
+    try:
+        options = {"split_objects": True, "group_material": False} if suffix == ".obj" else {}
+        scene = trimesh.load_scene(str(path), process=False, **options)
+        parts = [
+            (str(name), np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
+            for name, mesh in _placed(scene)
+            if len(mesh.faces)
+        ]
+        parts = _numbered(parts, scene) if suffix == ".ply" else parts
+    except Exception as error:  # noqa: BLE001
+        # trimesh lets the errors of whatever parser it uses through.
+        reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
+        raise ValueError(f"'{path}' cannot be read as {suffix} ({reason}); export it again") from None
+    if not parts:
+        raise ValueError(f"'{path}' has no surface cells; export the blocks as closed bodies or a flat mesh")
+    every = np.concatenate([points for _, points, _ in parts])
+    if not np.isfinite(every).all():
+        bad = every[~np.isfinite(every).all(axis=1)][0]
+        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+    size = float(np.ptp(every, axis=0).max())
+    unit = "m" if suffix == ".glb" else ""
+    rows = _own_rows(path)
+    if float(np.ptp(every, axis=0).min()) <= FLAT * size:
+        return replace(_flat(parts, size, path, rows), unit=unit)
+    bodies = [body for part in parts for body in _bodies(*part, size, path)]
+    known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
+    return replace(drawing_of_bodies(bodies, path, known), unit=unit)
+
+
+def _placed(scene: Any) -> list[tuple[str, Any]]:
+    """Meshes of a scene where its transforms put them, by the name of their node."""
+    found = []
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if hasattr(mesh, "faces"):
+            found.append((str(name), mesh.copy().apply_transform(transform)))
+    return found
+
+
+def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """The parts of a .ply whose faces carry the number of their block, one part per number."""
+    raw = next(iter(scene.geometry.values())).metadata.get("_ply_raw", {})
+    data = raw.get("face", {}).get("data")
+    names = getattr(getattr(data, "dtype", None), "names", None) or (data if isinstance(data, dict) else ())
+    if len(parts) != 1 or "block_id" not in names:
+        return parts
+    ids = np.asarray(data["block_id"]).ravel()
+    _, points, faces = parts[0]
+    if len(ids) != len(faces):
+        return parts
+    return [(f"block {value}", points, faces[ids == value]) for value in np.unique(ids).tolist()]
+
+
+def _welded(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """One number for points that coincide; faces without area dropped."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    # Exact copies first: a million of them must not become a million squared pairs.
+    unique, inverse = np.unique(points, axis=0, return_inverse=True)
+    pairs = cKDTree(unique).query_pairs(SAME_POINT * size, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(unique), len(unique)))
+    _, label = connected_components(graph, directed=False)
+    first = np.unique(label, return_index=True)[1]
+    faces = label[inverse.ravel()][faces]
+    alive = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return unique[first], faces[alive]
+
+
+def _bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path: Path) -> list[Body]:
+    points, faces = _welded(points, faces, size)
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    if (counts == 1).any():
+        x, y, z = points[unique[counts == 1][0]].mean(axis=0)
+        raise ValueError(
+            f"'{path}': body '{name}' is not closed: {int((counts == 1).sum())} edges belong to one face only, one around "
+            f"({x:.6g}, {y:.6g}, {z:.6g}); export closed bodies"
+        )
+    if (counts > 2).any():
+        x, y, z = points[unique[counts > 2][0]].mean(axis=0)
+        raise ValueError(
+            f"'{path}': body '{name}' holds bodies that touch and cannot be told apart: {int((counts > 2).sum())} edges "
+            f"belong to more than two faces, one around ({x:.6g}, {y:.6g}, {z:.6g}); export one file or one named "
+            "object per block (.obj, .glb, .step)"
+        )
+    # Through edges, not through points: blocks that touch in a corner stay two.
+    inverse = inverse.ravel().reshape(-1, 3)
+    piece = components(list(inverse), len(unique))
+    n = int(piece.max()) + 1
+    return [Body(name if n == 1 else f"{name} {k + 1}", points, faces[piece == k]) for k in range(n)]
+
+
+def drawing_of_bodies(bodies: Sequence[Body], path: Path | str, rows: Sequence[dict[str, Any]] = ()) -> Drawing:
+    """Outlines and thicknesses of prismatic bodies, cut by the plane of their common extrusion.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+        Closed.
+    path : Path or str
+        Named in messages.
+    rows : sequence of dict
+        What is known of each body beside its name.
+
+    Raises
+    ------
+    ValueError
+        Where no axis makes all bodies prisms.
+    """
+    if not bodies:
+        raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
+    every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
+    size = float(np.ptp(every, axis=0).max())
+    best: tuple[float, int] | None = None
+    worst = ("", 0.0)
+    for axis in (2, 1, 0):
+        wrong = next((body for body in bodies if not _is_prism(body, axis, size)), None)
+        if wrong is not None:
+            worst = (wrong.name, size)
+            continue
+        depths = np.array([np.ptp(body.points[np.unique(body.faces)][:, axis]) for body in bodies])
+        ends = np.array([body.points[np.unique(body.faces)][:, axis].min() for body in bodies])
+        # All bodies lie between the same two planes along the axis of extrusion.
+        scatter = float(np.ptp(depths) + np.ptp(ends)) / size
+        if best is None or scatter < best[0] - 1e-4:
+            best = (scatter, axis)
+    if best is None:
+        raise ValueError(
+            f"'{path}' is not prismatic: body '{worst[0]}' is no extrusion along x, y or z; "
+            "export extrusions of the blocks' outlines, or draw them in the plane"
+        )
+    axis = best[1]
+    # Seen so that the picture is not mirrored: from +z, from -y, from +x.
+    first, second = {2: (0, 1), 1: (0, 2), 0: (1, 2)}[axis]
+    outlines, depth = [], []
+    for body in bodies:
+        points = body.points
+        used = points[np.unique(body.faces)]
+        level = used[:, axis].max()
+        cap = (np.abs(points[body.faces][:, :, axis] - level) <= 1e-5 * size).all(axis=1)
+        owner = np.zeros(int(cap.sum()), dtype=np.int64)
+        outlines += outlines_of_cells(points[:, [first, second]], list(body.faces[cap]), owner, [body.name])
+        depth.append(float(np.ptp(used[:, axis])))
+    notes = [f"{len(bodies)} bodies were read as outlines in {'xyz'[first]}{'xyz'[second]}; their depth along "
+             f"{'xyz'[axis]} is the thickness"]  # fmt: skip
+    drawing = Drawing(
+        outlines=tuple(outlines), names=tuple(body.name for body in bodies), unit="", notes=tuple(notes)
+    )
+    drawing = with_rows(drawing, rows) if len(rows) == len(bodies) else drawing
+    return replace(drawing, thickness=np.array(depth))
+
+
+def _is_prism(body: Body, axis: int, size: float) -> bool:
+    corners = body.points[body.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.hypot(np.hypot(normal[:, 0], normal[:, 1]), normal[:, 2])
+    wide = area > 1e-9 * size**2
+    along = np.abs(normal[wide, axis]) / area[wide]
+    square = (along > 1 - SQUARE) | (along < SQUARE)
+    levels = body.points[np.unique(body.faces)][:, axis]
+    on_caps = (np.abs(levels - levels.min()) <= 1e-5 * size) | (np.abs(levels - levels.max()) <= 1e-5 * size)
+    return bool(square.all() and on_caps.all())
+
+
+def _flat(
+    parts: list[tuple[str, np.ndarray, np.ndarray]], size: float, path: Path, rows: list[dict[str, Any]]
+) -> Drawing:
+    drawings = [drawing_of_cells(points, list(faces), {}, path) for _, points, faces in parts]
+    drawing = merged(drawings, [name for name, _, _ in parts], path)
+    return with_rows(drawing, rows) if len(rows) == drawing.n_blocks else drawing
+
+
+def _own_rows(path: Path) -> list[dict[str, Any]]:
+    """What our own writer kept in comments, one JSON line per block."""
+    if path.suffix.lower() not in (".obj", ".ply"):
+        return []
+    rows = []
+    with path.open("rb") as stream:
+        for line in stream:
+            mark = line.find(b"blockvis {")
+            if mark >= 0 and line[:1] in b"#c":
+                try:
+                    rows.append(json.loads(line[mark + 9 :]))
+                except ValueError:
+                    return []
+    return rows
+
+
+def _prism(ring: np.ndarray, thickness: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points and triangles of an outline extruded along z, half of the thickness to each side."""
+    n = len(ring)
+    points = np.vstack([np.column_stack([ring, np.full(n, z)]) for z in (-thickness / 2.0, thickness / 2.0)])
+    cap = triangles_of_ring(ring)
+    k = np.arange(n)
+    following = (k + 1) % n
+    sides = np.concatenate([np.stack([k, following, following + n], 1), np.stack([k, following + n, k + n], 1)])
+    return points, np.concatenate([cap[:, ::-1], cap + n, sides])
+
+
+def write(drawing: Drawing, path: Path) -> None:
+    """Writes .stl, .obj or .ply as text: each block extruded along z by its thickness, 1 m where it has none."""
+    depth = np.ones(drawing.n_blocks) if drawing.thickness is None else np.nan_to_num(drawing.thickness, nan=1.0)
+    prisms = [_prism(ring, float(t)) for ring, t in zip(drawing.outlines, depth, strict=True)]
+    rows = rows_of(drawing)
+    lines = {".stl": _stl_lines, ".obj": _obj_lines, ".ply": _ply_lines}[path.suffix.lower()](prisms, rows)
+    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
+
+
+_Prisms = list[tuple[np.ndarray, np.ndarray]]
+
+
+def _stl_lines(prisms: _Prisms, rows: list[dict[str, Any]]) -> list[str]:
+    lines = []
+    for (points, faces), row in zip(prisms, rows, strict=True):
+        lines.append(f"solid {row['name']}")
+        for a, b, c in points[faces]:
+            normal = np.cross(b - a, c - a)
+            normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
+            lines.append("facet normal " + " ".join(f"{x:.9g}" for x in normal))
+            lines.append(" outer loop")
+            lines += ["  vertex " + " ".join(repr(float(x)) for x in p) for p in (a, b, c)]
+            lines += [" endloop", "endfacet"]
+        lines.append(f"endsolid {row['name']}")
+    return lines
+
+
+def _obj_lines(prisms: _Prisms, rows: list[dict[str, Any]]) -> list[str]:
+    lines, start = ["# blocks extruded by their thickness, lengths in m"], 1
+    for (points, faces), row in zip(prisms, rows, strict=True):
+        lines += [f"# blockvis {json.dumps(row)}", f"o {row['name']}"]
+        lines += ["v " + " ".join(repr(float(x)) for x in p) for p in points]
+        lines += ["f " + " ".join(str(int(k) + start) for k in face) for face in faces]
+        start += len(points)
+    return lines
+
+
+def _ply_lines(prisms: _Prisms, rows: list[dict[str, Any]]) -> list[str]:
+    n_points, n_faces = (sum(len(part[k]) for part in prisms) for k in (0, 1))
+    lines = ["ply", "format ascii 1.0", "comment blocks extruded by their thickness, lengths in m"]
+    lines += [f"comment blockvis {json.dumps(row)}" for row in rows]
+    lines += [f"element vertex {n_points}", *(f"property double {axis}" for axis in "xyz")]
+    lines += [f"element face {n_faces}", "property list uchar int vertex_indices", "property int block_id", "end_header"]
+    lines += [" ".join(repr(float(x)) for x in p) for points, _ in prisms for p in points]
+    start = 0
+    for number, (points, faces) in enumerate(prisms):
+        lines += ["3 " + " ".join(str(int(k) + start) for k in face) + f" {number}" for face in faces]
+        start += len(points)
+    return lines

@@ -1,0 +1,388 @@
+"""Vector drawings, .svg: closed shapes are blocks; layers, ids and titles are kept; y points down there, up here.
+
+A parser of our own on the standard library. Entities and document types are refused before parsing: no drawing needs
+them, and they can be made to fill any memory.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+import solver
+from blockvis.drawing import Drawing
+from blockvis.formats import Reading
+from blockvis.formats.layout_json import rows_of, with_rows
+from blockvis.outlines import LARGEST_CHORD
+from blockvis.units import UNITS, metres_per
+
+__all__ = ["read", "write"]
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_TOKEN = re.compile(rf"([MmZzLlHhVvCcSsQqTtAa])|({_NUMBER})")
+_TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
+_INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
+
+#: Numbers that follow each path command.
+_TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
+
+#: Groups nested deeper than this are no drawing.
+DEEPEST = 200
+
+#: Chords of one curve: finer than any drawing, and a bound on what a small file can ask for.
+MOST_CHORDS = 512
+
+
+@dataclass
+class _Found:
+    """What the elements gave so far, in user units, y down."""
+
+    rings: list[np.ndarray] = field(default_factory=list)
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    open_lines: int = 0
+
+
+@dataclass(frozen=True)
+class _Where:
+    """Where an element stands: the transform of its parents, its layer, and how far chords may lie off a curve."""
+
+    matrix: np.ndarray
+    layer: str
+    tolerance: float | None
+    path: Path
+    depth: int = 0
+
+
+def read(path: Path, reading: Reading) -> Drawing:
+    """Reads a .svg drawing; width and height beside the viewBox name its unit."""
+    text = path.read_bytes()
+    if re.search(rb"<!\s*(DOCTYPE|ENTITY)[^>]*(\[|ENTITY)", text, re.IGNORECASE):
+        raise ValueError(f"'{path}' defines XML entities; save it as plain SVG without a document type")
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
+        raise ValueError(f"'{path}' is not an SVG file: {error}; save it as plain SVG") from None
+    if _tag(root) != "svg":
+        raise ValueError(f"'{path}' is XML with the root <{_tag(root)}>, not <svg>; save it as plain SVG")
+    stated = root.get("data-blockvis-unit") or _unit(root)
+    tolerance = None
+    if reading.chord_tolerance is not None:
+        tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
+    found = _Found()
+    _walk(root, _Where(np.eye(3), "", tolerance, path), found)
+    if not found.rings:
+        rest = f"; {found.open_lines} lines enclose nothing" if found.open_lines else ""
+        raise ValueError(f"'{path}' has no closed shape{rest}; draw each block as a closed path or polygon")
+    if found.open_lines:
+        found.notes.append(f"{found.open_lines} lines without area were skipped")
+    turned = tuple(ring * [1.0, -1.0] for ring in found.rings)
+    names = tuple(row.get("name", f"block {k}") for k, row in enumerate(found.rows))
+    return with_rows(Drawing(outlines=turned, names=names, unit=stated, notes=tuple(found.notes)), found.rows)
+
+
+def _unit(root: ElementTree.Element) -> str:
+    """The unit of the drawing where one user unit is one of it; "" where the file does not say."""
+    width, box = root.get("width", ""), root.get("viewBox", "").replace(",", " ").split()
+    match = re.fullmatch(rf"\s*({_NUMBER})\s*([a-z]+)\s*", width)
+    if not match or match[2] not in UNITS or match[2] == "px":
+        return ""
+    if len(box) != 4:
+        return "px"
+    scale = float(match[1]) * UNITS[match[2]] / max(float(box[2]), 1e-300)
+    return next((unit for unit, metres in UNITS.items() if math.isclose(scale, metres, rel_tol=1e-3)), "")
+
+
+def _tag(element: ElementTree.Element) -> str:
+    return str(element.tag).rsplit("}", 1)[-1]
+
+
+def _walk(element: ElementTree.Element, where: _Where, found: _Found) -> None:
+    if where.depth > DEEPEST:
+        raise ValueError(f"'{where.path}' nests groups more than {DEEPEST} deep; ungroup it")
+    tag = _tag(element)
+    if tag in ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata"):
+        return
+    if "display:none" in element.get("style", "").replace(" ", "") or element.get("display") == "none":
+        found.notes.append(f"a hidden <{tag}> was skipped")
+        return
+    if tag == "use":
+        found.notes.append("a <use> (clone) was skipped; unlink clones to have them read")
+        return
+    where = replace(where, matrix=where.matrix @ _matrix(element.get("transform", ""), where.path), depth=where.depth + 1)
+    if tag == "g":
+        label = element.get(f"{_INKSCAPE}label") or element.get("id") or ""
+        where = replace(where, layer=label or where.layer)
+    shape = _SHAPES.get(tag)
+    if shape is not None:
+        try:
+            parts = shape(element, where)
+        except (ValueError, OverflowError) as error:
+            raise ValueError(f"'{where.path}': {_called(element)} {error}") from None
+        _add(element, parts, where, found)
+    for child in element:
+        _walk(child, where, found)
+
+
+def _called(element: ElementTree.Element) -> str:
+    return f"<{_tag(element)}> '{element.get('id', 'without id')}'"
+
+
+def _add(
+    element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], where: _Where, found: _Found
+) -> None:
+    rings = []
+    for points, closed in parts:
+        if len(points) < 3:
+            found.open_lines += len(points) > 1
+            continue
+        if not np.isfinite(points).all():
+            raise ValueError(f"'{where.path}': {_called(element)} has a point that is not a finite number; repair it")
+        ends = float(np.abs(points[0] - points[-1]).max())
+        closes = ends <= 1e-6 * float(np.ptp(points, axis=0).max())
+        if not closed and not closes:
+            first, last = points[0], points[-1]
+            raise ValueError(
+                f"'{where.path}': {_called(element)} in layer '{where.layer}' is open: it starts at ({first[0]:.6g}, "
+                f"{first[1]:.6g}) and ends at ({last[0]:.6g}, {last[1]:.6g}), {np.hypot(*(first - last)):.4g} apart; "
+                "close it"
+            )
+        rings.append(points[:-1] if closes else points)
+    if len(rings) > 1:
+        _check_holes(element, rings, where)
+    own = element.get("data-blockvis")
+    try:
+        kept = json.loads(own) if own else {}
+    except ValueError:
+        kept = {}
+    title = next((child.text or "" for child in element if _tag(child) == "title"), "")
+    name = title.strip() or element.get(f"{_INKSCAPE}label") or element.get("id") or ""
+    for k, ring in enumerate(rings):
+        row: dict[str, Any] = {"group": where.layer, "material": where.layer}
+        if where.layer.lower() in solver.ROLES:
+            row["material"] = ""
+        if name:
+            row["name"] = name if len(rings) == 1 else f"{name} {k + 1}"
+        found.rings.append(ring @ where.matrix[:2, :2].T + where.matrix[:2, 2])
+        if isinstance(kept, dict) and kept:
+            row = kept
+        found.rows.append(row)
+
+
+def _check_holes(element: ElementTree.Element, rings: list[np.ndarray], where: _Where) -> None:
+    import shapely
+
+    shapes = [shapely.Polygon(ring) for ring in rings]
+    for i, outer in enumerate(shapes):
+        for j, inner in enumerate(shapes):
+            if i != j and outer.is_valid and inner.is_valid and outer.contains(inner):
+                x, y = rings[j].mean(axis=0)
+                raise ValueError(
+                    f"'{where.path}': {_called(element)} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, "
+                    "or fill the hole with a block"
+                )
+
+
+def _matrix(text: str, path: Path) -> np.ndarray:
+    result = np.eye(3)
+    for name, arguments in _TRANSFORM.findall(text):
+        v = [float(x) for x in re.findall(_NUMBER, arguments)]
+        step = np.eye(3)
+        if name == "matrix" and len(v) == 6:
+            step[:2] = np.array(v).reshape(3, 2).T
+        elif name == "translate" and v:
+            step[:2, 2] = [v[0], v[1] if len(v) > 1 else 0.0]
+        elif name == "scale" and v:
+            step[0, 0], step[1, 1] = v[0], v[1] if len(v) > 1 else v[0]
+        elif name == "rotate" and len(v) in (1, 3):
+            c, s = math.cos(math.radians(v[0])), math.sin(math.radians(v[0]))
+            step[:2, :2] = [[c, -s], [s, c]]
+            if len(v) == 3:
+                step[:2, 2] = np.array(v[1:]) - step[:2, :2] @ v[1:]
+        elif name in ("skewX", "skewY") and len(v) == 1:
+            step[(0, 1) if name == "skewX" else (1, 0)] = math.tan(math.radians(v[0]))
+        else:
+            raise ValueError(f"'{path}' has a transform {name}({arguments}) that cannot be read; apply it to the shapes")
+        result = result @ step
+    return result
+
+
+def _length(element: ElementTree.Element, key: str) -> float:
+    text = element.get(key, "0")
+    match = re.fullmatch(rf"\s*({_NUMBER})\s*([a-z%]*)\s*", text)
+    if not match or match[2] not in ("", "px"):
+        raise ValueError(f"has {key}='{text}'; give a number in user units")
+    return float(match[1])
+
+
+def _rectangle(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
+    x, y, w, h = (_length(element, key) for key in ("x", "y", "width", "height"))
+    return [(np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]]), True)] if w > 0 and h > 0 else []
+
+
+def _ellipse(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
+    centre = np.array([_length(element, "cx"), _length(element, "cy")])
+    if _tag(element) == "circle":
+        radii = np.full(2, _length(element, "r"))
+    else:
+        radii = np.array([_length(element, "rx"), _length(element, "ry")])
+    if not (radii > 0).all():
+        return []
+    n = _chords(2 * math.pi, float(radii.max()), where)
+    angles = 2 * math.pi * np.arange(n) / n
+    return [(centre + radii * np.stack([np.cos(angles), np.sin(angles)], axis=1), True)]
+
+
+def _polygon(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
+    numbers = [float(x) for x in re.findall(_NUMBER, element.get("points", ""))]
+    if len(numbers) % 2:
+        raise ValueError(f"has {len(numbers)} coordinates, an odd number; repair it")
+    return [(np.array(numbers).reshape(-1, 2), _tag(element) == "polygon")]
+
+
+def _chords(sweep: float, radius: float, where: _Where) -> int:
+    allowed = 1e-3 if where.tolerance is None else min(max(where.tolerance / radius, 1e-7), 1.0)
+    widest = min(LARGEST_CHORD, 2.0 * math.acos(1.0 - allowed))
+    return min(max(1, math.ceil(abs(sweep) / widest - 1e-9)), MOST_CHORDS)
+
+
+def _path(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
+    """Subpaths of a path as points, and whether each was closed by Z."""
+    tokens = _TOKEN.findall(element.get("d", ""))
+    parts: list[tuple[np.ndarray, bool]] = []
+    points: list[np.ndarray] = []
+    at = start = control = np.zeros(2)
+    command, before, k = "", "", 0
+    while k < len(tokens):
+        if tokens[k][0]:
+            command, k = tokens[k][0], k + 1
+        elif not command or command in "Zz":
+            raise ValueError("has numbers without a command in its path; repair it")
+        kind, relative = command.upper(), command.islower()
+        taken = tokens[k : k + _TAKES[kind]]
+        if len(taken) < _TAKES[kind] or any(not token[1] for token in taken):
+            raise ValueError(f"has a path command '{command}' with too few numbers; repair it")
+        v = [float(token[1]) for token in taken]
+        k += _TAKES[kind]
+        if kind == "Z":
+            parts.append((np.array(points).reshape(-1, 2), True))
+            at, points = start, [start]
+            before = kind
+            continue
+        base = at if relative else np.zeros(2)
+        if kind == "M":
+            if len(points) > 1:
+                parts.append((np.array(points), False))
+            at = start = base + v
+            points = [at]
+            command = "l" if relative else "L"
+        elif kind in "LHV":
+            if kind == "L":
+                at = base + v
+            else:
+                at = np.array([base[0] + v[0], at[1]]) if kind == "H" else np.array([at[0], base[1] + v[0]])
+            points.append(at)
+        elif kind == "A":
+            end = base + v[5:]
+            points += _arc(at, end, v[:5], where)
+            at = end
+        else:
+            pairs = [base + pair for pair in np.array(v).reshape(-1, 2)]
+            smooth = 2 * at - control if before in ("CS" if kind in "CS" else "QT") and before else at
+            pairs = [smooth, *pairs] if kind in "ST" else pairs
+            points += _bezier([at, *pairs], where)
+            control, at = pairs[-2], pairs[-1]
+        before = kind
+    if len(points) > 1:
+        parts.append((np.array(points), False))
+    return parts
+
+
+def _bezier(controls: list[np.ndarray], where: _Where) -> list[np.ndarray]:
+    """Points of a quadratic or cubic curve after its start."""
+    c = np.array(controls)
+    degree = len(c) - 1
+    size = float(np.ptp(c, axis=0).max())
+    bend = float(np.abs(np.diff(c, 2, axis=0)).max(initial=0.0))
+    allowed = 1e-3 * size if where.tolerance is None else max(where.tolerance, 1e-6 * size)
+    # Wang's bound: chords of n equal parts stay within degree·(degree - 1)/8·bend/n² of the curve.
+    n = math.ceil(math.sqrt(degree * (degree - 1) / 8.0 * bend / allowed)) if bend > 0 else 1
+    t = np.linspace(0.0, 1.0, min(max(n, 1), MOST_CHORDS) + 1)[1:, None]
+    while len(c) > 1:
+        c = c[:-1, None] * (1 - t) + c[1:, None] * t if c.ndim == 2 else c[:-1] * (1 - t) + c[1:] * t
+    return list(c[0])
+
+
+def _arc(start: np.ndarray, end: np.ndarray, v: list[float], where: _Where) -> list[np.ndarray]:
+    """Points of an elliptical arc after its start; SVG 1.1, appendix F.6.5 and F.6.6."""
+    rx, ry, turn = abs(v[0]), abs(v[1]), math.radians(v[2])
+    if rx == 0 or ry == 0 or (start == end).all():
+        return [end]
+    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    half = rotation.T @ (start - end) / 2.0 / [rx, ry]
+    grow = float(half @ half)
+    if grow > 1:
+        rx, ry, half = rx * math.sqrt(grow), ry * math.sqrt(grow), half / math.sqrt(grow)
+    factor = math.sqrt(max(0.0, 1.0 / float(half @ half) - 1.0)) * (-1.0 if bool(v[3]) == bool(v[4]) else 1.0)
+    centre = factor * np.array([half[1], -half[0]])
+    first, last = half - centre, -half - centre
+    begin = math.atan2(first[1], first[0])
+    sweep = math.atan2(last[1], last[0]) - begin
+    if v[4] and sweep < 0:
+        sweep += 2 * math.pi
+    elif not v[4] and sweep > 0:
+        sweep -= 2 * math.pi
+    angles = begin + sweep * np.linspace(0, 1, _chords(sweep, max(rx, ry), where) + 1)[1:-1]
+    middle = (start + end) / 2.0 + rotation @ (centre * [rx, ry])
+    local = np.stack([rx * np.cos(angles), ry * np.sin(angles)], axis=1)
+    return [*(middle + local @ rotation.T), end]
+
+
+_SHAPES: dict[str, Callable[[ElementTree.Element, _Where], list[tuple[np.ndarray, bool]]]] = {
+    "rect": _rectangle,
+    "circle": _ellipse,
+    "ellipse": _ellipse,
+    "polygon": _polygon,
+    "polyline": _polygon,
+    "path": _path,
+}
+
+
+def write(drawing: Drawing, path: Path) -> None:
+    """Writes .svg in m: a layer per group, role or material, a path per block with its name as title."""
+    every = np.concatenate(drawing.outlines)
+    low, high = every.min(axis=0), every.max(axis=0)
+    size = np.maximum(high - low, 1e-9)
+    margin = 0.02 * float(size.max())
+    box = f"{low[0] - margin:.9g} {-high[1] - margin:.9g} {size[0] + 2 * margin:.9g} {size[1] + 2 * margin:.9g}"
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="{_INKSCAPE[1:-1]}" viewBox="{box}" '
+        'data-blockvis-unit="m">',
+    ]
+    rows = rows_of(drawing)
+    labels = [
+        group or (role if role in ("fixed", "moving") else "") or material or "blocks"
+        for group, role, material in zip(drawing.groups, drawing.roles, drawing.materials, strict=True)
+    ]
+    # One group per run of equal labels keeps the order of the blocks.
+    for i, row in enumerate(rows):
+        if i == 0 or labels[i] != labels[i - 1]:
+            lines += ["</g>"] if i else []
+            lines.append(
+                f'<g inkscape:groupmode="layer" inkscape:label={quoteattr(labels[i])} fill="#e0cfae" stroke="#333" '
+                f'stroke-width="{0.1 * margin:.4g}">'
+            )
+        points = " L ".join(f"{float(x)!r},{-float(y)!r}" for x, y in drawing.outlines[i])
+        title = row["name"].replace("&", "&amp;").replace("<", "&lt;")
+        lines.append(f'<path d="M {points} Z" data-blockvis={quoteattr(json.dumps(row))}><title>{title}</title></path>')
+    path.write_text("\n".join([*lines, "</g>", "</svg>", ""]), encoding="utf-8")
