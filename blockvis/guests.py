@@ -20,7 +20,7 @@ import solver
 from .drawing import Drawing, assemble, read_drawing, write_drawing
 from .formats.pyvista_files import dataset_of, drawing_of_dataset
 
-__all__ = ["BlockvisAccessor", "READS", "WRITES"]
+__all__ = ["READS", "WRITES", "BlockvisAccessor"]
 
 
 def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:

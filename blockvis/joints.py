@@ -496,7 +496,9 @@ def _strip(edges: _Edges, edge: int, stretch: np.ndarray, thickness: float, dist
     last = size + 2.0 * LONGEST_MITRE * thickness if size - last <= spare else last
     corners = [start + x * along + y * outward for x, y in ((first, 0.0), (last, 0.0), (last, 0.0), (first, 0.0))]
     reach = (2.0 * thickness + distance) * outward
-    return shapely.Polygon([corners[0] - thickness * outward, corners[1] - thickness * outward, corners[2] + reach, corners[3] + reach])
+    return shapely.Polygon(
+        [corners[0] - thickness * outward, corners[1] - thickness * outward, corners[2] + reach, corners[3] + reach]
+    )
 
 
 def _welded(

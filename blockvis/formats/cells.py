@@ -120,9 +120,7 @@ def merged(drawings: Sequence[Drawing], labels: Sequence[str], path: Path | str)
     return Drawing(
         outlines=joined("outlines"),
         names=joined("names"),
-        groups=tuple(
-            group or label for d, label in zip(named, labels, strict=True) for group in d.groups
-        ),
+        groups=tuple(group or label for d, label in zip(named, labels, strict=True) for group in d.groups),
         roles=joined("roles"),
         materials=joined("materials"),
         thickness=numbers("thickness"),

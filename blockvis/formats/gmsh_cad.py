@@ -70,7 +70,9 @@ def _drawing_of_volumes(found: list[dict[str, object]], path: Path) -> Drawing:
     bodies, rows = [], []
     for part in found:
         if int(str(part["groups"])) > 1:
-            raise ValueError(f"'{path}': '{part['name']}' is in {part['groups']} physical groups; keep it in one of them")
+            raise ValueError(
+                f"'{path}': '{part['name']}' is in {part['groups']} physical groups; keep it in one of them"
+            )
         points, faces = np.array(part["points"], dtype=float), np.array(part["faces"], dtype=np.int64)
         bodies.append(Body(str(part["name"]), points.reshape(-1, 3), faces.reshape(-1, 3)))
         row = {"name": str(part["name"])}

@@ -33,7 +33,9 @@ def read(path: Path, reading: Reading) -> Drawing:
             mesh = meshio.read(path)
     except (SystemExit, Exception) as error:  # noqa: BLE001
         reason = " ".join((str(error) or said.getvalue() or type(error).__name__).split())
-        raise ValueError(f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again") from None
+        raise ValueError(
+            f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again"
+        ) from None
     rings: list[np.ndarray] = []
     chosen: list[tuple[int, int]] = []
     for k, block in enumerate(mesh.cells):
@@ -57,7 +59,9 @@ def read(path: Path, reading: Reading) -> Drawing:
 def _sets(mesh: Any, chosen: list[tuple[int, int]]) -> dict[str, np.ndarray]:
     """Named cell sets (Abaqus ELSET, XDMF sets) as blocks, where every surface cell is in one of them."""
     total = sum(n for _, n in chosen)
-    start = dict(zip((k for k, _ in chosen), np.cumsum([0] + [n for _, n in chosen[:-1]]), strict=True)) if chosen else {}
+    start = (
+        dict(zip((k for k, _ in chosen), np.cumsum([0] + [n for _, n in chosen[:-1]]), strict=True)) if chosen else {}
+    )
     owner, names = np.full(total, -1), []
     for name, parts in mesh.cell_sets.items():
         members = [

@@ -49,6 +49,10 @@ def read(path: Path, reading: Reading) -> Drawing:
             if len(mesh.faces)
         ]
         parts = _numbered(parts, scene) if suffix == ".ply" else parts
+        if suffix == ".obj":
+            # trimesh returns objects last first; the file's order is kept instead.
+            named = {name: k for k, name in enumerate(_object_names(path))}
+            parts.sort(key=lambda part: named.get(part[0], len(named)))
     except Exception as error:  # noqa: BLE001
         # trimesh lets the errors of whatever parser it uses through.
         reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
@@ -65,6 +69,10 @@ def read(path: Path, reading: Reading) -> Drawing:
     if float(np.ptp(every, axis=0).min()) <= FLAT * size:
         return replace(_flat(parts, size, path, rows), unit=unit)
     bodies = [body for part in parts for body in _bodies(*part, size, path)]
+    if suffix == ".obj":
+        # Its reader returns the objects in an order of its own; their names say which is which.
+        by_name = {row.get("name"): row for row in rows}
+        rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
     return replace(drawing_of_bodies(bodies, path, known), unit=unit)
 
@@ -72,8 +80,9 @@ def read(path: Path, reading: Reading) -> Drawing:
 def _placed(scene: Any) -> list[tuple[str, Any]]:
     """Meshes of a scene where its transforms put them, by the name of their node."""
     found = []
-    for node in scene.graph.nodes_geometry:
-        transform, name = scene.graph[node]
+    order = {name: k for k, name in enumerate(scene.geometry)}
+    placed = [(*scene.graph[node], str(node)) for node in scene.graph.nodes_geometry]
+    for transform, name, _node in sorted(placed, key=lambda item: (order[item[1]], item[2])):
         mesh = scene.geometry[name]
         if hasattr(mesh, "faces"):
             found.append((str(name), mesh.copy().apply_transform(transform)))
@@ -188,9 +197,7 @@ def drawing_of_bodies(bodies: Sequence[Body], path: Path | str, rows: Sequence[d
         depth.append(float(np.ptp(used[:, axis])))
     notes = [f"{len(bodies)} bodies were read as outlines in {'xyz'[first]}{'xyz'[second]}; their depth along "
              f"{'xyz'[axis]} is the thickness"]  # fmt: skip
-    drawing = Drawing(
-        outlines=tuple(outlines), names=tuple(body.name for body in bodies), unit="", notes=tuple(notes)
-    )
+    drawing = Drawing(outlines=tuple(outlines), names=tuple(body.name for body in bodies), unit="", notes=tuple(notes))
     drawing = with_rows(drawing, rows) if len(rows) == len(bodies) else drawing
     return replace(drawing, thickness=np.array(depth))
 
@@ -213,6 +220,12 @@ def _flat(
     drawings = [drawing_of_cells(points, list(faces), {}, path) for _, points, faces in parts]
     drawing = merged(drawings, [name for name, _, _ in parts], path)
     return with_rows(drawing, rows) if len(rows) == drawing.n_blocks else drawing
+
+
+def _object_names(path: Path) -> list[str]:
+    """Names of the objects of an .obj file in its order."""
+    with path.open("rb") as stream:
+        return [line[2:].decode("utf-8", "replace").strip() for line in stream if line.startswith(b"o ")]
 
 
 def _own_rows(path: Path) -> list[dict[str, Any]]:
@@ -284,7 +297,12 @@ def _ply_lines(prisms: _Prisms, rows: list[dict[str, Any]]) -> list[str]:
     lines = ["ply", "format ascii 1.0", "comment blocks extruded by their thickness, lengths in m"]
     lines += [f"comment blockvis {json.dumps(row)}" for row in rows]
     lines += [f"element vertex {n_points}", *(f"property double {axis}" for axis in "xyz")]
-    lines += [f"element face {n_faces}", "property list uchar int vertex_indices", "property int block_id", "end_header"]
+    lines += [
+        f"element face {n_faces}",
+        "property list uchar int vertex_indices",
+        "property int block_id",
+        "end_header",
+    ]
     lines += [" ".join(repr(float(x)) for x in p) for points, _ in prisms for p in points]
     start = 0
     for number, (points, faces) in enumerate(prisms):

@@ -118,7 +118,9 @@ def _walk(element: ElementTree.Element, where: _Where, found: _Found) -> None:
     if tag == "use":
         found.notes.append("a <use> (clone) was skipped; unlink clones to have them read")
         return
-    where = replace(where, matrix=where.matrix @ _matrix(element.get("transform", ""), where.path), depth=where.depth + 1)
+    where = replace(
+        where, matrix=where.matrix @ _matrix(element.get("transform", ""), where.path), depth=where.depth + 1
+    )
     if tag == "g":
         label = element.get(f"{_INKSCAPE}label") or element.get("id") or ""
         where = replace(where, layer=label or where.layer)
@@ -137,9 +139,7 @@ def _called(element: ElementTree.Element) -> str:
     return f"<{_tag(element)}> '{element.get('id', 'without id')}'"
 
 
-def _add(
-    element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], where: _Where, found: _Found
-) -> None:
+def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], where: _Where, found: _Found) -> None:
     rings = []
     for points, closed in parts:
         if len(points) < 3:
@@ -211,7 +211,9 @@ def _matrix(text: str, path: Path) -> np.ndarray:
         elif name in ("skewX", "skewY") and len(v) == 1:
             step[(0, 1) if name == "skewX" else (1, 0)] = math.tan(math.radians(v[0]))
         else:
-            raise ValueError(f"'{path}' has a transform {name}({arguments}) that cannot be read; apply it to the shapes")
+            raise ValueError(
+                f"'{path}' has a transform {name}({arguments}) that cannot be read; apply it to the shapes"
+            )
         result = result @ step
     return result
 
