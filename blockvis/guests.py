@@ -2,7 +2,7 @@
 
     import pyvista, blockvis.guests
     mesh = pyvista.read("wall.dxf")
-    response = mesh.blockvis.settle(roles={"right": "moving", "left": "fixed"}, direction=(1, 0), friction_coefficient=0.6)
+    response = mesh.blockvis.settle({"right": "moving", "left": "fixed"}, direction=(1, 0), friction_coefficient=0.6)
 
 Importing this module registers everything. What PyVista reads or writes itself stays its own.
 """

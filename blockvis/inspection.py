@@ -11,7 +11,7 @@ import numpy as np
 import solver
 
 from .drawing import Drawing, read_drawing
-from .joints import Facing, proposed_thickness
+from .facing import Facing, proposed_thickness
 from .repair import CARELESS, ROUNDING, block_widths, duplicates, overlaps
 
 __all__ = ["Inspection", "draw_inspection", "inspect"]

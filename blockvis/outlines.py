@@ -107,9 +107,8 @@ def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> np.nda
         )
     rings = [points[loop] for loop in loops]
     if len(rings) > 1:
-        areas = [abs(ring_area(ring)) for ring in rings]
-        outer = rings[int(np.argmax(areas))]
-        inner = rings[int(np.argsort(areas)[-2])]
+        by_area = sorted(rings, key=lambda ring: abs(ring_area(ring)))
+        outer, inner = by_area[-1], by_area[-2]
         x, y = inner.mean(axis=0)
         if _contains(outer, inner[0]):
             raise ValueError(

@@ -8,7 +8,8 @@ import numpy as np
 
 import solver
 
-from .joints import Closing, close_joints, proposed_thickness
+from .facing import proposed_thickness
+from .joints import Closing, close_joints
 
 __all__ = ["block_widths", "duplicates", "mended", "overlaps"]
 

@@ -39,7 +39,8 @@ def read(path: Path, reading: Reading) -> Drawing:
         found = _REACHES_OUT.search(text)
         if found:
             raise ValueError(
-                f"'{path}' uses '{found[0].strip()}', which reaches beyond the file; run gmsh on it yourself and give the .msh"
+                f"'{path}' uses '{found[0].strip()}', which reaches beyond the file; "
+                "run gmsh on it yourself and give the .msh"
             )
     # A thousandth of the radius, or what the tolerance makes of a radius of 1 m.
     allowed = min(max(reading.chord_tolerance or 1e-3, 1e-6), 0.5)

@@ -59,7 +59,8 @@ def _body(gmsh, tag: int) -> dict[str, object]:  # type: ignore[no-untyped-def]
     group = gmsh.model.getPhysicalName(3, groups[0]) if len(groups) else ""
     name = gmsh.model.getEntityName(3, tag).rsplit("/", 1)[-1]
     number: dict[int, int] = {}
-    points, faces = [], []
+    points: list[list[float]] = []
+    faces: list[list[int]] = []
     for _, surface in gmsh.model.getBoundary([(3, tag)], oriented=False):
         nodes, coordinates, _ = gmsh.model.mesh.getNodes(2, surface, includeBoundary=True)
         place = {int(node): coordinates[3 * k : 3 * k + 3].tolist() for k, node in enumerate(nodes)}

@@ -62,7 +62,7 @@ def _sets(mesh: Any, chosen: list[tuple[int, int]]) -> dict[str, np.ndarray]:
     start = (
         dict(zip((k for k, _ in chosen), np.cumsum([0] + [n for _, n in chosen[:-1]]), strict=True)) if chosen else {}
     )
-    owner, names = np.full(total, -1), []
+    owner, names = np.full(total, -1), list[str]()
     for name, parts in mesh.cell_sets.items():
         members = [
             start[k] + np.asarray(part, dtype=np.int64)

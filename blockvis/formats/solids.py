@@ -127,15 +127,15 @@ def _bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path:
     if (counts == 1).any():
         x, y, z = points[unique[counts == 1][0]].mean(axis=0)
         raise ValueError(
-            f"'{path}': body '{name}' is not closed: {int((counts == 1).sum())} edges belong to one face only, one around "
-            f"({x:.6g}, {y:.6g}, {z:.6g}); export closed bodies"
+            f"'{path}': body '{name}' is not closed: {int((counts == 1).sum())} edges belong to one face only, "
+            f"one around ({x:.6g}, {y:.6g}, {z:.6g}); export closed bodies"
         )
     if (counts > 2).any():
         x, y, z = points[unique[counts > 2][0]].mean(axis=0)
         raise ValueError(
-            f"'{path}': body '{name}' holds bodies that touch and cannot be told apart: {int((counts > 2).sum())} edges "
-            f"belong to more than two faces, one around ({x:.6g}, {y:.6g}, {z:.6g}); export one file or one named "
-            "object per block (.obj, .glb, .step)"
+            f"'{path}': body '{name}' holds bodies that touch and cannot be told apart: {int((counts > 2).sum())} "
+            f"edges belong to more than two faces, one around ({x:.6g}, {y:.6g}, {z:.6g}); "
+            "export one file or one named object per block (.obj, .glb, .step)"
         )
     # Through edges, not through points: blocks that touch in a corner stay two.
     inverse = inverse.ravel().reshape(-1, 3)
