@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pyvista as pv
+from vtkmodules.vtkCommonCore import vtkStringArray
 
 import solver
 
@@ -47,19 +48,18 @@ def block_dataset(assembly: solver.Assembly, increment: solver.Increment | None 
     moved = pose.displacements(assembly)
     cells = {
         "block_id": np.arange(assembly.n_blocks, dtype=np.int32),
-        "name": np.array(assembly.names),
         "role": np.array([ROLE_NUMBERS[str(role)] for role in assembly.roles], dtype=np.int32),
-        "role_name": np.array([str(role) for role in assembly.roles]),
         "material_id": np.array([number[material] for material in assembly.materials], dtype=np.int32),
-        "material": np.array(assembly.materials),
         "displacement": _in_space(moved[:, :2]),
         "rotation": moved[:, 2].copy(),
     }
     for name, array in cells.items():
         grid.cell_data[name] = array
+    for name, words in (("name", assembly.names), ("role_name", assembly.roles), ("material", assembly.materials)):
+        grid.GetCellData().AddArray(_strings(name, words))
     grid.point_data["displacement"] = _in_space(corners - assembly.vertices)
-    grid.field_data["role_names"] = np.array(solver.ROLES)
-    grid.field_data["material_names"] = np.array(materials)
+    grid.GetFieldData().AddArray(_strings("role_names", solver.ROLES))
+    grid.GetFieldData().AddArray(_strings("material_names", materials))
     if increment is not None:
         _describe(grid, increment)
     return grid
@@ -101,7 +101,7 @@ def contact_dataset(assembly: solver.Assembly, increment: solver.Increment) -> p
     }
     for name, array in points.items():
         grid.point_data[name] = array
-    grid.field_data["state_names"] = np.array([state.name.lower() for state in solver.ContactState])
+    grid.GetFieldData().AddArray(_strings("state_names", [state.name.lower() for state in solver.ContactState]))
     _describe(grid, increment)
     return grid
 
@@ -138,7 +138,16 @@ def _describe(grid: pv.UnstructuredGrid, increment: solver.Increment) -> None:
     grid.field_data["phase"] = np.array([increment.phase])
     grid.field_data["load_multiplier"] = np.array([increment.load_multiplier])
     grid.field_data["reaction"] = np.array([increment.reaction])
-    grid.field_data["status"] = np.array([str(increment.status)])
+    grid.GetFieldData().AddArray(_strings("status", [str(increment.status)]))
+
+
+def _strings(name: str, words: Iterable[str]) -> vtkStringArray:
+    """A VTK array of strings; pyvista's own conversion refuses anything but ASCII, and names are in any language."""
+    array = vtkStringArray()
+    array.SetName(name)
+    for word in words:
+        array.InsertNextValue(str(word))
+    return array
 
 
 def _polygon_cells(offsets: np.ndarray) -> np.ndarray:

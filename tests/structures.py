@@ -1,0 +1,101 @@
+"""Structures and responses that several tests look at."""
+
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+import solver
+from blockvis import layouts
+
+#: Bent outlines that VTK would fill wrongly: an L, a U, a comb.
+BENT = {
+    "L": [[0, 0], [2, 0], [2, 1], [1, 1], [1, 3], [0, 3]],
+    "U": [[4, 0], [7, 0], [7, 3], [6, 3], [6, 1], [5, 1], [5, 3], [4, 3]],
+    "comb": [[9, 0], [14, 0], [14, 2], [13, 2], [13, 1], [12, 1], [12, 2], [11, 2], [11, 1], [10, 1], [10, 2], [9, 2]],
+}
+
+
+@cache
+def arch_response() -> solver.Response:
+    """A semicircular arch of 12 voussoirs whose right springer spreads until it collapses."""
+    spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
+    controls = solver.Controls(falling_frames=12)
+    return solver.settle(layouts.arch(), spread, friction_coefficient=0.6, controls=controls)
+
+
+def wall(columns: int, courses: int) -> solver.Assembly:
+    """Bricks of 0.25 m × 0.1 m in running bond on two footings, the right one moving."""
+    length, height = 0.25, 0.1
+    outlines, names = [], []
+    for course in range(courses):
+        joints = [0.0, *((np.arange(columns) + (0.5 if course % 2 else 1.0)) * length), columns * length]
+        joints = [x for k, x in enumerate(joints) if k == 0 or x > joints[k - 1] + 1e-9]
+        for left, right in pairwise(joints):
+            low, high = course * height, (course + 1) * height
+            outlines.append([[left, low], [right, low], [right, high], [left, high]])
+            names.append(f"brick {course}-{len(outlines)}")
+    split, end = round(0.66 * columns) * length, columns * length
+    outlines.append([[-2, -1], [split, -1], [split, 0], [-2, 0]])
+    outlines.append([[split, -1], [end + 2, -1], [end + 2, 0], [split, 0]])
+    bricks = len(names)
+    return solver.Assembly.from_outlines(
+        outlines,
+        roles=["free"] * bricks + ["fixed", "moving"],
+        names=[*names, "footing left", "footing right"],
+        materials=["brick"] * bricks + ["concrete"] * 2,
+    )
+
+
+def parted(assembly: solver.Assembly, path: int, fall: int, settlement: float = 0.1) -> solver.Response:
+    """A made-up response, no mechanics in it: the right part of a wall sinks as one body, then drops.
+
+    Forces are made up too, so that there are as many of them as in a real wall.
+    """
+    edge = assembly.vertices[assembly.free[assembly.block_of_vertex]].max(axis=0)
+    right = (assembly.centroids[:, 0] > 0.66 * edge[0] - 0.35 * assembly.centroids[:, 1]) & assembly.free
+    random = np.random.default_rng(7)
+    velocity = np.zeros((assembly.n_blocks, 3))
+    velocity[right | assembly.moving, 1] = -1.0
+    certificate = solver.Certificate(1e-12, 1e-9, 1e-10, 1e-10, 0.0)
+    increments = []
+    for k in range(path + fall):
+        s = settlement * min(k, path - 1) / (path - 1)
+        positions = assembly.centroids.copy()
+        positions[right | assembly.moving, 1] -= s
+        positions[right] += max(0, k - path + 1) * np.array([0.02, -0.01])
+        pose = solver.Pose(positions, np.zeros(assembly.n_blocks))
+        contacts = solver.find_contacts(assembly, solver.moved_vertices(assembly, pose), 0.002)
+        normal = np.where(np.abs(contacts.gaps) < 1e-3, (edge[1] - contacts.points[:, 1] + 0.1) * 1e3, 0.0)
+        normal *= random.random(len(normal))
+        forces = np.stack([normal, 0.2 * normal * (random.random(len(normal)) - 0.5)], axis=1)
+        apart = velocity[contacts.block_a, :2] - velocity[contacts.block_b, :2]
+        increments.append(
+            solver.Increment(
+                settlement=s,
+                phase=0,
+                load_multiplier=0.0,
+                pose=pose,
+                contacts=contacts,
+                forces=forces,
+                displacements=np.einsum("kij,kj->ki", contacts.frames, apart),
+                friction=np.full(len(normal), 0.6),
+                velocity=velocity,
+                reaction=2000.0 - 3000.0 * s,
+                support_forces=np.zeros((assembly.n_blocks, 3)),
+                certificate=certificate,
+                status=solver.Status.EQUILIBRIUM if k < path else solver.Status.FALLING,
+                programs=1,
+                seconds=0.0,
+            )
+        )
+    return solver.Response(
+        assembly=assembly,
+        settlements=(solver.Settlement(direction=(0, -1), increment=settlement / path, limit=1.0),),
+        interfaces=solver.Interfaces(),
+        loads=solver.self_weight(assembly),
+        increments=tuple(increments),
+        stop=solver.Status.COLLAPSED,
+        message="made up",
+        collapse=solver.Collapse(settlement, (settlement, settlement + 1e-3), 1700.0, velocity),
+    )

@@ -1,0 +1,139 @@
+"""Joints, cracks, hinges, resultants and the parts of a mechanism."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from structures import BENT, arch_response, parted, wall
+
+import solver
+from blockvis import marks
+from blockvis.fills import hatch_lines, triangles
+from blockvis.mechanism import part_outlines, rigid_parts, swung, with_motion
+
+
+def stacked(shift=(0.0, 0.0), turn=0.0):
+    """A block on another, 1 m wide, and the pose with the upper one moved."""
+    assembly = solver.Assembly.from_outlines(
+        [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 1], [1, 2], [0, 2]]], roles=["fixed", "free"]
+    )
+    pose = solver.Pose(assembly.centroids + np.array([(0.0, 0.0), shift]), np.array([0.0, turn]))
+    return assembly, pose
+
+
+def cracks(assembly, pose):
+    return marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose)
+
+
+def area(polygon):
+    x, y = polygon.T
+    return abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) / 2.0
+
+
+def test_one_joint_between_two_full_faces():
+    assembly, _ = stacked()
+    joints = marks.drawn_joints(assembly)
+    assert len(joints.block_a) == 1
+    assert {int(joints.block_a[0]), int(joints.block_b[0])} == {0, 1}
+    assert np.sort(joints.ends[0, :, 0]).tolist() == [0.0, 1.0]
+    assert joints.ends[0, :, 1].tolist() == [1.0, 1.0]
+
+
+def test_joints_of_a_running_bond_wall_are_counted():
+    assembly = wall(4, 2)
+    joints = marks.drawn_joints(assembly)
+    # Lower course of 4: three heads; upper course of 5 (halves at the ends): four heads; 8 beds between them,
+    # since joints alternate; the 4 lower bricks stand on a footing each, the split falls on a head joint.
+    assert len(joints.block_a) == 3 + 4 + 8 + 4
+
+
+def test_a_lifted_block_leaves_a_crack_of_its_size():
+    found = cracks(*stacked(shift=(0.0, 0.05)))
+    assert len(found) == 1
+    np.testing.assert_allclose(area(found[0]), 0.05, rtol=1e-9)
+
+
+def test_sliding_and_pressing_leave_none():
+    assert len(cracks(*stacked(shift=(0.2, 0.0)))) == 0
+    assert len(cracks(*stacked(shift=(0.0, -0.05)))) == 0
+
+
+def test_blocks_that_have_parted_have_no_joint():
+    assert len(cracks(*stacked(shift=(0.0, 1.5)))) == 0
+
+
+def test_resultants_balance_every_voussoir():
+    response = arch_response()
+    increment, assembly = response.path[-1], response.assembly
+    _, forces, blocks = marks.resultants(increment)
+    total = np.zeros((assembly.n_blocks, 2))
+    np.add.at(total, blocks[:, 0], forces)
+    np.subtract.at(total, blocks[:, 1], forces)
+    weight = assembly.masses * solver.GRAVITY
+    np.testing.assert_allclose(total[assembly.free, 1], weight[assembly.free], rtol=1e-6)
+    assert len(forces) == 13
+
+
+def test_arch_spreads_on_three_hinges_and_falls_on_five():
+    response = arch_response()
+    last, joints = response.path[-1], marks.drawn_joints(response.assembly)
+    spreading = marks.marks_of(response.assembly, joints, last, last.pose)
+    assert len(spreading.hinges) == 3
+    falling = with_motion(last, response.collapse.mechanism)
+    assert len(marks.marks_of(response.assembly, joints, falling, last.pose).hinges) == 5
+    parts = rigid_parts(response.assembly, falling)
+    assert sorted(np.bincount(parts[parts >= 0]).tolist()) == [2, 2, 4, 4]
+    assert (parts[~response.assembly.free] == -1).all()
+
+
+def test_parts_swing_as_one_body():
+    response = arch_response()
+    falling = with_motion(response.path[-1], response.collapse.mechanism)
+    parts = rigid_parts(response.assembly, falling)
+    displaced = swung(falling.pose, 0.1 * response.collapse.mechanism)
+    outlines = part_outlines(response.assembly, solver.moved_vertices(response.assembly, displaced), parts)
+    length = np.hypot(*(outlines[:, 1] - outlines[:, 0]).T).sum()
+    before = part_outlines(response.assembly, solver.moved_vertices(response.assembly, falling.pose), parts)
+    np.testing.assert_allclose(length, np.hypot(*(before[:, 1] - before[:, 0]).T).sum(), rtol=1e-2)
+
+
+def test_a_sinking_wall_is_one_part():
+    response = parted(wall(8, 6), 2, 0)
+    parts = rigid_parts(response.assembly, response.increments[-1])
+    assert set(parts) == {-1, 0}
+
+
+def test_bent_outlines_are_cut_into_triangles_of_the_same_area():
+    assembly = solver.Assembly.from_outlines([*BENT.values(), [[20, 0], [23, 0], [22, 4]]])
+    cells = triangles(assembly)
+    a, b, c = (assembly.vertices[cells[:, k]] for k in (1, 2, 3))
+    twice = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    assert (twice >= 0).all()
+    areas = np.bincount(assembly.block_of_vertex[cells[:, 1]], weights=twice / 2.0)
+    np.testing.assert_allclose(areas, assembly.areas, rtol=1e-12)
+
+
+def test_hatch_stays_inside_the_support():
+    assembly = solver.Assembly.from_outlines([BENT["U"]], roles=["fixed"])
+    points, blocks = hatch_lines(assembly, np.array([0]), np.array([-100.0, -100.0]), np.array([100.0, 100.0]), 0.1)
+    assert len(points) == len(blocks) > 20
+    middles = (points[::2] + points[1::2]) / 2.0
+    notch = (middles[:, 0] > 5.001) & (middles[:, 0] < 5.999) & (middles[:, 1] > 1.001)
+    assert not notch.any()
+    assert points.min() >= -1e-9
+
+
+@given(st.floats(1e-9, 1e9))
+def test_round_lengths_are_round_and_not_longer(length):
+    round_length = marks.rounded_length(length)
+    assert round_length <= length * (1 + 1e-6)
+    assert round_length > 0.39 * length
+    assert f"{round_length:.0e}"[0] in "125"
+
+
+@given(st.floats(-3, 3), st.floats(-10, 10), st.floats(-10, 10))
+def test_carried_there_and_back(turn, x, y):
+    before = solver.Pose(np.array([[1.0, 2.0]]), np.array([0.3]))
+    after = solver.Pose(np.array([[x, y]]), np.array([turn]))
+    point = np.array([[0.7, -0.4]])
+    there = marks.carried(point, np.array([0]), before, after)
+    np.testing.assert_allclose(marks.carried(there, np.array([0]), after, before), point, atol=1e-9)
