@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from blockvis.drawing import Drawing
 from blockvis.formats import Reading
 from blockvis.formats.layout_json import rows_of, with_rows
 from blockvis.formats.loose_lines import Line, faces_of_lines
+from blockvis.outlines import arc_points
 from blockvis.units import metres_per
 
 __all__ = ["read", "write"]
@@ -144,12 +146,12 @@ def _add_curve(entity: Any, handle: str, found: _Found, tolerance: float | None)
         ring = np.array([(p.x, p.y, p.z) for p in entity.wcs_vertices()])
         found.add(ring, entity, handle)
         return
+    exact = _circular(entity, tolerance)
     try:
-        curve = make_path(entity)
+        points = _points(make_path(entity), tolerance) if exact is None else exact
     except TypeError:  # a polyface or mesh POLYLINE
         found.skipped[kind] += 1
         return
-    points = _points(curve, tolerance)
     if len(points) < 2:
         found.skipped[f"{kind} without length"] += 1
         return
@@ -167,10 +169,65 @@ def _add_curve(entity: Any, handle: str, found: _Found, tolerance: float | None)
     found.loose.append(Line(points, str(entity.dxf.layer), handle, must_close=kind not in ("LINE", "ARC")))
 
 
-def _add_hatch(entity: Any, handle: str, found: _Found, tolerance: float | None, path: Path) -> None:
+def _circular(entity: Any, tolerance: float | None) -> np.ndarray | None:
+    """(n, 3) array: what consists of lines and circular arcs, its chords measured on the arcs themselves.
+
+    ezdxf's paths replace an arc by a cubic first, which lies up to 2.7e-4 of the radius beside it.
+    """
+    kind = entity.dxftype()
+    if kind in ("CIRCLE", "ARC"):
+        start, end = (0.0, 360.0) if kind == "CIRCLE" else (entity.dxf.start_angle, entity.dxf.end_angle)
+        sweep = math.radians((end - start) % 360.0 or 360.0)
+        c = entity.dxf.center
+        flat = arc_points(np.array([c.x, c.y]), abs(float(entity.dxf.radius)), math.radians(start), sweep, tolerance)
+        level = float(c.z)
+    elif kind == "LWPOLYLINE":
+        flat = _with_bulges([(x, y, b) for x, y, b in entity.get_points("xyb")], bool(entity.closed), tolerance)
+        level = float(entity.dxf.elevation)
+    elif kind == "POLYLINE" and entity.is_2d_polyline and not entity.dxf.flags & 6:
+        corners = [(v.dxf.location.x, v.dxf.location.y, float(v.dxf.bulge)) for v in entity.vertices]
+        flat = _with_bulges(corners, bool(entity.is_closed), tolerance)
+        level = float(entity.dxf.elevation.z) if entity.dxf.hasattr("elevation") else 0.0
+    else:
+        return None
+    system = entity.ocs()
+    return np.array([(*system.to_wcs((x, y, level)),) for x, y in flat]).reshape(-1, 3)
+
+
+def _with_bulges(corners: list[tuple[float, float, float]], closed: bool, tolerance: float | None) -> np.ndarray:
+    """(n, 2) array: a polyline whose bulged segments are chords; closed ones end where they start."""
+    from ezdxf.math import bulge_to_arc
+
+    points = [np.array(corner[:2]) for corner in corners[:1]]
+    following = [*corners[1:], *(corners[:1] if closed else [])]
+    for (x, y, bulge), (u, v, _) in zip(corners, following, strict=False):
+        if bulge and np.isfinite(bulge) and (x, y) != (u, v):
+            centre, start, end, radius = bulge_to_arc((x, y), (u, v), bulge)
+            sweep = (end - start) % (2 * math.pi)
+            arc = arc_points(np.array([centre.x, centre.y]), radius, start, sweep, tolerance)
+            points += list((arc if bulge > 0 else arc[::-1])[1:-1])
+        points.append(np.array([u, v]))
+    return np.array(points).reshape(-1, 2)
+
+
+def _hatch_rings(entity: Any, tolerance: float | None) -> list[np.ndarray]:
+    """Boundaries of a hatch as (n, 3) rings."""
     from ezdxf.path import from_hatch
 
-    rings = [_points(curve, tolerance) for curve in from_hatch(entity)]
+    rings = []
+    for boundary in entity.paths:
+        if not hasattr(boundary, "vertices"):
+            # Boundaries of separate edges may turn either way and hold splines: ezdxf orders them.
+            return [_points(curve, tolerance) for curve in from_hatch(entity)]
+        flat = _with_bulges([tuple(corner) for corner in boundary.vertices], True, tolerance)
+        system = entity.ocs()
+        level = float(entity.dxf.elevation.z) if entity.dxf.hasattr("elevation") else 0.0
+        rings.append(np.array([(*system.to_wcs((x, y, level)),) for x, y in flat]).reshape(-1, 3))
+    return rings
+
+
+def _add_hatch(entity: Any, handle: str, found: _Found, tolerance: float | None, path: Path) -> None:
+    rings = _hatch_rings(entity, tolerance)
     rings = [ring[:-1] if (ring[0] == ring[-1]).all() else ring for ring in rings if len(ring) > 2]
     if not rings:
         found.skipped["HATCH without boundary"] += 1

@@ -348,10 +348,10 @@ def write(drawing: Drawing, path: Path) -> None:
     ]
     number = {group: k + 1 for k, group in enumerate(dict.fromkeys(groups))}
     nodes, elements, entities = [], [], []
-    n_nodes = n_elements = 0
+    n_nodes = n_elements = n_parts = 0
     for i, ring in enumerate(drawing.outlines):
         low, high = ring.min(axis=0), ring.max(axis=0)
-        box = f"{low[0]!r} {low[1]!r} 0 {high[0]!r} {high[1]!r} 0".replace("np.float64(", "").replace(")", "")
+        box = " ".join(repr(float(x)) for x in (*low, 0.0, *high, 0.0))
         entities.append(f"{i + 1} {box} 1 {number[groups[i]]} 0")
         nodes.append(f"2 {i + 1} 0 {len(ring)}")
         nodes += [str(n_nodes + k + 1) for k in range(len(ring))]
@@ -360,12 +360,12 @@ def write(drawing: Drawing, path: Path) -> None:
         for kind, width in ((2, 3), (3, 4)):
             chosen = [cell for cell in cells if len(cell) == width]
             if chosen:
+                n_parts += 1
                 elements.append(f"2 {i + 1} {kind} {len(chosen)}")
                 for cell in chosen:
                     n_elements += 1
                     elements.append(" ".join(map(str, [n_elements, *(n_nodes + k + 1 for k in cell)])))
         n_nodes += len(ring)
-    n_parts = sum(1 for line in elements if line.startswith("2 ") and len(line.split()) == 4)
     lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat"]
     lines += ["$PhysicalNames", str(len(number))]
     lines += [f'2 {k} "{group.replace(chr(34), chr(39))}"' for group, k in number.items()]

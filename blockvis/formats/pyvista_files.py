@@ -161,11 +161,23 @@ def dataset_of(drawing: Drawing) -> pyvista.UnstructuredGrid:
     for key in ("name", "group", "role", "material"):
         words = [str(row.get(key, "")) for row in rows]
         if any(words):
-            grid.cell_data[key] = np.array(words)
+            _add_words(grid.GetCellData(), key, words)
     for key in ("thickness", "density"):
         if any(key in row for row in rows):
             grid.cell_data[key] = np.array([float(row.get(key, np.nan)) for row in rows])
     return grid
+
+
+def _add_words(attributes: Any, name: str, words: list[str]) -> None:
+    """A string array, filled by hand: pyvista refuses letters beyond ASCII, which VTK's files carry well."""
+    from vtkmodules.vtkCommonCore import vtkStringArray
+
+    array = vtkStringArray()
+    array.SetName(name)
+    array.SetNumberOfValues(len(words))
+    for k, word in enumerate(words):
+        array.SetValue(k, word)
+    attributes.AddArray(array)
 
 
 def write(drawing: Drawing, path: Path) -> None:
@@ -188,5 +200,5 @@ def _surface(grid: Any) -> pyvista.PolyData:
 
     surface = pyvista.PolyData(np.asarray(grid.points), faces=np.asarray(grid.cells))
     for key in grid.cell_data:
-        surface.cell_data[key] = grid.cell_data[key]
+        surface.GetCellData().AddArray(grid.GetCellData().GetAbstractArray(key))
     return surface

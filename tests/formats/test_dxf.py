@@ -1,0 +1,156 @@
+"""DXF as drawing programs write it, R12 to R2018."""
+
+import time
+
+import ezdxf
+import numpy as np
+import pytest
+
+from blockvis.drawing import read, read_drawing
+
+SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
+
+
+def saved(tmp_path, draw, version="R2010"):
+    document = ezdxf.new(version)
+    document.header["$INSUNITS"] = 6
+    draw(document, document.modelspace())
+    path = tmp_path / "a.dxf"
+    document.saveas(path)
+    return path
+
+
+@pytest.mark.parametrize("version", ["R12", "R2000", "R2004", "R2007", "R2010", "R2013", "R2018"])
+def test_versions(tmp_path, version):
+    def draw(document, space):
+        space.add_polyline2d(SQUARE, close=True, dxfattribs={"layer": "stone"})
+        space.add_polyline2d([*((x + 2, y) for x, y in SQUARE), (2, 0)], dxfattribs={"layer": "fixed"})
+
+    assembly = read(saved(tmp_path, draw, version))
+    assert assembly.materials == ("stone", "fixed")
+    assert assembly.roles.tolist() == ["free", "fixed"]
+    assert assembly.areas.tolist() == [1.0, 1.0]
+
+
+def test_bulges_and_hatches_become_chords(tmp_path):
+    def draw(document, space):
+        space.add_lwpolyline([(0, 0), (1, 0, 0, 0, 1.0), (1, 1), (0, 1)], close=True)
+        hatch = space.add_hatch()
+        edge = hatch.paths.add_edge_path()
+        edge.add_line((3, 0), (4, 0))
+        edge.add_arc((3.5, 0), 0.5, 0, 180)
+        space.add_circle((6, 0), 0.5)
+
+    path = saved(tmp_path, draw)
+    coarse, fine = (read(path, chord_tolerance=t) for t in (1e-2, 1e-5))
+    exact = np.pi * np.array([1 / 8, 1 / 8, 1 / 4]) + [1, 0, 0]
+    assert fine.areas[[0, 2]] == pytest.approx(exact[[0, 2]], rel=1e-4)
+    assert fine.areas[1] == pytest.approx(exact[1], rel=1e-3)
+    assert (np.abs(coarse.areas - exact) < 0.05).all()
+    assert len(fine.vertices) > 3 * len(coarse.vertices)
+
+
+def test_a_hatch_on_its_own_outline_is_one_block(tmp_path):
+    def draw(document, space):
+        space.add_lwpolyline(SQUARE, close=True)
+        space.add_hatch().paths.add_polyline_path(SQUARE)
+
+    assert read(saved(tmp_path, draw)).n_blocks == 1
+
+
+def test_inserted_blocks(tmp_path):
+    def draw(document, space):
+        brick = document.blocks.new("brick")
+        brick.add_lwpolyline(SQUARE, close=True, dxfattribs={"layer": "brick"})
+        pair = document.blocks.new("pair")
+        pair.add_blockref("brick", (0, 0))
+        pair.add_blockref("brick", (1.5, 0), dxfattribs={"xscale": 2})
+        space.add_blockref("pair", (0, 10), dxfattribs={"rotation": 90})
+        space.add_blockref("brick", (20, 0), dxfattribs={"column_count": 3, "column_spacing": 2})
+
+    assembly = read(saved(tmp_path, draw))
+    assert sorted(assembly.areas) == pytest.approx([1, 1, 1, 1, 2])
+    assert set(assembly.materials) == {"brick"}
+
+
+def test_loose_lines_enclose_blocks(tmp_path):
+    def draw(document, space):
+        for a, b in [((0, 0), (2, 0)), ((2, 0), (2, 1)), ((2, 1), (0, 1)), ((0, 1), (0, 0)), ((1, 0), (1, 1))]:
+            space.add_line(a, b, dxfattribs={"layer": "stone"})
+        space.add_line((5, 5), (6, 6))
+
+    drawing = read_drawing(saved(tmp_path, draw))
+    assert drawing.groups == ("stone", "stone")
+    assert any("2 blocks are faces between 6 loose lines" in note for note in drawing.notes)
+    assert any("1 loose lines enclose nothing" in note for note in drawing.notes)
+
+
+def test_open_polyline_names_layer_handle_and_gap(tmp_path):
+    def draw(document, space):
+        space.add_lwpolyline([(0, 0), (1, 0), (1, 1), (0, 0.25)], dxfattribs={"layer": "stone", "handle": "AB"})
+
+    with pytest.raises(
+        ValueError,
+        match=r"polyline AB on layer 'stone' is open: it starts at \(0, 0\) and ends at \(0, 0.25\), 0.25 apart; close it",
+    ):
+        read(saved(tmp_path, draw))
+
+
+def test_hidden_layers_and_texts_are_skipped_with_a_note(tmp_path):
+    def draw(document, space):
+        document.layers.add("old").off()
+        space.add_lwpolyline(SQUARE, close=True, dxfattribs={"layer": "old"})
+        space.add_lwpolyline([(x + 3, y) for x, y in SQUARE], close=True)
+        space.add_text("section A-A")
+
+    drawing = read_drawing(saved(tmp_path, draw))
+    assert drawing.n_blocks == 1
+    assert "skipped: 1 TEXT" in drawing.notes
+    assert "skipped on layers that are off or frozen: 1 on 'old'" in drawing.notes
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ([(0, 0), (1, 1), (1, 0), (0, 2)], "crosses itself"),
+        ([(0, 0), (2e9, 0), (2e9, 2e9), (0, 1)], r"has a coordinate of 2e\+09 m"),
+        ([(0, 0), (float("nan"), 0), (1, 1)], "coordinates must be finite"),
+        ([(0, 0), (1, 0), (2, 0), (3, 0)], "is a line, not a block"),
+    ],
+)
+def test_refused_outlines(tmp_path, points, message):
+    path = saved(tmp_path, lambda document, space: space.add_lwpolyline(points, close=True))
+    with pytest.raises(ValueError, match=message):
+        read(path)
+
+
+def test_a_hatch_with_an_island_is_a_hole(tmp_path):
+    def draw(document, space):
+        hatch = space.add_hatch()
+        hatch.paths.add_polyline_path([(3 * x, 3 * y) for x, y in SQUARE])
+        hatch.paths.add_polyline_path([(1 + x, 1 + y) for x, y in SQUARE])
+
+    with pytest.raises(ValueError, match=r"HATCH \w+ on layer '0' has a hole around \(1.5, 1.5\)"):
+        read(saved(tmp_path, draw))
+
+
+def test_a_small_file_cannot_ask_for_a_million_blocks(tmp_path):
+    def draw(document, space):
+        document.blocks.new("b0").add_lwpolyline(SQUARE, close=True)
+        for k in range(1, 9):
+            block = document.blocks.new(f"b{k}")
+            for _ in range(10):
+                block.add_blockref(f"b{k - 1}", (0, 0))
+        space.add_blockref("b8", (0, 0))
+
+    path = saved(tmp_path, draw)
+    start = time.perf_counter()
+    with pytest.raises(ValueError, match="inserts more entities than it has bytes"):
+        read(path)
+    assert time.perf_counter() - start < 20
+
+
+def test_no_outline(tmp_path):
+    path = saved(tmp_path, lambda document, space: space.add_text("nothing"))
+    with pytest.raises(ValueError, match=r"has no closed outline in its model space \(found: 1 TEXT\)"):
+        read(path)

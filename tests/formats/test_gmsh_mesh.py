@@ -1,0 +1,141 @@
+"""Meshes of gmsh: one surface, one block, groups by dimension and tag; and broken files."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blockvis.drawing import read, read_drawing
+
+ASSETS = Path(__file__).parents[2] / "assets"
+gmsh = pytest.importorskip("gmsh", reason="gmsh is an extra", exc_type=(ImportError, OSError))
+
+
+@pytest.fixture
+def model():
+    gmsh.initialize(["gmsh", "-nopopup"], interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    yield gmsh.model
+    gmsh.finalize()
+
+
+def quad(model, x, y, w, h):
+    return model.occ.addRectangle(x, y, 0, w, h)
+
+
+@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize("order", [1, 2])
+def test_versions(model, tmp_path, version, binary, order):
+    a, b, c = quad(model, 0, 0, 2, 1), quad(model, 2, 0, 2, 1), model.occ.addDisk(6, 0, 0, 1, 1)
+    model.occ.synchronize()
+    model.addPhysicalGroup(1, [1], 7, "stone")
+    model.addPhysicalGroup(2, [a, b], 7, "stone")
+    model.addPhysicalGroup(2, [c], 8, "fixed")
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 0.4)
+    gmsh.option.setNumber("Mesh.ElementOrder", order)
+    model.mesh.generate(2)
+    gmsh.option.setNumber("Mesh.MshFileVersion", version)
+    gmsh.option.setNumber("Mesh.Binary", binary)
+    path = tmp_path / "a.msh"
+    gmsh.write(str(path))
+    drawing = read_drawing(path)
+    assert drawing.groups == ("stone", "stone", "fixed")
+    assert drawing.names == ("stone 1", "stone 2", "fixed")
+    assembly = read(path)
+    assert assembly.roles.tolist() == ["free", "free", "fixed"]
+    assert assembly.areas[:2] == pytest.approx([2, 2])
+    assert len(assembly.outline(0)) == 4
+    assert assembly.areas[2] == pytest.approx(np.pi, rel=0.05)
+
+
+def test_a_surface_in_two_groups_is_refused(model, tmp_path):
+    a = quad(model, 0, 0, 2, 1)
+    model.occ.synchronize()
+    model.addPhysicalGroup(2, [a], 1, "stone")
+    model.addPhysicalGroup(2, [a], 2, "left")
+    model.mesh.generate(2)
+    for version in (2.2, 4.1):
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        path = tmp_path / "a.msh"
+        gmsh.write(str(path))
+        with pytest.raises(ValueError, match="surface 1 is in 2 physical groups, 'stone' and 'left'"):
+            read(path)
+
+
+def test_a_hole_is_refused(model, tmp_path):
+    outer, inner = quad(model, 0, 0, 3, 3), quad(model, 1, 1, 1, 1)
+    model.occ.cut([(2, outer)], [(2, inner)])
+    model.occ.synchronize()
+    model.mesh.generate(2)
+    gmsh.write(str(tmp_path / "a.msh"))
+    with pytest.raises(ValueError, match=r"has a hole around \(1.5, 1.5\)"):
+        read(tmp_path / "a.msh")
+
+
+def test_no_surface_cells(model, tmp_path):
+    quad(model, 0, 0, 3, 3)
+    model.occ.synchronize()
+    model.mesh.generate(1)
+    gmsh.write(str(tmp_path / "a.msh"))
+    with pytest.raises(ValueError, match=r"has no surface cells: none of its \d+ elements is a triangle"):
+        read(tmp_path / "a.msh")
+
+
+def test_gmsh_reads_what_we_write(model, tmp_path):
+    from blockvis.drawing import save_layout
+
+    arch = read(ASSETS / "semicircular_arch.msh", roles={"right springer": "moving", "left springer": "fixed"})
+    save_layout(arch, tmp_path / "a.msh")
+    gmsh.open(str(tmp_path / "a.msh"))
+    groups = {gmsh.model.getPhysicalName(*g): len(gmsh.model.getEntitiesForPhysicalGroup(*g)) for g in
+              gmsh.model.getPhysicalGroups(2)}  # fmt: skip
+    assert groups == {"voussoirs": 12, "moving": 1, "fixed": 1}
+
+
+def test_the_arch_of_the_assets_is_exact():
+    arch = read(ASSETS / "semicircular_arch.msh", roles={"right springer": "moving", "left springer": "fixed"})
+    assert arch.n_blocks == 14
+    assert np.diff(arch.offsets).tolist() == [4] * 14
+    radii = np.hypot(*arch.vertices[arch.block_of_vertex < 12].T)
+    assert np.minimum(np.abs(radii - 0.925), np.abs(radii - 1.075)).max() < 1e-15
+    assert arch.roles[12:].tolist() == ["moving", "fixed"]
+
+
+def test_the_script_of_the_arch_gives_the_same_blocks():
+    mesh, script = (read(ASSETS / f"semicircular_arch{suffix}") for suffix in (".msh", ".geo"))
+    assert script.names == mesh.names
+    assert np.allclose(script.centroids, mesh.centroids, rtol=0, atol=1e-12)
+    assert np.allclose(script.areas, mesh.areas, rtol=1e-12)
+
+
+def hostile(text, old, new):
+    assert old in text
+    return text.replace(old, new, 1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("4.1 0 8", "5.0 0 8", "is version 5.0 of .msh; versions 2.2 and 4.1 are read"),
+        ("$MeshFormat", "$Mesh", "is not a gmsh mesh: it has no section"),
+        ("$Nodes\n70 56 1 56", "$Nodes\n99999999999 9 1 9", "is cut off: its section .Nodes|has no section"),
+        ("0.925 0", "x.925 0", "holds something that is not a number"),
+    ],
+)
+def test_broken_files(old, new, message, tmp_path):
+    text = (ASSETS / "semicircular_arch.msh").read_text()
+    if old.startswith("$Nodes"):
+        line = text[text.index("$Nodes") :].split("\n")[1]
+        old = f"$Nodes\n{line}"
+    (tmp_path / "a.msh").write_text(hostile(text, old, new))
+    with pytest.raises(ValueError, match=message):
+        read(tmp_path / "a.msh")
+
+
+def test_truncated_anywhere_is_refused_or_complete(tmp_path):
+    data = (ASSETS / "semicircular_arch.msh").read_bytes()
+    for length in range(0, len(data), 397):
+        (tmp_path / "a.msh").write_bytes(data[:length])
+        with pytest.raises(ValueError):
+            read(tmp_path / "a.msh")
