@@ -85,10 +85,11 @@ def events_of(response: solver.Response) -> list[Event]:
     found = []
     for k in range(1, len(path)):
         text = []
-        for state, word in ((solver.ContactState.HINGING, "hinges"), (solver.ContactState.SLIDING, "sliding joints")):
+        for state, word in ((solver.ContactState.HINGING, "hinge"), (solver.ContactState.SLIDING, "sliding joint")):
             before, after = (_pairs(i, state) for i in (path[k - 1], path[k]))
             if before != after:
-                text.append(f"{len(after)} {word}" if len(before) != len(after) else f"{word} move")
+                some = f"{len(after) or 'no'} {word}{'s' if len(after) != 1 else ''}"
+                text.append(some if len(before) != len(after) else f"{word}s move")
         if text:
             found.append(Event(float(total[k]), path[k].reaction, ", ".join(text)))
     return found
@@ -250,7 +251,7 @@ def _mark_events(axes: Axes, response: solver.Response, factor: float, text: flo
             )  # fmt: skip
         lines = [f"{n}  {e.text}" for n, e in enumerate(found, 1)]
         axes.text(
-            0.02, 0.98, "\n".join(lines), transform=axes.transAxes, va="top", fontsize=0.8 * text, linespacing=1.4,
+            0.02, 0.04, "\n".join(lines), transform=axes.transAxes, va="bottom", fontsize=0.8 * text, linespacing=1.4,
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85},
         )  # fmt: skip
     else:

@@ -36,11 +36,17 @@ PARTS = np.array(
 #: Blocks of one material differ in lightness by up to this fraction, as stones do; it also tells neighbours apart.
 SHADE = 0.035
 
-#: Blue-green to yellow, light enough for outlines to show on it: viridis sampled above its darkest fifth.
+#: Pale to deep blue-green, even in lightness, and light enough at its end for outlines to show.
 RAMP = np.array(
     [
-        (237, 240, 241), (196, 222, 226), (150, 203, 210), (107, 181, 192),
-        (74, 155, 172), (52, 126, 150), (40, 97, 126), (30, 68, 99),
+        (240, 243, 243),
+        (205, 228, 231),
+        (168, 212, 218),
+        (131, 194, 204),
+        (101, 174, 188),
+        (78, 151, 170),
+        (58, 128, 151),
+        (45, 105, 131),
     ],
     dtype=float,
 )  # fmt: skip

@@ -30,7 +30,7 @@ def draw_still(
     size: tuple[int, int] = STILL_SIZE,
     magnification: float = 1.0,
     colour_by: str = "material",
-    forces: str = "thrust",
+    forces: str = "auto",
     joints: bool = True,
     curve: bool = False,
 ) -> Path:
@@ -48,8 +48,9 @@ def draw_still(
     magnification : float
         Of displacements and rotations; 1 is true scale.
     colour_by : {"material", "displacement"}
-    forces : {"thrust", "points", "none"}
-        Resultant of each joint, forces at the contact points, or neither.
+    forces : {"auto", "thrust", "points", "none"}
+        Resultant of each joint, forces at the contact points, or neither; "auto" draws resultants where the blocks
+        are few enough to see them.
     joints : bool
         Mark open and sliding joints and hinges.
     curve : bool
@@ -117,7 +118,7 @@ def animate(
     seconds: float = 5.0,
     magnification: float = 1.0,
     colour_by: str = "material",
-    forces: str = "thrust",
+    forces: str = "auto",
     joints: bool = True,
     curve: bool = False,
 ) -> Path:

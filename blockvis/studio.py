@@ -21,6 +21,9 @@ __all__ = ["Look", "Studio"]
 
 PSEUDO_TIME = "FALLING · pseudo-time"
 
+#: Resultants of more blocks than this hide what they stand on.
+FEW_BLOCKS = 300
+
 #: Up to this many parts of a mechanism are tinted one by one.
 MOST_PARTS = 16
 
@@ -37,21 +40,25 @@ class Look:
     magnification : float
         Of displacements and rotations; 1 is true scale.
     colour_by : {"material", "displacement"}
-    forces : {"thrust", "points", "none"}
-        Resultant of each joint, forces at the contact points, or neither.
+    forces : {"auto", "thrust", "points", "none"}
+        Resultant of each joint, forces at the contact points, or neither; resultants of structures with few blocks
+        where it is left to the picture.
     joints : bool
         Mark open and sliding joints and hinges.
     """
 
     magnification: float = 1.0
     colour_by: str = "material"
-    forces: str = "thrust"
+    forces: str = "auto"
     joints: bool = True
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.magnification) and self.magnification > 0.0):
             raise ValueError(f"magnification is {self.magnification:g}; it must be a positive number, 1 is true scale")
-        for name, allowed in (("colour_by", ("material", "displacement")), ("forces", ("thrust", "points", "none"))):
+        for name, allowed in (
+            ("colour_by", ("material", "displacement")),
+            ("forces", ("auto", "thrust", "points", "none")),
+        ):
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name} is '{getattr(self, name)}'; choose from {', '.join(allowed)}")
 
@@ -69,6 +76,9 @@ class Studio:
         curve: bool = False,
         extra: tuple[solver.Pose, ...] = (),
     ) -> None:
+        if look.forces == "auto":
+            few = response.assembly.n_blocks <= FEW_BLOCKS
+            look = replace(look, forces="thrust" if few else "none")
         self.response, self.look, self.increments = response, look, increments
         assembly = self.assembly = response.assembly
         self.joints = marks.drawn_joints(assembly)
@@ -250,7 +260,7 @@ class Studio:
         # What most joints carry is a block long: one corner that carries everything shall not make the rest vanish.
         usual = float(np.quantile(every[every > marks.SMALLEST_RESULTANT * largest], 0.9))
         extent = float(self.scene.frame.size.max())
-        scale = max(1.5 * self.assembly.block_size, 0.015 * extent) / usual
+        scale = max(1.3 * self.assembly.block_size, 0.015 * extent) / usual
         scale = min(scale, 0.12 * extent / largest)
         return scale, marks.rounded_length(min(largest, 0.12 * extent / scale))
 
