@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from functools import cache
@@ -58,9 +59,10 @@ def _probed(window: str, python: str) -> str | None:
         return remedy.format(f"the test picture failed: {error}")
     if done.returncode == 0:
         return None
-    told = [line for line in done.stderr.strip().splitlines() if line.strip()]
-    why = told[-1].strip() if told else "no message"
-    return remedy.format(f"the test picture ended with code {done.returncode}: {why[:200]}")
+    # VTK colours its messages and puts time, thread and file before them.
+    plain = [re.sub(r"\x1b\[[0-9;]*m", "", line).split("| ")[-1].strip() for line in done.stderr.splitlines()]
+    why = next((line for line in reversed(plain) if line), "no message")
+    return remedy.format(f"the test picture ended with code {done.returncode}: {why[:100]}")
 
 
 def _prefer_off_screen() -> None:
