@@ -13,7 +13,9 @@ UNIT = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
 
 def row(n, **more):
     return Drawing(
-        outlines=tuple(UNIT + [k, 0] for k in range(n)), names=tuple(f"brick {k + 1}" for k in range(n)), **more
+        outlines=tuple(UNIT + np.array([k, 0]) for k in range(n)),
+        names=tuple(f"brick {k + 1}" for k in range(n)),
+        **more,
     )
 
 
@@ -60,7 +62,7 @@ def test_duplicates_are_dropped_with_one_warning_that_names_them():
 
 def test_small_overlaps_are_resolved_and_large_ones_name_both_blocks():
     def pair(depth):
-        return Drawing(outlines=(UNIT, UNIT + [1 - depth, 0]), names=("left", "right"))
+        return Drawing(outlines=(UNIT, UNIT + np.array([1 - depth, 0])), names=("left", "right"))
 
     closed = assemble(pair(0.01))
     assert closed.outline(0)[:, 0].max() == pytest.approx(0.995, abs=1e-12)
@@ -78,7 +80,7 @@ def test_joint_thickness_is_checked(wrong):
 
 def test_exact_layouts_keep_their_coordinates():
     assembly = assemble(row(5))
-    assert (assembly.outline(3) == UNIT + [3, 0]).all()
+    assert (assembly.outline(3) == UNIT + np.array([3, 0])).all()
 
 
 def test_density_and_thickness_of_the_file_hold_where_it_has_them():
@@ -90,10 +92,10 @@ def test_density_and_thickness_of_the_file_hold_where_it_has_them():
 
 def test_a_deformed_pose_is_written(tmp_path):
     assembly = assemble(row(2))
-    pose = solver.Pose(assembly.centroids + [0, -0.25], np.array([0.0, np.pi / 2]))
+    pose = solver.Pose(assembly.centroids + np.array([0, -0.25]), np.array([0.0, np.pi / 2]))
     save_layout(assembly, tmp_path / "moved.json", pose=pose)
     moved = read(tmp_path / "moved.json")
-    assert np.allclose(moved.centroids, assembly.centroids + [0, -0.25])
+    assert np.allclose(moved.centroids, assembly.centroids + np.array([0, -0.25]))
     assert (drawing_of(assembly).outlines[1] == assembly.outline(1)).all()
 
 

@@ -55,7 +55,9 @@ def drawing_of_cells(
     used = np.unique(np.concatenate(list(rings)))
     if used.min() < 0 or used.max() >= len(points):
         raise ValueError(f"'{path}': a cell uses point {int(used.max())}, but there are {len(points)}; export it again")
-    key = next((name for name in BLOCK_ARRAYS if name in data and np.ndim(data[name]) == 1), None)
+    numbered = [name for name in BLOCK_ARRAYS if name in data and np.ndim(data[name]) == 1]
+    # An array that is the same everywhere, as some programs write by default, tells no blocks apart.
+    key = next((name for name in numbered if name == "block_id" or (data[name] != data[name][0]).any()), None)
     if key is not None:
         ids, owner = np.unique(np.asarray(data[key]), return_inverse=True)
         names = [f"block {value}" for value in ids.tolist()]

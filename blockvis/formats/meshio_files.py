@@ -32,6 +32,8 @@ def read(path: Path, reading: Reading) -> Drawing:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             mesh = meshio.read(path)
     except (SystemExit, Exception) as error:  # noqa: BLE001
+        if isinstance(error, ModuleNotFoundError):
+            raise ValueError(f"'{path}' needs the package {error.name}: pip install {error.name}") from None
         reason = " ".join((str(error) or said.getvalue() or type(error).__name__).split())
         raise ValueError(
             f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again"

@@ -209,8 +209,9 @@ def _is_prism(body: Body, axis: int, size: float) -> bool:
     wide = area > 1e-9 * size**2
     along = np.abs(normal[wide, axis]) / area[wide]
     square = (along > 1 - SQUARE) | (along < SQUARE)
-    levels = body.points[np.unique(body.faces)][:, axis]
-    on_caps = (np.abs(levels - levels.min()) <= 1e-5 * size) | (np.abs(levels - levels.max()) <= 1e-5 * size)
+    levels = corners[:, :, axis]
+    caps = levels[wide][along > 1 - SQUARE]
+    on_caps = (np.abs(caps - levels.min()) <= 1e-5 * size) | (np.abs(caps - levels.max()) <= 1e-5 * size)
     return bool(square.all() and on_caps.all())
 
 

@@ -91,7 +91,7 @@ def test_open_polyline_names_layer_handle_and_gap(tmp_path):
 
     with pytest.raises(
         ValueError,
-        match=r"polyline AB on layer 'stone' is open: it starts at \(0, 0\) and ends at \(0, 0.25\), 0.25 apart; close it",
+        match=r"polyline AB on layer 'stone' is open: it starts at \(0, 0\) and ends at \(0, 0.25\), 0.25 apart",
     ):
         read(saved(tmp_path, draw))
 

@@ -1,0 +1,112 @@
+"""Files of VTK as pyvista and ParaView write them."""
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from blockvis.drawing import read, read_drawing
+
+
+def quads(n=3):
+    points = np.array([[k + i, j, 0] for k in range(n) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=float)
+    faces = np.array([[4, 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3] for k in range(n)])
+    return pv.PolyData(points, faces=faces.ravel())
+
+
+@pytest.mark.parametrize("suffix", [".vtp", ".vtk"])
+def test_one_polygon_is_one_block_without_ids(tmp_path, suffix):
+    quads().save(tmp_path / f"a{suffix}")
+    drawing = read_drawing(tmp_path / f"a{suffix}")
+    assert drawing.n_blocks == 3
+    assert any("one per cell: no cell array 'block_id'" in note for note in drawing.notes)
+
+
+def test_cells_with_one_id_are_one_block(tmp_path):
+    mesh = pv.Plane(i_size=4, j_size=2, i_resolution=8, j_resolution=4)
+    x = mesh.cell_centers().points[:, 0]
+    mesh.cell_data["block_id"] = np.where(x < 0, 7, 9)
+    mesh.cell_data["material"] = np.where(x < 0, "stone", "brick")
+    mesh.triangulate().cast_to_unstructured_grid().save(tmp_path / "a.vtu")
+    assembly = read(tmp_path / "a.vtu")
+    assert assembly.names == ("block 7", "block 9")
+    assert assembly.materials == ("stone", "brick")
+    assert assembly.areas == pytest.approx([4, 4], rel=1e-6)
+    assert np.diff(assembly.offsets).tolist() == [4, 4]
+
+
+def test_triangles_that_share_points_are_one_block(tmp_path):
+    pieces = [pv.Disc(center=(3 * k, 0, 0), inner=0, outer=1, c_res=6).triangulate().clean() for k in range(3)]
+    pv.merge(pieces, merge_points=False).save(tmp_path / "a.vtp")
+    assert read(tmp_path / "a.vtp").n_blocks == 3
+
+
+def test_multiblock_names_the_blocks(tmp_path):
+    both = pv.MultiBlock({"left": quads(1), "right": quads(1).translate((5, 0, 0))})
+    both.save(tmp_path / "a.vtm")
+    assert read(tmp_path / "a.vtm").names == ("left", "right")
+
+
+def test_pvd_gives_its_first_time(tmp_path):
+    for k in range(2):
+        quads(1).translate((0, 10 * k, 0)).cast_to_unstructured_grid().save(tmp_path / f"{k}.vtu")
+    entries = "".join(f'<DataSet timestep="{k}" part="0" file="{k}.vtu"/>' for k in range(2))
+    path = tmp_path / "a.pvd"
+    path.write_text(f'<VTKFile type="Collection" version="0.1"><Collection>{entries}</Collection></VTKFile>')
+    assert read(path).centroids[0].tolist() == [0.5, 0.5]
+    path.write_text(path.read_text().replace("1.vtu", "lost.vtu"))
+    with pytest.raises(ValueError, match=r"names '.*lost.vtu', which does not exist"):
+        read(path)
+
+
+def test_results_are_layouts_too(tmp_path):
+    import solver
+    from blockvis.datasets import block_dataset
+    from blockvis.vtkxml import write_vtu
+
+    wall = solver.Assembly.from_outlines(
+        [[[0, 0], [1, 0], [1, 1], [0, 1]], [[1, 0], [2, 0], [2, 1], [1, 1]]],
+        names=["a", "b"],
+        roles=["fixed", "free"],
+        materials=["stone", "brick"],
+    )
+    write_vtu(block_dataset(wall), tmp_path / "a.vtu")
+    again = read(tmp_path / "a.vtu")
+    assert again.names == wall.names
+    assert again.roles.tolist() == wall.roles.tolist()
+    assert again.materials == wall.materials
+
+
+def test_extruded_cells_become_a_layout_with_a_thickness(tmp_path):
+    boxes = pv.merge([pv.Box((k, k + 1, 0, 1, 0, 0.3)).delaunay_3d() for k in (0, 2)], merge_points=False)
+    boxes.save(tmp_path / "a.vtu")
+    assembly = read(tmp_path / "a.vtu")
+    assert assembly.thickness == pytest.approx([0.3, 0.3], rel=1e-6)
+    assert assembly.areas == pytest.approx([1, 1], rel=1e-6)
+
+
+def test_a_hostile_count_is_refused_before_memory_is_reserved(tmp_path):
+    quads().cast_to_unstructured_grid().save(tmp_path / "a.vtu")
+    data = (tmp_path / "a.vtu").read_bytes()
+    assert b'NumberOfPoints="12"' in data
+    (tmp_path / "a.vtu").write_bytes(data.replace(b'NumberOfPoints="12"', b'NumberOfPoints="900000000000"'))
+    with pytest.raises(ValueError, match=r"announces 900000000000 items in \d+ bytes"):
+        read(tmp_path / "a.vtu")
+    (tmp_path / "b.vtk").write_text(
+        "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 999999999999 float\n"
+    )
+    with pytest.raises(ValueError, match="announces 999999999999 items"):
+        read(tmp_path / "b.vtk")
+
+
+def test_points_and_lines_are_no_blocks(tmp_path):
+    pv.Line().save(tmp_path / "a.vtp")
+    with pytest.raises(ValueError, match="has no surface cells"):
+        read(tmp_path / "a.vtp")
+    quads().save(tmp_path / "b.vtp")
+    bent = pv.read(tmp_path / "b.vtp")
+    bent.points[2, 2] = 0.5
+    bent.points[5, 2] = 0.25
+    bent.points[8, 1] = 0.25
+    bent.save(tmp_path / "b.vtp")
+    with pytest.raises(ValueError, match="is not flat: its points spread over"):
+        read(tmp_path / "b.vtp")

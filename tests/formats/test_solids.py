@@ -1,0 +1,81 @@
+"""Bodies in space: prisms become outlines with a thickness, everything else is refused."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from blockvis.drawing import read, read_drawing
+
+move = trimesh.transformations.translation_matrix
+
+
+def bricks(n=3, gap=0.1):
+    return [trimesh.creation.box((1, 0.5, 0.25), transform=move((k * (1 + gap), 0, 0.2 * k))) for k in range(n)]
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".off", ".ply", ".obj"])
+def test_separate_bodies_of_a_facade_that_stands_upright(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    trimesh.util.concatenate(bricks()).export(path)
+    drawing = read_drawing(path)
+    assert drawing.n_blocks == 3
+    assert drawing.thickness == pytest.approx([0.5] * 3, rel=1e-6)
+    assert any("outlines in xz; their depth along y is the thickness" in note for note in drawing.notes)
+    assert read(path).areas == pytest.approx([0.25] * 3, rel=1e-6)
+
+
+def test_named_objects_may_touch(tmp_path):
+    scene = trimesh.Scene()
+    for k, body in enumerate(bricks(4, gap=0.0)):
+        scene.add_geometry(body, node_name=f"brick {k}", geom_name=f"brick {k}")
+    scene.export(tmp_path / "a.glb")
+    assembly = read(tmp_path / "a.glb")
+    assert assembly.names == tuple(f"brick {k}" for k in range(4))
+    assert assembly.centroids[2] == pytest.approx([2, 0.4], abs=1e-6)
+
+
+def test_touching_bodies_in_one_mesh_are_refused(tmp_path):
+    pair = [trimesh.creation.box((1, 1, 1), transform=move((k, 0, 0))) for k in (0, 1)]
+    trimesh.util.concatenate(pair).export(tmp_path / "a.stl")
+    with pytest.raises(ValueError, match=r"holds bodies that touch and cannot be told apart: 4 edges .* per block"):
+        read(tmp_path / "a.stl")
+
+
+def test_what_is_no_prism_is_refused(tmp_path):
+    trimesh.creation.icosphere().export(tmp_path / "a.stl")
+    with pytest.raises(ValueError, match=r"is not prismatic: body .* is no extrusion along x, y or z"):
+        read(tmp_path / "a.stl")
+
+
+def test_open_bodies_are_refused(tmp_path):
+    body = bricks(1)[0]
+    trimesh.Trimesh(body.vertices, body.faces[:-1]).export(tmp_path / "a.ply")
+    with pytest.raises(ValueError, match="is not closed: 3 edges belong to one face only"):
+        read(tmp_path / "a.ply")
+
+
+def test_a_flat_mesh_is_a_layout(tmp_path):
+    (tmp_path / "a.obj").write_text(
+        "o left\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\no right\nv 1 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\n"
+        "f 5 6 7\nf 5 7 8\n"
+    )
+    assembly = read(tmp_path / "a.obj")
+    assert assembly.names == ("left", "right")
+    assert assembly.areas.tolist() == [1, 1]
+
+
+def test_not_finite(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv nan 0 0\nv 1 1 0\nv 0 1 1\nf 1 2 3\nf 1 3 4\n")
+    with pytest.raises(ValueError, match="coordinates must be finite"):
+        read(tmp_path / "a.obj")
+
+
+def test_a_ring_of_many_copies_of_one_point_is_quick(tmp_path):
+    body = bricks(1)[0]
+    many = np.repeat(body.triangles, 1, axis=0)
+    trimesh.Trimesh(*_soup(np.concatenate([many, np.zeros((20_000, 3, 3))]))).export(tmp_path / "a.stl")
+    assert read(tmp_path / "a.stl").n_blocks == 1
+
+
+def _soup(triangles):
+    return triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)

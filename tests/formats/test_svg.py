@@ -1,0 +1,95 @@
+"""SVG: shapes, paths, transforms, layers, units; and what is refused."""
+
+import numpy as np
+import pytest
+
+from blockvis.drawing import read, read_drawing
+
+
+def saved(tmp_path, body, head='width="2000mm" height="1000mm" viewBox="0 0 2000 1000"'):
+    path = tmp_path / "a.svg"
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {head}>{body}</svg>')
+    return path
+
+
+def test_shapes_layers_and_units(tmp_path):
+    path = saved(
+        tmp_path,
+        """<g id="stone" transform="translate(100,0) scale(2)"><rect x="0" y="0" width="100" height="50"/>
+        <g transform="rotate(90 600 0)"><polygon id="tri" points="600,0 650,0 650,50"/></g></g>
+        <g id="fixed"><polyline points="0,500 100,500 100,600 0,600 0,500"/></g>
+        <circle cx="500" cy="800" r="100"/>""",
+    )
+    drawing = read_drawing(path)
+    assert drawing.unit == "mm"
+    assert drawing.groups == ("stone", "stone", "fixed", "")
+    assembly = read(path, chord_tolerance=1e-5)
+    assert assembly.names[1] == "tri"
+    assert assembly.roles.tolist() == ["free", "free", "fixed", "free"]
+    assert assembly.areas == pytest.approx([0.02, 0.005, 0.01, np.pi * 0.01], rel=1e-3)
+    # y points up: the rectangle hangs below the line y = 0 of the page's top.
+    assert assembly.outline(0)[:, 1].min() == pytest.approx(-0.1)
+    assert assembly.centroids[2] == pytest.approx([0.05, -0.55])
+
+
+@pytest.mark.parametrize(
+    ("d", "area"),
+    [
+        ("M0 0 L100 0 L100 100 L0 100 Z", 1e4),
+        ("m0,0 100,0 0,100 -100,0z", 1e4),
+        ("M0 0H100V100H0Z", 1e4),
+        ("M0 0h100v100h-100z", 1e4),
+        ("M0 0 L100 0 L100 100 L0 100 L0 0", 1e4),
+        ("M0,0 A50,50 0 0 1 100,0 Z", np.pi * 1250),
+        ("M0,0 a50,50 0 0 0 100,0 z", np.pi * 1250),
+        ("M0 0 Q50 100 100 0 Z", 1e4 / 3),
+        ("M0 0 q25 50 50 50 t50 -50 Z", 1e4 / 3),
+        ("M0 0 C0 100 100 100 100 0 Z", 6000.0),
+        ("M-50 0 C-50 50 0 50 0 0 S50 -50 50 0 L50 -100 L-50 -100 Z", 1e4),
+    ],
+)
+def test_paths(tmp_path, d, area):
+    path = saved(tmp_path, f'<path d="{d}"/>', 'viewBox="0 0 1 1"')
+    assert read(path, chord_tolerance=1e-3).areas[0] == pytest.approx(area, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        (
+            '<g id="wall"><path id="q" d="M0 0 L1 0 L1 1"/></g>',
+            r"'q' in layer 'wall' is open: .* \(1, 1\), 1.414 apart",
+        ),
+        ('<path d="M0 0 L3 0 L3 3 L0 3Z M1 1 L2 1 L2 2 L1 2Z"/>', r"has a hole around \(1.5, 1.5\)"),
+        ('<path d="M0 0 L3 3 L3 0 L0 4Z"/>', "crosses itself"),
+        ('<path d="M0 0 L3"/>', "too few numbers"),
+        ('<polygon points="0 0 1 1 2"/>', "has 5 coordinates, an odd number"),
+        ('<rect width="50%" height="1"/>', "has width='50%'; give a number in user units"),
+        (
+            '<rect transform="spin(4) rotate()" width="1" height="1"/>',
+            r"has a transform rotate\(\) that cannot be read",
+        ),
+        ('<polygon points="0 0 1e999 1 0 1"/>', "not a finite number"),
+        ('<line x1="0" x2="1" y1="0" y2="0"/>', "has no closed shape"),
+        ("<g>" * 300 + "</g>" * 300, "nests groups more than 200 deep"),
+    ],
+)
+def test_refusals(tmp_path, body, message):
+    with pytest.raises(ValueError, match=message):
+        read(saved(tmp_path, body))
+
+
+def test_entities_are_refused_before_parsing(tmp_path):
+    path = tmp_path / "a.svg"
+    bombs = "".join(f'<!ENTITY l{k + 1} "{f"&l{k};" * 10}">' for k in range(9))
+    path.write_text(f'<!DOCTYPE svg [<!ENTITY l0 "ha">{bombs}]><svg><title>&l9;</title></svg>')
+    with pytest.raises(ValueError, match="defines XML entities"):
+        read(path)
+    path.write_text("<html/>")
+    with pytest.raises(ValueError, match="root <html>, not <svg>"):
+        read(path)
+
+
+def test_one_curve_has_a_bounded_number_of_chords(tmp_path):
+    path = saved(tmp_path, '<circle cx="0" cy="0" r="1"/>', 'viewBox="0 0 1 1"')
+    assert len(read(path, chord_tolerance=1e-12).vertices) <= 512
