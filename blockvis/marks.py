@@ -13,6 +13,10 @@ __all__ = ["DrawnJoints", "Marks", "carried", "drawn_joints", "marks_of", "resul
 #: A joint is shown open from this fraction of the block size on; on an ordinary brick it is a tenth of a millimetre.
 SMALLEST_OPENING = 1e-3
 
+#: What lies between faces is a crack up to this distance: on the path, in block sizes or lengths of the joint; in
+#: the fall, where blocks tumble apart, in lengths of the joint only, and up to this angle [rad].
+WIDEST_STANDING, WIDEST_FALLING, STEEPEST_FALLING = 1.5, 0.6, 1.0
+
 #: Faces count as one joint of the drawing when they are apart by at most this fraction of the block size.
 TOUCHING = 2e-3
 
@@ -121,7 +125,7 @@ def marks_of(assembly: solver.Assembly, joints: DrawnJoints, increment: solver.I
     contacts, states = increment.contacts, increment.states
     points = _middle(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
     return Marks(
-        cracks=_cracks(assembly, joints, increment.pose, shown),
+        cracks=_cracks(assembly, joints, increment.pose, shown, increment.status == solver.Status.FALLING),
         sliding=_sliding(contacts, states, points),
         hinges=_apart(points[states == solver.ContactState.HINGING], 0.05 * assembly.block_size),
     )
@@ -177,7 +181,9 @@ def _middle(
     return (carried(points, block_a, before, after) + carried(points, block_b, before, after)) / 2.0
 
 
-def _cracks(assembly: solver.Assembly, joints: DrawnJoints, pose: solver.Pose, shown: solver.Pose) -> np.ndarray:
+def _cracks(
+    assembly: solver.Assembly, joints: DrawnJoints, pose: solver.Pose, shown: solver.Pose, falling: bool
+) -> np.ndarray:
     drawn = solver.Pose.initial(assembly)
 
     def sides(at: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
@@ -196,7 +202,12 @@ def _cracks(assembly: solver.Assembly, joints: DrawnJoints, pose: solver.Pose, s
     opening = np.einsum("nij,nj->ni", on_a - on_b, normal).max(axis=1)
     apart = np.hypot(*np.moveaxis(on_a - on_b, 2, 0)).min(axis=1)
     # Blocks that have parted altogether have no joint any more: what lies between them is air, not a crack.
-    is_open = (opening > SMALLEST_OPENING * assembly.block_size) & (apart < length)
+    if falling:
+        turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])
+        together = (apart < WIDEST_FALLING * length) & (turn < STEEPEST_FALLING)
+    else:
+        together = apart < np.maximum(length, WIDEST_STANDING * assembly.block_size)
+    is_open = (opening > SMALLEST_OPENING * assembly.block_size) & together
     on_a, on_b = sides(shown)
     return np.concatenate([on_a, on_b[:, ::-1]], axis=1)[is_open]
 

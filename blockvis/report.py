@@ -110,6 +110,7 @@ def _model(response: solver.Response) -> dict[str, Any]:
         "bounds": [*(frame.low - origin).tolist(), *(frame.high - origin).tolist()],
         "block_size": assembly.block_size,
         "smallest_opening": marks.SMALLEST_OPENING * assembly.block_size,
+        "widest": [marks.WIDEST_STANDING * assembly.block_size, marks.WIDEST_FALLING, marks.STEEPEST_FALLING],
         "names": list(assembly.names),
         "materials": materials,
         "roles": [roles[str(role)] for role in assembly.roles],

@@ -20,8 +20,8 @@ def stacked(shift=(0.0, 0.0), turn=0.0):
     return assembly, pose
 
 
-def cracks(assembly, pose):
-    return marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose)
+def cracks(assembly, pose, falling=False):
+    return marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose, falling)
 
 
 def area(polygon):
@@ -58,7 +58,11 @@ def test_sliding_and_pressing_leave_none():
 
 
 def test_blocks_that_have_parted_have_no_joint():
-    assert len(cracks(*stacked(shift=(0.0, 1.5)))) == 0
+    assert len(cracks(*stacked(shift=(0.0, 1.6)))) == 0
+    assert len(cracks(*stacked(shift=(0.0, 0.7)))) == 1
+    assert len(cracks(*stacked(shift=(0.0, 0.7)), falling=True)) == 0
+    assert len(cracks(*stacked(shift=(0.1, 0.3), turn=1.2))) == 1
+    assert len(cracks(*stacked(shift=(0.1, 0.3), turn=1.2), falling=True)) == 0
 
 
 def test_resultants_balance_every_voussoir():

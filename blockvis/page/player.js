@@ -104,7 +104,8 @@
   }
   const support = hatch();
 
-  function cracks(pen) {
+  function cracks(pen, falling) {
+    const [widest, widestFalling, steepest] = model.widest;
     pen.fillStyle = pen.strokeStyle = model.colours.open;
     pen.lineWidth = 1.6;
     const lines = new Path2D();
@@ -117,7 +118,9 @@
       const nx = (b1[1] - b0[1]) / length, ny = -(b1[0] - b0[0]) / length;
       const open = Math.max((a0[0] - b0[0]) * nx + (a0[1] - b0[1]) * ny, (a1[0] - b1[0]) * nx + (a1[1] - b1[1]) * ny);
       const apart = Math.min(Math.hypot(a0[0] - b0[0], a0[1] - b0[1]), Math.hypot(a1[0] - b1[0], a1[1] - b1[1]));
-      if (open < model.smallest_opening * state.magnify || apart > length) continue;
+      if (open < model.smallest_opening * state.magnify) continue;
+      const wide = apart / state.magnify, bent = Math.abs(pose[3 * a + 2] - pose[3 * b + 2]) / state.magnify;
+      if (falling ? wide > widestFalling * length || bent > steepest : wide > Math.max(length, widest)) continue;
       const ring = [a0, a1, b1, b0];
       pen.beginPath();
       ring.forEach(([x, y], i) => (i ? pen.lineTo(px(x), py(y)) : pen.moveTo(px(x), py(y))));
@@ -133,7 +136,7 @@
     if (!state.view) fit();
     poseAt(state.frame);
     const near = Math.min(Math.round(state.frame), nFrames - 1), falling = model.frames[near].falling;
-    const lines = cracks(pen);
+    const lines = cracks(pen, falling);
     pen.lineJoin = "round";
     pen.strokeStyle = model.colours.outline;
     pen.lineWidth = Math.max(0.4, Math.min(1.1, model.block_size * state.view.scale / 25));
