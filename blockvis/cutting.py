@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+import solver
+
 from .facing import CLOSED, Edges, Facing
 from .outlines import without_collinear
 from .shared_lines import Line, moved_outlines, normal_form
 
-__all__ = ["LONGEST_MITRE", "cut_along"]
+__all__ = ["LONGEST_MITRE", "cut_along", "parted", "welded"]
 
 #: Corners closer than this fraction of the joint thickness become one where blocks were cut along each other.
 WELD = 0.2
@@ -70,7 +72,51 @@ def cut_along(
             shapes[block] = shapely.Polygon(max(pieces, key=lambda piece: piece.area).exterior)
             final[block] = np.array(shapely.orient_polygons(shapes[block]).exterior.coords)[:-1]
     involved = {int(edges.block[edge]) for k in uncommon for edge in (found.edge_a[k], found.edge_b[k])}
-    return _welded(final, sorted(involved), still, WELD * thickness, CLOSED * float(np.ptp(edges.start, axis=0).max()))
+    return welded(final, sorted(involved), still, WELD * thickness, CLOSED * float(np.ptp(edges.start, axis=0).max()))
+
+
+def parted(rings: list[np.ndarray], still: np.ndarray, thickness: float, closed: float) -> list[np.ndarray]:
+    """Outlines whose corners at junctions of several joints do not reach into each other.
+
+    Parameters
+    ----------
+    rings : list of (n, 2) arrays [m]
+        Counter-clockwise.
+    still : (n_blocks,) bool array
+        Blocks that keep their outline.
+    thickness : float [m]
+        Of the joints.
+    closed : float [m]
+        Overlap that is rounding.
+
+    Notes
+    -----
+    Where the joints of a crossing miss each other a little, its corners are drawn to one point; where blocks still
+    overlap afterwards, the larger one, or the one that keeps its outline, cuts the other.
+    """
+    import shapely
+
+    first, second, _ = _overlaps(rings, closed)
+    if len(first) == 0:
+        return rings
+    rings = welded(rings, sorted({*map(int, first), *map(int, second)}), still, WELD * thickness, closed / 10.0)
+    result = list(rings)
+    for i, j, _ in zip(*_overlaps(rings, closed), strict=True):
+        shapes = {int(k): shapely.Polygon(result[k]).buffer(0) for k in (i, j)}
+        small, large = sorted(shapes, key=lambda k: (bool(still[k]), shapes[k].area))
+        if still[small]:
+            continue
+        cut = shapely.difference(shapes[small], shapes[large])
+        pieces = [piece for piece in getattr(cut, "geoms", [cut]) if piece.geom_type == "Polygon"]
+        if pieces:
+            whole = shapely.Polygon(max(pieces, key=lambda piece: piece.area).exterior)
+            result[small] = np.array(shapely.orient_polygons(whole).exterior.coords)[:-1]
+    return result
+
+
+def _overlaps(rings: list[np.ndarray], closed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
+    return solver.overlap_depths(np.concatenate(rings), offsets, closed)
 
 
 def _outward_form(edges: Edges, lines: dict[int, Line], edge: int) -> tuple[np.ndarray, float]:
@@ -100,7 +146,7 @@ def _strip(edges: Edges, edge: int, stretch: np.ndarray, thickness: float, dista
     )
 
 
-def _welded(
+def welded(
     rings: list[np.ndarray], involved: list[int], still: np.ndarray, reach: float, closed: float
 ) -> list[np.ndarray]:
     """Draws corners that cutting has left close together to one point, in all blocks that share them.

@@ -126,14 +126,17 @@ def facing_edges(outlines: Sequence[np.ndarray], reach: float, overlap: float = 
         gap_first, gap_last = np.subtract(*heights(first)[::-1]), np.subtract(*heights(last)[::-1])
         # Cut the stretch to where the gap is within bounds.
         slope = (gap_last - gap_first) / full
-        for bound, sign in ((reach, 1.0), (-overlap, -1.0)):
-            limit = first + (bound + sign * CLOSED * max(reach, overlap, 1e-300) - gap_first) / slope
-            last = np.where((sign * gap_last > sign * bound) & np.isfinite(limit), np.minimum(last, limit), last)
-            first = np.where((sign * gap_first > sign * bound) & np.isfinite(limit), np.maximum(first, limit), first)
+        for exact, sign in ((reach, 1.0), (-overlap, -1.0)):
+            bound = exact + sign * 1e-6 * max(reach, overlap)
+            limit = first + (bound - gap_first) / slope
+            last, first = (
+                np.where((sign * gap_last > sign * bound) & np.isfinite(limit), np.minimum(last, limit), last),
+                np.where((sign * gap_first > sign * bound) & np.isfinite(limit), np.maximum(first, limit), first),
+            )
         keep = (full > 1e-3 * shortest) & (last - first >= 0.5 * full)
         ends = [(at, *heights(at)) for at in (first, last)]
     gaps = np.stack([hb - ha for _, ha, hb in ends], axis=1)
-    keep &= (gaps <= reach * (1 + 1e-6) + 1e-12).all(axis=1) & (gaps >= -overlap * (1 + 1e-6) - 1e-12).all(axis=1)
+    keep &= (gaps <= reach * (1 + 2e-6) + 1e-12).all(axis=1) & (gaps >= -overlap * (1 + 2e-6) - 1e-12).all(axis=1)
     middle = np.stack([origin + at[:, None] * axis + ((ha + hb) / 2)[:, None] * normal for at, ha, hb in ends], axis=1)
     found = Facing(a[keep], b[keep], gaps[keep], middle[keep], (last - first)[keep])
     return _nearest(found, edges)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .cutting import LONGEST_MITRE, cut_along
+from .cutting import LONGEST_MITRE, cut_along, parted
 from .facing import CLOSED, edges_of, facing_edges
 from .shared_lines import common_lines, moved_outlines
 
@@ -83,6 +83,7 @@ def close_joints(
     lines, uncommon = common_lines(found, edges, still, closed)
     base = moved_outlines(edges, lines, LONGEST_MITRE * max(thickness, overlap))
     final = cut_along(base, edges, found, uncommon, lines, still, max(thickness, overlap))
+    final = parted(final, still, max(thickness, overlap), 10.0 * closed)
     left = facing_edges(final, thickness, max(overlap, closed))
     residual = float(np.abs(left.gaps).max()) if len(left) else 0.0
     return Closing(
