@@ -10,7 +10,7 @@ import numpy as np
 
 from .assembly import Assembly
 from .contact import InterfaceLaw, Interfaces
-from .correction import GEOMETRY_TOLERANCE, Falls, NotConverged, corrected, solve_again
+from .correction import GEOMETRY_TOLERANCE, Falls, NotConverged, at_rest, corrected, solve_again
 from .kinematics import Pose, moved, moved_vertices
 from .loads import Loads, Settlement, checked_loads
 from .lp import SolveError
@@ -62,12 +62,8 @@ class Ending:
     collapse: Collapse | None = None
 
 
-class _TooFar(Exception):
-    """Blocks move by the whole trust region before the supports have moved by the step."""
-
-    def __init__(self, solved: Solved) -> None:
-        super().__init__("the increment is too large")
-        self.solved = solved
+class _NotHere(Falls):
+    """The place itself, reached without proof, has no equilibrium."""
 
 
 def settle(
@@ -169,11 +165,8 @@ def _increments(model: Model, phases: Sequence[Settlement], controls: Controls) 
     assembly = model.assembly
     pose = Pose.initial(assembly)
     try:
-        solved = solve_program(model, pose)
-        if solved.falling:
-            raise Falls(solved)
         # Gaps and overlaps within the accuracy of the drawing are closed before anything moves.
-        pose = corrected(model, solved, pose, controls.correctors)
+        pose = at_rest(model, pose, controls.correctors)
     except Falls as fall:
         yield _falling_frame(model, fall.solved, 0.0, 0)
         return Ending(Status.NO_INITIAL_EQUILIBRIUM, _no_equilibrium_message(assembly, fall.solved))
@@ -196,6 +189,7 @@ class _Place:
     pose: Pose
     step: float = 0.0
     velocity: np.ndarray | None = None
+    proved: bool = False
 
 
 class _Path:
@@ -218,7 +212,7 @@ class _Path:
     def follow(self) -> Generator[Increment, None, Ending]:
         """Yields the increments of the phase, each when it is left behind; returns how the phase ended."""
         phase = self.phase
-        step, verified = phase.increment, False
+        step = phase.increment
         while True:
             here = self.here
             if here.s >= phase.limit * (1.0 - 1e-12):
@@ -227,35 +221,39 @@ class _Path:
             step = self._shortened(step)
             try:
                 predictor = self._predict(here, step)
-                if self._mechanism_changed(predictor, step):
-                    step = self._go_back(here.step)
+                changed = predictor.falling or self._mechanism_changed(predictor, step)
+                coarse = self.before is not None and here.step > self.finest * (1.0 + 1e-9)
+                if changed and coarse and not predictor.falling:
+                    step = self._go_back()
+                    continue
+                if changed and not here.proved:
+                    self._prove()
+                    continue
+                if predictor.falling:
+                    if step <= self.tolerance:
+                        return (yield from self._collapse(here.s + step, predictor, self._last_reading()))
+                    step /= 2.0
                     continue
                 target = phase.displaced(self.model.assembly, self.start, here.s + step)
-                pose = corrected(self.model, predictor, target, self.controls.correctors)
-                if np.isfinite(self.first_without):
-                    self._verify(here.s + step, pose)
-            except _TooFar as far:
-                if not verified:
-                    try:
-                        self._verify(here.s, here.pose)
-                        verified = True
-                    except Falls as fall:
-                        if self.before is None:
-                            yield _falling_frame(self.model, fall.solved, here.s, self.number)
-                            return Ending(
-                                Status.NO_INITIAL_EQUILIBRIUM, _no_equilibrium_message(self.model.assembly, fall.solved)
-                            )
-                        self.first_without = here.s
-                        step = self._go_back(here.step)
-                        continue
-                if step <= self.tolerance:
-                    return (yield from self._collapse(here.s + step, far.solved))
-                step /= 2.0
+                proved = bool(np.isfinite(self.first_without))
+                pose = corrected(self.model, predictor, target, self.controls.correctors, proved=proved)
+            except _NotHere as fall:
+                if self.before is None:
+                    yield _falling_frame(self.model, fall.solved, here.s, self.number)
+                    message = _no_equilibrium_message(self.model.assembly, fall.solved)
+                    return Ending(Status.NO_INITIAL_EQUILIBRIUM, message)
+                self.first_without = min(self.first_without, here.s)
+                step = self._go_back()
                 continue
             except Falls as fall:
                 self.first_without = min(self.first_without, here.s + step)
                 if self.first_without - here.s <= self.tolerance * (1.0 + 1e-9):
-                    return (yield from self._collapse(self.first_without, fall.solved))
+                    reading = self._read(here.s, here.pose)
+                    if not reading.falling:
+                        return (yield from self._collapse(self.first_without, fall.solved, reading))
+                    self.first_without = here.s
+                    step = self._go_back() if self.before is not None else step / 2.0
+                    continue
                 step /= 2.0
                 continue
             except (Locked, NotConverged, SolveError) as error:
@@ -270,9 +268,8 @@ class _Path:
             if here.s > self.told:
                 yield self._left(predictor, step)
                 self.told = here.s
-            verified = bool(np.isfinite(self.first_without))
             self.before = here
-            self.here = _Place(here.s + step, pose, step, predictor.motion / step)
+            self.here = _Place(here.s + step, pose, step, predictor.motion / step, proved)
             step = min(2.0 * step, phase.increment)
 
     def _shortened(self, step: float) -> float:
@@ -282,16 +279,25 @@ class _Path:
             step = rest if rest <= self.tolerance else min(step, rest / 2.0)
         return min(step, self.phase.limit - self.here.s)
 
-    def _go_back(self, step: float) -> float:
+    def _go_back(self) -> float:
         """Returns to the place before; gives the step to try from there."""
         assert self.before is not None
+        step = self.here.step
         self.here, self.before = self.before, None
         return step / 2.0
 
+    def _prove(self) -> None:
+        """Makes sure that this place is an equilibrium, moving on to the nearest one where a hinge has to jump."""
+        try:
+            pose = at_rest(self.model, self.here.pose, self.controls.correctors)
+        except Falls as fall:
+            raise _NotHere(fall.solved) from None
+        self.here = replace(self.here, pose=pose, proved=True)
+
     def _mechanism_changed(self, predictor: Solved, step: float) -> bool:
-        """Whether the last step went past a change of the mechanism and is worth taking again in smaller ones."""
+        """Whether the blocks move otherwise than in the step that led here: hinges jumped, joints opened or closed."""
         here = self.here
-        if here.velocity is None or self.before is None or here.step <= self.finest * (1.0 + 1e-9):
+        if here.velocity is None:
             return False
         size = np.sqrt(self.model.assembly.masses)[:, None] * np.array([1.0, 1.0, self.model.length])
         new, old = predictor.motion / step * size, here.velocity * size
@@ -299,19 +305,11 @@ class _Path:
 
     def _predict(self, place: _Place, step: float) -> Solved:
         rate = self.phase.rate(self.model.assembly, self.start, place.s)
-        predictor = solve_program(self.model, place.pose, rate * step)
-        if predictor.falling:
-            raise _TooFar(predictor)
-        return predictor
+        return solve_program(self.model, place.pose, rate * step)
 
     def _read(self, s: float, pose: Pose) -> Solved:
         """The forces at a place, from a program with a step so small that nothing moves."""
         return solve_program(self.model, pose, self.phase.rate(self.model.assembly, self.start, s) * self.probe)
-
-    def _verify(self, s: float, pose: Pose) -> None:
-        solved = self._read(s, pose)
-        if solved.falling:
-            raise Falls(solved)
 
     def _left(self, predictor: Solved, step: float) -> Increment:
         """The increment at the place that is left; its forces are the predictor's unless joints close on the way."""
@@ -333,8 +331,14 @@ class _Path:
         rate = self.phase.rate(self.model.assembly, self.start, self.here.s)
         return _increment(self.model, solved, rate, step, self.here.s, self.number, Status.EQUILIBRIUM)
 
-    def _collapse(self, first_without: float, falling: Solved) -> Generator[Increment, None, Ending]:
-        last = self._increment(self._read(self.here.s, self.here.pose), self.probe)
+    def _last_reading(self) -> Solved:
+        reading = self._read(self.here.s, self.here.pose)
+        if reading.falling:
+            raise _NotHere(reading)
+        return reading
+
+    def _collapse(self, first_without: float, falling: Solved, reading: Solved) -> Generator[Increment, None, Ending]:
+        last = self._increment(reading, self.probe)
         if self.here.s > self.told:
             yield last
         collapse = Collapse(

@@ -21,6 +21,10 @@ CORNER_TOLERANCE = 1e-5
 #: longer counts as facing it: an open joint that may close again leans by its opening angle.
 LARGEST_LEAN = 0.5
 
+#: A corner over the end of an edge, its face leading away, may touch the edge in this increment if its gap is at most
+#: this multiple of its overlap.
+STEEPEST_LANDING = 0.25
+
 #: Penetration up to this fraction of the width of the thinner block is a contact to be corrected; beyond, the
 #: corner belongs to another face behind.
 PENETRATION_FRACTION = 0.1
@@ -264,29 +268,30 @@ def _settle_ends(
     following = assembly.next_vertex
     start, stop = edge, following[edge]
     tangent = _unit(vertices[stop] - vertices[start])
-    along = ((vertices[vertex] - vertices[start]) * tangent).sum(axis=1)
+    rest = vertices[vertex] - vertices[start]
+    along = (rest * tangent).sum(axis=1)
+    gap = rest[:, 0] * tangent[:, 1] - rest[:, 1] * tangent[:, 0]
+    far = assembly.edge_lengths[edge] - along
+    at_start = along <= far
+    other = np.where(at_start, start, stop)
+    overlap = np.minimum(along, far)
     end = end_zone(assembly, vertex, edge)
-    at_start, at_stop = along <= end, along >= assembly.edge_lengths[edge] - end
-    other = np.where(at_start, start, np.where(at_stop, stop, -1))
-    near_end = other >= 0
-    # At a re-entrant corner the edge ends at a wall: a corner that gets there is simply on the edge.
-    near_end &= assembly.convex_vertex[other]
-    corner = np.where(near_end, other, -1)
-
-    k = np.flatnonzero(near_end)
-    facing = _facing_edge(assembly, vertex[k], edge[k], corner[k])
-    sense = np.where(at_start[k], 1.0, -1.0)[:, None]
-    along_edge = sense * tangent[k]
+    # Seen from the nearer end: the way the edge leaves it, and the way the face over the edge leaves the corner.
+    sense = np.where(at_start, 1.0, -1.0)[:, None]
+    facing = _facing_edge(assembly, vertex, edge, other)
+    along_edge = sense * tangent
     along_facing = -sense * _unit(vertices[following[facing]] - vertices[facing])
     same_way = (along_edge * along_facing).sum(axis=1) > 0.0
+    # At a re-entrant corner the edge ends at a wall: a corner that gets there is simply on the edge.
+    near_end = (overlap <= end) & assembly.convex_vertex[other]
+    # Faces that overlap on a bit at an angle touch at the corner below alone: the one above slides past the end
+    # before it comes down, and held up by the line of the edge it could not.
+    past = ~same_way & assembly.convex_vertex[other] & ((overlap <= end) | (gap > STEEPEST_LANDING * overlap))
     # Both corners lie within the end zone of the other's face, seen along the half-way direction.
-    halfway = _unit(along_edge + along_facing)
-    offset = np.abs(((vertices[vertex[k]] - vertices[corner[k]]) * halfway).sum(axis=1))
-    paired = same_way & (offset <= end[k])
-    keep = np.ones(len(vertex), dtype=bool)
-    keep[k[~same_way]] = False
-    corner[k[~paired]] = -1
-
+    halfway = _unit(along_edge + along_facing + 1e-300)
+    offset = np.abs(((vertices[vertex] - vertices[other]) * halfway).sum(axis=1))
+    corner = np.where(near_end & same_way & (offset <= end), other, -1)
+    keep = ~past
     vertex, edge, corner = vertex[keep], edge[keep], corner[keep]
     return _once(assembly, vertex, edge, corner)
 

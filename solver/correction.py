@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from .assembly import Assembly
 from .contact import CORNER_TOLERANCE, Contacts, end_zone, feature_pairs, find_contacts, measure_contacts
+from .equilibrium import equilibrium_matrix
 from .kinematics import Pose, moved, moved_vertices
 from .program import Model, Solved, solve_program
 
-__all__ = ["Falls", "NotConverged", "corrected", "solve_again"]
+__all__ = ["Falls", "NotConverged", "at_rest", "corrected", "solve_again"]
 
 #: A geometry is exact enough when contact points that carry force are closed, and those that stick have
 #: not moved along the joint, to this fraction of the block size.
 GEOMETRY_TOLERANCE = 1e-8
+
+#: A pose is an equilibrium when a program at rest moves no block by more than this, in block sizes: friction leaves
+#: a little freedom at the edge of its cone, a structure that has to find another equilibrium moves much further.
+STILL = 1e-5
+
+#: Step of a descent, in block sizes.
+DESCENT_STEP = 0.1
 
 #: Contact points below this fraction of the largest normal force do not decide whether a geometry is exact.
 CARRYING_FRACTION = 1e-6
@@ -22,6 +34,15 @@ CARRYING_FRACTION = 1e-6
 #: Drift of a hinge within an increment, as a fraction of the shortest edge, before it is corrected: second order in
 #: the rotation, which an increment keeps below a few hundredths.
 LARGEST_DRIFT = 1e-2
+
+#: Newton's method is given up where it has not converged after so many iterations, or moves blocks by more than so
+#: many times the error it is to correct: then the mechanism itself has to change, which takes a program.
+NEWTON_ITERATIONS = 8
+NEWTON_REACH = 100.0
+
+#: Contact points of a face depend on each other; this much on the diagonal, against entries near 1, keeps their
+#: equations solvable and their solution the smallest to ten digits.
+REDUNDANCY = 1e-11
 
 #: Part of the expected lift that is taken off: all of it could end in penetration, which a wedge locked by friction
 #: cannot give back.
@@ -46,8 +67,8 @@ class Falls(Exception):
         self.solved = solved
 
 
-def corrected(model: Model, predictor: Solved, supports: Pose, correctors: int) -> Pose:
-    """Moves the blocks exactly and solves again with the supports at rest until the geometry is exact.
+def corrected(model: Model, predictor: Solved, supports: Pose, correctors: int, *, proved: bool) -> Pose:
+    """Moves the blocks exactly and corrects the geometry with the supports at rest until it is exact.
 
     Parameters
     ----------
@@ -58,6 +79,8 @@ def corrected(model: Model, predictor: Solved, supports: Pose, correctors: int) 
         Where the supports are at the end of the increment; free blocks are not looked at.
     correctors : int
         Largest number of programs.
+    proved : bool
+        Whether the pose must be an equilibrium that a program at rest confirms, or the next increment may find out.
 
     Returns
     -------
@@ -76,27 +99,122 @@ def corrected(model: Model, predictor: Solved, supports: Pose, correctors: int) 
     enter the next program; so does the slip nobody asked for, as drift that friction takes back. Where each contact
     point should be along its joint is what the last program said: where it was, plus its slip in that program.
     """
-    assembly = model.assembly
-    free = assembly.free
+    free = model.assembly.free
     pose = moved(predictor.pose, np.where(free[:, None], predictor.motion, 0.0))
     pose = Pose(
         np.where(free[:, None], pose.positions, supports.positions), np.where(free, pose.rotations, supports.rotations)
     )
-    tolerance = GEOMETRY_TOLERANCE * model.length
-    solved = predictor
-    for _ in range(correctors):
-        contacts = _contacts_after(model, pose, solved)
-        drift, allowance = _carried(assembly, contacts, solved)
-        error = _geometry_error(assembly, contacts, drift, solved)
-        if error <= tolerance:
+    return _settled(model, pose, predictor, correctors, proved)
+
+
+def at_rest(model: Model, pose: Pose, correctors: int) -> Pose:
+    """The equilibrium that a pose settles into with the supports at rest, near or not.
+
+    Raises
+    ------
+    Falls
+        If blocks move by more than a block size without finding one.
+    SolveError
+    """
+    solved = solve_program(model, pose)
+    if solved.falling:
+        raise Falls(solved)
+    if _size(model, solved.motion) <= STILL * model.length:
+        return pose
+    try:
+        return _settled(model, moved(pose, solved.motion), solved, correctors, True)
+    except NotConverged:
+        return _descended(model, pose)
+
+
+def _descended(model: Model, pose: Pose) -> Pose:
+    """Follows the blocks downhill by small steps until they rest, or have moved by more than a block size."""
+    slow = replace(model, trust=model.length * DESCENT_STEP)
+    solved = solve_program(slow, pose)
+    for _ in range(round(2.0 / DESCENT_STEP)):
+        if not solved.falling and _size(model, solved.motion) <= STILL * model.length:
             return pose
+        pose = moved(pose, solved.motion)
+        solved = solve_again(slow, pose, solved)
+    raise Falls(solved)
+
+
+def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, proved: bool) -> Pose:
+    tolerance = GEOMETRY_TOLERANCE * model.length
+    for _ in range(correctors):
+        pose, contacts, error = _closed(model, pose, solved)
+        if error <= tolerance and not proved:
+            return pose
+        drift, allowance = _carried(model.assembly, contacts, solved)
         solved = solve_program(model, pose, contacts=contacts, drift=drift, allowance=allowance)
         if solved.falling:
             raise Falls(solved)
+        if error <= tolerance and _size(model, solved.motion) <= STILL * model.length:
+            return pose
         pose = moved(pose, solved.motion)
     raise NotConverged(
         f"after {correctors} corrections a contact point is still off by {error:.3g} m (accepted: {tolerance:.3g} m)"
     )
+
+
+def _size(model: Model, motion: np.ndarray) -> float:
+    return float(np.abs(motion * np.array([1.0, 1.0, model.length])).max(initial=0.0))
+
+
+def _closed(model: Model, pose: Pose, solved: Solved) -> tuple[Pose, Contacts, float]:
+    """Closes the contact points that carry force, by Newton's method, where that is all there is to correct.
+
+    Returns
+    -------
+    pose : Pose
+        The best pose found; the given one where closing the points moves blocks far more than there is to correct.
+    contacts : Contacts
+        At that pose.
+    error : float [m]
+        Deepest penetration, or largest gap or drift at a contact point that carries force.
+
+    Notes
+    -----
+    Points that carry force close their gap, and those that stick return to where they stuck: the smallest movement of
+    the blocks that does this, from one sparse factorisation per iteration. Friction leaves no dilation behind. A
+    program would cost a hundred times as much.
+    """
+    assembly = model.assembly
+    contacts = _contacts_after(model, pose, solved)
+    error = _geometry_error(assembly, contacts, solved)
+    best, allowed = (pose, contacts, error), NEWTON_REACH * error
+    travelled = 0.0
+    for _ in range(NEWTON_ITERATIONS):
+        if best[2] <= GEOMETRY_TOLERANCE * model.length:
+            break
+        motion = _closing_motion(model, pose, contacts, solved)
+        travelled += _size(model, motion)
+        if not travelled <= allowed:
+            break
+        pose = moved(pose, motion)
+        contacts = _contacts_after(model, pose, solved)
+        error = _geometry_error(assembly, contacts, solved)
+        if error > best[2] / 2.0:
+            break
+        best = (pose, contacts, error)
+    return best
+
+
+def _closing_motion(model: Model, pose: Pose, contacts: Contacts, solved: Solved) -> np.ndarray:
+    """(n_blocks, 3) array: smallest movement of the free blocks that closes, to first order, what carries force."""
+    assembly = model.assembly
+    carrying, sticking = _carrying_and_sticking(assembly, contacts, solved)
+    drift, _ = _carried(assembly, contacts, solved)
+    wanted = np.zeros(2 * len(contacts))
+    wanted[0::2], wanted[1::2] = -contacts.gaps / model.length, -drift / model.length
+    rows = np.zeros(2 * len(contacts), dtype=bool)
+    rows[0::2], rows[1::2] = carrying, sticking
+    freedoms = np.repeat(assembly.free, 3)
+    jacobian = sp.csr_array(equilibrium_matrix(contacts, pose, model.length).T)[rows][:, freedoms]
+    gram = sp.csc_array(jacobian @ jacobian.T + REDUNDANCY * sp.identity(jacobian.shape[0]))
+    motion = np.zeros((assembly.n_blocks, 3))
+    motion[assembly.free] = (jacobian.T @ splu(gram).solve(wanted[rows])).reshape(-1, 3)
+    return motion * model.lengths
 
 
 def solve_again(model: Model, pose: Pose, solved: Solved) -> Solved:
@@ -141,6 +259,14 @@ def _slid_off(
     return (past > drifting) | (sliding & (corner < 0) & (past > end_zone(assembly, vertex, edge)))
 
 
+def _matched(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
+    """For each contact, its number in the last program, and whether it was in it."""
+    keys, known = contacts.keys(assembly), solved.contacts.keys(assembly)
+    order = np.argsort(known, kind="stable")
+    place = order[np.minimum(np.searchsorted(known[order], keys), len(known) - 1)]
+    return place, known[place] == keys
+
+
 def _carried(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
     """What the last program leaves to the next at each contact point.
 
@@ -153,11 +279,7 @@ def _carried(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np
         gaps would only shrink by a constant factor; a point that closed and slid in the last program is expected
         to do so again in the same proportion.
     """
-    keys, known = contacts.keys(assembly), solved.contacts.keys(assembly)
-    order = np.argsort(known, kind="stable")
-    place = np.minimum(np.searchsorted(known[order], keys), len(known) - 1)
-    before = order[place]
-    same = known[before] == keys
+    before, same = _matched(assembly, contacts, solved)
     expected = solved.contacts.along[before] + solved.slip[before]
     drift = np.where(same, contacts.along - expected, 0.0)
     closing, slip = -solved.opening[before], solved.sliding[before]
@@ -166,12 +288,21 @@ def _carried(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np
     return drift, np.where(again, ALLOWED * solved.friction[before] * ratio * contacts.gaps, 0.0)
 
 
-def _geometry_error(assembly: Assembly, contacts: Contacts, drift: np.ndarray, solved: Solved) -> float:
-    """Deepest penetration, or largest gap or drift at a contact point that carries force [m]."""
-    penetration = float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0))
-    normal = solved.forces[:, 0]
-    carrying = solved.contacts.keys(assembly)[normal > CARRYING_FRACTION * normal.max(initial=0.0)]
-    now = np.isin(contacts.keys(assembly), carrying)
+def _carrying_and_sticking(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
+    """Points that carried force in the last program, and those of them that stuck: (n_contacts,) bool arrays."""
+    place, same = _matched(assembly, contacts, solved)
+    normal, shear = solved.forces[place, 0], np.abs(solved.forces[place, 1])
+    carrying = same & (normal > CARRYING_FRACTION * normal.max(initial=0.0))
+    at_limit = shear >= solved.friction[place] * normal * (1.0 - 1e-6)
+    return carrying, carrying & ~(at_limit & (solved.sliding[place] > 0.0))
+
+
+def _geometry_error(assembly: Assembly, contacts: Contacts, solved: Solved) -> float:
+    """Deepest penetration, largest gap at a contact point that carries force, or drift at one that sticks [m]."""
+    carrying, sticking = _carrying_and_sticking(assembly, contacts, solved)
+    drift, _ = _carried(assembly, contacts, solved)
     return max(
-        penetration, float(np.abs(contacts.gaps[now]).max(initial=0.0)), float(np.abs(drift[now]).max(initial=0.0))
+        float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)),
+        float(np.abs(contacts.gaps[carrying]).max(initial=0.0)),
+        float(np.abs(drift[sticking]).max(initial=0.0)),
     )
