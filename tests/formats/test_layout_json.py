@@ -1,0 +1,35 @@
+"""Our own layout file: what it needs, and what is said where that is missing."""
+
+import json
+import math
+
+import pytest
+
+from blockvis.drawing import read
+
+RING = [[0, 0], [1, 0], [1, 1]]
+STAR = [[(1 + k % 2) * math.cos(k * math.pi / 1250), (1 + k % 2) * math.sin(k * math.pi / 1250)] for k in range(2500)]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("[" * 200_000, "is not a JSON file"),
+        ({"walls": []}, 'is JSON but no layout; it needs a list "blocks"'),
+        ({"blocks": []}, "draws no block"),
+        ({"version": 9, "blocks": []}, "is a layout of version 9; version 1 is read"),
+        ({"blocks": [{"outline": "abc"}]}, "block 'block 0' has no outline of numbers"),
+        ({"blocks": [{"name": "a", "outline": RING[:2]}]}, r"block 'a' needs at least three corners .*\(2, 2\)"),
+        ({"blocks": [{"name": "a", "outline": [[0, 0], [1, float("nan")], [1, 1]]}]}, "'a' has a corner at .*nan"),
+        ({"blocks": [{"name": "a", "outline": RING, "role": "loose"}]}, "block 'a' has role 'loose' in the file"),
+        ({"blocks": [{"name": "a", "outline": RING, "thickness": "thick"}]}, "a block has thickness 'thick'"),
+        ({"blocks": [{"name": "a", "outline": RING, "density": -1}]}, "'a'\\) has density -1"),
+        ({"unit": "parsec", "blocks": [{"outline": RING}]}, "unit 'parsec' is not known"),
+        ({"blocks": [{"name": "a", "outline": STAR}]}, "has 2500 corners, more than 2000"),
+    ],
+)
+def test_refusals(tmp_path, content, message):
+    path = tmp_path / "a.json"
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
+    with pytest.raises(ValueError, match=message):
+        read(path)
