@@ -71,13 +71,14 @@ def read(path: Path, reading: Reading) -> Drawing:
     tolerance = None if reading.chord_tolerance is None else reading.chord_tolerance / in_metres
     shut = {layer.dxf.name for layer in document.layers if layer.is_off() or layer.is_frozen()}
     found = _Found()
-    # A small file can ask for any number of copies; more entities than it has bytes are a trap.
-    budget = max(path.stat().st_size, 1000)
+    # A small file can ask for any number of copies; more of them than a quarter of its bytes are a trap.
+    size = path.stat().st_size
+    most = budget = max(size // 4, 1000)
     for entity, handle in _flat(document.modelspace(), 0, path):
         budget -= 1
         if budget < 0:
             raise ValueError(
-                f"'{path}' inserts more entities than it has bytes ({path.stat().st_size}); "
+                f"'{path}' inserts more than {most} entities, though it has {size} bytes only; "
                 "explode its block references"
             )
         if entity.dxf.layer in shut:

@@ -28,7 +28,11 @@ from blockvis.units import UNITS, metres_per
 __all__ = ["read", "write"]
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_TOKEN = re.compile(rf"([MmZzLlHhVvCcSsQqTtAa])|({_NUMBER})")
+_COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
+#: The two flags of an arc may stand without anything between them and the next number.
+_ARC = re.compile(
+    rf"({_NUMBER})[\s,]*({_NUMBER})[\s,]*({_NUMBER})[\s,]*([01])[\s,]*([01])[\s,]*({_NUMBER})[\s,]*({_NUMBER})"
+)
 _TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
 _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 
@@ -257,9 +261,22 @@ def _chords(sweep: float, radius: float, where: _Where) -> int:
     return min(max(1, math.ceil(abs(sweep) / widest - 1e-9)), MOST_CHORDS)
 
 
+def _tokens(d: str) -> list[tuple[str, str]]:
+    """Commands and numbers of a path in order, as pairs of which one is empty."""
+    tokens = []
+    for command, arguments in _COMMAND.findall(d):
+        tokens.append((command, ""))
+        if command in "Aa":
+            numbers = [number for arc in _ARC.findall(arguments) for number in arc]
+        else:
+            numbers = re.findall(_NUMBER, arguments)
+        tokens += [("", number) for number in numbers]
+    return tokens
+
+
 def _path(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
     """Subpaths of a path as points, and whether each was closed by Z."""
-    tokens = _TOKEN.findall(element.get("d", ""))
+    tokens = _tokens(element.get("d", ""))
     parts: list[tuple[np.ndarray, bool]] = []
     points: list[np.ndarray] = []
     at = start = control = np.zeros(2)

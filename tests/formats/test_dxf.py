@@ -145,9 +145,10 @@ def test_a_small_file_cannot_ask_for_a_million_blocks(tmp_path):
 
     path = saved(tmp_path, draw)
     start = time.perf_counter()
-    with pytest.raises(ValueError, match="inserts more entities than it has bytes"):
+    with pytest.raises(ValueError, match=r"inserts more than \d+ entities, though it has \d+ bytes only"):
         read(path)
-    assert time.perf_counter() - start < 20
+    # Ten million blocks would take hours.
+    assert time.perf_counter() - start < 60
 
 
 def test_no_outline(tmp_path):

@@ -24,7 +24,7 @@ def test_garbage_is_refused(tmp_path, suffix, content):
     start = time.perf_counter()
     with pytest.raises(ValueError):
         read(path)
-    assert time.perf_counter() - start < 10
+    assert time.perf_counter() - start < 30
 
 
 @pytest.mark.parametrize("suffix", [".msh", ".json", ".dxf", ".svg", ".vtu", ".vtp", ".obj", ".ply", ".stl"])
