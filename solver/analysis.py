@@ -231,12 +231,13 @@ class _Path:
                     continue
                 if predictor.falling:
                     if step <= self.tolerance:
-                        return (yield from self._collapse(here.s + step, predictor, self._last_reading()))
+                        return (yield from self._collapse(here.s + step, predictor))
                     step /= 2.0
                     continue
                 target = phase.displaced(self.model.assembly, self.start, here.s + step)
                 proved = bool(np.isfinite(self.first_without))
-                pose = corrected(self.model, predictor, target, self.controls.correctors, proved=proved)
+                nudge = self._nudge(here.s + step) if proved else None
+                pose = corrected(self.model, predictor, target, self.controls.correctors, nudge=nudge)
             except _NotHere as fall:
                 if self.before is None:
                     yield _falling_frame(self.model, fall.solved, here.s, self.number)
@@ -244,16 +245,13 @@ class _Path:
                     return Ending(Status.NO_INITIAL_EQUILIBRIUM, message)
                 self.first_without = min(self.first_without, here.s)
                 step = self._go_back()
+                if self.first_without - self.here.s <= self.tolerance * (1.0 + 1e-9):
+                    return (yield from self._collapse(self.first_without, fall.solved))
                 continue
             except Falls as fall:
                 self.first_without = min(self.first_without, here.s + step)
                 if self.first_without - here.s <= self.tolerance * (1.0 + 1e-9):
-                    reading = self._read(here.s, here.pose)
-                    if not reading.falling:
-                        return (yield from self._collapse(self.first_without, fall.solved, reading))
-                    self.first_without = here.s
-                    step = self._go_back() if self.before is not None else step / 2.0
-                    continue
+                    return (yield from self._collapse(self.first_without, fall.solved))
                 step /= 2.0
                 continue
             except (Locked, NotConverged, SolveError) as error:
@@ -289,7 +287,7 @@ class _Path:
     def _prove(self) -> None:
         """Makes sure that this place is an equilibrium, moving on to the nearest one where a hinge has to jump."""
         try:
-            pose = at_rest(self.model, self.here.pose, self.controls.correctors)
+            pose = at_rest(self.model, self.here.pose, self.controls.correctors, self._nudge(self.here.s))
         except Falls as fall:
             raise _NotHere(fall.solved) from None
         self.here = replace(self.here, pose=pose, proved=True)
@@ -306,6 +304,9 @@ class _Path:
     def _predict(self, place: _Place, step: float) -> Solved:
         rate = self.phase.rate(self.model.assembly, self.start, place.s)
         return solve_program(self.model, place.pose, rate * step)
+
+    def _nudge(self, s: float) -> np.ndarray:
+        return self.phase.rate(self.model.assembly, self.start, s) * (0.1 * self.probe)
 
     def _read(self, s: float, pose: Pose) -> Solved:
         """The forces at a place, from a program with a step so small that nothing moves."""
@@ -331,13 +332,12 @@ class _Path:
         rate = self.phase.rate(self.model.assembly, self.start, self.here.s)
         return _increment(self.model, solved, rate, step, self.here.s, self.number, Status.EQUILIBRIUM)
 
-    def _last_reading(self) -> Solved:
+    def _collapse(self, first_without: float, falling: Solved) -> Generator[Increment, None, Ending]:
         reading = self._read(self.here.s, self.here.pose)
-        if reading.falling:
-            raise _NotHere(reading)
-        return reading
-
-    def _collapse(self, first_without: float, falling: Solved, reading: Solved) -> Generator[Increment, None, Ending]:
+        if reading.falling and self.before is not None:
+            # In balance with the supports at rest, but not with the least further movement: on the verge itself.
+            first_without, self.here = self.here.s, self.before
+            reading = self._read(self.here.s, self.here.pose)
         last = self._increment(reading, self.probe)
         if self.here.s > self.told:
             yield last

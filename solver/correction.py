@@ -67,7 +67,9 @@ class Falls(Exception):
         self.solved = solved
 
 
-def corrected(model: Model, predictor: Solved, supports: Pose, correctors: int, *, proved: bool) -> Pose:
+def corrected(
+    model: Model, predictor: Solved, supports: Pose, correctors: int, *, nudge: np.ndarray | None = None
+) -> Pose:
     """Moves the blocks exactly and corrects the geometry with the supports at rest until it is exact.
 
     Parameters
@@ -79,8 +81,9 @@ def corrected(model: Model, predictor: Solved, supports: Pose, correctors: int, 
         Where the supports are at the end of the increment; free blocks are not looked at.
     correctors : int
         Largest number of programs.
-    proved : bool
-        Whether the pose must be an equilibrium that a program at rest confirms, or the next increment may find out.
+    nudge : (n_blocks, 3) array [m, m, rad], optional
+        A very small movement of the supports. Where given, the pose must be an equilibrium that a program with this
+        movement confirms; otherwise the next increment may find out.
 
     Returns
     -------
@@ -100,15 +103,15 @@ def corrected(model: Model, predictor: Solved, supports: Pose, correctors: int, 
     point should be along its joint is what the last program said: where it was, plus its slip in that program.
     """
     free = model.assembly.free
-    pose = moved(predictor.pose, np.where(free[:, None], predictor.motion, 0.0))
+    pose = _moved_freely(model, predictor.pose, predictor)
     pose = Pose(
         np.where(free[:, None], pose.positions, supports.positions), np.where(free, pose.rotations, supports.rotations)
     )
-    return _settled(model, pose, predictor, correctors, proved)
+    return _settled(model, pose, predictor, correctors, nudge)
 
 
-def at_rest(model: Model, pose: Pose, correctors: int) -> Pose:
-    """The equilibrium that a pose settles into with the supports at rest, near or not.
+def at_rest(model: Model, pose: Pose, correctors: int, nudge: np.ndarray | None = None) -> Pose:
+    """The equilibrium that a pose settles into with the supports at rest or merely nudged, near or not.
 
     Raises
     ------
@@ -116,13 +119,15 @@ def at_rest(model: Model, pose: Pose, correctors: int) -> Pose:
         If blocks move by more than a block size without finding one.
     SolveError
     """
-    solved = solve_program(model, pose)
+    if nudge is None:
+        nudge = np.zeros((model.assembly.n_blocks, 3))
+    solved = solve_program(model, pose, nudge)
     if solved.falling:
         raise Falls(solved)
     if _size(model, solved.motion) <= STILL * model.length:
         return pose
     try:
-        return _settled(model, moved(pose, solved.motion), solved, correctors, True)
+        return _settled(model, _moved_freely(model, pose, solved), solved, correctors, nudge)
     except NotConverged:
         return _descended(model, pose)
 
@@ -139,22 +144,27 @@ def _descended(model: Model, pose: Pose) -> Pose:
     raise Falls(solved)
 
 
-def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, proved: bool) -> Pose:
+def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, nudge: np.ndarray | None) -> Pose:
     tolerance = GEOMETRY_TOLERANCE * model.length
     for _ in range(correctors):
         pose, contacts, error = _closed(model, pose, solved)
-        if error <= tolerance and not proved:
+        if error <= tolerance and nudge is None:
             return pose
         drift, allowance = _carried(model.assembly, contacts, solved)
-        solved = solve_program(model, pose, contacts=contacts, drift=drift, allowance=allowance)
+        solved = solve_program(model, pose, nudge, contacts, drift, allowance)
         if solved.falling:
             raise Falls(solved)
         if error <= tolerance and _size(model, solved.motion) <= STILL * model.length:
             return pose
-        pose = moved(pose, solved.motion)
+        pose = _moved_freely(model, pose, solved)
     raise NotConverged(
         f"after {correctors} corrections a contact point is still off by {error:.3g} m (accepted: {tolerance:.3g} m)"
     )
+
+
+def _moved_freely(model: Model, pose: Pose, solved: Solved) -> Pose:
+    """The free blocks moved; a nudge of the supports is not carried out."""
+    return moved(pose, np.where(model.assembly.free[:, None], solved.motion, 0.0))
 
 
 def _size(model: Model, motion: np.ndarray) -> float:
