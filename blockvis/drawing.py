@@ -248,6 +248,9 @@ def assemble(
     ValueError
         For a role that is none, or whose name matches nothing.
     """
+    for note in drawing.notes:
+        if note.startswith("unit clash"):
+            warnings.warn(f"{drawing.source}: {note}", stacklevel=2)
     n_drawn = drawing.n_blocks
     twins = duplicates(drawing.outlines)
     if twins:

@@ -112,6 +112,8 @@ def test_units(tmp_path):
     clash = read_drawing(path)
     assert clash.unit == "m"
     assert "unit clash: the file says its unit is in" in clash.notes[0]
+    with pytest.warns(UserWarning, match="unit clash: the file says its unit is in"):
+        read(path)
     with pytest.raises(ValueError, match="unit 'furlong' is not known"):
         read(path, unit="furlong")
 
