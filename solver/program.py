@@ -71,6 +71,9 @@ class Model:
     reach : float [m]
         Largest gap of a contact point that is kept.
     tally : Tally
+    live : (n_blocks, 3) array [N, N, N·m], optional
+        Where given, loads whose multiplier is an unknown of every program: it takes the value that lets the program
+        do its work.
     """
 
     assembly: Assembly
@@ -81,6 +84,7 @@ class Model:
     trust: float
     reach: float
     tally: Tally = field(default_factory=Tally)
+    live: np.ndarray | None = None
 
     @property
     def lengths(self) -> np.ndarray:
@@ -91,6 +95,16 @@ class Model:
     def scaled_load(self) -> np.ndarray:
         """(n_blocks, 3) array: the load in units of the program."""
         return self.load / (self.force * np.array([1.0, 1.0, self.length]))
+
+    @property
+    def scaled_live(self) -> tuple[np.ndarray, float]:
+        """(n_blocks, 3) array: the live load on the free blocks, its largest component 1; what it was divided by."""
+        free = self.assembly.free
+        live = np.zeros((len(free), 3))
+        if self.live is not None:
+            live[free] = self.live[free] / (self.force * np.array([1.0, 1.0, self.length]))
+        size = float(np.abs(live).max(initial=0.0))
+        return live / (size or 1.0), size
 
     @property
     def total_load(self) -> float:
@@ -118,6 +132,8 @@ class Solved:
         Whether blocks move by the whole trust region because no equilibrium holds them.
     certificate : Certificate
     support_forces : (n_blocks, 3) array [N, N, N·m]
+    multiplier : float
+        Of the model's live load; 0 where it has none.
     """
 
     pose: Pose
@@ -131,6 +147,7 @@ class Solved:
     falling: bool
     certificate: Certificate
     support_forces: np.ndarray
+    multiplier: float = 0.0
 
 
 def solve_program(
@@ -140,6 +157,7 @@ def solve_program(
     contacts: Contacts | None = None,
     drift: np.ndarray | None = None,
     allowance: np.ndarray | None = None,
+    work: float = 0.0,
 ) -> Solved:
     """States and solves the static program of one increment.
 
@@ -155,6 +173,8 @@ def solve_program(
         Slip that has already happened without being asked for, and that friction takes back.
     allowance : (n_contacts,) array [m], optional
         Lift of the associative flow rule that is taken off in advance where a contact point slides.
+    work : float [N·m]
+        What the model's live load does at a multiplier of 1: it holds the motion, and the multiplier is its price.
 
     Raises
     ------
@@ -174,6 +194,9 @@ def solve_program(
     that it is always feasible: unbalanced force at the optimum means that blocks move by the whole trust region.
     After Portioli & Cascini (2017), https://doi.org/10.1016/j.engstruct.2017.06.073, with the trust region, the
     drift and the tolerance ε added.
+
+    With a live load l its multiplier α, of either sign, joins the unknowns: + α l in the balance and - α · work in the
+    cost; in the kinematic program l · motion = work.
     """
     assembly = model.assembly
     if contacts is None:
@@ -195,9 +218,16 @@ def solve_program(
     identity = sp.identity(rows, format="csc")
     external = model.scaled_load[assembly.free].ravel()
     tolerance = BALANCE_TOLERANCE * model.total_load
+    cost = [rays.T @ distance, np.full(2 * rows, model.trust / model.length)]
+    columns = [balance, identity, -identity]
+    live, live_size = model.scaled_live
+    if live_size > 0.0:
+        column = sp.csc_array(live[assembly.free].reshape(-1, 1))
+        columns += [column, -column]
+        cost.append(np.array([-1.0, 1.0]) * work / (model.force * model.length * live_size))
     program = LinearProgram(
-        cost=np.concatenate([rays.T @ distance, np.full(2 * rows, model.trust / model.length)]),
-        matrix=sp.csc_array(sp.hstack([balance, identity, -identity], format="csc")),
+        cost=np.concatenate(cost),
+        matrix=sp.csc_array(sp.hstack(columns, format="csc")),
         lower=-external - tolerance,
         upper=-external + tolerance,
     )
@@ -209,13 +239,15 @@ def solve_program(
         raise Locked(tuple(assembly.names[i] for i in squeezed)) from None
     motion = support_motion.copy()
     motion[assembly.free] = -solution.row_dual.reshape(-1, 3) * model.lengths
-    multipliers, unbalanced = solution.x[: 2 * len(contacts)], solution.x[2 * len(contacts) :]
+    multipliers = solution.x[: 2 * len(contacts)]
+    unbalanced = solution.x[2 * len(contacts) : 2 * (len(contacts) + rows)]
+    level = float(solution.x[-2] - solution.x[-1]) if live_size > 0.0 else 0.0
     scaled_forces = rays @ multipliers
     resultant = (matrix @ scaled_forces).reshape(-1, 3)
     relative = matrix.T @ (motion / model.lengths).ravel()
     approach = distance + matrix.T @ (np.where(assembly.free[:, None], motion, 0.0) / model.lengths).ravel()
     room = rays.T @ approach
-    certificate = _certificate(model, contacts, resultant, multipliers, room, solution)
+    certificate = _certificate(model, contacts, resultant + level * live, multipliers, room, solution)
     at_limit = room.reshape(-1, 2).min(axis=1) <= AT_LIMIT
     on_supports = np.where(assembly.free[:, None], 0.0, resultant)
     return Solved(
@@ -230,6 +262,7 @@ def solve_program(
         falling=float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * model.total_load,
         certificate=certificate,
         support_forces=on_supports * model.force * np.array([1.0, 1.0, model.length]),
+        multiplier=level / live_size if live_size > 0.0 else 0.0,
     )
 
 
