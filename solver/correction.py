@@ -12,7 +12,7 @@ from .assembly import Assembly
 from .contact import CORNER_TOLERANCE, Contacts, end_zone, feature_pairs, find_contacts, measure_contacts
 from .equilibrium import equilibrium_matrix
 from .kinematics import Pose, moved, moved_vertices
-from .program import Model, Solved, solve_program
+from .program import Model, Solved, closing_program, matched_contacts, solve_program
 
 __all__ = ["Falls", "NotConverged", "at_rest", "corrected", "solve_again"]
 
@@ -43,6 +43,9 @@ NEWTON_REACH = 100.0
 #: Contact points of a face depend on each other; this much on the diagonal, against entries near 1, keeps their
 #: equations solvable and their solution the smallest to ten digits.
 REDUNDANCY = 1e-11
+
+#: Programs that close gaps one after another before a full program is solved again.
+CLOSINGS = 4
 
 #: Part of the expected lift that is taken off: all of it could end in penetration, which a wedge locked by friction
 #: cannot give back.
@@ -146,11 +149,18 @@ def _descended(model: Model, pose: Pose) -> Pose:
 
 def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, nudge: np.ndarray | None) -> Pose:
     tolerance = GEOMETRY_TOLERANCE * model.length
+    closings = 0
     for _ in range(correctors):
         pose, contacts, error = _closed(model, pose, solved)
         if error <= tolerance and nudge is None:
             return pose
         drift, allowance = _carried(model.assembly, contacts, solved)
+        if error > tolerance and closings < CLOSINGS:
+            closings += 1
+            solved = closing_program(model, pose, contacts, drift, solved)
+            pose = _moved_freely(model, pose, solved)
+            continue
+        closings = 0
         solved = solve_program(model, pose, nudge, contacts, drift, allowance)
         if solved.falling:
             raise Falls(solved)
@@ -269,14 +279,6 @@ def _slid_off(
     return (past > drifting) | (sliding & (corner < 0) & (past > end_zone(assembly, vertex, edge)))
 
 
-def _matched(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
-    """For each contact, its number in the last program, and whether it was in it."""
-    keys, known = contacts.keys(assembly), solved.contacts.keys(assembly)
-    order = np.argsort(known, kind="stable")
-    place = order[np.minimum(np.searchsorted(known[order], keys), len(known) - 1)]
-    return place, known[place] == keys
-
-
 def _carried(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
     """What the last program leaves to the next at each contact point.
 
@@ -289,7 +291,7 @@ def _carried(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np
         gaps would only shrink by a constant factor; a point that closed and slid in the last program is expected
         to do so again in the same proportion.
     """
-    before, same = _matched(assembly, contacts, solved)
+    before, same = matched_contacts(assembly, contacts, solved.contacts)
     expected = solved.contacts.along[before] + solved.slip[before]
     drift = np.where(same, contacts.along - expected, 0.0)
     closing, slip = -solved.opening[before], solved.sliding[before]
@@ -300,11 +302,10 @@ def _carried(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np
 
 def _carrying_and_sticking(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
     """Points that carried force in the last program, and those of them that stuck: (n_contacts,) bool arrays."""
-    place, same = _matched(assembly, contacts, solved)
-    normal, shear = solved.forces[place, 0], np.abs(solved.forces[place, 1])
+    place, same = matched_contacts(assembly, contacts, solved.contacts)
+    normal = solved.forces[place, 0]
     carrying = same & (normal > CARRYING_FRACTION * normal.max(initial=0.0))
-    at_limit = shear >= solved.friction[place] * normal * (1.0 - 1e-6)
-    return carrying, carrying & ~(at_limit & (solved.sliding[place] > 0.0))
+    return carrying, carrying & solved.sticking[place]
 
 
 def _geometry_error(assembly: Assembly, contacts: Contacts, solved: Solved) -> float:

@@ -20,8 +20,9 @@ ACCEPTED_VIOLATION = 1e-7
 #: Relative difference of the two objectives that our own check accepts.
 ACCEPTED_GAP = 1e-7
 
-#: Above this many rows the interior point methods win over the simplex method (measured, benchmarks/).
-SIMPLEX_ROWS = 400
+#: Up to this many rows the simplex method is the fastest; up to the second number crossover from an interior solution
+#: to a vertex costs little, beyond it twenty times the program itself (measured on running-bond walls).
+SIMPLEX_ROWS, CROSSOVER_ROWS = 250, 1500
 
 
 class SolveError(RuntimeError):
@@ -106,6 +107,8 @@ ROUTES: dict[str, dict[str, object]] = {
     "simplex": {"solver": "simplex"},
     "simplex without presolve": {"solver": "simplex", "presolve": "off"},
     "hipo": {"solver": "hipo", "run_crossover": "off"},
+    "hipo without presolve": {"solver": "hipo", "run_crossover": "off", "presolve": "off"},
+    "hipo with crossover": {"solver": "hipo", "run_crossover": "on"},
     "ipx": {"solver": "ipx", "run_crossover": "off"},
     "ipx with crossover": {"solver": "ipx", "run_crossover": "on"},
 }
@@ -128,12 +131,13 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> L
         If no route gives a solution that passes; the message lists what each of them ended with.
     """
     if routes is None:
-        small = program.matrix.shape[0] <= SIMPLEX_ROWS
-        routes = (
-            ("simplex", "simplex without presolve", "ipx with crossover", "hipo")
-            if small
-            else ("hipo", "ipx", "ipx with crossover", "simplex")
-        )
+        rows = program.matrix.shape[0]
+        if rows <= SIMPLEX_ROWS:
+            routes = ("simplex", "simplex without presolve", "ipx with crossover", "hipo")
+        elif rows <= CROSSOVER_ROWS:
+            routes = ("hipo with crossover", "ipx with crossover", "simplex", "simplex without presolve")
+        else:
+            routes = ("hipo", "hipo without presolve", "ipx", "ipx with crossover", "simplex")
     outcomes = []
     for route in routes:
         solution, status = _run(program, route)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,7 +14,16 @@ from .kinematics import Pose, moved_vertices
 from .lp import LinearProgram, LPSolution, Unbounded, solve_lp
 from .response import Certificate
 
-__all__ = ["Locked", "Model", "Solved", "Tally", "point_velocities", "solve_program"]
+__all__ = [
+    "Locked",
+    "Model",
+    "Solved",
+    "Tally",
+    "closing_program",
+    "matched_contacts",
+    "point_velocities",
+    "solve_program",
+]
 
 #: A free block out of balance by less than this fraction of the total load is in balance. Without it the program
 #: may move a block without friction sideways, for nothing, as far as it is allowed to.
@@ -24,6 +33,10 @@ BALANCE_TOLERANCE = 1e-9
 #: what HiGHS leaves, and within the residual that a certificate promises.
 FALLING_FRACTION = 5e-9
 
+
+#: Resistance of every block to being moved by the closing of gaps, in mean block weights: without friction at the
+#: points that slide, blocks could drift along their joints for nothing.
+CLOSING_FRICTION = 1e-2
 
 #: Distance from the edge of the friction cone, in units of the program, at which a contact point is on it.
 AT_LIMIT = 1e-9
@@ -128,6 +141,8 @@ class Solved:
         Normal and tangential relative displacement of each contact point in that motion.
     sliding : (n_contacts,) array [m]
         Slip, drift not counted, of the points whose motion takes them to the edge of their friction cone; else 0.
+    sticking : (n_contacts,) bool array
+        Points that carry force and do not slide.
     falling : bool
         Whether blocks move by the whole trust region because no equilibrium holds them.
     certificate : Certificate
@@ -144,6 +159,7 @@ class Solved:
     opening: np.ndarray
     slip: np.ndarray
     sliding: np.ndarray
+    sticking: np.ndarray
     falling: bool
     certificate: Certificate
     support_forces: np.ndarray
@@ -249,21 +265,102 @@ def solve_program(
     room = rays.T @ approach
     certificate = _certificate(model, contacts, resultant + level * live, multipliers, room, solution)
     at_limit = room.reshape(-1, 2).min(axis=1) <= AT_LIMIT
+    forces = scaled_forces.reshape(-1, 2)
+    used_up = np.abs(forces[:, 1]) >= friction * forces[:, 0] * (1.0 - 1e-6)
+    sliding = np.where(at_limit, np.abs(approach[1::2]) * model.length, 0.0)
     on_supports = np.where(assembly.free[:, None], 0.0, resultant)
     return Solved(
         pose=pose,
         contacts=contacts,
         friction=friction,
-        forces=scaled_forces.reshape(-1, 2) * model.force,
+        forces=forces * model.force,
         motion=motion,
         opening=relative[0::2] * model.length,
         slip=relative[1::2] * model.length,
-        sliding=np.where(at_limit, np.abs(approach[1::2]) * model.length, 0.0),
+        sliding=sliding,
+        sticking=(forces[:, 0] > 0.0) & ~(used_up & (sliding > 0.0)),
         falling=float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * model.total_load,
         certificate=certificate,
         support_forces=on_supports * model.force * np.array([1.0, 1.0, model.length]),
         multiplier=level / live_size if live_size > 0.0 else 0.0,
     )
+
+
+def closing_program(model: Model, pose: Pose, contacts: Contacts, drift: np.ndarray, before: Solved) -> Solved:
+    """Closes the gaps that sliding and finite rotation have left, without a lift of its own.
+
+    Parameters
+    ----------
+    model : Model
+    pose : Pose
+    contacts : Contacts
+        At the pose; they may contain others than ``before``.
+    drift : (n_contacts,) array [m]
+    before : Solved
+        The last program; its forces say which points are to be closed, and how much each counts.
+
+    Returns
+    -------
+    Solved
+        Supports at rest. Its forces are weights of the closing, not an equilibrium under the loads.
+
+    Notes
+    -----
+    minimise Σ N⁰_k (N_k + g_k) over the movements of the free blocks, where N⁰ are the normal forces of the last
+    program, subject to N_k + g_k ≥ 0 at every point and N_k + g_k ≥ μ |T_k + drift_k| where it stuck: points that slide
+    do so without friction. In its static form it is a program of the same shape whose load is what the forces of
+    the last program balance; these forces are admissible, so that it always has a solution.
+    """
+    assembly = model.assembly
+    model.tally.programs += 1
+    friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
+    place, same = matched_contacts(assembly, contacts, before.contacts)
+    sticking = same & before.sticking[place]
+    matrix = equilibrium_matrix(contacts, pose, model.length)
+    rays = cone_rays(np.where(sticking, friction, 0.0))
+    rays = rays[:, np.repeat(sticking, 2) | (np.arange(2 * len(contacts)) % 2 == 0)]
+    distance = np.zeros(2 * len(contacts))
+    distance[0::2] = _beyond_rounding(contacts.gaps / model.length)
+    distance[1::2] = np.where(sticking, _beyond_rounding(drift / model.length), 0.0)
+    weights = np.where(same[:, None], before.forces[place], 0.0) / model.force
+    weights[:, 1] = np.where(sticking, weights[:, 1], 0.0)
+    by_row = sp.csr_array(matrix)[np.repeat(assembly.free, 3)]
+    balance = sp.csc_array(by_row @ rays)
+    load = by_row @ weights.ravel()
+    rows = balance.shape[0]
+    identity = sp.identity(rows, format="csc")
+    program = LinearProgram(
+        cost=np.concatenate([rays.T @ distance, np.full(2 * rows, model.trust / model.length)]),
+        matrix=sp.csc_array(sp.hstack([balance, identity, -identity], format="csc")),
+        lower=load - CLOSING_FRICTION,
+        upper=load + CLOSING_FRICTION,
+    )
+    solution = solve_lp(program)
+    motion = np.zeros((assembly.n_blocks, 3))
+    motion[assembly.free] = -solution.row_dual.reshape(-1, 3) * model.lengths
+    forces = (rays @ solution.x[: rays.shape[1]]).reshape(-1, 2)
+    relative = matrix.T @ (motion / model.lengths).ravel() * model.length
+    return replace(
+        before,
+        pose=pose,
+        contacts=contacts,
+        friction=friction,
+        forces=forces * model.force,
+        motion=motion,
+        opening=relative[0::2],
+        slip=relative[1::2],
+        sliding=np.zeros(len(contacts)),
+        sticking=sticking & (forces[:, 0] > 0.0),
+        falling=False,
+    )
+
+
+def matched_contacts(assembly: Assembly, contacts: Contacts, before: Contacts) -> tuple[np.ndarray, np.ndarray]:
+    """For each contact, its number among those before, and whether it was there."""
+    keys, known = contacts.keys(assembly), before.keys(assembly)
+    order = np.argsort(known, kind="stable")
+    place = order[np.minimum(np.searchsorted(known[order], keys), len(known) - 1)]
+    return place, known[place] == keys
 
 
 def _beyond_rounding(values: np.ndarray) -> np.ndarray:
