@@ -1,6 +1,6 @@
 """Contact points: which corners face which edges, with the touching joints of shapely as the independent measure."""
 
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -13,6 +13,10 @@ SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 def rectangle(left, low, right, high):
     return [[left, low], [right, low], [right, high], [left, high]]
+
+
+def square(x, y):
+    return SQUARE + np.array([x, y])
 
 
 def find(outlines, roles=None, reach=0.05):
@@ -64,7 +68,7 @@ def running_bond(bricks, courses, length=2.0, height=1.0):
     for course in range(courses):
         inner = np.arange(1, 2 * bricks, 2) if course % 2 else np.arange(2, 2 * bricks, 2)
         joints = np.concatenate([[0], inner, [2 * bricks]]) * length / 2
-        for left, right in zip(joints[:-1], joints[1:], strict=True):
+        for left, right in pairwise(joints):
             outlines.append(rectangle(left, course * height, right, (course + 1) * height))
     return outlines
 
@@ -161,7 +165,7 @@ def test_hinge_of_a_turned_block(angle, frame, right):
     """A block turned about a corner keeps that corner, with the normal half-way between the two faces."""
     corner = np.array([1.0 if right else 0.0, 1.0])
     sense = -1.0 if right else 1.0
-    upper = turned(SQUARE + [0, 1], sense * angle, corner)
+    upper = turned(square(0, 1), sense * angle, corner)
     outlines = [turned(outline, frame, (0, 0)) for outline in (SQUARE, upper)]
     _, contacts = find(outlines, reach=0.01)
     hinge = turned(corner[None], frame, (0, 0))[0]
@@ -181,18 +185,18 @@ def test_hinge_of_a_turned_block(angle, frame, right):
 
 @pytest.mark.parametrize("past", [0.0, 1e-4, 1e-3, 0.02])
 def test_corner_past_the_end_of_an_edge_does_not_touch(past):
-    assert len(find([SQUARE, SQUARE + [1 + past, 1]])[1]) == 0
+    assert len(find([SQUARE, square(1 + past, 1)])[1]) == 0
 
 
 @pytest.mark.parametrize("bearing", [1e-4, 1e-3, 0.02])
 def test_narrow_bearing_is_a_joint(bearing):
-    assert len(find([SQUARE, SQUARE + [1 - bearing, 1]])[1]) == 2
+    assert len(find([SQUARE, square(1 - bearing, 1)])[1]) == 2
 
 
 def test_drift_of_a_hair_keeps_the_hinge():
     """A corner a millionth of the edge past the other, as after a finite rotation, stays one contact."""
     for drift in (-1e-6, 1e-6):
-        upper = turned(SQUARE + [0, 1], -0.05, (1, 1)) + [drift, 0]
+        upper = turned(square(drift, 1), -0.05, (1 + drift, 1))
         _, contacts = find([SQUARE, upper], reach=0.01)
         assert len(contacts) == 1
         assert contacts.corner[0] >= 0
@@ -251,7 +255,7 @@ def test_impossible_friction_is_refused(mu):
 
 
 def test_friction_of_pairs_of_materials():
-    assembly = solver.Assembly.from_outlines([SQUARE, SQUARE + [0, 1], SQUARE + [0, 2]], materials=["a", "b", "a"])
+    assembly = solver.Assembly.from_outlines([SQUARE, square(0, 1), square(0, 2)], materials=["a", "b", "a"])
     laws = solver.Interfaces(solver.InterfaceLaw(0.5), {("b", "a"): solver.InterfaceLaw(0.2)})
     first, second = np.array([0, 1, 2, 0]), np.array([1, 0, 1, 2])
     assert laws.friction(assembly, first, second).tolist() == [0.2, 0.2, 0.2, 0.5]

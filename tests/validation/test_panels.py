@@ -4,6 +4,8 @@ Reference: the smallest vertical reaction over all statically admissible states,
 formulations, as fractions where they are rational; two or three codes agree to eight digits.
 """
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -30,8 +32,7 @@ def panel(bricks, courses, start, scale=1.0):
     end, outlines = 2 * bricks, []
     for course in range(courses):
         joints = [0, *range(1, end, 2), end] if course % 2 else range(0, end + 1, 2)
-        joints = list(joints)
-        for left, right in zip(joints[:-1], joints[1:], strict=True):
+        for left, right in pairwise(joints):
             outlines.append([[left, course], [right, course], [right, course + 1], [left, course + 1]])
     free = len(outlines)
     outlines.append([[-1, -1], [start, -1], [start, 0], [-1, 0]])

@@ -1,0 +1,109 @@
+"""Loads at the centroids, and the motion of the supports."""
+
+import numpy as np
+import pytest
+
+import solver
+
+OUTLINES = [[[0, 0], [2, 0], [2, 1], [0, 1]], [[0, -1], [3, -1], [3, 0], [0, 0]], [[5, 0], [6, 0], [6, 1], [5, 1]]]
+ASSEMBLY = solver.Assembly.from_outlines(OUTLINES, names=["brick", "base", "pier"], roles=["free", "moving", "moving"])
+START = solver.Pose.initial(ASSEMBLY)
+
+MOTIONS = {
+    "translation": {"direction": (3, -4)},
+    "rotation": {"rotation_centre": (2, 7), "rotation": -1},
+    "both": {"direction": (0, -1), "rotation_centre": (1, 1), "rotation": 0.4},
+}
+
+
+def test_self_weight():
+    loads = solver.self_weight(ASSEMBLY)
+    assert loads.dead[:, 1] == pytest.approx(-2000 * 9.81 * np.array([2, 3, 1]))
+    assert (loads.dead[:, [0, 2]] == 0).all()
+    assert (loads.live == 0).all()
+
+
+def test_live_loads_are_multiplied():
+    live = solver.weight_fraction(ASSEMBLY, (0.1, 0), np.array([0]))
+    loads = solver.Loads(solver.self_weight(ASSEMBLY).dead, live)
+    total = loads.total(3.0)
+    assert total[0] == pytest.approx([0.3 * 2 * 19620, -2 * 19620, 0])
+    assert total[1:] == pytest.approx(loads.dead[1:])
+
+
+def test_weight_fraction_of_all_blocks():
+    assert solver.weight_fraction(ASSEMBLY, (0.1, -0.2))[:, 1] == pytest.approx(-0.2 * ASSEMBLY.masses * 9.81)
+
+
+def test_point_load_has_the_moment_of_its_arm():
+    """Force (3, 5) at (2, 1), one right and half up of the centroid (1, 0.5): moment 1 · 5 - 0.5 · 3."""
+    load = solver.point_load(ASSEMBLY, 0, (3, 5), point=(2, 1), moment=10)
+    assert load[0] == pytest.approx([3, 5, 10 + 1 * 5 - 0.5 * 3])
+    assert (load[1:] == 0).all()
+    assert solver.point_load(ASSEMBLY, 0, (3, 5))[0].tolist() == [3, 5, 0]
+
+
+@pytest.mark.parametrize("s", [0.0, 0.3, 2.0])
+def test_rotation_follows_the_true_arc(s):
+    settlement = solver.Settlement(rotation_centre=(2, 7), rotation=-5)
+    pose = settlement.displaced(ASSEMBLY, START, s)
+    arms = [p.positions[1:] - [2, 7] for p in (START, pose)]
+    assert np.hypot(*arms[1].T) == pytest.approx(np.hypot(*arms[0].T), rel=1e-14)
+    turned = np.angle((arms[1] @ [1, 1j]) / (arms[0] @ [1, 1j]))
+    assert turned == pytest.approx([-s, -s], abs=1e-14)
+    assert pose.rotations.tolist() == pytest.approx([0, -s, -s])
+    assert (pose.positions[0] == START.positions[0]).all()
+
+
+def test_centre_travels_with_the_translation():
+    settlement = solver.Settlement(direction=(0, -2), rotation_centre=(1.5, -0.5), rotation=0.4)
+    pose = settlement.displaced(ASSEMBLY, START, 0.5)
+    assert settlement.unit == "m"
+    # The base is centred on the point it turns about.
+    assert pose.positions[1] == pytest.approx([1.5, -1.0])
+    assert pose.rotations[1] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("s", [0.0, 0.7])
+def test_rate_is_the_derivative_of_the_displacement(motion, s):
+    settlement = solver.Settlement(**MOTIONS[motion])
+    step = 1e-5
+    ahead, behind = (settlement.displaced(ASSEMBLY, START, s + sign * step) for sign in (1, -1))
+    slope = (ahead.displacements(ASSEMBLY) - behind.displacements(ASSEMBLY)) / (2 * step)
+    assert np.abs(settlement.rate(ASSEMBLY, START, s) - slope).max() < 1e-9
+
+
+def test_only_named_supports_take_part():
+    settlement = solver.Settlement(direction=(1, 0), blocks=("pier", "brick"))
+    assert settlement.taking_part(ASSEMBLY).tolist() == [False, False, True]
+    moved = settlement.displaced(ASSEMBLY, START, 0.5).positions - START.positions
+    assert moved.tolist() == [[0, 0], [0, 0], [0.5, 0]]
+    with pytest.raises(ValueError, match="'pillar'"):
+        solver.Settlement(direction=(1, 0), blocks=("pillar",)).taking_part(ASSEMBLY)
+
+
+def test_direction_counts_as_a_direction_only():
+    assert solver.Settlement(direction=(0, -7)).direction == (0, -1)
+    assert solver.Settlement(direction=(1, 0), increment=0.02).tolerance == pytest.approx(2e-4)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "needs a direction"),
+        ({"direction": (0, 0)}, "direction"),
+        ({"direction": (1, np.nan)}, "two finite numbers"),
+        ({"direction": (1, 0, 0)}, "two finite numbers"),
+        ({"rotation_centre": (0, 0)}, "must not be zero"),
+        ({"rotation_centre": (0, np.inf), "rotation": 1}, "two finite numbers"),
+        ({"direction": (1, 0), "rotation": 1}, "no rotation_centre"),
+        ({"direction": (1, 0), "increment": 0}, "increment"),
+        ({"direction": (1, 0), "increment": -0.1}, "increment"),
+        ({"direction": (1, 0), "limit": np.nan}, "limit"),
+        ({"direction": (1, 0), "tolerance": -1e-4}, "tolerance"),
+    ],
+)
+def test_refused_settlements(given, message):
+    with pytest.raises(ValueError, match=message):
+        solver.Settlement(**given)
