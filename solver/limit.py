@@ -1,0 +1,514 @@
+"""Limit load: the largest multiplier of the live loads that a structure carries at one geometry; its mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+import scipy.sparse as sp
+
+from .assembly import Assembly
+from .contact import Contacts, InterfaceLaw, Interfaces, find_contacts
+from .equilibrium import cone_rays, equilibrium_matrix
+from .kinematics import Pose, moved_vertices
+from .loads import Loads, checked_loads
+from .lp import LinearProgram, Unbounded, solve_lp
+from .polygons import overlap_depths
+from .program import FALLING_FRACTION, point_velocities
+from .response import Certificate, Increment, Status
+
+__all__ = ["Envelope", "LimitLoad", "LimitStatus", "check_blocks", "checked_live", "limit_load", "limit_load_envelope"]
+
+#: Largest gap of a closed contact point: in the drawing, as a fraction of the width of the thinnest block, the accuracy
+#: also accepted for overlaps; at a computed pose, as a fraction of the block size, a hundred times its accuracy.
+DRAWN_GAP = 1e-3
+COMPUTED_GAP = 1e-6
+
+#: Non-associative flow: part of the new normal forces in the next program, while wandering and while settling, and
+#: part of the dilatancy that is kept.
+RELAXATION, SETTLING_RELAXATION = 0.5, 0.9
+DILATANCY_KEPT = 0.5
+
+#: Non-associative flow has converged when the multiplier changes by less than the first and shear forces exceed
+#: friction by less than the second, relative to the multiplier and to the largest normal force.
+MULTIPLIER_CHANGE = 1e-7
+FRICTION_EXCESS = 1e-6
+
+#: Programs of the non-associative sequence: without preference among equal forces, which wanders to low multipliers,
+#: and then at most, near the forces of the lowest, to convergence.
+WANDERING, SETTLING = 40, 100
+
+#: Cost of a change of a normal force in the non-associative programs, in multipliers: it only decides between equals.
+CHANGE_COST = 1e-8
+
+#: Cost of unbalanced force in the non-associative programs, in multipliers: far above that of any real mechanism.
+UNBALANCED_COST = 1e3
+
+
+class LimitStatus(StrEnum):
+    """What a limit load is."""
+
+    FOUND = "limit load"
+    UNBOUNDED = "unbounded"
+    NO_EQUILIBRIUM = "no equilibrium"
+    NOT_CONVERGED = "not converged"
+
+
+@dataclass(frozen=True)
+class LimitLoad:
+    """The capacity of a structure under live loads at one geometry.
+
+    Attributes
+    ----------
+    multiplier : float
+        α of the live loads at the limit; ``inf`` where they are no danger, ``nan`` where the dead load falls already.
+    bounds : (float, float)
+        Static value, from forces in equilibrium within friction, and kinematic value, from the power balance of the
+        mechanism, - dead · velocity / live · velocity (plus friction where it is not associative). For associative
+        flow they enclose the limit load.
+    mechanism : (n_blocks, 3) array
+        How the blocks begin to move, largest movement 1 (rotations times block size). Where there is no equilibrium,
+        how they fall; where the multiplier is unbounded, zero.
+    contacts : Contacts
+        The closed contact points.
+    forces : (n_contacts, 2) array [N]
+        Normal (compression positive) and shear force on ``block_a`` at the limit.
+    certificate : Certificate
+    status : LimitStatus
+    flow : str
+        "associative" or "non-associative".
+    pose : Pose
+        The geometry.
+    friction : (n_contacts,) array
+        Friction coefficients.
+    live_force : float [N]
+        Resultant of the live loads on the free blocks at a multiplier of 1.
+    programs : int
+        Linear programs solved.
+    """
+
+    multiplier: float
+    bounds: tuple[float, float]
+    mechanism: np.ndarray
+    contacts: Contacts
+    forces: np.ndarray
+    certificate: Certificate
+    status: LimitStatus
+    flow: str
+    pose: Pose
+    friction: np.ndarray
+    live_force: float
+    programs: int
+
+    @property
+    def gap(self) -> float:
+        """Kinematic minus static value; what rounding leaves of it."""
+        return self.bounds[1] - self.bounds[0]
+
+    @property
+    def increment(self) -> Increment:
+        """The state at the limit as an increment, for pictures and tables; its velocity is the mechanism."""
+        contacts, velocity = self.contacts, self.mechanism
+        a, b = (point_velocities(contacts.points, k, self.pose, velocity) for k in (contacts.block_a, contacts.block_b))
+        finite = self.multiplier if np.isfinite(self.multiplier) else 0.0
+        return Increment(
+            settlement=0.0,
+            phase=0,
+            load_multiplier=self.multiplier,
+            pose=self.pose,
+            contacts=contacts,
+            forces=self.forces,
+            displacements=np.einsum("kij,kj->ki", contacts.frames, a - b),
+            friction=self.friction,
+            velocity=velocity,
+            reaction=finite * self.live_force,
+            support_forces=np.zeros_like(velocity),
+            certificate=self.certificate,
+            status=Status.FALLING if self.status is LimitStatus.NO_EQUILIBRIUM else Status.EQUILIBRIUM,
+            programs=self.programs,
+            seconds=0.0,
+        )
+
+    def __str__(self) -> str:
+        moving = int((np.abs(self.mechanism).max(axis=1) > 0.01).sum())
+        if self.status is LimitStatus.NO_EQUILIBRIUM:
+            return f"no equilibrium under the dead load alone: {moving} blocks fall"
+        if self.status is LimitStatus.UNBOUNDED:
+            return "unbounded: no live load of this pattern brings the structure down"
+        text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction, bounds differ by {self.gap:.1e})"
+        return f"{text}, {moving} blocks moving" + (", not converged" if self.status != LimitStatus.FOUND else "")
+
+
+def limit_load(
+    assembly: Assembly,
+    *,
+    loads: Loads,
+    friction_coefficient: float = 0.6,
+    interfaces: Interfaces | None = None,
+    pose: Pose | None = None,
+    flow: str = "associative",
+    closed_gap: float | None = None,
+    overlap_tolerance: float | None = None,
+) -> LimitLoad:
+    """The largest multiplier of the live loads at which the structure can be in equilibrium.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        Fixed and moving supports both stand still.
+    loads : Loads
+        Dead loads, and the live loads that the multiplier scales. For the other direction give minus the live loads.
+    friction_coefficient : float
+        Of every interface, where ``interfaces`` is not given.
+    interfaces : Interfaces, optional
+    pose : Pose, optional
+        The geometry: that of an increment gives the capacity left after a settlement. The drawing by default.
+    flow : {"associative", "non-associative"}
+        Whether sliding joints lift by friction coefficient times slip, or do not lift.
+    closed_gap : float, optional [m]
+        Contact points with a larger gap are open and carry nothing. By default a thousandth of the width of the
+        thinnest block in the drawing, a millionth of the block size at a given pose.
+    overlap_tolerance : float, optional [m]
+        Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
+
+    Returns
+    -------
+    LimitLoad
+
+    Raises
+    ------
+    ValueError
+        For no free block, overlapping blocks, loads of the wrong shape, no live load on a free block.
+    SolveError
+        If HiGHS gives no solution that passes its check.
+
+    Notes
+    -----
+    Associative flow, over multipliers λ ≥ 0 of the rays n ∓ μ t of the friction cones and α ≥ 0:
+
+        maximise α  subject to  A λ + dead + α live = 0  for every free block
+
+    Its dual is the kinematic program: minimise - dead · q over mechanisms q with N(q) ≥ μ |T(q)| at every closed
+    contact point and live · q = 1. Livesley (1978), https://doi.org/10.1002/nme.1620121207, for the static form; both
+    bounds are recomputed from the forces and from the mechanism. The multiplier is the exact limit load of the model with
+    associative flow, and an upper bound for every other flow rule with the same friction.
+
+    Non-associative flow is a sequence of such programs in the manner of Gilbert, Casapulla & Ahmed (2006),
+    https://doi.org/10.1016/j.compstruc.2006.02.005: the friction cone of each point is replaced by
+    |T| ≤ μ N⁰ + ψ (N - N⁰), with N⁰ out of the normal forces of the programs before and a dilatancy ψ that falls from
+    μ to zero. Ours first wanders among equal solutions, which leads to low multipliers, and then settles near the
+    lowest. Where it converges (N = N⁰) the forces obey Coulomb friction and balance the loads, the mechanism does not
+    lift where it slides, and the power of the loads is what friction takes: a complete solution for friction without
+    dilatancy, never above the associative value. It is not proved to be the least: such a structure may have several
+    limit loads, depending on how it was loaded, and may fall below this one. Its two values agree where it has
+    converged, but are no bounds. Convergence is not proved either; "not converged" says so and gives the last
+    program.
+    """
+    if flow not in ("associative", "non-associative"):
+        raise ValueError(f"flow is '{flow}'; it is 'associative' or 'non-associative'")
+    check_blocks(assembly, overlap_tolerance)
+    loads = checked_live(assembly, loads)
+    interfaces = interfaces or Interfaces(InterfaceLaw(friction_coefficient))
+    if closed_gap is None:
+        closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
+    pose = Pose.initial(assembly) if pose is None else pose
+    problem = _Problem.stated(assembly, interfaces, loads, pose, closed_gap)
+    dead_alone = problem.dead_alone()
+    if dead_alone.falls:
+        return problem.result(dead_alone, LimitStatus.NO_EQUILIBRIUM, flow, 1)
+    try:
+        found = problem.associative(dead_alone)
+    except Unbounded:
+        return problem.result(dead_alone, LimitStatus.UNBOUNDED, flow, 2)
+    if flow == "associative":
+        return problem.result(found, LimitStatus.FOUND, flow, 2)
+    return problem.non_associative(found)
+
+
+@dataclass(frozen=True)
+class _State:
+    """Forces (n_contacts, 2), multiplier and velocity of one program, in its units.
+
+    ``unbalanced`` is what the dead load alone leaves, per row; ``drag`` (n_contacts,) the friction force that slip
+    works against without being in the normal forces' power.
+    """
+
+    forces: np.ndarray
+    multiplier: float
+    velocity: np.ndarray
+    unbalanced: np.ndarray
+    gap: float
+    falls: bool = False
+    drag: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """One geometry and its loads in units of block size and mean block load; rows of the free blocks."""
+
+    assembly: Assembly
+    pose: Pose
+    contacts: Contacts
+    friction: np.ndarray
+    length: float
+    force: float
+    matrix: sp.csr_array
+    dead: np.ndarray
+    live: np.ndarray
+    live_size: float
+    live_force: float
+
+    @classmethod
+    def stated(
+        cls, assembly: Assembly, interfaces: Interfaces, loads: Loads, pose: Pose, closed_gap: float
+    ) -> _Problem:
+        contacts = find_contacts(assembly, moved_vertices(assembly, pose), closed_gap)
+        length, free = assembly.block_size, assembly.free
+        units = np.array([1.0, 1.0, length])
+        weights = np.abs(loads.dead[free] / units)
+        live = loads.live[free] / units
+        force = float(weights.sum() / len(weights)) or float(np.abs(live).max())
+        size = float(np.abs(live).max())
+        return cls(
+            assembly=assembly,
+            pose=pose,
+            contacts=contacts,
+            friction=interfaces.friction(assembly, contacts.block_a, contacts.block_b),
+            length=length,
+            force=force,
+            matrix=sp.csr_array(equilibrium_matrix(contacts, pose, length))[np.repeat(free, 3)],
+            dead=(loads.dead[free] / units / force).ravel(),
+            live=(live / size).ravel(),
+            live_size=size / force,
+            live_force=float(np.hypot(*loads.live[free, :2].sum(axis=0))),
+        )
+
+    def dead_alone(self) -> _State:
+        """The least unbalanced force that the dead load leaves, and how the blocks move where it is not nothing."""
+        rays, rows = cone_rays(self.friction), len(self.dead)
+        identity = sp.identity(rows, format="csc")
+        program = LinearProgram(
+            cost=np.concatenate([np.zeros(rays.shape[1]), np.ones(2 * rows)]),
+            matrix=sp.csc_array(sp.hstack([self.matrix @ rays, identity, -identity], format="csc")),
+            lower=-self.dead,
+            upper=-self.dead,
+        )
+        solution = solve_lp(program)
+        forces = rays @ solution.x[: rays.shape[1]]
+        unbalanced = np.abs(self.matrix @ forces + self.dead)
+        falls = float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * float(np.abs(self.dead).sum())
+        return _State(forces.reshape(-1, 2), 0.0, -solution.row_dual, unbalanced, solution.gap, falls)
+
+    def associative(self, dead_alone: _State) -> _State:
+        """The program of the limit load; what the dead load leaves unbalanced by rounding it may leave too."""
+        rays = cone_rays(self.friction)
+        program = LinearProgram(
+            cost=np.append(np.zeros(rays.shape[1]), -1.0),
+            matrix=sp.csc_array(sp.hstack([self.matrix @ rays, sp.csc_array(self.live[:, None])], format="csc")),
+            lower=-self.dead - dead_alone.unbalanced,
+            upper=-self.dead + dead_alone.unbalanced,
+        )
+        solution = solve_lp(program)
+        forces = (rays @ solution.x[:-1]).reshape(-1, 2)
+        return _State(forces, float(solution.x[-1]), -solution.row_dual, dead_alone.unbalanced, solution.gap)
+
+    def non_associative(self, start: _State) -> LimitLoad:
+        """The sequence of programs with normal forces carried over and dilatancy taken away."""
+        normal, dilatancy, before = start.forces[:, 0], self.friction.copy(), start
+        state, converged = start, False
+        lowest = (np.inf, normal)
+        for number in range(WANDERING + SETTLING):
+            wandering = number < WANDERING
+            dilatancy = np.where(dilatancy > 1e-3, DILATANCY_KEPT * dilatancy, 0.0)
+            if number == WANDERING:
+                normal = lowest[1]
+            state = self._without_dilatancy(normal, dilatancy, start.unbalanced, 0.0 if wandering else CHANGE_COST)
+            largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
+            excess = np.abs(state.forces[:, 1]) - self.friction * state.forces[:, 0]
+            change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
+            if (
+                not (wandering or state.falls)
+                and float(excess.max(initial=0.0)) <= FRICTION_EXCESS * largest
+                and change <= MULTIPLIER_CHANGE
+            ):
+                converged = True
+                break
+            kept = 1.0 - (RELAXATION if wandering else SETTLING_RELAXATION)
+            normal = kept * normal + (1.0 - kept) * state.forces[:, 0]
+            if wandering and not state.falls and not dilatancy.any() and state.multiplier < lowest[0]:
+                lowest = (state.multiplier, normal)
+            before = state
+        status = LimitStatus.FOUND if converged else LimitStatus.NOT_CONVERGED
+        return self.result(state, status, "non-associative", 3 + number)
+
+    def _without_dilatancy(
+        self, normal: np.ndarray, dilatancy: np.ndarray, unbalanced: np.ndarray, change_cost: float
+    ) -> _State:
+        """Maximises α with |T| ≤ μ N⁰ + ψ (N - N⁰); where changes cost, takes of equal α the forces nearest to N⁰.
+
+        Columns N, u, v, then p, m, α and unbalanced forces: T = (u - v) / 2, u + v = 2 (c + ψ N), N - N⁰ = p - m.
+        """
+        n, rows = len(normal), len(self.dead)
+        a_normal, a_shear = self.matrix[:, 0::2], self.matrix[:, 1::2]
+        constant = (self.friction - dilatancy) * normal
+        identity, eye = sp.identity(rows, format="csr"), sp.identity(n, format="csr")
+        live = sp.csr_array(self.live[:, None])
+        balance = [a_normal, a_shear / 2.0, -a_shear / 2.0, None, None, live, identity, -identity]
+        cone = [sp.diags_array(-2.0 * dilatancy), eye, eye, None, None, None, None, None]
+        change = [eye, None, None, -eye, eye, None, None, None]
+        program = LinearProgram(
+            cost=np.concatenate(
+                [np.zeros(3 * n), np.full(2 * n, change_cost), [-1.0], np.full(2 * rows, UNBALANCED_COST)]
+            ),
+            matrix=sp.csc_array(sp.block_array([balance, cone, change], format="csc")),
+            lower=np.concatenate([-self.dead - unbalanced, 2.0 * constant, normal]),
+            upper=np.concatenate([-self.dead + unbalanced, 2.0 * constant, normal]),
+        )
+        solution = solve_lp(program)
+        x = solution.x
+        forces = np.stack([x[:n], (x[n : 2 * n] - x[2 * n : 3 * n]) / 2.0], axis=1)
+        left = float(x[5 * n + 1 :].max(initial=0.0))
+        return _State(
+            forces,
+            float(x[5 * n]),
+            -solution.row_dual[:rows],
+            unbalanced,
+            solution.gap,
+            left > FALLING_FRACTION * float(np.abs(self.dead).sum()),
+            constant,
+        )
+
+    def result(self, state: _State, status: LimitStatus, flow: str, programs: int) -> LimitLoad:
+        """The state in metres and newtons, its bounds and its certificate recomputed from it."""
+        velocity, multiplier = state.velocity, state.multiplier
+        if status is LimitStatus.UNBOUNDED:
+            velocity, multiplier = np.zeros_like(velocity), 0.0
+        relative = (self.matrix.T @ velocity).reshape(-1, 2)
+        drag = np.zeros(len(relative)) if state.drag is None else state.drag
+        taken = float(drag @ np.abs(relative[:, 1]))
+        live_power = float(self.live @ velocity)
+        kinematic = (taken - float(self.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
+        slope = self.friction if state.drag is None else np.zeros(len(relative))
+        room = np.stack([relative[:, 0] - slope * relative[:, 1], relative[:, 0] + slope * relative[:, 1]], axis=1)
+        normal, shear = state.forces.T
+        lost = normal * relative[:, 0] + shear * relative[:, 1] + drag * np.abs(relative[:, 1])
+        balance = self.matrix @ state.forces.ravel() + self.dead + multiplier * self.live
+        total = float(np.abs(self.dead).sum()) or 1.0
+        mechanism = np.zeros((self.assembly.n_blocks, 3))
+        size = float(np.abs(velocity).max(initial=0.0)) or 1.0
+        mechanism[self.assembly.free] = velocity.reshape(-1, 3) / size * [1.0, 1.0, 1.0 / self.length]
+        found = status in (LimitStatus.FOUND, LimitStatus.NOT_CONVERGED)
+        static = multiplier / self.live_size
+        nothing = np.inf if status is LimitStatus.UNBOUNDED else np.nan
+        return LimitLoad(
+            multiplier=static if found else nothing,
+            bounds=(static, kinematic / self.live_size) if found else (nothing, nothing),
+            mechanism=mechanism,
+            contacts=self.contacts,
+            forces=state.forces * self.force,
+            certificate=Certificate(
+                equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / total,
+                largest_penetration=float(np.maximum(-self.contacts.gaps, 0.0).max(initial=0.0)),
+                duality_gap=abs(kinematic - multiplier) / (1.0 + abs(multiplier)) if found else state.gap,
+                complementarity=float(np.abs(lost).sum()) / (1.0 + abs(multiplier)) if found else 0.0,
+                kinematic_violation=float(np.maximum(-room, 0.0).max(initial=0.0)) / size,
+            ),
+            status=status,
+            flow=flow,
+            pose=self.pose,
+            friction=self.friction,
+            live_force=self.live_force,
+            programs=programs,
+        )
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Limit loads for several positions of a live load.
+
+    Attributes
+    ----------
+    positions : (n,) array
+        As given, usually x [m].
+    limits : tuple of LimitLoad
+    """
+
+    positions: np.ndarray
+    limits: tuple[LimitLoad, ...]
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """(n,) array: load multiplier at each position."""
+        return np.array([limit.multiplier for limit in self.limits])
+
+    @property
+    def worst(self) -> int:
+        """Number of the position with the smallest multiplier; no equilibrium counts as smaller than any."""
+        return int(np.argmin(np.nan_to_num(self.multipliers, nan=-np.inf, posinf=np.inf)))
+
+
+def limit_load_envelope(
+    assembly: Assembly,
+    positions: Sequence[float] | np.ndarray,
+    live: Callable[[float], np.ndarray],
+    *,
+    dead: np.ndarray,
+    friction_coefficient: float = 0.6,
+    interfaces: Interfaces | None = None,
+    pose: Pose | None = None,
+    flow: str = "associative",
+) -> Envelope:
+    """Limit loads of a live load that moves over the structure.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    positions : (n,) sequence
+    live : callable
+        From a position to the live loads there, an (n_blocks, 3) array [N, N, N·m].
+    dead : (n_blocks, 3) array [N, N, N·m]
+    friction_coefficient, interfaces, pose, flow
+        As in :func:`limit_load`.
+    """
+    positions = np.asarray(positions, dtype=float)
+    if positions.ndim != 1 or len(positions) == 0:
+        raise ValueError(f"positions have shape {positions.shape}; give at least one number")
+    limits = tuple(
+        limit_load(
+            assembly,
+            loads=Loads(dead, live(float(x))),
+            friction_coefficient=friction_coefficient,
+            interfaces=interfaces,
+            pose=pose,
+            flow=flow,
+        )
+        for x in positions
+    )
+    return Envelope(positions, limits)
+
+
+def checked_live(assembly: Assembly, loads: Loads) -> Loads:
+    """The loads, checked, with live loads on at least one free block; those on supports are taken off."""
+    loads = checked_loads(assembly, loads)
+    live = np.where(assembly.free[:, None], loads.live, 0.0)
+    if not live.any():
+        raise ValueError("no live load acts on any free block; give Loads whose 'live' is not zero")
+    return replace(loads, live=live)
+
+
+def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> None:
+    """Refuses an assembly without free blocks, or whose blocks overlap by more than the tolerance [m]."""
+    if not assembly.free.any():
+        raise ValueError(f"all {assembly.n_blocks} blocks are supports; at least one must be free")
+    tolerance = 1e-3 * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
+    i, j, depth = overlap_depths(assembly.vertices, assembly.offsets, tolerance)
+    real = np.flatnonzero(assembly.free[i] | assembly.free[j])
+    if len(real):
+        k = int(real[np.argmax(depth[real])])
+        a, b = int(i[k]), int(j[k])
+        raise ValueError(
+            f"block {a} ('{assembly.names[a]}') overlaps block {b} ('{assembly.names[b]}') by {depth[k]:.3g} m; "
+            f"move them apart or raise overlap_tolerance ({tolerance:.3g} m)"
+        )
