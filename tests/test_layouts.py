@@ -205,7 +205,7 @@ def walls(draw):
     for k in range(draw(st.integers(1, 2))):
         width = draw(st.floats(0.3, 0.9))
         x = k * length / 2 + draw(st.floats(0.45, length / 2 - 0.45 - width))
-        y = draw(st.one_of(st.just(0.0), st.just(0.3), st.floats(0.0, 0.4)))
+        y = draw(st.one_of(st.just(0.0), st.just(0.3), st.floats(0.03, 0.4)))
         opening = {
             "x": x,
             "y": y,
@@ -325,6 +325,8 @@ def test_bad_parameters_are_named_with_their_value_and_a_remedy(name, parameters
         ({"x": 2.8}, "opening 1 ends at x = 3.3 m, outside the wall of 3 m"),
         ({"y": 1.0}, "opening 1 ends at y = 1.3 m, above the wall of 1.2 m"),
         ({"x": 0.02}, "opening 1 leaves 0.02 m of wall on its left; leave at least 0.05 m"),
+        ({"y": 0.01}, "opening 1 leaves 0.01 m of wall under its sill; leave at least 0.03 m, or nothing"),
+        ({"y": 0.69}, "opening 1 leaves 0.01 m of wall above it; leave at least 0.03 m"),
         ({"y": 0.75}, "opening 1 with its head reaches .* up to y = 1.25 m"),
     ],
 )
@@ -337,7 +339,7 @@ def test_a_bad_opening_is_named_with_its_value_and_a_remedy(changes, message):
 
 def test_openings_that_overlap_with_their_heads_are_both_named():
     openings = [{"x": x, "y": 0.1, "width": 0.5, "height": 0.3} for x in (1.0, 1.6)]
-    with pytest.raises(ValueError, match="opening 1 and opening 2 overlap by 0.03 m², heads included; move them"):
+    with pytest.raises(ValueError, match=r"opening 1 and opening 2 overlap by 0\.03 m², heads included; move them"):
         layouts.wall(**WALL, openings=openings)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -12,11 +13,14 @@ import shapely
 import solver
 
 from .bonds import BONDS, SHORTEST_BRICK
-from .bricks import Bond, brick_outline, cut_bricks, lay_bricks
+from .bricks import LOWEST_BRICK, Bond, brick_outline, cut_bricks, lay_bricks
 from .dimensions import above_zero, choice, finite, pair, whole
 from .openings import Opening, checked_opening, head_joints_of, head_outlines, opening_ring
 
 __all__ = ["facade", "panel", "wall"]
+
+#: An edge of an opening this near a joint, as a fraction of their spacing, was meant to be on it.
+ROUNDING = 1e-6
 
 
 def wall(
@@ -79,7 +83,7 @@ def wall(
     height = courses * bonded.brick_height
     holes = _placed(bonded, openings, width, height)
     rings = [opening_ring(opening, joints) for opening, joints in holes]
-    _check_room(rings, width, height)
+    _check_room(bonded, rings, width, height)
     laid = cut_bricks(bonded, lay_bricks(bonded, width, courses), rings)
     laid.sort(key=lambda brick: (brick.course, brick.shape.bounds[0], brick.shape.bounds[1]))
     outlines, names, materials = [], [], []
@@ -293,12 +297,28 @@ def _placed(
                 raise ValueError(
                     f"{where} leaves {pier:.4g} m of wall on its {side}; leave at least {least:g} m, or nothing"
                 )
+        opening = _on_joints(bond, opening)
         placed.append((opening, head_joints_of(opening)))
     return placed
 
 
-def _check_room(rings: Sequence[np.ndarray], width: float, height: float) -> None:
-    """Refuses heads that leave the wall, and openings that overlap, heads included."""
+def _on_joints(bond: Bond, opening: Opening) -> Opening:
+    """The opening with its edges moved onto the joints of the bond that they miss by a rounding error."""
+
+    def moved(value: float, spacing: float) -> float:
+        nearest = round(value / spacing) * spacing
+        return nearest if abs(value - nearest) <= ROUNDING * spacing else value
+
+    x, y = moved(opening.x, bond.brick_length / 4.0), moved(opening.y, bond.brick_height)
+    right = moved(opening.x + opening.width, bond.brick_length / 4.0)
+    top = moved(opening.top, bond.brick_height)
+    rise = (right - x) / 2.0 if opening.head == "round arch" else opening.rise
+    return replace(opening, x=x, y=y, width=right - x, height=top - y, rise=rise)
+
+
+def _check_room(bond: Bond, rings: Sequence[np.ndarray], width: float, height: float) -> None:
+    """Refuses heads that leave the wall or splinters above and below, and openings that overlap, heads included."""
+    least = LOWEST_BRICK * bond.brick_height
     small = 1e-9 * max(width, height)
     for number, ring in enumerate(rings, start=1):
         low, high = ring.min(axis=0), ring.max(axis=0)
@@ -308,6 +328,11 @@ def _check_room(rings: Sequence[np.ndarray], width: float, height: float) -> Non
                 f"y = {high[1]:g} m, "
                 f"outside the wall of {width:g} × {height:g} m; move it, or choose another head"
             )
+        for place, rest in (("under its sill", low[1]), ("above it", height - high[1])):
+            if small < rest < least:
+                raise ValueError(
+                    f"opening {number} leaves {rest:.4g} m of wall {place}; leave at least {least:g} m, or nothing"
+                )
     shapes = [shapely.Polygon(ring) for ring in rings]
     for i, j in combinations(range(len(shapes)), 2):
         shared = shapes[i].intersection(shapes[j]).area
