@@ -192,8 +192,8 @@ def limit_load(
 
     Its dual is the kinematic program: minimise - dead · q over mechanisms q with N(q) ≥ μ |T(q)| at every closed
     contact point and live · q = 1. Livesley (1978), https://doi.org/10.1002/nme.1620121207, for the static form; both
-    bounds are recomputed from the forces and from the mechanism. The multiplier is the exact limit load of the model with
-    associative flow, and an upper bound for every other flow rule with the same friction.
+    bounds are recomputed from the forces and from the mechanism. The multiplier is the exact limit load of the model
+    with associative flow, and an upper bound for every other flow rule with the same friction.
 
     Non-associative flow is a sequence of such programs in the manner of Gilbert, Casapulla & Ahmed (2006),
     https://doi.org/10.1016/j.compstruc.2006.02.005: the friction cone of each point is replaced by
