@@ -21,8 +21,9 @@ from .response import Collapse, Increment, Response, Status
 __all__ = ["Controls", "Ending", "check_settlement", "settle", "settlement_increments"]
 
 #: The mechanism has changed within an increment when the velocities before and after differ by this much of their
-#: size, weighted by mass: hinges that move change it by more, the slow turning of the geometry by less.
-EVENT_CHANGE = 0.05
+#: size, weighted by mass, times the root of the number of blocks (in a wall a few bricks always change their ways),
+#: up to the second number. Hinges that move change it by more, the slow turning of the geometry by less.
+EVENT_CHANGE, LARGEST_CHANGE = 0.015, 0.5
 
 #: Step by which a reaction is read off at the last equilibrium, in block sizes.
 PROBE = 1e-6
@@ -299,7 +300,8 @@ class _Path:
             return False
         size = np.sqrt(self.model.assembly.masses)[:, None] * np.array([1.0, 1.0, self.model.length])
         new, old = predictor.motion / step * size, here.velocity * size
-        return bool(np.linalg.norm(new - old) > EVENT_CHANGE * np.linalg.norm(old))
+        many = np.sqrt(self.model.assembly.free.sum())
+        return bool(np.linalg.norm(new - old) > min(EVENT_CHANGE * many, LARGEST_CHANGE) * np.linalg.norm(old))
 
     def _predict(self, place: _Place, step: float) -> Solved:
         rate = self.phase.rate(self.model.assembly, self.start, place.s)

@@ -47,6 +47,11 @@ REDUNDANCY = 1e-11
 #: Programs that close gaps one after another before a full program is solved again.
 CLOSINGS = 4
 
+#: Where friction keeps many points on the edge of sliding, corrections converge slowly. After so many programs gaps of
+#: this part of the increment's movement may stay (the next program sees them, so they do not add up), penetration of
+#: this part of the thinnest block's width.
+GAP_LEFT, PENETRATION_LEFT = 1e-2, 1e-6
+
 #: Part of the expected lift that is taken off: all of it could end in penetration, which a wedge locked by friction
 #: cannot give back.
 ALLOWED = 0.999
@@ -149,9 +154,13 @@ def _descended(model: Model, pose: Pose) -> Pose:
 
 def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, nudge: np.ndarray | None) -> Pose:
     tolerance = GEOMETRY_TOLERANCE * model.length
+    enough = max(tolerance, GAP_LEFT * _size(model, solved.motion))
+    deepest = PENETRATION_LEFT * float(model.assembly.widths.min())
     closings = 0
-    for _ in range(correctors):
+    for attempt in range(correctors):
         pose, contacts, error = _closed(model, pose, solved)
+        if attempt >= CLOSINGS and error <= enough and float(-contacts.gaps.min(initial=0.0)) <= deepest:
+            tolerance = enough
         if error <= tolerance and nudge is None:
             return pose
         drift, allowance = _carried(model.assembly, contacts, solved)
