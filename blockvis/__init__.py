@@ -34,9 +34,14 @@ _HOMES = {
     "open_results": "results",
     "read": "drawing",
     "read_case": "case",
+    "inspect": "inspection",
+    "read_drawing": "drawing",
     "run_case": "run",
     "save_layout": "drawing",
+    "show": "notebook",
     "write": "results",
+    "write_drawing": "drawing",
+    "write_report": "report",
 }
 
 __all__ = sorted(_HOMES)

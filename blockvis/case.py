@@ -15,11 +15,14 @@ import numpy as np
 
 import solver
 
-from . import drawing
+from . import drawing, layouts
 
 __all__ = ["ANALYSES", "Case", "LoadCase", "case_assembly", "case_interfaces", "case_loads", "parse_case", "read_case"]
 
 ANALYSES = ("settlement",)
+
+#: What a file's blocks are made of where nothing else is said [kg/m³, m].
+DENSITY, THICKNESS = 2000.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -60,14 +63,16 @@ class Case:
 
     source: Path
     text: str
-    file: Path
+    file: Path | None = None
+    layout: str | None = None
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     unit: str | None = None
-    thickness: float = 1.0
+    thickness: float | None = None
     joint_thickness: float | str = 0.0
     overlap_tolerance: float | None = None
     roles: Mapping[str, str] = field(default_factory=dict)
     supports: tuple[Mapping[str, Any], ...] = ()
-    density: float = 2000.0
+    density: float | None = None
     densities: Mapping[str, float] = field(default_factory=dict)
     friction_coefficient: float = 0.6
     interfaces: Mapping[tuple[str, str], float] = field(default_factory=dict)
@@ -182,9 +187,13 @@ def parse_case(text: str, source: Path) -> Case:
         raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"') from None
     top = _Table(values, "", source)
     geometry = top.table("geometry")
-    file = geometry.text("file")
-    if file is None:
-        raise geometry.error("file", "is missing; name the layout file")
+    file, layout = geometry.text("file"), geometry.text("layout")
+    parameters = geometry.table("parameters").values
+    if (file is None) == (layout is None):
+        problem = "is missing; name the layout file" if file is None else "and layout are both given; give one of them"
+        raise geometry.error("file", problem + f", or a layout: {', '.join(layouts.LAYOUTS)}" * (file is None))
+    if file is not None and parameters:
+        raise geometry.error("parameters", "belong to a layout, not to a file")
     joint = geometry.take("joint_thickness", 0.0)
     if joint != "auto":
         joint = geometry.number("joint_thickness", 0.0)
@@ -209,14 +218,16 @@ def parse_case(text: str, source: Path) -> Case:
     case = Case(
         source=source,
         text=text,
-        file=source.parent / file,
+        file=None if file is None else source.parent / file,
+        layout=layout,
+        parameters=dict(parameters),
         unit=geometry.text("unit"),
-        thickness=geometry.number("thickness", 1.0, positive=True),
+        thickness=geometry.number("thickness", positive=True),
         joint_thickness=joint,
         overlap_tolerance=geometry.number("overlap_tolerance", positive=True),
         roles=dict(roles),
         supports=tuple(_support(entry) for entry in top.tables("supports")),
-        density=material.number("density", 2000.0, positive=True),
+        density=material.number("density", positive=True),
         densities=densities,
         friction_coefficient=_friction(material),
         interfaces=dict(_interface(entry) for entry in top.tables("interfaces")),
@@ -312,16 +323,16 @@ def _controls(table: _Table) -> solver.Controls:
 
 
 def case_assembly(case: Case) -> solver.Assembly:
-    """The assembly of a case: its layout file with roles, supports and materials applied."""
-    sketch = drawing.read_drawing(case.file, unit=case.unit)
+    """The assembly of a case: its layout file or parametric layout with roles, supports and materials applied."""
+    sketch = _case_drawing(case)
     if case.densities:
         sketch = _with_densities(case, sketch)
     assembly = drawing.assemble(
         sketch,
         roles=case.roles,
         supports=case.supports,
-        density=case.density,
-        thickness=case.thickness,
+        density=case.density or DENSITY,
+        thickness=case.thickness or THICKNESS,
         joint_thickness=case.joint_thickness,
         overlap_tolerance=case.overlap_tolerance,
     )
@@ -332,6 +343,22 @@ def case_assembly(case: Case) -> solver.Assembly:
             f"[[supports]]: {', '.join(groups)}"
         )
     return assembly
+
+
+def _case_drawing(case: Case) -> drawing.Drawing:
+    if case.file is not None:
+        return drawing.read_drawing(case.file, unit=case.unit)
+    assert case.layout is not None
+    try:
+        sketch = drawing.drawing_of(layouts.build(case.layout, case.parameters))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{case.source}: [geometry] layout: {error}") from None
+    # A layout brings its own density and thickness, unless the case says otherwise.
+    return replace(
+        sketch,
+        density=sketch.density if case.density is None else None,
+        thickness=sketch.thickness if case.thickness is None else None,
+    )
 
 
 def _with_densities(case: Case, sketch: drawing.Drawing) -> drawing.Drawing:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import argparse
 import sys
+import tomllib
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import solver
+
+from .layouts import LAYOUTS
 
 __all__ = ["entry", "main"]
 
@@ -57,6 +61,37 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("-o", "--output", metavar="OUT", help="results folder (default: <case>-results)")
     run.add_argument("--force", action="store_true", help="replace results that are there already")
     run.set_defaults(verb=_run)
+    info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
+    info.add_argument("file", metavar="FILE")
+    info.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    info.add_argument("--picture", metavar="PNG", help="draw what was found")
+    info.set_defaults(verb=_info)
+    convert = verbs.add_parser("convert", help="any layout file to any other")
+    convert.add_argument("source", metavar="IN")
+    convert.add_argument("target", metavar="OUT")
+    convert.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    convert.add_argument(
+        "--joint-thickness", default="0", metavar="M", help='close mortar joints up to this, or "auto"'
+    )
+    convert.add_argument("--force", action="store_true", help="replace OUT if it is there already")
+    convert.set_defaults(verb=_convert)
+    layout = verbs.add_parser("layout", help="a parametric layout as a file", epilog=f"layouts: {', '.join(LAYOUTS)}")
+    layout.add_argument("name", metavar="NAME")
+    layout.add_argument(
+        "parameters", nargs="*", metavar="key=value", help="parameters of the layout, values as in TOML"
+    )
+    layout.add_argument("-o", "--output", required=True, metavar="FILE")
+    layout.add_argument("--force", action="store_true", help="replace FILE if it is there already")
+    layout.set_defaults(verb=_layout)
+    render = verbs.add_parser("render", help="draw again from a results folder, without solving")
+    render.add_argument("results", metavar="OUT")
+    render.add_argument("--animation", default="collapse.mp4", help=".mp4, .gif or .webp in the folder; none to skip")
+    render.add_argument("--magnification", type=float, default=1.0, help="of the displacements")
+    render.add_argument("--colour-by", choices=("material", "displacement"), default="material")
+    render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")
+    render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
+    render.add_argument("--size", default="1280x720", metavar="WxH")
+    render.set_defaults(verb=_render)
     return parser
 
 
@@ -73,6 +108,105 @@ def _run(options: argparse.Namespace) -> int:
     if stop is solver.Status.SOLVER_FAILED:
         return SOLVER_FAILED
     return NO_PICTURES if run.missing else 0
+
+
+def _info(options: argparse.Namespace) -> int:
+    from .inspection import draw_inspection, inspect
+
+    found = inspect(options.file, unit=options.unit)
+    print(found)
+    if options.picture:
+        print(f"drawn in {draw_inspection(found, options.picture)}")
+    return 0
+
+
+def _convert(options: argparse.Namespace) -> int:
+    from .drawing import assemble, read_drawing, save_layout, write_drawing
+
+    target = _new_file(options.target, options.force)
+    drawing = read_drawing(options.source, unit=options.unit)
+    for note in drawing.notes:
+        print(f"blockvis: note: {note}", file=sys.stderr)
+    joint = options.joint_thickness
+    if joint == "0":
+        write_drawing(drawing, target)
+    else:
+        save_layout(assemble(drawing, joint_thickness=joint if joint == "auto" else _number(joint)), target)
+    print(f"{drawing.n_blocks} blocks written to {target}")
+    return 0
+
+
+def _layout(options: argparse.Namespace) -> int:
+    from .drawing import save_layout
+    from .layouts import build
+
+    target = _new_file(options.output, options.force)
+    assembly = build(options.name, dict(_parameter(given) for given in options.parameters))
+    save_layout(assembly, target)
+    print(f"{assembly.n_blocks} blocks written to {target}")
+    return 0
+
+
+def _render(options: argparse.Namespace) -> int:
+    from .curves import draw_curve
+    from .render import animate, draw_mechanism, draw_still, rendering_available
+    from .report import write_report
+    from .results import open_results, stored_case
+
+    folder = Path(options.results)
+    response = open_results(folder)
+    width, _, height = options.size.partition("x")
+    size = (int(_number(width)), int(_number(height or "0")))
+    write_report(response, folder / "report.html", stored_case(folder))
+    drawn = ["report.html"]
+    if response.path:
+        draw_curve(response, folder / "curve.png")
+        draw_curve(response, folder / "curve.svg")
+        drawn += ["curve.png", "curve.svg"]
+    problem = rendering_available()
+    if problem is not None:
+        print(f"blockvis: {problem}", file=sys.stderr)
+        return NO_PICTURES
+    look = {
+        "magnification": options.magnification,
+        "colour_by": options.colour_by,
+        "forces": options.forces,
+        "curve": options.curve,
+    }
+    last = response.path[-1] if response.path else response.increments[-1]
+    draw_still(response, last, folder / "last.png", size=size, **look)
+    draw_mechanism(response, folder / "mechanism.png")
+    drawn += ["last.png", "mechanism.png"]
+    if options.animation != "none":
+        animate(response, folder / options.animation, size=size, **look)
+        drawn.append(options.animation)
+    print(f"drawn in {folder}/: {', '.join(drawn)}")
+    return 0
+
+
+def _new_file(path: str, force: bool) -> Path:
+    target = Path(path)
+    if target.exists() and not force:
+        raise ValueError(f"'{target}' is there already; choose another name or add --force")
+    return target
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"'{text}' is not a number") from None
+
+
+def _parameter(given: str) -> tuple[str, Any]:
+    """A parameter "key=value" of the command line; the value as TOML writes it, or a plain word."""
+    key, equals, value = given.partition("=")
+    if not equals:
+        raise ValueError(f"'{given}' is not a parameter; write key=value, for instance voussoirs=12")
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value
 
 
 def _in_words(response: solver.Response, folder: Path) -> str:
@@ -98,6 +232,7 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         lines += [
             f"last reaction        {last:12.6g} N   {last / weight:.6f} W",
             f"collapse displacement{response.collapse.displacement:12.6g} {unit}   between {low:.6g} and {high:.6g}",
+            f"mechanism: {response.collapse.words}",
         ]
     elif len(path) > 1:
         lines.append(f"last reaction        {path[-1].reaction:12.6g} N   {path[-1].reaction / weight:.6f} W")

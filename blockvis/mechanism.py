@@ -5,16 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 import shapely
-from scipy.sparse.csgraph import connected_components
 
 import solver
 
-__all__ = ["part_outlines", "rigid_parts", "swung", "with_motion"]
-
-#: Blocks belong together where their contact points move apart by less than this fraction of the fastest block.
-TOGETHER = 1e-3
+__all__ = ["part_outlines", "swung", "with_motion"]
 
 
 def with_motion(increment: solver.Increment, motion: np.ndarray) -> solver.Increment:
@@ -54,34 +49,6 @@ def swung(pose: solver.Pose, motion: np.ndarray) -> solver.Pose:
     return solver.Pose(pose.positions + np.where(turns[:, None], arc, motion[:, :2]), pose.rotations + angle)
 
 
-def rigid_parts(assembly: solver.Assembly, increment: solver.Increment) -> np.ndarray:
-    """(n_blocks,) int array: the part each block moves with in the motion that follows an increment.
-
-    Part -1 stands still. The others are numbered from 0, the largest area first.
-    """
-    contacts = increment.contacts
-    fastest = float(np.abs(increment.velocity[:, :2]).max(initial=0.0))
-    if fastest == 0.0:
-        return np.full(assembly.n_blocks, -1)
-    low, high = np.minimum(contacts.block_a, contacts.block_b), np.maximum(contacts.block_a, contacts.block_b)
-    pair, which = np.unique(low.astype(np.int64) * assembly.n_blocks + high, return_inverse=True)
-    apart = np.zeros(len(pair))
-    np.maximum.at(apart, which.ravel(), np.abs(increment.displacements).max(axis=1))
-    spin = np.abs(increment.velocity[pair // assembly.n_blocks, 2] - increment.velocity[pair % assembly.n_blocks, 2])
-    together = (apart < TOGETHER * fastest) & (spin * assembly.block_size < TOGETHER * fastest)
-    a, b = (pair // assembly.n_blocks)[together], (pair % assembly.n_blocks)[together]
-    graph = sp.coo_array((np.ones(len(a)), (a, b)), shape=(assembly.n_blocks, assembly.n_blocks))
-    _, part = connected_components(graph, directed=False)
-    # Corners, not centroids: a block may turn about its own centroid.
-    reach = np.abs(increment.velocity[:, 2]) * assembly.block_size
-    moves = np.maximum(np.abs(increment.velocity[:, :2]).max(axis=1), reach) > 10.0 * TOGETHER * fastest
-    moves &= assembly.free
-    area = np.bincount(part, weights=assembly.areas * moves, minlength=int(part.max()) + 1)
-    rank = np.empty(len(area), dtype=int)
-    rank[np.argsort(-area, kind="stable")] = np.arange(len(area))
-    return np.where(moves, rank[part], -1)
-
-
 def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndarray) -> np.ndarray:
     """(n, 2, 2) array [m]: edges of the outline around each part, its blocks merged.
 
@@ -90,7 +57,7 @@ def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndar
     assembly : solver.Assembly
     corners : (n_vertices, 2) array [m]
     parts : (n_blocks,) int array
-        As :func:`rigid_parts` gives them.
+        As ``solver.rigid_parts`` gives them.
     """
     edges = [np.zeros((0, 2, 2))]
     # Faces that touch leave slivers where the last digit differs: grown together, then shrunk back.

@@ -11,7 +11,7 @@ from PIL import Image
 import solver
 
 from .film import write_film
-from .mechanism import rigid_parts, swung, with_motion
+from .mechanism import swung, with_motion
 from .opengl import RenderingUnavailable, rendering_available
 from .scene import framed
 from .studio import MOST_PARTS, Look, Studio
@@ -102,7 +102,7 @@ def draw_mechanism(
     fastest = float(np.hypot(*velocity.T)[free[block]].max(initial=0.0))
     reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
     displaced = swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
-    parts = rigid_parts(assembly, last)
+    parts = solver.rigid_parts(assembly, last)
     with Studio(response, Look(forces="none"), size, (last,), extra=(displaced,)) as studio:
         if fastest > 0:
             studio.show_motion(last.pose, displaced, parts)

@@ -17,7 +17,7 @@ import numpy as np
 
 import solver
 
-__all__ = ["ResultsExist", "ResultsFolder", "open_results", "summary_of", "write"]
+__all__ = ["ResultsExist", "ResultsFolder", "open_results", "stored_case", "summary_of", "write"]
 
 #: Columns of response.csv.
 COLUMNS = (
@@ -169,6 +169,7 @@ def summary_of(response: solver.Response, *, seconds: float, case_text: str = ""
         "settlement_unit": response.settlements[-1].unit if response.settlements else "m",
         "initial_reaction": path[0].reaction if path else None,
         "collapse_reaction": collapse.reaction if collapse else None,
+        "mechanism": collapse.words if collapse else None,
         "last_settlement": path[-1].settlement if path else None,
         "last_reaction": path[-1].reaction if path else None,
         "total_weight": response.total_weight,
@@ -268,6 +269,14 @@ def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
     )
 
 
+def stored_case(folder: str | Path) -> str:
+    """Text of the case that a results folder was written from; empty where it was written from Python."""
+    summary = Path(folder) / "summary.json"
+    if not summary.is_file():
+        return ""
+    return str(json.loads(summary.read_text(encoding="utf-8")).get("case", ""))
+
+
 def open_results(folder: str | Path) -> solver.Response:
     """Reopens a results folder as the response it was written from, without solving.
 
@@ -341,4 +350,5 @@ def _collapse_of(
         reaction=summary["collapse_reaction"],
         mechanism=mechanism,
         unit=summary.get("settlement_unit", "m"),
+        words=summary.get("mechanism") or "",
     )

@@ -94,7 +94,7 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
     summary = results.finish(response, sum(i.seconds for i in response.increments))
     missing: tuple[str, ...] = ()
     if ending.stop is not solver.Status.INTERRUPTED:
-        missing = draw_results(response, folder, animation=case.animation, progress=progress, case_text=case.text)
+        missing = draw_results(response, folder, animation=case.animation, case_text=case.text)
     return Run(response, folder, summary, missing)
 
 
@@ -103,7 +103,6 @@ def draw_results(
     folder: Path,
     *,
     animation: str | None = "collapse.mp4",
-    progress: Progress | None = None,
     case_text: str = "",
 ) -> tuple[str, ...]:
     """Draws the pictures of a results folder.
@@ -114,7 +113,6 @@ def draw_results(
     folder : Path
     animation : str or None
         File name in the folder; the suffix chooses mp4, gif or webp.
-    progress : Progress, optional
     case_text : str
         Shown in the report.
 
@@ -124,11 +122,16 @@ def draw_results(
         What could not be drawn, and why; empty where all is there.
     """
     from .curves import draw_curve
-
-    if len(response.path) > 0:
-        draw_curve(response, folder / "curve.png")
+    from .paraview_macro import write_paraview_macro
     from .render import RenderingUnavailable, animate, draw_mechanism, rendering_available
+    from .report import write_report
 
+    if not response.increments:
+        return ()
+    write_paraview_macro(folder)
+    write_report(response, folder / "report.html", case_text)
+    if response.path:
+        draw_curve(response, folder / "curve.png")
     problem = rendering_available()
     if problem is not None:
         return (problem,)
@@ -138,7 +141,4 @@ def draw_results(
             animate(response, folder / animation)
     except RenderingUnavailable as error:
         return (str(error),)
-    finally:
-        if progress is not None:
-            progress.done()
     return ()

@@ -18,6 +18,7 @@ from .contact import Contacts, InterfaceLaw, Interfaces, find_contacts, measure_
 from .kinematics import Pose, moved_vertices
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
 from .lp import SolveError
+from .mechanism import Mechanism, mechanism_of, rigid_parts
 from .polygons import overlap_depths
 from .response import Certificate, Collapse, ContactState, Increment, Response, Status, total_weight
 
@@ -38,6 +39,7 @@ __all__ = [
     "InterfaceLaw",
     "Interfaces",
     "Loads",
+    "Mechanism",
     "Pose",
     "Response",
     "Settlement",
@@ -46,9 +48,11 @@ __all__ = [
     "check_settlement",
     "find_contacts",
     "measure_contacts",
+    "mechanism_of",
     "moved_vertices",
     "overlap_depths",
     "point_load",
+    "rigid_parts",
     "self_weight",
     "settle",
     "settlement_increments",

@@ -14,6 +14,7 @@ from .correction import GEOMETRY_TOLERANCE, Falls, NotConverged, at_rest, correc
 from .kinematics import Pose, moved, moved_vertices
 from .loads import Loads, Settlement, checked_loads
 from .lp import SolveError
+from .mechanism import mechanism_of
 from .polygons import overlap_depths
 from .program import Locked, Model, Solved, point_velocities, solve_program
 from .response import Collapse, Increment, Response, Status
@@ -343,12 +344,14 @@ class _Path:
         last = self._increment(reading, self.probe)
         if self.here.s > self.told:
             yield last
+        falls = _falling_frame(self.model, falling, first_without, self.number)
         collapse = Collapse(
             displacement=(self.here.s + first_without) / 2.0,
             bracket=(self.here.s, first_without),
             reaction=last.reaction,
             mechanism=falling.motion / _largest_movement(self.model, falling.motion),
             unit=self.phase.unit,
+            words=str(mechanism_of(self.model.assembly, falls)),
         )
         yield from self._fall(first_without, falling)
         return Ending(Status.COLLAPSED, str(collapse), collapse)

@@ -162,6 +162,8 @@ class Collapse:
     mechanism : (n_blocks, 3) array
         Direction in which the blocks move when they fall, largest movement 1 (rotations times block size).
     unit : str
+    words : str
+        How it fails: macro-blocks, hinges and sliding joints.
     """
 
     displacement: float
@@ -169,14 +171,14 @@ class Collapse:
     reaction: float
     mechanism: np.ndarray
     unit: str = "m"
+    words: str = ""
 
     def __str__(self) -> str:
         low, high = self.bracket
         force = "N" if self.unit == "m" else "N·m"
-        moving = int((np.abs(self.mechanism).max(axis=1) > 0.01).sum())
         return (
             f"collapse at {self.displacement:.6g} {self.unit} (equilibrium at {low:.6g}, none at {high:.6g}), "
-            f"reaction {self.reaction:.6g} {force}, {moving} blocks moving"
+            f"reaction {self.reaction:.6g} {force}, {self.words}"
         )
 
 

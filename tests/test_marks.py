@@ -8,7 +8,7 @@ from structures import BENT, arch_response, parted, wall
 import solver
 from blockvis import marks
 from blockvis.fills import hatch_lines, triangles
-from blockvis.mechanism import part_outlines, rigid_parts, swung, with_motion
+from blockvis.mechanism import part_outlines, swung, with_motion
 
 
 def stacked(shift=(0.0, 0.0), turn=0.0):
@@ -84,7 +84,7 @@ def test_arch_spreads_on_three_hinges_and_falls_on_five():
     assert len(spreading.hinges) == 3
     falling = with_motion(last, response.collapse.mechanism)
     assert len(marks.marks_of(response.assembly, joints, falling, last.pose).hinges) == 5
-    parts = rigid_parts(response.assembly, falling)
+    parts = solver.rigid_parts(response.assembly, falling)
     assert sorted(np.bincount(parts[parts >= 0]).tolist()) == [2, 2, 4, 4]
     assert (parts[~response.assembly.free] == -1).all()
 
@@ -92,7 +92,7 @@ def test_arch_spreads_on_three_hinges_and_falls_on_five():
 def test_parts_swing_as_one_body():
     response = arch_response()
     falling = with_motion(response.path[-1], response.collapse.mechanism)
-    parts = rigid_parts(response.assembly, falling)
+    parts = solver.rigid_parts(response.assembly, falling)
     displaced = swung(falling.pose, 0.1 * response.collapse.mechanism)
     outlines = part_outlines(response.assembly, solver.moved_vertices(response.assembly, displaced), parts)
     length = np.hypot(*(outlines[:, 1] - outlines[:, 0]).T).sum()
@@ -102,7 +102,7 @@ def test_parts_swing_as_one_body():
 
 def test_a_sinking_wall_is_one_part():
     response = parted(wall(8, 6), 2, 0)
-    parts = rigid_parts(response.assembly, response.increments[-1])
+    parts = solver.rigid_parts(response.assembly, response.increments[-1])
     assert set(parts) == {-1, 0}
 
 
