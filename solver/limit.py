@@ -48,9 +48,14 @@ UNBALANCED_COST = 1e3
 
 
 class LimitStatus(StrEnum):
-    """What a limit load is."""
+    """What a limit load is.
+
+    ``HELD``: a limit load, but without any live load the blocks would move: back onto joints that are open at this
+    pose, or down. ``NO_EQUILIBRIUM``: the dead load is not carried, nor with any live load of this pattern.
+    """
 
     FOUND = "limit load"
+    HELD = "held by the live load"
     UNBOUNDED = "unbounded"
     NO_EQUILIBRIUM = "no equilibrium"
     NOT_CONVERGED = "not converged"
@@ -63,7 +68,7 @@ class LimitLoad:
     Attributes
     ----------
     multiplier : float
-        α of the live loads at the limit; ``inf`` where they are no danger, ``nan`` where the dead load falls already.
+        α of the live loads at the limit; ``inf`` where they are no danger, ``nan`` where there is no equilibrium.
     bounds : (float, float)
         Static value, from forces in equilibrium within friction, and kinematic value, from the power balance of the
         mechanism, - dead · velocity / live · velocity (plus friction where it is not associative). For associative
@@ -134,11 +139,11 @@ class LimitLoad:
     def __str__(self) -> str:
         moving = int((np.abs(self.mechanism).max(axis=1) > 0.01).sum())
         if self.status is LimitStatus.NO_EQUILIBRIUM:
-            return f"no equilibrium under the dead load alone: {moving} blocks fall"
+            return f"no equilibrium under the dead load: {moving} blocks fall"
         if self.status is LimitStatus.UNBOUNDED:
             return "unbounded: no live load of this pattern brings the structure down"
         text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction, bounds differ by {self.gap:.1e})"
-        return f"{text}, {moving} blocks moving" + (", not converged" if self.status != LimitStatus.FOUND else "")
+        return f"{text}, {moving} blocks moving" + ("" if self.status is LimitStatus.FOUND else f", {self.status}")
 
 
 def limit_load(
@@ -204,7 +209,8 @@ def limit_load(
     dilatancy, never above the associative value. It is not proved to be the least: such a structure may have several
     limit loads, depending on how it was loaded, and may fall below this one. Its two values agree where it has
     converged, but are no bounds. Convergence is not proved either; "not converged" says so and gives the last
-    program.
+    program. Where the associative limit load is unbounded, so is what is given here, although friction without
+    dilatancy might slide.
     """
     if flow not in ("associative", "non-associative"):
         raise ValueError(f"flow is '{flow}'; it is 'associative' or 'non-associative'")
@@ -215,16 +221,19 @@ def limit_load(
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else pose
     problem = _Problem.stated(assembly, interfaces, loads, pose, closed_gap)
-    dead_alone = problem.dead_alone()
-    if dead_alone.falls:
-        return problem.result(dead_alone, LimitStatus.NO_EQUILIBRIUM, flow, 1)
+    balanced, status = problem.balanced(with_live=False), LimitStatus.FOUND
+    if balanced.falls:
+        falling, status = balanced, LimitStatus.HELD
+        balanced = problem.balanced(with_live=True)
+        if balanced.falls:
+            return problem.result(falling, LimitStatus.NO_EQUILIBRIUM, flow, 2)
     try:
-        found = problem.associative(dead_alone)
+        found = problem.associative(balanced)
     except Unbounded:
-        return problem.result(dead_alone, LimitStatus.UNBOUNDED, flow, 2)
+        return problem.result(balanced, LimitStatus.UNBOUNDED, flow, 2)
     if flow == "associative":
-        return problem.result(found, LimitStatus.FOUND, flow, 2)
-    return problem.non_associative(found)
+        return problem.result(found, status, flow, 2)
+    return problem.non_associative(found, status)
 
 
 @dataclass(frozen=True)
@@ -285,36 +294,37 @@ class _Problem:
             live_force=float(np.hypot(*loads.live[free, :2].sum(axis=0))),
         )
 
-    def dead_alone(self) -> _State:
+    def balanced(self, *, with_live: bool) -> _State:
         """The least unbalanced force that the dead load leaves, and how the blocks move where it is not nothing."""
         rays, rows = cone_rays(self.friction), len(self.dead)
         identity = sp.identity(rows, format="csc")
+        live = sp.csc_array(self.live[:, None] * float(with_live))
         program = LinearProgram(
-            cost=np.concatenate([np.zeros(rays.shape[1]), np.ones(2 * rows)]),
-            matrix=sp.csc_array(sp.hstack([self.matrix @ rays, identity, -identity], format="csc")),
+            cost=np.concatenate([np.zeros(rays.shape[1] + 1), np.ones(2 * rows)]),
+            matrix=sp.csc_array(sp.hstack([self.matrix @ rays, live, identity, -identity], format="csc")),
             lower=-self.dead,
             upper=-self.dead,
         )
         solution = solve_lp(program)
-        forces = rays @ solution.x[: rays.shape[1]]
-        unbalanced = np.abs(self.matrix @ forces + self.dead)
+        forces, multiplier = rays @ solution.x[: rays.shape[1]], float(solution.x[rays.shape[1]]) * with_live
+        unbalanced = np.abs(self.matrix @ forces + self.dead + multiplier * self.live)
         falls = float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * float(np.abs(self.dead).sum())
-        return _State(forces.reshape(-1, 2), 0.0, -solution.row_dual, unbalanced, solution.gap, falls)
+        return _State(forces.reshape(-1, 2), multiplier, -solution.row_dual, unbalanced, solution.gap, falls)
 
-    def associative(self, dead_alone: _State) -> _State:
+    def associative(self, balanced: _State) -> _State:
         """The program of the limit load; what the dead load leaves unbalanced by rounding it may leave too."""
         rays = cone_rays(self.friction)
         program = LinearProgram(
             cost=np.append(np.zeros(rays.shape[1]), -1.0),
             matrix=sp.csc_array(sp.hstack([self.matrix @ rays, sp.csc_array(self.live[:, None])], format="csc")),
-            lower=-self.dead - dead_alone.unbalanced,
-            upper=-self.dead + dead_alone.unbalanced,
+            lower=-self.dead - balanced.unbalanced,
+            upper=-self.dead + balanced.unbalanced,
         )
         solution = solve_lp(program)
         forces = (rays @ solution.x[:-1]).reshape(-1, 2)
-        return _State(forces, float(solution.x[-1]), -solution.row_dual, dead_alone.unbalanced, solution.gap)
+        return _State(forces, float(solution.x[-1]), -solution.row_dual, balanced.unbalanced, solution.gap)
 
-    def non_associative(self, start: _State) -> LimitLoad:
+    def non_associative(self, start: _State, found: LimitStatus) -> LimitLoad:
         """The sequence of programs with normal forces carried over and dilatancy taken away."""
         normal, dilatancy, before = start.forces[:, 0], self.friction.copy(), start
         state, converged = start, False
@@ -340,7 +350,7 @@ class _Problem:
             if wandering and not state.falls and not dilatancy.any() and state.multiplier < lowest[0]:
                 lowest = (state.multiplier, normal)
             before = state
-        status = LimitStatus.FOUND if converged else LimitStatus.NOT_CONVERGED
+        status = found if converged else LimitStatus.NOT_CONVERGED
         return self.result(state, status, "non-associative", 3 + number)
 
     def _without_dilatancy(
@@ -384,7 +394,7 @@ class _Problem:
         """The state in metres and newtons, its bounds and its certificate recomputed from it."""
         velocity, multiplier = state.velocity, state.multiplier
         if status is LimitStatus.UNBOUNDED:
-            velocity, multiplier = np.zeros_like(velocity), 0.0
+            velocity = np.zeros_like(velocity)
         relative = (self.matrix.T @ velocity).reshape(-1, 2)
         drag = np.zeros(len(relative)) if state.drag is None else state.drag
         taken = float(drag @ np.abs(relative[:, 1]))
@@ -399,7 +409,7 @@ class _Problem:
         mechanism = np.zeros((self.assembly.n_blocks, 3))
         size = float(np.abs(velocity).max(initial=0.0)) or 1.0
         mechanism[self.assembly.free] = velocity.reshape(-1, 3) / size * [1.0, 1.0, 1.0 / self.length]
-        found = status in (LimitStatus.FOUND, LimitStatus.NOT_CONVERGED)
+        found = status not in (LimitStatus.UNBOUNDED, LimitStatus.NO_EQUILIBRIUM)
         static = multiplier / self.live_size
         nothing = np.inf if status is LimitStatus.UNBOUNDED else np.nan
         return LimitLoad(

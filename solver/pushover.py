@@ -31,6 +31,9 @@ PROBE = 1e-6
 #: The control point follows the mechanism where it moves by at least this fraction of the fastest block.
 SMALLEST_SHARE = 1e-4
 
+#: Places in a row at which the control displacement may lie behind what it was before a jump.
+LONGEST_RETREAT = 100
+
 #: Steps by which the end of an increment is brought to the wanted control displacement, and the accuracy wanted, in
 #: block sizes.
 AIMS, AIM_TOLERANCE = 6, 1e-10
@@ -140,7 +143,7 @@ def pushover(
     interfaces : Interfaces, optional
     controls : Controls, optional
     pose : Pose, optional
-        Where to start, for instance after a settlement; the drawing by default.
+        Where to start, for instance after a settlement; the drawing by default. Displacements count from there.
     on_increment : callable, optional
         Called with every :class:`Increment` as it is found.
 
@@ -163,11 +166,15 @@ def pushover(
 
         minimise  Σ g_k N_k - w α   subject to  A λ + dead + α live = 0  for every free block
 
-    whose dual is the kinematic program: minimise - dead · q with N(q) + g ≥ μ |T(q)| and live · q = w. The work w of the
-    live load is chosen so that the control point moves by one step; the blocks then move exactly, gaps are closed and
-    friction does not dilate, as in a settlement, and the motion is scaled until the control displacement is met. At zero
-    gaps w only scales the mechanism, and the program is that of the limit load. The rigid structure does not move
-    before the limit load, so that the curve starts at it.
+    whose dual is the kinematic program: minimise - dead · q with N(q) + g ≥ μ |T(q)| and live · q = w. The work w of
+    the live load is chosen so that the control point moves by one step; the blocks then move exactly, gaps are closed
+    and friction does not dilate, as in a settlement, and the motion is scaled until the control displacement is met.
+    At zero gaps w only scales the mechanism, and the program is that of the limit load. The rigid structure does not
+    move before the limit load, so that the curve starts at it.
+
+    Where a hinge has to jump, the structure settles into its next equilibrium with the work of the live load held; the
+    multiplier may drop there, and what the loads then do more than they gain goes into the jump. Where the control
+    displacement recedes in it, the curve goes on when it has come back.
     """
     interfaces = interfaces or Interfaces(InterfaceLaw(friction_coefficient))
     steps = pushover_increments(assembly, control, loads=loads, interfaces=interfaces, controls=controls, pose=pose)
@@ -183,7 +190,7 @@ def pushover(
             on_increment(increment)
     return Response(
         assembly=assembly,
-        settlements=(control,),
+        settlements=(control,),  # type: ignore[arg-type]  # stands in for a settlement of no support
         interfaces=interfaces,
         loads=loads,
         increments=tuple(increments),
@@ -235,9 +242,10 @@ def _increments(
     model: Model, control: ControlDisplacement, controls: Controls, start: Pose | None
 ) -> Generator[Increment, None, Ending]:
     still = replace(model, live=None)
-    pose = Pose.initial(model.assembly) if start is None else start
     try:
-        pose = at_rest(still, pose, controls.correctors)
+        # Gaps and overlaps within the accuracy of the drawing are closed; a pose that is given stays as it is, since
+        # without its live load it may not be in equilibrium.
+        pose = at_rest(still, Pose.initial(model.assembly), controls.correctors) if start is None else start
     except Falls as fall:
         yield _increment(still, fall.solved, 0.0, 1.0, Status.FALLING)
         return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no equilibrium under the dead load alone")
@@ -259,11 +267,11 @@ class _Place:
 
 
 class _Lost(Exception):
-    """The control point does not move on with the mechanism."""
+    """The control displacement does not grow with the mechanism."""
 
 
 class _Path:
-    """The equilibrium path. A place is told when it is left, and left only if it holds and was reached finely enough."""
+    """The equilibrium path. A place is told when it is left, and left only if it was reached finely enough."""
 
     def __init__(self, model: Model, control: ControlDisplacement, controls: Controls, start: Pose) -> None:
         assert control.tolerance is not None
@@ -273,84 +281,108 @@ class _Path:
         self.before: _Place | None = None
         self.first_without = np.inf
         self.told = -np.inf
+        self.silent = 0
         self.finest = control.increment / max(controls.event_refinement, 1)
         self.tolerance = float(control.tolerance)
         self.work = 0.0
 
     def follow(self) -> Generator[Increment, None, Ending]:
         """Yields the increments, each when it is left behind; returns how the path ended."""
-        control = self.control
-        step = control.increment
+        step = self.control.increment
         while True:
-            here = self.here
-            at_limit = here.d >= control.limit * (1.0 - 1e-12)
-            step = self._shortened(step)
+            at_limit = self.here.d >= self.control.limit * (1.0 - 1e-12)
+            step = self.control.increment if at_limit else self._shortened(step)
             try:
-                predictor = self._predict(here, self.control.increment if at_limit else step)
+                predictor = self._predict(self.here, step)
                 reading = self._read(predictor)
-            except Locked:
-                yield from self._tell_last()
-                where = f"at a control displacement of {here.d:.6g} m" if self.before else "from the start"
-                return Ending(Status.LOCKED, f"{where} no live load of this pattern moves the structure")
-            except _Lost:
-                if self.before is None:
-                    raise ValueError(
-                        f"the mechanism does not move block '{control.block}' along {control.direction}; "
-                        "choose another control block, point or direction"
-                    ) from None
-                yield from self._tell_last()
-                return Ending(
-                    Status.SOLVER_FAILED, f"at {here.d:.6g} m the mechanism moves on without the control displacement"
-                )
-            except SolveError as error:
-                yield from self._tell_last()
-                return Ending(Status.SOLVER_FAILED, f"at a control displacement of {here.d:.6g} m: {error}")
-            self.here = here = replace(here, multiplier=reading.multiplier)
-            if reading.falling or here.multiplier <= 0.0:
-                self.first_without = min(self.first_without, here.d)
-                if self.before is None:
-                    yield _increment(self.model, reading, 0.0, self._length(predictor), Status.EQUILIBRIUM)
-                    return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
-                if self.first_without - self.before.d <= self.tolerance * (1.0 + 1e-9):
-                    return (yield from self._collapse(here))
-                step = self._toward_zero(self.before, here)
-                self.here, self.before = self.before, None
+                self.here = replace(self.here, multiplier=reading.multiplier)
+                verdict, fall = self._judged(predictor, reading)
+                if verdict == "leave":
+                    if self.here.d > self.told:
+                        yield _increment(self.model, reading, self.here.d, self._length(reading), Status.EQUILIBRIUM)
+                        self.told, self.silent = self.here.d, 0
+                    self.silent += 1
+                    if self.silent > LONGEST_RETREAT:
+                        raise _Lost
+                    if at_limit:
+                        message = f"the control displacement reached its limit of {self.control.limit:g} m"
+                        return Ending(Status.LIMIT_REACHED, message)
+                    self._go_on(predictor, step)
+                    step = min(2.0 * step, self.control.increment)
+                    continue
+            except Falls as error:
+                self.first_without = min(self.first_without, self.here.d + step)
+                if step <= self.tolerance:
+                    return (yield from self._collapse(self.here, self.here, error.solved))
+                step /= 2.0
                 continue
-            if self._mechanism_changed(predictor) and here.step > 0.0:
-                if here.step > self.finest * (1.0 + 1e-9) and self.before is not None:
-                    step = here.step / 2.0
-                    self.here, self.before = self.before, None
-                    continue
-                if not here.proved:
-                    if self._prove():
-                        continue
-                    step = here.step / 2.0
-                    if self.before is None or step < self.tolerance / 64.0:
-                        return Ending(Status.SOLVER_FAILED, f"no equilibrium found near {here.d:.6g} m")
-                    self.here, self.before = self.before, None
-                    continue
-            if here.d > self.told:
-                yield _increment(self.model, reading, here.d, self._length(reading), Status.EQUILIBRIUM)
-                self.told = here.d
-            if at_limit:
-                return Ending(
-                    Status.LIMIT_REACHED, f"the control displacement reached its limit of {control.limit:g} m"
-                )
-            try:
-                pose = self._moved_on(predictor, here.d + step)
-            except (Falls, NotConverged, SolveError) as error:
-                if isinstance(error, Falls):
-                    self.first_without = min(self.first_without, here.d + step)
-                if isinstance(error, Falls) and step <= self.tolerance:
-                    return (yield from self._collapse(replace(here, d=here.d + step, pose=error.solved.pose)))
+            except NotConverged as error:
                 step /= 2.0
                 if step < self.tolerance / 64.0:
-                    return Ending(Status.SOLVER_FAILED, f"at a control displacement of {here.d:.6g} m: {error}")
+                    return Ending(Status.SOLVER_FAILED, f"at a control displacement of {self.here.d:.6g} m: {error}")
                 continue
-            self.before = here
-            reached = self._displacement(pose)
-            self.here = _Place(reached, pose, step, predictor.motion / step)
-            step = min(2.0 * step, control.increment)
+            except (Locked, _Lost, SolveError) as error:
+                yield from self._tell_last()
+                return self._stopped(error)
+            if verdict == "stay":
+                continue
+            if verdict == "lost":
+                if self.before is None:
+                    yield _increment(self.model, reading, 0.0, self._length(reading), Status.EQUILIBRIUM)
+                    return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
+                # What has settled after a jump may lie behind the place before it.
+                reached = max(self.here.d, self.before.d + self.here.step)
+                self.first_without = min(self.first_without, reached)
+                if self.first_without - self.before.d <= self.tolerance * (1.0 + 1e-9):
+                    return (yield from self._collapse(self.before, self.here, fall))
+                step = self._toward_zero(self.before, self.here)
+            else:
+                step = self.here.step / 2.0
+            assert self.before is not None
+            self.here, self.before = self.before, None
+
+    def _judged(self, predictor: Solved, reading: Solved) -> tuple[str, Solved | None]:
+        """What to do at this place: "leave" it, "refine" the step to it, "stay" where it settled, or it is "lost".
+
+        With a place that is lost for want of any equilibrium comes the program that says so.
+        """
+        here = self.here
+        changed = here.step > 0.0 and not reading.falling and self._mechanism_changed(predictor)
+        if changed and here.step > self.finest * (1.0 + 1e-9) and self.before is not None:
+            return "refine", None
+        if reading.falling:
+            return "lost", reading
+        if here.multiplier <= 0.0:
+            return "lost", None
+        if changed and not here.proved:
+            try:
+                self._prove()
+            except Falls as fall:
+                return "lost", fall.solved
+            except NotConverged:
+                if self.before is None:
+                    raise
+                return "refine", None
+            return "stay", None
+        return "leave", None
+
+    def _stopped(self, error: Exception) -> Ending:
+        where = f"at a control displacement of {self.here.d:.6g} m"
+        if isinstance(error, Locked):
+            return Ending(Status.LOCKED, f"{where} no live load of this pattern moves the structure")
+        if isinstance(error, _Lost):
+            if self.before is None and self.here.d == 0.0:
+                raise ValueError(
+                    f"the mechanism does not move block '{self.control.block}' along {self.control.direction}; "
+                    "choose another control block, point or direction"
+                ) from None
+            return Ending(Status.SOLVER_FAILED, f"{where} the control displacement no longer grows; choose another")
+        return Ending(Status.SOLVER_FAILED, f"{where}: {error}")
+
+    def _go_on(self, predictor: Solved, step: float) -> None:
+        pose = self._moved_on(predictor, self.here.d + step)
+        self.before = self.here
+        self.here = _Place(self._displacement(pose), pose, step, predictor.motion / step)
 
     def _shortened(self, step: float) -> float:
         """The step, not past the limit nor to where capacity is known to be lost."""
@@ -380,7 +412,7 @@ class _Path:
                 return solved
             moves = self._speed(solved) / step
             if moves * step <= SMALLEST_SHARE * self._length(solved):
-                raise _Lost
+                return _scaled(solved, min(1.0, step / self._length(solved)))
             closes = ((solved.forces[:, 0] > 0.0) & (solved.contacts.gaps > self._exact)).any()
             rate /= moves
             if abs(moves - 1.0) < 1e-2 or not closes:
@@ -394,7 +426,7 @@ class _Path:
 
     def _first_work(self) -> float:
         """Work of the live load per control displacement in the first mechanism, from a program that barely moves."""
-        live, size = self.model.scaled_live
+        _, size = self.model.scaled_live
         unit = size * self.model.force * self.model.length
         work = PROBE * unit
         solved = solve_program(self.model, self.here.pose, work=work)
@@ -419,6 +451,8 @@ class _Path:
         """The exact pose at the wanted control displacement, by scaling the motion of the program."""
         part, low = 1.0, 0.0
         low_d = self.here.d
+        if self._speed(predictor) <= SMALLEST_SHARE * self._length(predictor):
+            return corrected(self.model, predictor, self.start, self.controls.correctors)
         for _ in range(AIMS):
             pose = corrected(self.model, _scaled(predictor, part), self.start, self.controls.correctors)
             reached = self._displacement(pose)
@@ -429,25 +463,18 @@ class _Path:
             part = float(np.clip(part + slope * (target - reached), 0.2 * part, 2.0 * part))
         return pose
 
-    def _prove(self) -> bool:
+    def _prove(self) -> None:
         """Lets a place where the mechanism changed find its equilibrium with the live load's work held."""
-        try:
-            pose = at_rest(self.model, self.here.pose, self.controls.correctors)
-        except (Falls, NotConverged, SolveError):
-            return False
-        d = self._displacement(pose)
-        if self.before is not None and d <= self.before.d:
-            return False
-        self.here = replace(self.here, d=d, pose=pose, proved=True)
-        return True
+        pose = at_rest(self.model, self.here.pose, self.controls.correctors)
+        self.here = replace(self.here, d=self._displacement(pose), pose=pose, proved=True)
 
     def _mechanism_changed(self, predictor: Solved) -> bool:
         if self.here.velocity is None:
             return False
         size = np.sqrt(self.model.assembly.masses)[:, None] * np.array([1.0, 1.0, self.model.length])
-        new = predictor.motion / max(self._speed(predictor), 1e-300) * size
-        old = self.here.velocity * size
-        return bool(np.linalg.norm(new - old) > EVENT_CHANGE * np.linalg.norm(old))
+        new, old = predictor.motion * size, self.here.velocity * size
+        new, old = new / (np.linalg.norm(new) or 1.0), old / (np.linalg.norm(old) or 1.0)
+        return bool(np.linalg.norm(new - old) > EVENT_CHANGE)
 
     def _displacement(self, pose: Pose) -> float:
         return self.control.displacement(self.model.assembly, pose) - self.offset
@@ -465,33 +492,42 @@ class _Path:
             solved = solve_program(self.model, self.here.pose)
             yield _increment(self.model, solved, self.here.d, 1.0, Status.EQUILIBRIUM)
 
-    def _collapse(self, lost: _Place) -> Generator[Increment, None, Ending]:
-        last = self.before if self.before is not None and self.before.d < lost.d else self.here
+    def _collapse(self, last: _Place, lost: _Place, fall: Solved | None) -> Generator[Increment, None, Ending]:
+        """Tells the last equilibrium and the fall: with the live load's work held where no multiplier balances."""
         if last.d > self.told:
             reading = self._read(self._predict(last, self.tolerance))
             yield _increment(self.model, reading, last.d, self._length(reading), Status.EQUILIBRIUM)
-        still = replace(self.model, live=None, trust=self.model.length / 10.0)
-        falling = solve_program(still, lost.pose)
-        size = self._length(falling)
-        live = self.model.live
-        assert live is not None
+        falling_model = replace(self.model, trust=self.model.length / 10.0)
+        if fall is None:
+            falling_model = replace(falling_model, live=None)
+            fall = solve_program(falling_model, lost.pose)
+        part = 0.5
+        what = "equilibrium is lost"
+        if lost.multiplier <= 0.0:
+            part = last.multiplier / (last.multiplier - lost.multiplier)
+            what = "no capacity is left"
+        assert self.model.live is not None
         collapse = Collapse(
-            displacement=(last.d + self.first_without) / 2.0,
+            displacement=last.d + part * (self.first_without - last.d),
             bracket=(last.d, self.first_without),
-            reaction=last.multiplier * float(np.hypot(*live[:, :2].sum(axis=0))),
-            mechanism=falling.motion / size,
+            reaction=last.multiplier * float(np.hypot(*self.model.live[:, :2].sum(axis=0))),
+            mechanism=fall.motion / self._length(fall),
             unit="m",
         )
-        what = "no capacity is left" if lost.multiplier <= 0.0 else "equilibrium is lost"
-        for _ in range(self.controls.falling_frames):
-            yield _increment(still, falling, lost.d, 1.0, Status.FALLING)
-            if not falling.falling and self._length(falling) < 1e-3 * still.trust:
-                break
-            try:
-                falling = solve_again(still, moved(falling.pose, falling.motion), falling)
-            except SolveError:
-                break
+        yield from self._fall(falling_model, fall)
         return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)
+
+    def _fall(self, model: Model, fall: Solved) -> Iterator[Increment]:
+        """Pseudo-time frames: the blocks move downhill by a trust region at a time until they rest."""
+        for _ in range(self.controls.falling_frames):
+            fall = _scaled(fall, min(1.0, model.trust / self._length(fall)))
+            yield _increment(model, fall, self.first_without, 1.0, Status.FALLING)
+            try:
+                fall = solve_again(model, moved(fall.pose, fall.motion), fall)
+            except (SolveError, Locked):
+                return
+            if not fall.falling and self._length(fall) < 1e-3 * model.trust:
+                return
 
 
 def _scaled(solved: Solved, part: float) -> Solved:

@@ -1,0 +1,152 @@
+"""Loads on surfaces: pressure on an edge or on all that a direction meets, and a load that moves over the structure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .assembly import Assembly
+from .loads import point_load
+
+__all__ = ["edge_pressure", "load_on_top", "surface_pressure"]
+
+#: Strips of the surface narrower than this fraction of its width are rounding of the drawing.
+NARROWEST = 1e-12
+
+
+def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) -> np.ndarray:
+    """Uniform pressure perpendicular to one edge of a block.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    block : int
+    edge : int
+        Number of the edge within the block: it runs from corner ``edge`` to the next, counter-clockwise.
+    pressure : float [Pa]
+        Positive into the block.
+
+    Returns
+    -------
+    (n_blocks, 3) array [N, N, N·m]
+    """
+    ring = assembly.outline(block)
+    if not 0 <= edge < len(ring):
+        raise ValueError(f"block '{assembly.names[block]}' has {len(ring)} edges; edge {edge} is none of them")
+    start, stop = ring[edge], ring[(edge + 1) % len(ring)]
+    along = stop - start
+    inward = np.array([-along[1], along[0]])
+    force = pressure * float(assembly.thickness[block]) * inward
+    return point_load(assembly, block, (force[0], force[1]), point=(start + stop) / 2.0)
+
+
+def surface_pressure(
+    assembly: Assembly,
+    pressure: float,
+    direction: Sequence[float] = (0.0, -1.0),
+    *,
+    blocks: np.ndarray | None = None,
+) -> np.ndarray:
+    """Uniform pressure along a direction on the faces it meets first: snow on a wall's top, wind on its flank.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    pressure : float [Pa]
+        Per area perpendicular to the direction, as snow is given per area in plan.
+    direction : (2,) sequence
+        Where the pressure pushes: downwards by default.
+    blocks : (n,) int or (n_blocks,) bool array, optional
+        The blocks that it acts on; by default all free ones. Blocks in front of others shield them in any case.
+
+    Returns
+    -------
+    (n_blocks, 3) array [N, N, N·m]
+    """
+    size = float(np.hypot(*np.asarray(direction, dtype=float)))
+    if size == 0.0:
+        raise ValueError("pressure direction is [0, 0]; give the direction in which it pushes")
+    pushed = np.asarray(direction, dtype=float) / size
+    across = np.array([-pushed[1], pushed[0]])
+    chosen = np.zeros(assembly.n_blocks, dtype=bool)
+    chosen[assembly.free if blocks is None else blocks] = True
+    strips, depth, block = _first_met(assembly, pushed, across)
+    middle = (strips[:-1] + strips[1:]) / 2.0
+    met = np.isfinite(depth)
+    met[met] = chosen[block[met]]
+    points = middle[met, None] * across + depth[met, None] * pushed
+    owner = block[met]
+    forces = (pressure * np.diff(strips)[met] * assembly.thickness[owner])[:, None] * pushed
+    arms = points - assembly.centroids[owner]
+    load = np.zeros((assembly.n_blocks, 3))
+    np.add.at(load, owner, np.column_stack([forces, arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]]))
+    return load
+
+
+def load_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.0)) -> np.ndarray:
+    """A force on the topmost surface at a place: one position of a load that moves along an arch or a wall.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    x : float [m]
+        Strictly within a block, seen from above; between two the one to the left carries it.
+    force : (2,) sequence [N]
+
+    Returns
+    -------
+    (n_blocks, 3) array [N, N, N·m]
+
+    Raises
+    ------
+    ValueError
+        Where nothing is below, or a support.
+    """
+    down = np.array([0.0, -1.0])
+    strips, _, block = _first_met(assembly, down, np.array([1.0, 0.0]))
+    k = int(np.clip(np.searchsorted(strips, x) - 1, 0, len(block) - 1))
+    if not strips[0] <= x <= strips[-1] or block[k] < 0:
+        raise ValueError(
+            f"nothing is below a load at x = {x:g} m; the structure reaches from {strips[0]:g} to {strips[-1]:g} m"
+        )
+    owner = int(block[k])
+    if not assembly.free[owner]:
+        raise ValueError(f"the load at x = {x:g} m stands on the support '{assembly.names[owner]}'")
+    ring = assembly.outline(owner)
+    following = np.roll(ring, -1, axis=0)
+    low, high = np.minimum(ring[:, 0], following[:, 0]), np.maximum(ring[:, 0], following[:, 0])
+    edges = np.flatnonzero((low <= x) & (x <= high) & (high > low))
+    part = (x - ring[edges, 0]) / (following[edges, 0] - ring[edges, 0])
+    top = float((ring[edges, 1] + part * (following[edges, 1] - ring[edges, 1])).max())
+    return point_load(assembly, owner, force, point=(x, top))
+
+
+def _first_met(assembly: Assembly, pushed: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Strips along a direction, between all corners, and what each meets first.
+
+    Returns
+    -------
+    strips : (n + 1,) array [m]
+        Where they begin and end, measured across.
+    depth : (n,) array [m]
+        Along the direction in the middle of the strip; infinite where it meets nothing.
+    block : (n,) int array
+        -1 where it meets nothing.
+    """
+    start, stop = assembly.vertices, assembly.vertices[assembly.next_vertex]
+    a, b = start @ across, stop @ across
+    strips = np.unique(np.concatenate([a, b]))
+    strips = strips[np.append(True, np.diff(strips) > NARROWEST * (strips[-1] - strips[0]))]
+    middle = (strips[:-1] + strips[1:]) / 2.0
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    depth, block = np.full(len(middle), np.inf), np.full(len(middle), -1)
+    first, last = np.searchsorted(middle, low), np.searchsorted(middle, high)
+    for edge in np.flatnonzero(last > first).tolist():
+        under = slice(int(first[edge]), int(last[edge]))
+        part = (middle[under] - a[edge]) / (b[edge] - a[edge])
+        at = start[edge] @ pushed + part * float((stop[edge] - start[edge]) @ pushed)
+        nearer = at < depth[under]
+        depth[under] = np.where(nearer, at, depth[under])
+        block[under] = np.where(nearer, assembly.block_of_vertex[edge], block[under])
+    return strips, depth, block
