@@ -10,7 +10,7 @@ import numpy as np
 
 from .assembly import Assembly
 from .contact import InterfaceLaw, Interfaces
-from .correction import GEOMETRY_TOLERANCE, Falls, NotConverged, at_rest, corrected, solve_again
+from .correction import Falls, NotConverged, at_rest, corrected, solve_again
 from .kinematics import Pose, moved, moved_vertices
 from .loads import Loads, Settlement, checked_loads
 from .lp import SolveError
@@ -317,7 +317,8 @@ class _Path:
 
     def _left(self, predictor: Solved, step: float) -> Increment:
         """The increment at the place that is left; its forces are the predictor's unless joints close on the way."""
-        closing = predictor.contacts.gaps > GEOMETRY_TOLERANCE * 100.0 * self.model.length
+        left = max(1e-6 * self.model.length, 0.2 * _largest_movement(self.model, predictor.motion))
+        closing = predictor.contacts.gaps > left
         if (predictor.forces[closing, 0] > 0.0).any():
             return self._increment(self._read(self.here.s, self.here.pose), self.probe)
         return self._increment(predictor, step)

@@ -12,6 +12,7 @@ from .assembly import Assembly
 from .contact import CORNER_TOLERANCE, Contacts, end_zone, feature_pairs, find_contacts, measure_contacts
 from .equilibrium import equilibrium_matrix
 from .kinematics import Pose, moved, moved_vertices
+from .lp import CROSSOVER_ROWS
 from .program import Model, Solved, closing_program, matched_contacts, solve_program
 
 __all__ = ["Falls", "NotConverged", "at_rest", "corrected", "solve_again"]
@@ -47,10 +48,11 @@ REDUNDANCY = 1e-11
 #: Programs that close gaps one after another before a full program is solved again.
 CLOSINGS = 4
 
-#: Where friction keeps many points on the edge of sliding, corrections converge slowly. After so many programs gaps of
-#: this part of the increment's movement may stay (the next program sees them, so they do not add up), penetration of
-#: this part of the thinnest block's width.
-GAP_LEFT, PENETRATION_LEFT = 1e-2, 1e-6
+#: Where friction keeps many points on the edge of sliding, corrections converge slowly. After CLOSINGS programs gaps of
+#: this part of the increment's movement may stay (the next program sees them, so they do not add up), and penetration
+#: of this part of the smallest block. In programs too large for vertex solutions, whose interior solutions say less
+#: clearly what sticks, ten times as much of either.
+GAP_LEFT, GAP_LEFT_LARGE, PENETRATION_LEFT = 1e-2, 1e-1, 1e-6
 
 #: Part of the expected lift that is taken off: all of it could end in penetration, which a wedge locked by friction
 #: cannot give back.
@@ -154,8 +156,9 @@ def _descended(model: Model, pose: Pose) -> Pose:
 
 def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, nudge: np.ndarray | None) -> Pose:
     tolerance = GEOMETRY_TOLERANCE * model.length
-    enough = max(tolerance, GAP_LEFT * _size(model, solved.motion))
-    deepest = PENETRATION_LEFT * float(model.assembly.widths.min())
+    large = 3 * int(model.assembly.free.sum()) > CROSSOVER_ROWS
+    enough = max(tolerance, (GAP_LEFT_LARGE if large else GAP_LEFT) * _size(model, solved.motion))
+    deepest = PENETRATION_LEFT * float(np.sqrt(model.assembly.areas.min())) * (10.0 if large else 1.0)
     closings = 0
     for attempt in range(correctors):
         pose, contacts, error = _closed(model, pose, solved)
