@@ -61,7 +61,6 @@ def test_flat_arch(height, friction_coefficient):
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-6])
 @pytest.mark.parametrize("height", [0.25, 0.5])
-@pytest.mark.xfail(strict=True, reason="near the singular end the corrections stall at the size of the nudge")
 def test_flat_arch_within_a_narrow_bracket(height, tolerance):
     response = flat_arch(height, tolerance=tolerance)
     assert response.stop is solver.Status.COLLAPSED
