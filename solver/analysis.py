@@ -26,6 +26,13 @@ __all__ = ["Controls", "Ending", "check_settlement", "settle", "settlement_incre
 #: up to the second number. Hinges that move change it by more, the slow turning of the geometry by less.
 EVENT_CHANGE, LARGEST_CHANGE = 0.015, 0.5
 
+#: Overlap of two blocks, as a fraction of the width of the thinnest, at which an increment is refused: twice what is
+#: accepted of a drawing.
+OVERLAP = 2e-3
+
+#: Places kept to go back to.
+PLACES = 16
+
 #: Step by which a reaction is read off at the last equilibrium, in block sizes.
 PROBE = 1e-6
 
@@ -176,7 +183,11 @@ def _increments(model: Model, phases: Sequence[Settlement], controls: Controls) 
         return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
     for number, phase in enumerate(phases):
         path = _Path(model, phase, number, pose, controls)
-        ending = yield from path.follow()
+        try:
+            ending = yield from path.follow()
+        except SolveError as error:
+            # While forces at the last equilibrium were read: everything found so far has been told.
+            return Ending(Status.SOLVER_FAILED, f"at a settlement of {path.here.s:.6g} {phase.unit}: {error}")
         if ending.stop is not Status.LIMIT_REACHED:
             return ending
         pose = path.here.pose
@@ -197,14 +208,14 @@ class _Place:
 class _Path:
     """The equilibrium path of one settlement phase.
 
-    The path goes from place to place. It keeps the place before the last, because whether a place really is an
+    The path goes from place to place. It keeps the last few it has left, because whether a place really is an
     equilibrium, and whether the mechanism changed on the way to it, is only known from the program solved there.
     """
 
     def __init__(self, model: Model, phase: Settlement, number: int, start: Pose, controls: Controls) -> None:
         self.model, self.phase, self.number, self.controls, self.start = model, phase, number, controls, start
         self.here = _Place(0.0, start)
-        self.before: _Place | None = None
+        self.left: list[_Place] = []
         self.first_without = np.inf
         self.told = -np.inf
         self.finest = phase.increment / max(controls.event_refinement, 1)
@@ -224,7 +235,7 @@ class _Path:
             try:
                 predictor = self._predict(here, step)
                 changed = predictor.falling or self._mechanism_changed(predictor, step)
-                coarse = self.before is not None and here.step > self.finest * (1.0 + 1e-9)
+                coarse = bool(self.left) and here.step > self.finest * (1.0 + 1e-9)
                 if changed and coarse and not predictor.falling:
                     step = self._go_back()
                     continue
@@ -240,8 +251,9 @@ class _Path:
                 proved = bool(np.isfinite(self.first_without))
                 nudge = self._nudge(here.s + step) if proved else None
                 pose = corrected(self.model, predictor, target, self.controls.correctors, nudge=nudge)
+                self._refuse_overlap(pose)
             except _NotHere as fall:
-                if self.before is None:
+                if not self.left:
                     yield _falling_frame(self.model, fall.solved, here.s, self.number)
                     message = _no_equilibrium_message(self.model.assembly, fall.solved)
                     return Ending(Status.NO_INITIAL_EQUILIBRIUM, message)
@@ -268,7 +280,7 @@ class _Path:
             if here.s > self.told:
                 yield self._left(predictor, step)
                 self.told = here.s
-            self.before = here
+            self.left = [*self.left[1 - PLACES :], here]
             self.here = _Place(here.s + step, pose, step, predictor.motion / step, proved)
             step = min(2.0 * step, phase.increment)
 
@@ -281,9 +293,8 @@ class _Path:
 
     def _go_back(self) -> float:
         """Returns to the place before; gives the step to try from there."""
-        assert self.before is not None
         step = self.here.step
-        self.here, self.before = self.before, None
+        self.here = self.left.pop()
         return step / 2.0
 
     def _prove(self) -> None:
@@ -307,6 +318,18 @@ class _Path:
     def _predict(self, place: _Place, step: float) -> Solved:
         rate = self.phase.rate(self.model.assembly, self.start, place.s)
         return solve_program(self.model, place.pose, rate * step)
+
+    def _refuse_overlap(self, pose: Pose) -> None:
+        """A last look at the blocks as they are, contact points or not: none may have come into another."""
+        assembly = self.model.assembly
+        deepest = OVERLAP * float(assembly.widths.min())
+        i, j, depth = overlap_depths(moved_vertices(assembly, pose), assembly.offsets, deepest)
+        worst = np.where(assembly.free[i] | assembly.free[j], depth, 0.0)
+        if worst.max(initial=0.0) > deepest:
+            k = int(np.argmax(worst))
+            raise NotConverged(
+                f"block '{assembly.names[i[k]]}' came {worst[k]:.3g} m into block '{assembly.names[j[k]]}'"
+            )
 
     def _nudge(self, s: float) -> np.ndarray:
         return self.phase.rate(self.model.assembly, self.start, s) * (0.1 * self.probe)
@@ -338,9 +361,9 @@ class _Path:
 
     def _collapse(self, first_without: float, falling: Solved) -> Generator[Increment, None, Ending]:
         reading = self._read(self.here.s, self.here.pose)
-        if reading.falling and self.before is not None:
+        if reading.falling and self.left:
             # In balance with the supports at rest, but not with the least further movement: on the verge itself.
-            first_without, self.here = self.here.s, self.before
+            first_without, self.here = self.here.s, self.left.pop()
             reading = self._read(self.here.s, self.here.pose)
         last = self._increment(reading, self.probe)
         if self.here.s > self.told:

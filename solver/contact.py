@@ -25,6 +25,9 @@ LARGEST_LEAN = 0.5
 #: this multiple of its overlap.
 STEEPEST_LANDING = 0.25
 
+#: Cosine up to which two faces that leave a corner count as perpendicular, as those of diagonal neighbours are.
+PERPENDICULAR = 1e-6
+
 #: Penetration up to this fraction of the width of the thinner block is a contact to be corrected; beyond, the
 #: corner belongs to another face behind.
 PENETRATION_FRACTION = 0.1
@@ -281,7 +284,7 @@ def _settle_ends(
     facing = _facing_edge(assembly, vertex, edge, other)
     along_edge = sense * tangent
     along_facing = -sense * _unit(vertices[following[facing]] - vertices[facing])
-    same_way = (along_edge * along_facing).sum(axis=1) > 0.0
+    same_way = (along_edge * along_facing).sum(axis=1) > PERPENDICULAR
     # At a re-entrant corner the edge ends at a wall: a corner that gets there is simply on the edge.
     near_end = (overlap <= end) & assembly.convex_vertex[other]
     # Faces that overlap on a bit at an angle touch at the corner below alone: the one above slides past the end

@@ -136,22 +136,24 @@ def at_rest(model: Model, pose: Pose, correctors: int, nudge: np.ndarray | None 
         raise Falls(solved)
     if _size(model, solved.motion) <= STILL * model.length:
         return pose
-    try:
-        return _settled(model, _moved_freely(model, pose, solved), solved, correctors, nudge)
-    except NotConverged:
-        return _descended(model, pose)
+    return _settled(model, _moved_freely(model, pose, solved), solved, correctors, nudge)
 
 
-def _descended(model: Model, pose: Pose) -> Pose:
-    """Follows the blocks downhill by small steps until they rest, or have moved by more than a block size."""
+def _descended(model: Model, start: Pose) -> Pose:
+    """Follows the blocks downhill by small steps until they rest, or have moved by more than a block size.
+
+    Friction at the edge of its cone may keep a pose in a small cycle; that is rest, too.
+    """
     slow = replace(model, trust=model.length * DESCENT_STEP)
-    solved = solve_program(slow, pose)
+    solved, pose = solve_program(slow, start), start
     for _ in range(round(2.0 / DESCENT_STEP)):
         if not solved.falling and _size(model, solved.motion) <= STILL * model.length:
             return pose
         pose = moved(pose, solved.motion)
         solved = solve_again(slow, pose, solved)
-    raise Falls(solved)
+    if solved.falling or np.abs(pose.positions - start.positions).max() > model.length / 2.0:
+        raise Falls(solved)
+    return pose
 
 
 def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, nudge: np.ndarray | None) -> Pose:
@@ -179,6 +181,8 @@ def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, nudge: n
         if error <= tolerance and _size(model, solved.motion) <= STILL * model.length:
             return pose
         pose = _moved_freely(model, pose, solved)
+    if nudge is not None and error <= tolerance:
+        return _descended(model, pose)
     raise NotConverged(
         f"after {correctors} corrections a contact point is still off by {error:.3g} m (accepted: {tolerance:.3g} m)"
     )
@@ -260,14 +264,16 @@ def _contacts_after(model: Model, pose: Pose, solved: Solved) -> Contacts:
     """Contacts found at the pose; those that carried force stay what they were, wherever on their line they are now.
 
     A hinge whose corner has come to lie a hair past the end of its edge, or outside the zone in which it counts as a
-    corner on a corner, must neither vanish nor change its kind before its drift is corrected.
+    corner on a corner, must neither vanish nor change its kind before its drift is corrected. Corners that have gone
+    through the edge they faced stay too, however deep: found afresh they would seem to belong to a face behind.
     """
     assembly = model.assembly
     vertices = moved_vertices(assembly, pose)
     found = find_contacts(assembly, vertices, model.reach)
     before = solved.contacts
-    kept = np.flatnonzero(solved.forces[:, 0] > 0.0)
-    kept = kept[~_slid_off(assembly, vertices, before, kept, solved.sliding[kept] > 0.0)]
+    carrying = np.flatnonzero(solved.forces[:, 0] > 0.0)
+    carrying = carrying[~_slid_off(assembly, vertices, before, carrying, solved.sliding[carrying] > 0.0)]
+    kept = np.union1d(carrying, _gone_through(assembly, vertices, before))
     own, reverse = feature_pairs(assembly, before)
     covered = np.concatenate([own[kept], reverse[kept]])
     own, reverse = feature_pairs(assembly, found)
@@ -277,6 +283,14 @@ def _contacts_after(model: Model, pose: Pose, solved: Solved) -> Contacts:
         for name in ("vertex", "edge", "corner")
     )
     return measure_contacts(assembly, vertices, vertex, edge, corner)
+
+
+def _gone_through(assembly: Assembly, vertices: np.ndarray, before: Contacts) -> np.ndarray:
+    """Numbers of the contact points whose corner was in front of its edge and is now behind it."""
+    now = measure_contacts(assembly, vertices, before.vertex, before.edge, before.corner)
+    inside = (now.along >= 0.0) & (now.along <= assembly.edge_lengths[before.edge]) & (before.corner < 0)
+    rounding = 1e-12 * assembly.block_size
+    return np.flatnonzero(inside & (before.gaps >= -rounding) & (now.gaps < -rounding))
 
 
 def _slid_off(

@@ -267,7 +267,8 @@ def solve_program(
     at_limit = room.reshape(-1, 2).min(axis=1) <= AT_LIMIT
     forces = scaled_forces.reshape(-1, 2)
     used_up = np.abs(forces[:, 1]) >= friction * forces[:, 0] * (1.0 - 1e-6)
-    sliding = np.where(at_limit, np.abs(approach[1::2]) * model.length, 0.0)
+    slid = np.abs(approach[1::2])
+    sliding = np.where(at_limit & (slid > AT_LIMIT), slid * model.length, 0.0)
     on_supports = np.where(assembly.free[:, None], 0.0, resultant)
     return Solved(
         pose=pose,

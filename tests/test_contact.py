@@ -118,7 +118,6 @@ def test_diagonal_neighbours_in_stack_bond_do_not_touch():
     assert len(contacts) == 2 * 12
 
 
-@pytest.mark.xfail(strict=True, reason="at right angles rounding decides whether faces run the same way")
 def test_diagonal_neighbours_in_turned_stack_bond_do_not_touch():
     for angle in (0.3, 0.7, 1.0, 2.5):
         _, contacts = find([turned(outline, angle, (0, 0)) for outline in LAYOUTS["stack bond"]])

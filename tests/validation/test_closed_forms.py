@@ -93,7 +93,6 @@ def _lever(response, width, height, sense):
     return centroid[0] * np.cos(theta) - centroid[1] * np.sin(theta)
 
 
-@pytest.mark.xfail(strict=True, reason="in the first increment a sticking block creeps by the square of the increment")
 def test_block_that_sticks_does_not_creep():
     turn = solver.Settlement(rotation_centre=(0.3, -0.5), rotation=1, increment=0.02, limit=0.1)
     response = settle([rectangle(0, 0, 1, 1), rectangle(-1, -1, 2, 0)], ["free", "moving"], turn, 0.4)
