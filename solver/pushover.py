@@ -169,7 +169,8 @@ def pushover(
 
     whose dual is the kinematic program: minimise - dead · q with N(q) + g ≥ μ |T(q)| and live · q = w. The work w of
     the live load is chosen so that the control point moves by one step; the blocks then move exactly, gaps are closed
-    and friction does not dilate, as in a settlement, and the motion is scaled until the control displacement is met.
+    and friction does not dilate, as in a settlement, and the motion is scaled until the control displacement is met
+    (where closing takes programs, it comes out near the one wanted; what is reported is always measured).
     At zero gaps w only scales the mechanism, and the program is that of the limit load. The rigid structure does not
     move before the limit load, so that the curve starts at it.
 
@@ -458,15 +459,19 @@ class _Path:
         return solve_program(self.model, predictor.pose, work=part * float((live * predictor.motion).sum()))
 
     def _moved_on(self, predictor: Solved, target: float) -> Pose:
-        """The exact pose at the wanted control displacement, by scaling the motion of the program."""
+        """The exact pose at the wanted control displacement, by scaling the program's motion; near it in slides."""
         part, low = 1.0, 0.0
         low_d = self.here.d
         if self._speed(predictor) <= SMALLEST_SHARE * self._length(predictor):
             return corrected(self.model, predictor, self.start, self.controls.correctors)
         for _ in range(AIMS):
+            programs = self.model.tally.programs
             pose = corrected(self.model, _scaled(predictor, part), self.start, self.controls.correctors)
             reached = self._displacement(pose)
             if abs(reached - target) <= AIM_TOLERANCE * self.model.length or reached == low_d:
+                break
+            if self.model.tally.programs > programs:
+                # Closing what slid took programs: dear, and not smooth enough to aim with.
                 break
             slope = (part - low) / (reached - low_d)
             low, low_d = part, reached
