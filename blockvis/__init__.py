@@ -14,6 +14,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import solver
+
 if TYPE_CHECKING:
     from .case import Case as Case
     from .case import read_case as read_case
@@ -45,6 +47,17 @@ _HOMES = {
 }
 
 __all__ = sorted(_HOMES)
+
+
+def _plot(response: solver.Response, **options: Any) -> Any:
+    """The response as a player for notebooks; see :func:`blockvis.show`."""
+    from .notebook import show
+
+    return show(response, **options)
+
+
+# The mechanics draw nothing; who has pictures lends them: `response.plot()` works once blockvis is imported.
+setattr(solver.Response, "plot", _plot)  # noqa: B010
 
 
 def __getattr__(name: str) -> Any:

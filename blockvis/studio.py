@@ -21,7 +21,7 @@ __all__ = ["Look", "Studio"]
 
 PSEUDO_TIME = "FALLING · pseudo-time"
 
-#: Resultants of more blocks than this hide what they stand on.
+#: Resultants and hinges of more blocks than this hide what they stand on.
 FEW_BLOCKS = 300
 
 #: Up to this many parts of a mechanism are tinted one by one.
@@ -197,7 +197,11 @@ class Studio:
 
     def _kinds(self, increment: solver.Increment) -> tuple[bool, bool, bool]:
         found = marks.marks_of(self.assembly, self.joints, increment, increment.pose)
-        return len(found.cracks) > 0, len(found.sliding) > 0, len(found.hinges) > 0
+        return len(found.cracks) > 0, len(found.sliding) > 0, len(self._hinges(found)) > 0
+
+    def _hinges(self, found: marks.Marks) -> np.ndarray:
+        """Hinges worth a dot: in a wall of many blocks nearly every brick turns a little about some corner."""
+        return found.hinges if self.assembly.n_blocks <= FEW_BLOCKS else found.hinges[:0]
 
     def _vertex_colours(self, pose: solver.Pose) -> np.ndarray | None:
         if self.look.colour_by != "displacement":
@@ -217,8 +221,8 @@ class Studio:
         scene.lines("crack edge", middle, palette.OPEN, self._line(2.2 * thin))
         scene.lines("sliding", found.sliding, palette.SLIDING, self._line(5.0 * thin))
         radius = float(np.clip(0.09 * self.assembly.block_size / scene.pixel, 3.0 * thin, 11.0 * thin))
-        scene.discs("hinge/rim", found.hinges, radius * 1.35, palette.PAPER)
-        scene.discs("hinge top", found.hinges, radius, palette.HINGE)
+        scene.discs("hinge/rim", self._hinges(found), radius * 1.35, palette.PAPER)
+        scene.discs("hinge top", self._hinges(found), radius, palette.HINGE)
 
     def _line(self, pixels: float) -> float:
         return max(pixels, 1.2)
