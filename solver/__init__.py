@@ -16,11 +16,14 @@ from .analysis import Controls, Ending, check_settlement, settle, settlement_inc
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly
 from .contact import Contacts, InterfaceLaw, Interfaces, find_contacts, measure_contacts
 from .kinematics import Pose, moved_vertices
+from .limit import Envelope, LimitLoad, LimitStatus, limit_load, limit_load_envelope
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
 from .lp import SolveError
 from .mechanism import Mechanism, mechanism_of, rigid_parts
 from .polygons import overlap_depths
+from .pushover import ControlDisplacement, pushover, pushover_increments
 from .response import Certificate, Collapse, ContactState, Increment, Response, Status, total_weight
+from .surface_loads import edge_pressure, load_on_top, surface_pressure
 
 __all__ = [
     "FIXED",
@@ -33,11 +36,15 @@ __all__ = [
     "Collapse",
     "ContactState",
     "Contacts",
+    "ControlDisplacement",
     "Controls",
     "Ending",
+    "Envelope",
     "Increment",
     "InterfaceLaw",
     "Interfaces",
+    "LimitLoad",
+    "LimitStatus",
     "Loads",
     "Mechanism",
     "Pose",
@@ -46,16 +53,23 @@ __all__ = [
     "SolveError",
     "Status",
     "check_settlement",
+    "edge_pressure",
     "find_contacts",
+    "limit_load",
+    "limit_load_envelope",
+    "load_on_top",
     "measure_contacts",
     "mechanism_of",
     "moved_vertices",
     "overlap_depths",
     "point_load",
+    "pushover",
+    "pushover_increments",
     "rigid_parts",
     "self_weight",
     "settle",
     "settlement_increments",
+    "surface_pressure",
     "total_weight",
     "weight_fraction",
 ]

@@ -237,7 +237,7 @@ def _vertex_edge_candidates(
     p = vertices[vertex]
     to_next = _unit(vertices[following[vertex]] - p)
     to_previous = _unit(vertices[previous[vertex]] - p)
-    inward = np.stack([to_previous[:, 1] - to_next[:, 1], to_next[:, 0] - to_previous[:, 0]], axis=1)
+    inward = _inward(assembly, vertices, vertex)
     outside = (
         ((to_next * normal).sum(axis=1) >= -LARGEST_LEAN)
         & ((to_previous * normal).sum(axis=1) >= -LARGEST_LEAN)
@@ -260,8 +260,19 @@ def _through_this_face(
         tangent = _unit(vertices[following[neighbour]] - vertices[neighbour])
         rest = vertices[vertex[k]] - vertices[neighbour]
         beside = rest[:, 0] * tangent[:, 1] - rest[:, 1] * tangent[:, 0]
-        through[k] &= ~(assembly.convex_vertex[shared] & (beside > gap[k] + end[k]))
+        # The block of a corner that came through the neighbouring face lies on that face's side.
+        inward = _inward(assembly, vertices, vertex[k])
+        from_there = inward[:, 0] * tangent[:, 1] - inward[:, 1] * tangent[:, 0] > 0.0
+        through[k] &= ~(assembly.convex_vertex[shared] & from_there & (beside > gap[k] + end[k]))
     return through
+
+
+def _inward(assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray) -> np.ndarray:
+    """(n, 2) array: from each corner into its block, half-way between the flanks."""
+    p = vertices[vertex]
+    to_next = _unit(vertices[assembly.next_vertex[vertex]] - p)
+    to_previous = _unit(vertices[assembly.previous_vertex[vertex]] - p)
+    return np.stack([to_previous[:, 1] - to_next[:, 1], to_next[:, 0] - to_previous[:, 0]], axis=1)
 
 
 def _settle_ends(

@@ -52,7 +52,7 @@ CLOSINGS = 4
 #: this part of the increment's movement may stay (the next program sees them, so they do not add up), and penetration
 #: of this part of the smallest block. In programs too large for vertex solutions, whose interior solutions say less
 #: clearly what sticks, ten times as much of either.
-GAP_LEFT, GAP_LEFT_LARGE, PENETRATION_LEFT = 1e-2, 1e-1, 1e-6
+GAP_LEFT, GAP_LEFT_LARGE, PENETRATION_LEFT = 1e-2, 1e-1, 5e-7
 
 #: Part of the expected lift that is taken off: all of it could end in penetration, which a wedge locked by friction
 #: cannot give back.
