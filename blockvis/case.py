@@ -234,7 +234,7 @@ def parse_case(text: str, source: Path) -> Case:
         settlements=tuple(_settlement(entry) for entry in top.tables("settlement")),
         loads=tuple(_load(entry) for entry in top.tables("loads")),
         analysis=analysis.text("kind", "settlement", among=ANALYSES),
-        controls=_controls(analysis),
+        controls=_controls(analysis, geometry.number("overlap_tolerance", positive=True)),
         animation=animation or None,
     )
     for table in (geometry, material, analysis, output, top):
@@ -311,7 +311,7 @@ def _load(table: _Table) -> LoadCase:
     return load
 
 
-def _controls(table: _Table) -> solver.Controls:
+def _controls(table: _Table, overlap_tolerance: float | None) -> solver.Controls:
     default = solver.Controls()
     counts = {}
     for key in ("event_refinement", "correctors", "falling_frames"):
@@ -319,7 +319,8 @@ def _controls(table: _Table) -> solver.Controls:
         if value < (0 if key == "falling_frames" else 1) or value != int(value):
             raise table.error(key, f"is {value:g}; give a whole number")
         counts[key] = int(value)
-    return solver.Controls(trust_region=table.number("trust_region", positive=True), **counts)
+    trust_region = table.number("trust_region", positive=True)
+    return solver.Controls(trust_region=trust_region, overlap_tolerance=overlap_tolerance, **counts)
 
 
 def case_assembly(case: Case) -> solver.Assembly:

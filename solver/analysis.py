@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .assembly import Assembly
+from .assembly import Assembly, check_blocks
 from .contact import InterfaceLaw, Interfaces
 from .correction import Falls, NotConverged, at_rest, corrected, solve_again
 from .kinematics import Pose, moved, moved_vertices
@@ -122,26 +122,33 @@ def settle(
     interfaces = interfaces or Interfaces(InterfaceLaw(friction_coefficient))
     loads = checked_loads(assembly, loads)
     steps = settlement_increments(assembly, phases, interfaces=interfaces, loads=loads, controls=controls)
-    increments = []
-    while True:
-        try:
-            increment = next(steps)
-        except StopIteration as stop:
-            ending: Ending = stop.value
-            break
-        increments.append(increment)
-        if on_increment is not None:
-            on_increment(increment)
+    increments, ending = drained(steps, on_increment)
     return Response(
         assembly=assembly,
         settlements=phases,
         interfaces=interfaces,
         loads=loads,
-        increments=tuple(increments),
+        increments=increments,
         stop=ending.stop,
         message=ending.message,
         collapse=ending.collapse,
     )
+
+
+def drained(
+    steps: Generator[Increment, None, Ending], on_increment: Callable[[Increment], None] | None = None
+) -> tuple[tuple[Increment, ...], Ending]:
+    """All increments of a loop and how it ended; ``on_increment`` is called with each as it is found."""
+    increments: list[Increment] = []
+    while True:
+        try:
+            increment = next(steps)
+        except StopIteration as stop:
+            ending: Ending = stop.value
+            return tuple(increments), ending
+        increments.append(increment)
+        if on_increment is not None:
+            on_increment(increment)
 
 
 def settlement_increments(
@@ -415,25 +422,11 @@ def check_settlement(assembly: Assembly, phases: Sequence[Settlement], controls:
     controls = controls or Controls()
     if not phases:
         raise ValueError("no settlement was given; give one Settlement, or several phases")
-    if not assembly.free.any():
-        raise ValueError(f"all {assembly.n_blocks} blocks are supports; at least one must be free")
     for number, phase in enumerate(phases):
         if not phase.taking_part(assembly).any():
             which = f"settlement phase {number + 1}" if len(phases) > 1 else "the settlement"
             raise ValueError(f"{which} moves no support: give at least one block the role 'moving'")
-    tolerance = (
-        1e-3 * float(assembly.widths.min()) if controls.overlap_tolerance is None else controls.overlap_tolerance
-    )
-    i, j, depth = overlap_depths(assembly.vertices, assembly.offsets, tolerance)
-    real = np.flatnonzero(assembly.free[i] | assembly.free[j])
-    if len(real):
-        k = int(real[np.argmax(depth[real])])
-        a, b = int(i[k]), int(j[k])
-        more = f" ({len(real) - 1} more pairs overlap)" if len(real) > 1 else ""
-        raise ValueError(
-            f"block {a} ('{assembly.names[a]}') overlaps block {b} ('{assembly.names[b]}') by {depth[k]:.3g} m{more}; "
-            f"move them apart or raise overlap_tolerance ({tolerance:.3g} m)"
-        )
+    check_blocks(assembly, controls.overlap_tolerance)
 
 
 def _lever(assembly: Assembly, phase: Settlement, start: Pose) -> float:

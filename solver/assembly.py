@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .polygons import polygon_integrals, self_crossings
+from .polygons import overlap_depths, polygon_integrals, self_crossings
 
-__all__ = ["FIXED", "FREE", "MOVING", "ROLES", "Assembly"]
+__all__ = ["FIXED", "FREE", "MOVING", "ROLES", "Assembly", "check_blocks"]
 
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 
@@ -224,6 +224,35 @@ class Assembly:
                 f"give {self.n_blocks} roles out of {', '.join(ROLES)}; found {len(roles)}, {unknown or ''}"
             )
         return replace(self, roles=np.array(list(map(str, roles)), dtype="<U6"))
+
+
+def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> None:
+    """Refuses an assembly without free blocks, or with blocks that overlap, before anything is solved.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    overlap_tolerance : float, optional [m]
+        Overlap that is accepted; a thousandth of the width of the thinnest block by default.
+
+    Raises
+    ------
+    ValueError
+        Names both blocks and the depth.
+    """
+    if not assembly.free.any():
+        raise ValueError(f"all {assembly.n_blocks} blocks are supports; at least one must be free")
+    tolerance = 1e-3 * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
+    i, j, depth = overlap_depths(assembly.vertices, assembly.offsets, tolerance)
+    real = np.flatnonzero(assembly.free[i] | assembly.free[j])
+    if len(real):
+        k = int(real[np.argmax(depth[real])])
+        a, b = int(i[k]), int(j[k])
+        more = f" ({len(real) - 1} more pairs overlap)" if len(real) > 1 else ""
+        raise ValueError(
+            f"block {a} ('{assembly.names[a]}') overlaps block {b} ('{assembly.names[b]}') by {depth[k]:.3g} m{more}; "
+            f"move them apart or raise overlap_tolerance ({tolerance:.3g} m)"
+        )
 
 
 def _next(offsets: np.ndarray) -> np.ndarray:

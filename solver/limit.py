@@ -9,17 +9,16 @@ from enum import StrEnum
 import numpy as np
 import scipy.sparse as sp
 
-from .assembly import Assembly
+from .assembly import Assembly, check_blocks
 from .contact import Contacts, InterfaceLaw, Interfaces, find_contacts
 from .equilibrium import cone_rays, equilibrium_matrix
 from .kinematics import Pose, moved_vertices
 from .loads import Loads, checked_loads
 from .lp import LinearProgram, Unbounded, solve_lp
-from .polygons import overlap_depths
 from .program import FALLING_FRACTION, point_velocities
 from .response import Certificate, Increment, Status
 
-__all__ = ["Envelope", "LimitLoad", "LimitStatus", "check_blocks", "checked_live", "limit_load", "limit_load_envelope"]
+__all__ = ["Envelope", "LimitLoad", "LimitStatus", "checked_live", "limit_load", "limit_load_envelope"]
 
 #: Largest gap of a closed contact point: in the drawing, as a fraction of the width of the thinnest block, the accuracy
 #: also accepted for overlaps; at a computed pose, as a fraction of the block size, a hundred times its accuracy.
@@ -506,19 +505,3 @@ def checked_live(assembly: Assembly, loads: Loads) -> Loads:
     if not live.any():
         raise ValueError("no live load acts on any free block; give Loads whose 'live' is not zero")
     return replace(loads, live=live)
-
-
-def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> None:
-    """Refuses an assembly without free blocks, or whose blocks overlap by more than the tolerance [m]."""
-    if not assembly.free.any():
-        raise ValueError(f"all {assembly.n_blocks} blocks are supports; at least one must be free")
-    tolerance = 1e-3 * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
-    i, j, depth = overlap_depths(assembly.vertices, assembly.offsets, tolerance)
-    real = np.flatnonzero(assembly.free[i] | assembly.free[j])
-    if len(real):
-        k = int(real[np.argmax(depth[real])])
-        a, b = int(i[k]), int(j[k])
-        raise ValueError(
-            f"block {a} ('{assembly.names[a]}') overlaps block {b} ('{assembly.names[b]}') by {depth[k]:.3g} m; "
-            f"move them apart or raise overlap_tolerance ({tolerance:.3g} m)"
-        )

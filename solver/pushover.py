@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .analysis import Controls, Ending
-from .assembly import Assembly
+from .analysis import Controls, Ending, drained
+from .assembly import Assembly, check_blocks
 from .contact import InterfaceLaw, Interfaces
 from .correction import GEOMETRY_TOLERANCE, Falls, NotConverged, at_rest, corrected, solve_again
 from .kinematics import Pose, moved, rotation_matrices
-from .limit import check_blocks, checked_live
+from .limit import checked_live
 from .loads import Loads
 from .lp import SolveError
 from .program import Locked, Model, Solved, point_velocities, solve_program
@@ -182,22 +182,13 @@ def pushover(
     """
     interfaces = interfaces or Interfaces(InterfaceLaw(friction_coefficient))
     steps = pushover_increments(assembly, control, loads=loads, interfaces=interfaces, controls=controls, pose=pose)
-    increments = []
-    while True:
-        try:
-            increment = next(steps)
-        except StopIteration as stop:
-            ending: Ending = stop.value
-            break
-        increments.append(increment)
-        if on_increment is not None:
-            on_increment(increment)
+    increments, ending = drained(steps, on_increment)
     return Response(
         assembly=assembly,
         settlements=(control,),  # type: ignore[arg-type]  # stands in for a settlement of no support
         interfaces=interfaces,
         loads=loads,
-        increments=tuple(increments),
+        increments=increments,
         stop=ending.stop,
         message=ending.message,
         collapse=ending.collapse,
