@@ -148,24 +148,36 @@ def _descended(model: Model, start: Pose) -> Pose:
     solved, pose = solve_program(slow, start), start
     for _ in range(round(2.0 / DESCENT_STEP)):
         if not solved.falling and _size(model, solved.motion) <= STILL * model.length:
-            return pose
+            break
         pose = moved(pose, solved.motion)
         solved = solve_again(slow, pose, solved)
     if solved.falling or np.abs(pose.positions - start.positions).max() > model.length / 2.0:
         raise Falls(solved)
+    return _without_penetration(model, pose, solved)
+
+
+def _without_penetration(model: Model, pose: Pose, solved: Solved) -> Pose:
+    """The pose with what the last steps left of penetration closed, as far as a few programs can."""
+    for _ in range(2 * CLOSINGS):
+        pose, contacts, _ = _closed(model, pose, solved)
+        if float(-contacts.gaps.min(initial=0.0)) <= PENETRATION_LEFT * float(np.sqrt(model.assembly.areas.min())):
+            break
+        drift, _ = _carried(model.assembly, contacts, solved)
+        solved = closing_program(model, pose, contacts, drift, solved)
+        pose = _moved_freely(model, pose, solved)
     return pose
 
 
 def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, nudge: np.ndarray | None) -> Pose:
-    tolerance = GEOMETRY_TOLERANCE * model.length
+    tolerance = exact = GEOMETRY_TOLERANCE * model.length
     large = 3 * int(model.assembly.free.sum()) > CROSSOVER_ROWS
     enough = max(tolerance, (GAP_LEFT_LARGE if large else GAP_LEFT) * _size(model, solved.motion))
     deepest = PENETRATION_LEFT * float(np.sqrt(model.assembly.areas.min())) * (10.0 if large else 1.0)
     closings = 0
     for attempt in range(correctors):
         pose, contacts, error = _closed(model, pose, solved)
-        if attempt >= CLOSINGS and error <= enough and float(-contacts.gaps.min(initial=0.0)) <= deepest:
-            tolerance = enough
+        shallow = float(-contacts.gaps.min(initial=0.0)) <= deepest
+        tolerance = enough if attempt >= CLOSINGS and shallow else exact
         if error <= tolerance and nudge is None:
             return pose
         drift, allowance = _carried(model.assembly, contacts, solved)
