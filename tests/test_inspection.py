@@ -10,7 +10,7 @@ import solver
 from blockvis.drawing import save_layout
 from blockvis.inspection import draw_inspection, inspect
 
-FACADE = Path("/work/shared/data/facade/facade.dxf")
+FACADE = Path(__file__).resolve().parents[2] / "shared" / "data" / "facade" / "facade.dxf"
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from blockvis.drawing import assemble, read_drawing
 from blockvis.facing import facing_edges, proposed_thickness
 from blockvis.joints import close_joints
 
-FACADE = Path("/work/shared/data/facade/facade.dxf")
+FACADE = Path(__file__).resolve().parents[2] / "shared" / "data" / "facade" / "facade.dxf"
 needs_facade = pytest.mark.skipif(not FACADE.exists(), reason="third-party drawing, not part of the project")
 
 
