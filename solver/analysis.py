@@ -165,7 +165,11 @@ def settlement_increments(
     """
     controls = controls or Controls()
     check_settlement(assembly, phases, controls)
-    steps = _increments(_model(assembly, phases, interfaces, loads, controls), phases, controls)
+    return (yield from timed(_increments(_model(assembly, phases, interfaces, loads, controls), phases, controls)))
+
+
+def timed(steps: Generator[Increment, None, Ending]) -> Generator[Increment, None, Ending]:
+    """The same increments with the seconds each took, not counting what whoever listens takes in between."""
     while True:
         started = time.perf_counter()
         try:
@@ -173,7 +177,6 @@ def settlement_increments(
         except StopIteration as stop:
             ending: Ending = stop.value
             return ending
-        # Not the time that whoever listens takes between two increments.
         yield replace(increment, seconds=time.perf_counter() - started)
 
 

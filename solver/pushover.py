@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .analysis import Controls, Ending, drained
+from .analysis import Controls, Ending, drained, timed
 from .assembly import Assembly, check_blocks
 from .contact import InterfaceLaw, Interfaces
 from .correction import GEOMETRY_TOLERANCE, Falls, NotConverged, at_rest, corrected, solve_again
@@ -210,15 +209,8 @@ def pushover_increments(
     loads = checked_live(assembly, loads)
     if not assembly.free[assembly.index(control.block)]:
         raise ValueError(f"control block '{control.block}' is a support; name a free block")
-    steps = _increments(_model(assembly, control, interfaces, loads, controls), control, controls, pose)
-    while True:
-        started = time.perf_counter()
-        try:
-            increment = next(steps)
-        except StopIteration as stop:
-            ending: Ending = stop.value
-            return ending
-        yield replace(increment, seconds=time.perf_counter() - started)
+    model = _model(assembly, control, interfaces, loads, controls)
+    return (yield from timed(_increments(model, control, controls, pose)))
 
 
 def _model(
