@@ -57,9 +57,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     verbs = parser.add_subparsers(required=True, metavar="VERB")
     run = verbs.add_parser("run", help="solve a case, write everything, draw")
-    run.add_argument("case", metavar="CASE.toml")
+    run.add_argument("case", metavar="CASE.toml", nargs="?")
     run.add_argument("-o", "--output", metavar="OUT", help="results folder (default: <case>-results)")
     run.add_argument("--force", action="store_true", help="replace results that are there already")
+    run.add_argument(
+        "--resume", metavar="OUT", help="go on with the run in this results folder, however it was stopped"
+    )
     run.set_defaults(verb=_run)
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
     info.add_argument("file", metavar="FILE")
@@ -96,14 +99,24 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from .run import run_case
+    from .run import resume_run, run_case
 
-    run = run_case(options.case, options.output, overwrite=options.force)
+    if options.resume is not None:
+        if options.case is not None or options.output is not None or options.force:
+            raise ValueError("--resume takes the results folder alone; the case is stored in it")
+        run = resume_run(options.resume)
+        if run.had_finished:
+            print(f"blockvis: this run had finished ({run.response.stop}); nothing was left to solve", file=sys.stderr)
+    elif options.case is None:
+        raise ValueError("name a case file: blockvis run CASE.toml, or go on with a run: blockvis run --resume OUT")
+    else:
+        run = run_case(options.case, options.output, overwrite=options.force)
     print(_in_words(run.response, run.folder))
     for problem in run.missing:
         print(f"blockvis: everything but the pictures is written: {problem}", file=sys.stderr)
     stop = run.response.stop
     if stop is solver.Status.INTERRUPTED:
+        print(f"blockvis: go on with it by blockvis run --resume {run.folder}", file=sys.stderr)
         return INTERRUPTED
     if stop is solver.Status.SOLVER_FAILED:
         return SOLVER_FAILED

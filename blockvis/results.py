@@ -6,16 +6,19 @@ import csv
 import io
 import json
 import os
-import platform
 import time
-from collections.abc import Mapping, Sequence
-from importlib.metadata import PackageNotFoundError, version
+import weakref
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import solver
+
+from .record import RECORD, Record, read_record, versions
+from .stored_values import packed, unpacked
 
 __all__ = ["ResultsExist", "ResultsFolder", "open_results", "stored_case", "summary_of", "write"]
 
@@ -41,6 +44,18 @@ COLUMNS = (
 )
 
 
+#: Where a run can go on from, beside the increments it belongs to.
+CHECKPOINT = "checkpoint.npz"
+
+#: Files that list or sum up others; what a run starts with; pictures of the results.
+_LISTS = ("summary.json", "response.csv", "blocks.pvd", "contacts.pvd")
+_STARTED = (RECORD, CHECKPOINT, "assembly.npz")
+_PICTURES = (
+    *("report.html", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
+    *(f"collapse{suffix}" for suffix in (".mp4", ".gif", ".webp")),
+)
+
+
 class ResultsExist(ValueError):
     """The results folder holds a run already."""
 
@@ -63,60 +78,147 @@ class ResultsFolder:
     ----------
     path : str or Path
     assembly : solver.Assembly
-    case_text : str
-        The case file, kept in the summary.
+    record : Record, optional
+        What the run is made from.
     overwrite : bool
         Whether results that are there already may be replaced.
 
     Raises
     ------
     ResultsExist
-        If the folder holds results and ``overwrite`` is false.
+        If the folder holds results and ``overwrite`` is false, or another run is writing to it.
+
+    Notes
+    -----
+    The checkpoint is written last of what belongs to an increment: whatever a killed run has left beyond it is taken
+    away when the run goes on.
     """
 
     def __init__(
-        self, path: str | Path, assembly: solver.Assembly, *, case_text: str = "", overwrite: bool = False
+        self, path: str | Path, assembly: solver.Assembly, *, record: Record | None = None, overwrite: bool = False
     ) -> None:
-        self.path, self.assembly, self.case_text = Path(path), assembly, case_text
-        if not overwrite and ((self.path / "summary.json").exists() or (self.path / "increments").exists()):
-            raise ResultsExist(f"'{self.path}' holds results already; choose another folder with -o or add --force")
-        (self.path / "increments").mkdir(parents=True, exist_ok=True)
-        for old in [*self.path.glob("increments/*.vtu"), *self.path.glob("increments/*.npz")]:
-            old.unlink()
-        for name in ("summary.json", "response.csv", "blocks.pvd", "contacts.pvd"):
-            (self.path / name).unlink(missing_ok=True)
+        self.path, self.assembly, self.record = Path(path), assembly, record or Record(versions=versions())
         self.increments: list[solver.Increment] = []
-        self._rows = io.StringIO()
-        self._table = csv.writer(self._rows, lineterminator="\n")
-        self._table.writerow(COLUMNS)
+        if not overwrite and ((self.path / "summary.json").exists() or (self.path / "increments").exists()):
+            unfinished = not (self.path / "summary.json").exists() and (self.path / RECORD).exists()
+            go_on = f"go on with it by blockvis run --resume {self.path}, " if unfinished else ""
+            raise ResultsExist(
+                f"'{self.path}' holds results already; {go_on}choose another folder with -o or add --force"
+            )
+        (self.path / "increments").mkdir(parents=True, exist_ok=True)
+        self._release = _held(self, self.path)
+        # What lists others goes first, so that nothing ever points to a file that is gone.
+        for name in (*_LISTS, *_PICTURES, *_STARTED):
+            (self.path / name).unlink(missing_ok=True)
+        self._remove_from(0)
         _written(self.path / "assembly.npz", _packed(_assembly_arrays(assembly)))
+        _written(self.path / RECORD, self.record.text())
+        self._start_table()
+
+    @classmethod
+    def reopened(cls, path: str | Path) -> tuple[ResultsFolder, solver.Checkpoint | None]:
+        """The folder of a run that was stopped, as it was after its last checkpoint, and that checkpoint.
+
+        Raises
+        ------
+        ValueError
+            If the folder holds no run.
+        """
+        results = cls.__new__(cls)
+        results.path = Path(path)
+        results.record = read_record(results.path)
+        results.assembly = _stored_assembly(results.path)
+        results._release = _held(results, results.path)
+        results.increments, checkpoint, count = [], None, 0
+        stored = results.path / CHECKPOINT
+        if stored.is_file():
+            try:
+                checkpoint, extra = unpacked(stored.read_bytes(), solver.Checkpoint)
+                count = int(extra["increments"])
+                results.increments = [_stored_increment(results.path, k) for k in range(count)]
+            except (ValueError, KeyError, OSError) as error:
+                raise ValueError(f"'{results.path}' cannot go on ({error}); run the case again with --force") from None
+        (results.path / "summary.json").unlink(missing_ok=True)
+        results._start_table()
+        for number, increment in enumerate(results.increments):
+            results._add_row(number, increment)
+        results._write_lists()
+        results._remove_from(count)
+        return results, checkpoint
 
     def add(self, increment: solver.Increment) -> None:
-        """Writes one increment: its VTU files, its row, and PVD files that list everything so far."""
-        from .datasets import block_dataset, contact_dataset, output_times
-        from .vtkxml import write_pvd, write_vtu
+        """Writes one increment: its VTU files, its row, PVD files that list everything so far, and where to go on."""
+        from .datasets import block_dataset, contact_dataset
+        from .vtkxml import write_vtu
 
         number = len(self.increments)
-        self.increments.append(increment)
+        self.increments.append(replace(increment, checkpoint=None))
         folder = self.path / "increments"
         write_vtu(block_dataset(self.assembly, increment), folder / f"blocks_{number:05d}.vtu")
         write_vtu(contact_dataset(self.assembly, increment), folder / f"contacts_{number:05d}.vtu")
         _written(folder / f"state_{number:05d}.npz", _packed(_increment_arrays(increment)))
+        self._add_row(number, increment)
+        self._write_lists()
+        if increment.checkpoint is not None:
+            _written(self.path / CHECKPOINT, packed(increment.checkpoint, increments=number + 1))
+
+    def finish(self, response: solver.Response, seconds: float) -> dict[str, Any]:
+        """Writes and returns the summary."""
+        self._write_lists()
+        summary = summary_of(response, seconds=seconds, record=self.record)
+        _written(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
+        self._release()
+        return summary
+
+    def _start_table(self) -> None:
+        self._rows = io.StringIO()
+        self._table = csv.writer(self._rows, lineterminator="\n")
+        self._table.writerow(COLUMNS)
+
+    def _add_row(self, number: int, increment: solver.Increment) -> None:
+        if increment.status == solver.Status.EQUILIBRIUM:
+            self._table.writerow(_row(number, increment, solver.total_weight(self.assembly)))
+
+    def _write_lists(self) -> None:
+        """The table and the lists of files, of everything so far."""
+        from .datasets import output_times
+        from .vtkxml import write_pvd
+
+        _written(self.path / "response.csv", self._rows.getvalue())
         times = output_times(self.increments)
         for kind in ("blocks", "contacts"):
             entries = [(t, f"increments/{kind}_{i:05d}.vtu") for i, t in enumerate(times)]
             write_pvd(self.path / f"{kind}.pvd", entries)
-        if increment.status == solver.Status.EQUILIBRIUM:
-            self._table.writerow(_row(number, increment, solver.total_weight(self.assembly)))
-            _written(self.path / "response.csv", self._rows.getvalue())
 
-    def finish(self, response: solver.Response, seconds: float) -> dict[str, Any]:
-        """Writes and returns the summary."""
-        if not response.path:
-            _written(self.path / "response.csv", self._rows.getvalue())
-        summary = summary_of(response, seconds=seconds, case_text=self.case_text)
-        _written(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
-        return summary
+    def _remove_from(self, count: int) -> None:
+        """Removes the files of increments from a number on, and what was being written when a run was killed."""
+        folder = self.path / "increments"
+        for old in [*folder.glob("*.vtu"), *folder.glob("*.npz")]:
+            number = old.stem.rpartition("_")[2]
+            if not old.name.startswith(".") and number.isdigit() and int(number) >= count:
+                old.unlink()
+        for half in (*self.path.glob(".*.part*"), *folder.glob(".*.part*")):
+            half.unlink()
+
+
+def _held(owner: ResultsFolder, folder: Path) -> Callable[[], None]:
+    """Holds the folder for one run, until what is returned is called or the process ends, however it ends."""
+    try:
+        import fcntl
+    except ImportError:
+        return lambda: None
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        raise ResultsExist(
+            f"another run is writing to '{folder}'; wait for it, end it, or choose another folder with -o"
+        ) from None
+    except OSError:
+        # A file system without locks: then the user has to know.
+        pass
+    return weakref.finalize(owner, os.close, handle)
 
 
 def write(response: solver.Response, folder: str | Path, *, overwrite: bool = False) -> Path:
@@ -140,7 +242,7 @@ def write(response: solver.Response, folder: str | Path, *, overwrite: bool = Fa
     return results.path
 
 
-def summary_of(response: solver.Response, *, seconds: float, case_text: str = "") -> dict[str, Any]:
+def summary_of(response: solver.Response, *, seconds: float, record: Record) -> dict[str, Any]:
     """What summary.json holds; every length in m, force in N, angle in rad.
 
     Parameters
@@ -148,7 +250,8 @@ def summary_of(response: solver.Response, *, seconds: float, case_text: str = ""
     response : solver.Response
     seconds : float
         Solver time.
-    case_text : str
+    record : Record
+        What the run was made from.
     """
     path, collapse = response.path, response.collapse
     worst = {
@@ -181,19 +284,10 @@ def summary_of(response: solver.Response, *, seconds: float, case_text: str = ""
         "largest_residuals": worst,
         "seconds": seconds,
         "finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-        "versions": _versions(),
-        "case": case_text,
+        "versions": record.versions,
+        "inputs": record.inputs(),
+        "case": record.case,
     }
-
-
-def _versions() -> dict[str, str]:
-    found = {"python": platform.python_version(), "platform": platform.platform()}
-    for name in ("blockvis", "numpy", "scipy", "highspy", "pyvista", "vtk", "meshio"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
 
 
 def _row(number: int, increment: solver.Increment, weight: float) -> Sequence[Any]:
@@ -269,12 +363,33 @@ def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
     )
 
 
+def _stored_assembly(folder: Path) -> solver.Assembly:
+    if not (folder / "assembly.npz").is_file():
+        raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
+    with np.load(folder / "assembly.npz", allow_pickle=False) as stored:
+        return solver.Assembly(
+            vertices=stored["vertices"],
+            offsets=stored["offsets"],
+            names=tuple(map(str, stored["names"])),
+            roles=stored["roles"],
+            density=stored["density"],
+            thickness=stored["thickness"],
+            materials=tuple(map(str, stored["materials"])),
+        )
+
+
+def _stored_increment(folder: Path, number: int) -> solver.Increment:
+    with np.load(folder / "increments" / f"state_{number:05d}.npz", allow_pickle=False) as stored:
+        return _increment_of(stored)
+
+
 def stored_case(folder: str | Path) -> str:
     """Text of the case that a results folder was written from; empty where it was written from Python."""
-    summary = Path(folder) / "summary.json"
-    if not summary.is_file():
-        return ""
-    return str(json.loads(summary.read_text(encoding="utf-8")).get("case", ""))
+    for name in ("summary.json", RECORD):
+        file = Path(folder) / name
+        if file.is_file():
+            return str(json.loads(file.read_text(encoding="utf-8")).get("case", ""))
+    return ""
 
 
 def open_results(folder: str | Path) -> solver.Response:
@@ -297,29 +412,16 @@ def open_results(folder: str | Path) -> solver.Response:
     from .case import case_interfaces, case_loads, parse_case
 
     folder = Path(folder)
-    if not (folder / "assembly.npz").is_file():
-        raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
-    with np.load(folder / "assembly.npz", allow_pickle=False) as stored:
-        assembly = solver.Assembly(
-            vertices=stored["vertices"],
-            offsets=stored["offsets"],
-            names=tuple(map(str, stored["names"])),
-            roles=stored["roles"],
-            density=stored["density"],
-            thickness=stored["thickness"],
-            materials=tuple(map(str, stored["materials"])),
-        )
-    increments = []
-    for file in sorted((folder / "increments").glob("state_*.npz")):
-        with np.load(file, allow_pickle=False) as stored:
-            increments.append(_increment_of(stored))
+    assembly = _stored_assembly(folder)
+    increments = [_stored_increment(folder, k) for k in range(len(list((folder / "increments").glob("state_*.npz"))))]
     summary = {}
     if (folder / "summary.json").is_file():
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     settlements: tuple[solver.Settlement, ...] = ()
     interfaces, loads = solver.Interfaces(), solver.self_weight(assembly)
-    if summary.get("case"):
-        case = parse_case(summary["case"], folder / "case.toml")
+    text = stored_case(folder)
+    if text:
+        case = parse_case(text, folder / "case.toml")
         settlements, interfaces, loads = case.settlements, case_interfaces(case), case_loads(case, assembly)
     stop = solver.Status(summary.get("status", solver.Status.INTERRUPTED))
     return solver.Response(

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import warnings
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import solver
 
-from .case import Case, case_assembly, case_interfaces, case_loads, read_case
+from .case import Case, case_assembly, case_interfaces, case_loads, parse_case, read_case
 from .progress import Progress
-from .results import ResultsFolder
+from .record import read_record, record_of
+from .results import ResultsFolder, open_results
 
-__all__ = ["Run", "draw_results", "run_case"]
+__all__ = ["Run", "draw_results", "resume_run", "run_case"]
 
 
 @dataclass(frozen=True)
@@ -27,12 +31,15 @@ class Run:
         What summary.json holds.
     missing : tuple of str
         What could not be drawn, and why.
+    had_finished : bool
+        Whether there was nothing left to solve when it was asked to go on.
     """
 
     response: solver.Response
     folder: Path
     summary: dict[str, Any]
     missing: tuple[str, ...] = field(default=())
+    had_finished: bool = False
 
 
 def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overwrite: bool = False) -> Run:
@@ -60,12 +67,80 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
         case = read_case(case)
     folder = Path(f"{case.source.stem}-results") if folder is None else Path(folder)
     assembly = case_assembly(case)
-    interfaces, loads = case_interfaces(case), case_loads(case, assembly)
-    steps = solver.settlement_increments(
-        assembly, case.settlements, interfaces=interfaces, loads=loads, controls=case.controls
-    )
+    steps = _steps(case, assembly)
     solver.check_settlement(assembly, case.settlements, case.controls)
-    results = ResultsFolder(folder, assembly, case_text=case.text, overwrite=overwrite)
+    results = ResultsFolder(folder, assembly, record=record_of(case), overwrite=overwrite)
+    return _followed(case, results, steps)
+
+
+def resume_run(folder: str | Path) -> Run:
+    """Goes on with a run that was stopped, from its results folder alone, to the result it would have had.
+
+    Parameters
+    ----------
+    folder : str or Path
+        That a run has written, whatever ended it.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    ValueError
+        If the folder holds no run, or one that was made from Python and cannot be followed again.
+
+    Notes
+    -----
+    A settlement goes on from its last equilibrium; what has no checkpoint starts again. Files of the case that have
+    changed are named in a warning, and not read again. Of a run that has finished, what is not drawn yet is drawn.
+    """
+    folder = Path(folder)
+    record = read_record(folder)
+    if not record.case:
+        raise ValueError(f"'{folder}' was written from Python, without a case file; run it again from there")
+    case = parse_case(record.case, Path(record.case_file or folder / "case.toml"))
+    finished = _finished(folder)
+    if finished is not None:
+        response = open_results(folder)
+        missing: tuple[str, ...] = ()
+        if not all((folder / name).is_file() for name in _drawn(case)):
+            missing = draw_results(response, folder, animation=case.animation, case_text=case.text)
+        return Run(response, folder, finished, missing, had_finished=True)
+    for note in record.changes():
+        warnings.warn(note, stacklevel=2)
+    results, checkpoint = ResultsFolder.reopened(folder)
+    return _followed(case, results, _steps(case, results.assembly, checkpoint))
+
+
+def _finished(folder: Path) -> dict[str, Any] | None:
+    """The summary of a run that came to its end; None where it was stopped."""
+    if not (folder / "summary.json").is_file():
+        return None
+    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    return None if summary["status"] == solver.Status.INTERRUPTED else summary
+
+
+def _drawn(case: Case) -> list[str]:
+    return ["report.html", "mechanism.png", *([case.animation] if case.animation else [])]
+
+
+def _steps(
+    case: Case, assembly: solver.Assembly, resume: solver.Checkpoint | None = None
+) -> Generator[solver.Increment, None, solver.Ending]:
+    return solver.settlement_increments(
+        assembly,
+        case.settlements,
+        interfaces=case_interfaces(case),
+        loads=case_loads(case, assembly),
+        controls=case.controls,
+        resume=resume,
+    )
+
+
+def _followed(case: Case, results: ResultsFolder, steps: Generator[solver.Increment, None, solver.Ending]) -> Run:
+    """Follows the increments to their end or to Ctrl-C, writing each, and draws what came out."""
+    folder, assembly = results.path, results.assembly
     progress = Progress(case.settlements)
     ending = solver.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
     try:
@@ -84,8 +159,8 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
     response = solver.Response(
         assembly=assembly,
         settlements=case.settlements,
-        interfaces=interfaces,
-        loads=loads,
+        interfaces=case_interfaces(case),
+        loads=case_loads(case, assembly),
         increments=tuple(results.increments),
         stop=ending.stop,
         message=ending.message,

@@ -14,6 +14,7 @@ This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 
 from .analysis import Controls, Ending, check_settlement, settle, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly
+from .checkpoint import Checkpoint
 from .contact import Contacts, InterfaceLaw, Interfaces, find_contacts, measure_contacts
 from .kinematics import Pose, moved_vertices
 from .limit import Envelope, LimitLoad, LimitStatus, limit_load, limit_load_envelope
@@ -33,6 +34,7 @@ __all__ = [
     "ROLES",
     "Assembly",
     "Certificate",
+    "Checkpoint",
     "Collapse",
     "ContactState",
     "Contacts",

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .assembly import Assembly, check_blocks
+from .checkpoint import Checkpoint, Place
 from .contact import InterfaceLaw, Interfaces
 from .correction import Falls, NotConverged, at_rest, corrected, solve_again
 from .kinematics import Pose, moved, moved_vertices
@@ -146,6 +147,7 @@ def drained(
         except StopIteration as stop:
             ending: Ending = stop.value
             return tuple(increments), ending
+        increment = replace(increment, checkpoint=None)
         increments.append(increment)
         if on_increment is not None:
             on_increment(increment)
@@ -158,14 +160,27 @@ def settlement_increments(
     interfaces: Interfaces,
     loads: Loads,
     controls: Controls | None = None,
+    resume: Checkpoint | None = None,
 ) -> Generator[Increment, None, Ending]:
     """The increment loop of :func:`settle` as a generator: yields each Increment, returns the Ending.
 
     Parameters are those of :func:`settle`. Everything found so far has been yielded whenever it is interrupted.
+
+    Parameters
+    ----------
+    resume : Checkpoint, optional
+        Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
+        for bit as if the loop had not been interrupted.
     """
     controls = controls or Controls()
     check_settlement(assembly, phases, controls)
-    return (yield from timed(_increments(_model(assembly, phases, interfaces, loads, controls), phases, controls)))
+    if resume is not None and (resume.phase >= len(phases) or len(resume.here.pose.rotations) != assembly.n_blocks):
+        raise ValueError(
+            f"the checkpoint is of phase {resume.phase + 1} with {len(resume.here.pose.rotations)} blocks; there are "
+            f"{len(phases)} phases and {assembly.n_blocks} blocks: it belongs to another run"
+        )
+    model = _model(assembly, phases, interfaces, loads, controls)
+    return (yield from timed(_increments(model, phases, controls, resume)))
 
 
 def timed(steps: Generator[Increment, None, Ending]) -> Generator[Increment, None, Ending]:
@@ -180,19 +195,22 @@ def timed(steps: Generator[Increment, None, Ending]) -> Generator[Increment, Non
         yield replace(increment, seconds=time.perf_counter() - started)
 
 
-def _increments(model: Model, phases: Sequence[Settlement], controls: Controls) -> Generator[Increment, None, Ending]:
+def _increments(
+    model: Model, phases: Sequence[Settlement], controls: Controls, resume: Checkpoint | None
+) -> Generator[Increment, None, Ending]:
     assembly = model.assembly
     pose = Pose.initial(assembly)
     try:
         # Gaps and overlaps within the accuracy of the drawing are closed before anything moves.
-        pose = at_rest(model, pose, controls.correctors)
+        pose = at_rest(model, pose, controls.correctors) if resume is None else resume.start
     except Falls as fall:
         yield _falling_frame(model, fall.solved, 0.0, 0)
         return Ending(Status.NO_INITIAL_EQUILIBRIUM, _no_equilibrium_message(assembly, fall.solved))
     except (SolveError, NotConverged) as error:
         return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
-    for number, phase in enumerate(phases):
-        path = _Path(model, phase, number, pose, controls)
+    first = 0 if resume is None else resume.phase
+    for number, phase in enumerate(phases[first:], start=first):
+        path = _Path(model, phase, number, pose, controls, resume if number == first else None)
         try:
             ending = yield from path.follow()
         except SolveError as error:
@@ -204,17 +222,6 @@ def _increments(model: Model, phases: Sequence[Settlement], controls: Controls) 
     return ending
 
 
-@dataclass(frozen=True)
-class _Place:
-    """An equilibrium on the path, and how it was reached."""
-
-    s: float
-    pose: Pose
-    step: float = 0.0
-    velocity: np.ndarray | None = None
-    proved: bool = False
-
-
 class _Path:
     """The equilibrium path of one settlement phase.
 
@@ -222,20 +229,42 @@ class _Path:
     equilibrium, and whether the mechanism changed on the way to it, is only known from the program solved there.
     """
 
-    def __init__(self, model: Model, phase: Settlement, number: int, start: Pose, controls: Controls) -> None:
+    def __init__(
+        self,
+        model: Model,
+        phase: Settlement,
+        number: int,
+        start: Pose,
+        controls: Controls,
+        resume: Checkpoint | None = None,
+    ) -> None:
         self.model, self.phase, self.number, self.controls, self.start = model, phase, number, controls, start
-        self.here = _Place(0.0, start)
-        self.left: list[_Place] = []
+        self.here = Place(0.0, start)
+        self.left: list[Place] = []
         self.first_without = np.inf
         self.told = -np.inf
         self.finest = phase.increment / max(controls.event_refinement, 1)
         self.tolerance = float(phase.tolerance or phase.increment / 100.0)
         self.probe = PROBE * model.length / _lever(model.assembly, phase, start)
+        self.step = phase.increment
+        if resume is not None:
+            self.here, self.left, self.step = resume.here, list(resume.left), resume.step
+            self.first_without, self.told = resume.first_without, resume.told
+
+    def _checkpoint(self) -> Checkpoint:
+        return Checkpoint(
+            phase=self.number,
+            start=self.start,
+            here=self.here,
+            left=tuple(self.left),
+            step=self.step,
+            first_without=self.first_without,
+            told=self.told,
+        )
 
     def follow(self) -> Generator[Increment, None, Ending]:
         """Yields the increments of the phase, each when it is left behind; returns how the phase ended."""
-        phase = self.phase
-        step = phase.increment
+        phase, step = self.phase, self.step
         while True:
             here = self.here
             if here.s >= phase.limit * (1.0 - 1e-12):
@@ -287,12 +316,13 @@ class _Path:
                 continue
             if here.s + step >= self.first_without:
                 self.first_without = np.inf
-            if here.s > self.told:
-                yield self._left(predictor, step)
-                self.told = here.s
+            found = self._left(predictor, step) if here.s > self.told else None
+            self.told = max(self.told, here.s)
             self.left = [*self.left[1 - PLACES :], here]
-            self.here = _Place(here.s + step, pose, step, predictor.motion / step, proved)
-            step = min(2.0 * step, phase.increment)
+            self.here = Place(here.s + step, pose, step, predictor.motion / step, proved)
+            self.step = step = min(2.0 * step, phase.increment)
+            if found is not None:
+                yield replace(found, checkpoint=self._checkpoint())
 
     def _shortened(self, step: float) -> float:
         """The step, not past the limit, and half-way to where equilibrium is known to be lost."""
@@ -325,7 +355,7 @@ class _Path:
         many = np.sqrt(self.model.assembly.free.sum())
         return bool(np.linalg.norm(new - old) > min(EVENT_CHANGE * many, LARGEST_CHANGE) * np.linalg.norm(old))
 
-    def _predict(self, place: _Place, step: float) -> Solved:
+    def _predict(self, place: Place, step: float) -> Solved:
         rate = self.phase.rate(self.model.assembly, self.start, place.s)
         return solve_program(self.model, place.pose, rate * step)
 

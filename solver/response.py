@@ -8,6 +8,7 @@ from enum import IntEnum, StrEnum
 import numpy as np
 
 from .assembly import Assembly
+from .checkpoint import Checkpoint
 from .contact import Contacts, Interfaces
 from .kinematics import Pose
 from .loads import Loads, Settlement
@@ -103,6 +104,8 @@ class Increment:
         Linear programs solved for this increment.
     seconds : float
         Time spent on this increment.
+    checkpoint : Checkpoint, optional
+        Where the path stands after this increment, while a loop runs; a :class:`Response` keeps none.
     """
 
     settlement: float
@@ -120,6 +123,7 @@ class Increment:
     status: Status
     programs: int
     seconds: float
+    checkpoint: Checkpoint | None = field(default=None, repr=False, compare=False)
 
     @property
     def states(self) -> np.ndarray:

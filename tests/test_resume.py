@@ -1,0 +1,305 @@
+"""A run that is killed goes on to the result it would have had, bit for bit."""
+
+import csv
+import io
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import blockvis
+import solver
+from blockvis import layouts
+from blockvis.cli import main
+from blockvis.results import ResultsExist, ResultsFolder
+from blockvis.stored_values import packed, unpacked
+
+#: Two phases, and a hinge that jumps: the path goes back, halves its steps, proves places.
+CASE = """
+[geometry]
+layout = "arch"
+[geometry.parameters]
+voussoirs = 13
+[material]
+friction_coefficient = 0.7
+[[settlement]]
+direction = [1.0, 0.0]
+increment = 0.02
+limit = 0.05
+[[settlement]]
+direction = [0.0, -1.0]
+increment = 0.03
+limit = 0.5
+[analysis]
+falling_frames = 3
+[output]
+animation = false
+"""
+
+
+def _command(folder, *arguments, code=""):
+    """The command line in a process of its own; ``code`` runs before it."""
+    script = f"{code}\nimport sys; from blockvis.cli import main; sys.exit(main({[str(a) for a in arguments]!r}))"
+    return subprocess.Popen(
+        [sys.executable, "-c", script], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def _killed_at(number):
+    """Code that has the process killed, by the real signal, when it replaces a file for the n-th time, or before it."""
+    return (
+        "import os, signal, itertools\n"
+        "replace, count = os.replace, itertools.count(1)\n"
+        "def lethal(*names):\n"
+        f"    if next(count) == {number}: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "    replace(*names)\n"
+        "os.replace = lethal"
+    )
+
+
+def _same_result(one: Path, other: Path) -> None:
+    """Every file of the two folders but the pictures, timings apart."""
+    names = sorted(str(p.relative_to(one)) for p in one.rglob("*") if p.is_file())
+    assert names == sorted(str(p.relative_to(other)) for p in other.rglob("*") if p.is_file())
+    tables = []
+    for folder in (one, other):
+        rows = list(csv.DictReader((folder / "response.csv").read_text(encoding="utf-8").splitlines()))
+        tables.append([{key: value for key, value in row.items() if key != "seconds"} for row in rows])
+    assert tables[0] == tables[1]
+    for name in names:
+        if name.endswith(".npz"):
+            with np.load(one / name) as a, np.load(other / name) as b:
+                for key in a.files:
+                    assert key == "seconds" or a[key].tobytes() == b[key].tobytes(), (name, key)
+        elif name.endswith((".vtu", ".pvd")):
+            assert (one / name).read_bytes() == (other / name).read_bytes(), name
+    summaries = [json.loads((folder / "summary.json").read_text(encoding="utf-8")) for folder in (one, other)]
+    for summary in summaries:
+        del summary["seconds"], summary["finished"]
+    assert summaries[0] == summaries[1]
+
+
+def _readable(folder: Path) -> None:
+    """What is in the folder can be read: reopened as a response, tables and lists whole, nothing named is absent."""
+    for name in ("blocks.pvd", "contacts.pvd"):
+        if (folder / name).exists():
+            text = (folder / name).read_text(encoding="utf-8")
+            assert text.endswith("</VTKFile>\n")
+            for file in re.findall(r'file="([^"]*)"', text):
+                assert (folder / file).read_bytes().rstrip().endswith(b"</VTKFile>")
+    if (folder / "response.csv").exists():
+        rows = list(csv.reader((folder / "response.csv").read_text(encoding="utf-8").splitlines()))
+        assert len({len(row) for row in rows}) == 1
+    if (folder / "assembly.npz").exists():
+        assert blockvis.open_results(folder).stop is solver.Status.INTERRUPTED
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A case and the folder of its run that nobody disturbed."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "case.toml").write_text(CASE, encoding="utf-8")
+    assert main(["run", str(folder / "case.toml"), "-o", str(folder / "out")]) == 0
+    summary = json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["status"] == "collapsed"
+    assert blockvis.open_results(folder / "out").path[-1].phase == 1
+    return folder
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
+@pytest.mark.parametrize("moments", [(2,), (30, 40), (74,), (200,)])
+def test_killed_run_goes_on(whole, tmp_path, moments):
+    out = tmp_path / "out"
+    arguments = ["run", whole / "case.toml", "-o", out]
+    for moment in moments:
+        process = _command(tmp_path, *arguments, code=_killed_at(moment))
+        _, said = process.communicate(timeout=120)
+        assert process.returncode == -signal.SIGKILL, said
+        _readable(out)
+        arguments = ["run", "--resume", out]
+    if moments == (2,):
+        # Killed between the assembly and the record of the case: nothing has begun.
+        assert main(["run", "--resume", str(out)]) == 2
+        assert main(["run", str(whole / "case.toml"), "-o", str(out), "--force"]) == 0
+    else:
+        assert main(["run", "--resume", str(out)]) == 0
+    _same_result(whole / "out", out)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
+def test_killed_from_outside_while_it_runs(whole, tmp_path):
+    out = tmp_path / "out"
+    process = _command(tmp_path, "run", whole / "case.toml", "-o", out)
+    deadline = time.monotonic() + 120
+    while not (out / "increments" / "state_00004.npz").exists() and time.monotonic() < deadline:
+        time.sleep(0.001)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate(timeout=60)
+    if process.returncode == 0:
+        pytest.skip("the run was over before the signal came")
+    _readable(out)
+    assert main(["run", "--resume", str(out)]) == 0
+    _same_result(whole / "out", out)
+
+
+def test_ctrl_c_ends_cleanly_and_the_run_goes_on(whole, tmp_path, monkeypatch, capsys):
+    added = ResultsFolder.add
+
+    def stopped(self, increment):
+        if len(self.increments) == 5:
+            raise KeyboardInterrupt
+        added(self, increment)
+
+    out = tmp_path / "out"
+    monkeypatch.setattr(ResultsFolder, "add", stopped)
+    assert main(["run", str(whole / "case.toml"), "-o", str(out)]) == 130
+    assert "--resume" in capsys.readouterr().err
+    assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["status"] == "interrupted"
+    _readable(out)
+    monkeypatch.undo()
+    assert main(["run", "--resume", str(out)]) == 0
+    _same_result(whole / "out", out)
+
+
+def test_finished_run_says_so_and_draws_what_is_missing(whole, capsys):
+    before = (whole / "out" / "response.csv").read_bytes()
+    (whole / "out" / "mechanism.png").unlink()
+    assert main(["run", "--resume", str(whole / "out")]) == 0
+    assert "had finished (collapsed)" in capsys.readouterr().err
+    assert (whole / "out" / "mechanism.png").stat().st_size > 500
+    assert (whole / "out" / "response.csv").read_bytes() == before
+
+
+def test_files_that_changed_are_named_and_not_read_again(whole, tmp_path, monkeypatch, capsys):
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(CASE, encoding="utf-8")
+    process = _command(tmp_path, "run", case, "-o", out, code=_killed_at(30))
+    process.communicate(timeout=120)
+    case.write_text(CASE.replace("0.7", "0.3"), encoding="utf-8")
+    assert main(["run", "--resume", str(out)]) == 0
+    assert "case.toml' has changed" in capsys.readouterr().err
+    rows = [(f / "response.csv").read_text(encoding="utf-8").splitlines() for f in (out, whole / "out")]
+    assert [row.rsplit(",", 1)[0] for row in rows[0]] == [row.rsplit(",", 1)[0] for row in rows[1]]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--resume", "nowhere"], "holds no run"),
+        (["--resume", "nowhere", "-o", "out"], "takes the results folder alone"),
+        (["case.toml", "--resume", "nowhere"], "takes the results folder alone"),
+        ([], "name a case file"),
+    ],
+)
+def test_what_cannot_go_on(tmp_path, monkeypatch, capsys, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", *arguments]) == 2
+    assert words in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_damaged_checkpoint_is_refused(whole, tmp_path, capsys):
+    out = tmp_path / "out"
+    shutil.copytree(whole / "out", out)
+    (out / "summary.json").unlink()
+    data = (out / "checkpoint.npz").read_bytes()
+    for damaged in (b"", data[:200], data[: len(data) // 2], b"PK" + bytes(500)):
+        (out / "checkpoint.npz").write_bytes(damaged)
+        assert main(["run", "--resume", str(out)]) == 2
+        assert "cannot go on" in capsys.readouterr().err
+
+
+def test_two_runs_cannot_write_to_one_folder(whole, tmp_path):
+    pytest.importorskip("fcntl", reason="the system has no file locks")
+    assembly = layouts.arch()
+    first = ResultsFolder(tmp_path / "out", assembly)
+    for overwrite in (False, True):
+        with pytest.raises(ResultsExist, match=r"results already|another run is writing"):
+            ResultsFolder(tmp_path / "out", assembly, overwrite=overwrite)
+    del first
+    ResultsFolder(tmp_path / "out", assembly, overwrite=True)
+
+
+def _equal(one, other):
+    if is_dataclass(one):
+        return type(one) is type(other) and all(
+            _equal(getattr(one, f.name), getattr(other, f.name)) for f in fields(one)
+        )
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(_equal, one, other))
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
+    return type(one) is type(other) and one == other
+
+
+def test_every_checkpoint_leads_to_the_same_end():
+    arch = layouts.arch(voussoirs=13)
+    phases = (
+        solver.Settlement(direction=(1, 0), increment=0.03, limit=0.06),
+        solver.Settlement(direction=(0, -1), increment=0.04, limit=0.5),
+    )
+    setting = {
+        "interfaces": solver.Interfaces(solver.InterfaceLaw(0.7)),
+        "loads": solver.self_weight(arch),
+        "controls": solver.Controls(falling_frames=2),
+    }
+    told = list(solver.settlement_increments(arch, phases, **setting))
+    assert {i.phase for i in told} == {0, 1}
+    for k in range(0, len(told), 3):
+        if told[k].checkpoint is None:
+            continue
+        checkpoint, extra = unpacked(packed(told[k].checkpoint, increments=k + 1), solver.Checkpoint)
+        assert extra == {"increments": k + 1}
+        assert _equal(checkpoint, told[k].checkpoint)
+        again = list(solver.settlement_increments(arch, phases, resume=checkpoint, **setting))
+        assert len(again) == len(told) - k - 1
+        for one, other in zip(again, told[k + 1 :], strict=True):
+            for name in (
+                "settlement",
+                "pose",
+                "forces",
+                "velocity",
+                "reaction",
+                "certificate",
+                "programs",
+                "checkpoint",
+            ):
+                assert _equal(getattr(one, name), getattr(other, name)), (k, name)
+
+
+def test_checkpoint_of_another_run_is_refused():
+    arch, other = layouts.arch(voussoirs=13), layouts.arch(voussoirs=12)
+    spread = solver.Settlement(direction=(1, 0), increment=0.03, limit=0.06)
+    setting = {"interfaces": solver.Interfaces(), "controls": solver.Controls()}
+    checkpoint = next(
+        solver.settlement_increments(arch, (spread,), loads=solver.self_weight(arch), **setting)
+    ).checkpoint
+    steps = solver.settlement_increments(
+        other, (spread,), loads=solver.self_weight(other), resume=checkpoint, **setting
+    )
+    with pytest.raises(ValueError, match="belongs to another run"):
+        next(steps)
+
+
+def test_a_response_keeps_no_checkpoints():
+    arch = layouts.arch()
+    spread = solver.Settlement(direction=(1, 0), increment=0.05, limit=0.1)
+    assert all(i.checkpoint is None for i in solver.settle(arch, spread).increments)
+
+
+def test_stored_values_refuse_what_they_cannot_hold():
+    with pytest.raises(TypeError, match="cannot be stored"):
+        packed(solver.Ending(solver.Status.LOCKED, {"a": 1}))
+    buffer = io.BytesIO()
+    np.savez(buffer, tree=np.array('{"value": {"phase": 1}, "extra": {}}'))
+    with pytest.raises(ValueError, match="it has the fields"):
+        unpacked(buffer.getvalue(), solver.Checkpoint)
