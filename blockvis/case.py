@@ -16,8 +16,19 @@ import numpy as np
 import solver
 
 from . import drawing, layouts
+from .imperfections import Imperfection, imperfect, joint_scatter, read_imperfection
 
-__all__ = ["ANALYSES", "Case", "LoadCase", "case_assembly", "case_interfaces", "case_loads", "parse_case", "read_case"]
+__all__ = [
+    "ANALYSES",
+    "Case",
+    "LoadCase",
+    "case_assembly",
+    "case_interfaces",
+    "case_loads",
+    "case_of",
+    "parse_case",
+    "read_case",
+]
 
 ANALYSES = ("settlement",)
 
@@ -76,6 +87,7 @@ class Case:
     densities: Mapping[str, float] = field(default_factory=dict)
     friction_coefficient: float = 0.6
     interfaces: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    imperfections: tuple[Imperfection, ...] = ()
     settlements: tuple[solver.Settlement, ...] = ()
     loads: tuple[LoadCase, ...] = ()
     analysis: str = "settlement"
@@ -185,6 +197,11 @@ def parse_case(text: str, source: Path) -> Case:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"') from None
+    return case_of(values, source, text)
+
+
+def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
+    """As :func:`parse_case`, from the values that TOML makes of a text."""
     top = _Table(values, "", source)
     geometry = top.table("geometry")
     file, layout = geometry.text("file"), geometry.text("layout")
@@ -231,6 +248,7 @@ def parse_case(text: str, source: Path) -> Case:
         densities=densities,
         friction_coefficient=_friction(material),
         interfaces=dict(_interface(entry) for entry in top.tables("interfaces")),
+        imperfections=_imperfections(top),
         settlements=tuple(_settlement(entry) for entry in top.tables("settlement")),
         loads=tuple(_load(entry) for entry in top.tables("loads")),
         analysis=analysis.text("kind", "settlement", among=ANALYSES),
@@ -275,6 +293,16 @@ def _interface(table: _Table) -> tuple[tuple[str, str], float]:
     friction = _friction(table, None)
     table.finish()
     return (pair[0], pair[1]), friction
+
+
+def _imperfections(top: _Table) -> tuple[Imperfection, ...]:
+    found: dict[str, Imperfection] = {}
+    for entry in top.tables("imperfections"):
+        one = read_imperfection(entry.values, f"{top.source}: [{entry.where}]")
+        if one.kind in found:
+            raise ValueError(f"{top.source}: [{entry.where}] kind '{one.kind}' is there twice; give one of each kind")
+        found[one.kind] = one
+    return tuple(found.values())
 
 
 def _settlement(table: _Table) -> solver.Settlement:
@@ -343,7 +371,7 @@ def case_assembly(case: Case) -> solver.Assembly:
             f'{case.source}: no block is a moving support; give one of these the role "moving" under [roles] or add '
             f"[[supports]]: {', '.join(groups)}"
         )
-    return assembly
+    return imperfect(assembly, case.imperfections)
 
 
 def _case_drawing(case: Case) -> drawing.Drawing:
@@ -381,6 +409,7 @@ def case_interfaces(case: Case) -> solver.Interfaces:
     return solver.Interfaces(
         solver.InterfaceLaw(case.friction_coefficient),
         {pair: solver.InterfaceLaw(friction) for pair, friction in case.interfaces.items()},
+        scatter=joint_scatter(case.imperfections),
     )
 
 

@@ -15,7 +15,7 @@ This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 from .analysis import Controls, Ending, check_settlement, settle, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly
 from .checkpoint import Checkpoint
-from .contact import Contacts, InterfaceLaw, Interfaces, find_contacts, measure_contacts
+from .contact import Contacts, InterfaceLaw, Interfaces, JointScatter, find_contacts, measure_contacts
 from .kinematics import Pose, moved_vertices
 from .limit import Envelope, LimitLoad, LimitStatus, limit_load, limit_load_envelope
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
@@ -45,6 +45,7 @@ __all__ = [
     "Increment",
     "InterfaceLaw",
     "Interfaces",
+    "JointScatter",
     "LimitLoad",
     "LimitStatus",
     "Loads",

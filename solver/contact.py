@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from .assembly import Assembly
 from .polygons import box_pairs, boxes, expand_ranges
 
-__all__ = ["Contacts", "InterfaceLaw", "Interfaces", "find_contacts", "measure_contacts"]
+__all__ = ["Contacts", "InterfaceLaw", "Interfaces", "JointScatter", "find_contacts", "measure_contacts"]
 
 #: A corner this close to the end of an edge, as a fraction of the shortest edge involved, stands on the corner
 #: there. Correctors take drift along a hinge back, so that it need not cover the error of an increment, only of
@@ -52,6 +52,46 @@ class InterfaceLaw:
 
 
 @dataclass(frozen=True)
+class JointScatter:
+    """Friction that differs from joint to joint: a random factor for each pair of blocks.
+
+    The factor of a pair depends on the seed and the two blocks alone, so that it is the same whenever the two touch:
+    contact points come and go, joints keep their friction.
+
+    Attributes
+    ----------
+    seed : int
+        Of at least 0; the same seed gives the same factors.
+    quantile : callable
+        From an (n,) array of probabilities, inside 0 to 1, to the factors, finite and at least 0.
+    """
+
+    seed: int
+    quantile: Callable[[np.ndarray], np.ndarray]
+
+    def factors(self, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
+        """(n,) array: factor of each pair of blocks, in either order."""
+        low, high = np.minimum(block_a, block_b), np.maximum(block_a, block_b)
+        number = _mixed(_mixed(_mixed(np.array([self.seed])) ^ low.astype(np.uint64)) ^ high.astype(np.uint64))
+        # The 53 bits that a float holds, half a step off both ends.
+        return np.asarray(self.quantile(((number >> np.uint64(11)) + 0.5) * 2.0**-53), dtype=float)
+
+
+def _mixed(number: np.ndarray) -> np.ndarray:
+    """(n,) uint64 array: numbers that pass for random, each a function of the one it comes from.
+
+    Notes
+    -----
+    The finalizer of SplitMix64: G. L. Steele, D. Lea and C. H. Flood, Fast splittable pseudorandom number generators,
+    OOPSLA 2014, https://doi.org/10.1145/2660193.2660195.
+    """
+    z = number.astype(np.uint64) + np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
+
+
+@dataclass(frozen=True)
 class Interfaces:
     """The law of every interface: a default, and others for pairs of materials.
 
@@ -60,13 +100,20 @@ class Interfaces:
     default : InterfaceLaw
     pairs : mapping from (material, material) to InterfaceLaw
         Either order.
+    scatter : JointScatter, optional
+        Factors on the friction of each pair of blocks; without it joints of the same materials are alike.
     """
 
     default: InterfaceLaw = field(default_factory=InterfaceLaw)
     pairs: Mapping[tuple[str, str], InterfaceLaw] = field(default_factory=dict)
+    scatter: JointScatter | None = None
 
     def friction(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
         """(n,) array: friction coefficient between the blocks of each pair."""
+        alike = self._by_material(assembly, block_a, block_b)
+        return alike if self.scatter is None else alike * self.scatter.factors(block_a, block_b)
+
+    def _by_material(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
         if not self.pairs:
             return np.full(len(block_a), self.default.friction_coefficient)
         kinds = sorted({*assembly.materials, *(m for pair in self.pairs for m in pair)})
