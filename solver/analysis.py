@@ -206,14 +206,14 @@ def _increments(
     except Falls as fall:
         yield _falling_frame(model, fall.solved, 0.0, 0)
         return Ending(Status.NO_INITIAL_EQUILIBRIUM, _no_equilibrium_message(assembly, fall.solved))
-    except (SolveError, NotConverged) as error:
+    except (Locked, SolveError, NotConverged) as error:
         return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
     first = 0 if resume is None else resume.phase
     for number, phase in enumerate(phases[first:], start=first):
         path = _Path(model, phase, number, pose, controls, resume if number == first else None)
         try:
             ending = yield from path.follow()
-        except SolveError as error:
+        except (Locked, SolveError) as error:
             # While forces at the last equilibrium were read: everything found so far has been told.
             return Ending(Status.SOLVER_FAILED, f"at a settlement of {path.here.s:.6g} {phase.unit}: {error}")
         if ending.stop is not Status.LIMIT_REACHED:
@@ -267,10 +267,9 @@ class _Path:
         phase, step = self.phase, self.step
         while True:
             here = self.here
-            if here.s >= phase.limit * (1.0 - 1e-12):
-                yield from self._tell_last()
-                return Ending(Status.LIMIT_REACHED, f"the settlement reached its limit of {phase.limit:g} {phase.unit}")
-            step = self._shortened(step)
+            # The last place is looked at like any other: as if the path went on.
+            at_limit = here.s >= phase.limit * (1.0 - 1e-12)
+            step = self.finest if at_limit else self._shortened(step)
             try:
                 predictor = self._predict(here, step)
                 changed = predictor.falling or self._mechanism_changed(predictor, step)
@@ -281,6 +280,12 @@ class _Path:
                 if changed and not here.proved:
                     self._prove()
                     continue
+                if at_limit:
+                    if here.s > self.told and not predictor.falling:
+                        last = self._left(predictor, step)
+                        self.told = here.s
+                        yield last
+                    break
                 if predictor.falling:
                     if step <= self.tolerance:
                         return (yield from self._collapse(here.s + step, predictor))
@@ -308,6 +313,8 @@ class _Path:
                 step /= 2.0
                 continue
             except (Locked, NotConverged, SolveError) as error:
+                if at_limit:
+                    break
                 step /= 2.0
                 if step < self.tolerance / 64.0:
                     yield from self._tell_last()
@@ -323,6 +330,8 @@ class _Path:
             self.step = step = min(2.0 * step, phase.increment)
             if found is not None:
                 yield replace(found, checkpoint=self._checkpoint())
+        yield from self._tell_last()
+        return Ending(Status.LIMIT_REACHED, f"the settlement reached its limit of {phase.limit:g} {phase.unit}")
 
     def _shortened(self, step: float) -> float:
         """The step, not past the limit, and half-way to where equilibrium is known to be lost."""
@@ -433,7 +442,7 @@ class _Path:
             pose = moved(solved.pose, solved.motion)
             try:
                 solved = solve_again(model, pose, solved)
-            except SolveError:
+            except (Locked, SolveError):
                 return
             yield _falling_frame(model, solved, s, self.number)
             if not solved.falling and _largest_movement(model, solved.motion) < 1e-3 * model.trust:

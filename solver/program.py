@@ -11,7 +11,7 @@ from .assembly import Assembly
 from .contact import Contacts, Interfaces, find_contacts
 from .equilibrium import cone_rays, equilibrium_matrix
 from .kinematics import Pose, moved_vertices
-from .lp import LinearProgram, LPSolution, Unbounded, solve_lp
+from .lp import LinearProgram, LPSolution, SolveError, Unbounded, solve_lp
 from .response import Certificate
 
 __all__ = [
@@ -336,7 +336,11 @@ def closing_program(model: Model, pose: Pose, contacts: Contacts, drift: np.ndar
         lower=load - CLOSING_FRICTION,
         upper=load + CLOSING_FRICTION,
     )
-    solution = solve_lp(program)
+    try:
+        solution = solve_lp(program)
+    except Unbounded:
+        # A corner that has gone in too deep, wedged between blocks that cannot give way: a smaller step may not.
+        raise SolveError("gaps that an increment has left cannot be closed: blocks are wedged") from None
     motion = np.zeros((assembly.n_blocks, 3))
     motion[assembly.free] = -solution.row_dual.reshape(-1, 3) * model.lengths
     forces = (rays @ solution.x[: rays.shape[1]]).reshape(-1, 2)

@@ -236,7 +236,7 @@ def _increments(
     except Falls as fall:
         yield _increment(still, fall.solved, 0.0, 1.0, Status.FALLING)
         return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no equilibrium under the dead load alone")
-    except (SolveError, NotConverged) as error:
+    except (Locked, SolveError, NotConverged) as error:
         return Ending(Status.SOLVER_FAILED, f"before any live load: {error}")
     return (yield from _Path(model, control, controls, pose).follow())
 
