@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
 
 import solver
 
-__all__ = ["hatch_lines", "triangles"]
+__all__ = ["cut_into_triangles", "hatch_lines", "triangles"]
 
 
 def triangles(assembly: solver.Assembly) -> np.ndarray:
@@ -26,6 +28,12 @@ def triangles(assembly: solver.Assembly) -> np.ndarray:
     for block in np.flatnonzero(bent):
         fans.append(_ears(assembly.outline(int(block)), int(offsets[block])))
     return np.concatenate(fans)
+
+
+def cut_into_triangles(outlines: Sequence[np.ndarray]) -> np.ndarray:
+    """(n, 3, 2) array [m]: triangles that fill outlines, (k, 2) arrays [m] counter-clockwise, bent ones included."""
+    cut = [outline[_ears(outline, 0)[:, 1:]] for outline in outlines]
+    return np.concatenate([np.zeros((0, 3, 2)), *cut])
 
 
 def _ears(outline: np.ndarray, first: int) -> np.ndarray:

@@ -5,10 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 import solver
 
-__all__ = ["DrawnJoints", "Marks", "carried", "drawn_joints", "marks_of", "resultants", "rounded_length"]
+__all__ = [
+    "DrawnJoints",
+    "Marks",
+    "carried",
+    "drawn_joints",
+    "marks_of",
+    "resultants",
+    "rounded_length",
+    "slipping",
+]
 
 #: A joint is shown open from this fraction of the block size on; on an ordinary brick it is a tenth of a millimetre.
 SMALLEST_OPENING = 1e-3
@@ -16,6 +26,13 @@ SMALLEST_OPENING = 1e-3
 #: What lies between faces is a crack up to this distance: on the path, in block sizes or lengths of the joint; in
 #: the fall, where blocks tumble apart, in lengths of the joint only, and up to this angle [rad].
 WIDEST_STANDING, WIDEST_FALLING, STEEPEST_FALLING = 1.5, 0.6, 1.0
+
+#: A joint is shown sliding from this fraction of the speed of the fastest block on: the slip of the others is not seen.
+SMALLEST_SLIP = 1e-2
+
+#: What cracks and blocks enclose without covering it belongs to the cracks from this fraction of the block size squared
+#: (what is smaller is rounding) up to that: where several cracks meet.
+SMALLEST_POCKET, LARGEST_POCKET = 1e-5, 2.0
 
 #: Faces count as one joint of the drawing when they are apart by at most this fraction of the block size.
 TOUCHING = 2e-3
@@ -54,12 +71,18 @@ class Marks:
     ----------
     cracks : (n_cracks, 4, 2) array [m]
         Quadrilateral between the faces of each open joint: both ends on block a, then back along block b.
+    openings : (n_cracks,) array [m]
+        Largest distance of the two faces of each, unmagnified.
+    pockets : tuple of (n, 2) arrays [m]
+        Outlines of what is enclosed where cracks meet.
     sliding : (n_sliding, 2, 2) array [m]
         Ends of each sliding joint.
     hinges : (n_hinges, 2) array [m]
     """
 
     cracks: np.ndarray
+    openings: np.ndarray
+    pockets: tuple[np.ndarray, ...]
     sliding: np.ndarray
     hinges: np.ndarray
 
@@ -124,11 +147,22 @@ def marks_of(assembly: solver.Assembly, joints: DrawnJoints, increment: solver.I
     """
     contacts, states = increment.contacts, increment.states
     points = _middle(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
+    falling = increment.status == solver.Status.FALLING
+    cracks, openings, cracked = _cracks(assembly, joints, increment.pose, shown, falling)
     return Marks(
-        cracks=_cracks(assembly, joints, increment.pose, shown, increment.status == solver.Status.FALLING),
-        sliding=_sliding(contacts, states, points),
+        cracks=cracks,
+        openings=openings,
+        pockets=() if falling else _pockets(assembly, cracks, cracked, shown),
+        sliding=_sliding(contacts, slipping(increment), points),
         hinges=_apart(points[states == solver.ContactState.HINGING], 0.05 * assembly.block_size),
     )
+
+
+def slipping(increment: solver.Increment) -> np.ndarray:
+    """(n_contacts,) bool array: contact points that slide fast enough to be seen."""
+    fastest = np.abs(increment.velocity[:, :2]).max(initial=0.0)
+    seen = np.abs(increment.displacements[:, 1]) > SMALLEST_SLIP * fastest
+    return (increment.states == solver.ContactState.SLIDING) & seen
 
 
 def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -183,7 +217,8 @@ def _middle(
 
 def _cracks(
     assembly: solver.Assembly, joints: DrawnJoints, pose: solver.Pose, shown: solver.Pose, falling: bool
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Quadrilaterals of the open joints, their openings [m], and the blocks beside them."""
     drawn = solver.Pose.initial(assembly)
 
     def sides(at: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
@@ -209,12 +244,47 @@ def _cracks(
         together = apart < np.maximum(length, WIDEST_STANDING * assembly.block_size)
     is_open = (opening > SMALLEST_OPENING * assembly.block_size) & together
     on_a, on_b = sides(shown)
-    return np.concatenate([on_a, on_b[:, ::-1]], axis=1)[is_open]
+    beside = np.unique(np.concatenate([joints.block_a[is_open], joints.block_b[is_open]]))
+    return np.concatenate([on_a, on_b[:, ::-1]], axis=1)[is_open], opening[is_open], beside
 
 
-def _sliding(contacts: solver.Contacts, states: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The stretch of each sliding joint between its outermost contact points that carry force."""
-    k = np.flatnonzero(states == solver.ContactState.SLIDING)
+def _pockets(
+    assembly: solver.Assembly, cracks: np.ndarray, cracked: np.ndarray, shown: solver.Pose
+) -> tuple[np.ndarray, ...]:
+    """What lies between several cracks and belongs to no pair of faces: where a brick has left its corner."""
+    if len(cracks) < 2:
+        return ()
+    size = assembly.block_size
+    corners = solver.moved_vertices(assembly, shown)
+    blocks = [corners[assembly.offsets[b] : assembly.offsets[b + 1]] for b in range(assembly.n_blocks)]
+    # Crossed where one end has closed up, so the hull; a hair wider, or a joint just not open would let the pocket out.
+    filled = shapely.buffer(
+        shapely.convex_hull(shapely.multipoints(cracks)), SMALLEST_OPENING * size, join_style="mitre", quad_segs=1
+    )
+    near = [shapely.Polygon(blocks[b]) for b in cracked]
+    covered = shapely.union_all([*shapely.buffer(near, 0.0), *filled])
+    holes = [
+        shapely.Polygon(ring)
+        for part in shapely.get_parts(covered)
+        for ring in part.interiors
+        if SMALLEST_POCKET * size**2 < shapely.Polygon(ring).area < LARGEST_POCKET * size**2
+    ]
+    if not holes:
+        return ()
+    # Not what has been open from the start, nor where blocks without a crack stand.
+    tree = shapely.STRtree([shapely.Polygon(outline) for outline in blocks])
+    drawn = shapely.STRtree([shapely.Polygon(assembly.outline(b)) for b in range(assembly.n_blocks)])
+    pockets = []
+    for hole in holes:
+        inside = hole.representative_point()
+        if len(tree.query(inside, predicate="intersects")) == 0 and len(drawn.query(inside, predicate="intersects")):
+            pockets.append(shapely.get_coordinates(hole)[:-1])
+    return tuple(pockets)
+
+
+def _sliding(contacts: solver.Contacts, slips: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """The stretch of each sliding joint between the outermost of its contact points that slip."""
+    k = np.flatnonzero(slips)
     if len(k) == 0:
         return np.zeros((0, 2, 2))
     low = np.minimum(contacts.block_a[k], contacts.block_b[k])

@@ -211,8 +211,7 @@ def _packed_marks(shown: list[solver.Increment], origin: np.ndarray, unit: float
     """Hinges (1) and sliding points (2), frame after frame."""
     places, kinds, counts = [np.zeros((0, 2))], [np.zeros(0, dtype=int)], []
     for increment in shown:
-        states = increment.states
-        hinging, sliding = states == solver.ContactState.HINGING, states == solver.ContactState.SLIDING
+        hinging, sliding = increment.states == solver.ContactState.HINGING, marks.slipping(increment)
         places += [increment.contacts.points[hinging], increment.contacts.points[sliding]]
         kinds.append(np.repeat([1, 2], [hinging.sum(), sliding.sum()]))
         counts.append(int(hinging.sum() + sliding.sum()))

@@ -13,6 +13,7 @@ import solver
 
 from . import marks, palette
 from .curves import CurvePanel, settlement_text
+from .fills import cut_into_triangles
 from .mechanism import part_outlines
 from .scene import Scene, framed, magnified
 from .sheet import ColourBar, Key, Sheet, force_text
@@ -23,6 +24,9 @@ PSEUDO_TIME = "FALLING · pseudo-time"
 
 #: Resultants and hinges of more blocks than this hide what they stand on.
 FEW_BLOCKS = 300
+
+#: Joints open by less than this fraction of the block size are drawn half as wide: not every hair is a crack.
+FINE_CRACK = 0.01
 
 #: Up to this many parts of a mechanism are tinted one by one.
 MOST_PARTS = 16
@@ -217,8 +221,11 @@ class Studio:
         scene, thin = self.scene, self.scene.size[1] / 1080.0
         found = marks.marks_of(self.assembly, self.joints, increment, shown)
         scene.polygons("crack", found.cracks, palette.OPEN)
+        scene.polygons("crack/pocket", cut_into_triangles(found.pockets), palette.OPEN)
         middle = (found.cracks[:, [0, 1]] + found.cracks[:, [3, 2]]) / 2.0 if len(found.cracks) else found.cracks
-        scene.lines("crack edge", middle, palette.OPEN, self._line(2.2 * thin))
+        fine = found.openings < FINE_CRACK * self.assembly.block_size
+        scene.lines("crack edge", middle[~fine], palette.OPEN, self._line(2.2 * thin))
+        scene.lines("crack edge/fine", middle[fine], palette.OPEN, self._line(1.1 * thin))
         scene.lines("sliding", found.sliding, palette.SLIDING, self._line(5.0 * thin))
         radius = float(np.clip(0.09 * self.assembly.block_size / scene.pixel, 3.0 * thin, 11.0 * thin))
         scene.discs("hinge/rim", self._hinges(found), radius * 1.35, palette.PAPER)

@@ -266,6 +266,15 @@ def test_facade_has_about_1500_bricks_in_regular_courses():
     assert facade.roles[facade.index("ground right")] == "moving"
 
 
+def test_facade_arches_rise_by_the_courses_asked_for():
+    facade = layouts.facade(**SMALL["facade"], voussoirs=3, rise_courses=1.5)
+    key = _block(facade, "voussoir 1-2")
+    # Of three equal voussoirs the key's intrados is a chord about the crown, below it by its sagitta.
+    radius = (1.0**2 + 0.1875**2) / (2 * 0.1875)
+    sixth = np.arctan2(1.0, radius - 0.1875) / 3
+    assert key[:, 1].min() == pytest.approx((5 + 12) * 0.125 + 0.1875 - radius * (1 - np.cos(sixth)))
+
+
 def test_layouts_are_found_by_name_however_it_is_written():
     assert layouts.build("Basket_handle arch", {"voussoirs": 7.0}).n_blocks == 9
     assert layouts.build("façade", SMALL["facade"]).n_blocks == layouts.facade(**SMALL["facade"]).n_blocks

@@ -1,5 +1,7 @@
 """Joints, cracks, hinges, resultants and the parts of a mechanism."""
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,7 +9,7 @@ from structures import BENT, arch_response, parted, wall
 
 import solver
 from blockvis import marks
-from blockvis.fills import hatch_lines, triangles
+from blockvis.fills import cut_into_triangles, hatch_lines, triangles
 from blockvis.mechanism import part_outlines, swung, with_motion
 
 
@@ -21,7 +23,7 @@ def stacked(shift=(0.0, 0.0), turn=0.0):
 
 
 def cracks(assembly, pose, falling=False):
-    return marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose, falling)
+    return marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose, falling)[0]
 
 
 def area(polygon):
@@ -63,6 +65,52 @@ def test_blocks_that_have_parted_have_no_joint():
     assert len(cracks(*stacked(shift=(0.0, 0.7)), falling=True)) == 0
     assert len(cracks(*stacked(shift=(0.1, 0.3), turn=1.2))) == 1
     assert len(cracks(*stacked(shift=(0.1, 0.3), turn=1.2), falling=True)) == 0
+
+
+def four_blocks(apart):
+    """Four blocks of 1 m × 1 m around a point, each moved away from it along the diagonal."""
+    corners = [(0, 0), (1, 0), (0, 1), (1, 1)]
+    assembly = solver.Assembly.from_outlines(
+        [[[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]] for x, y in corners], roles=["free"] * 3 + ["fixed"]
+    )
+    away = apart * (2.0 * np.array(corners) - 1.0)
+    return assembly, solver.Pose(assembly.centroids + away, np.zeros(4))
+
+
+@given(st.floats(0.01, 0.3))
+def test_where_four_cracks_meet_nothing_stays_white(apart):
+    assembly, pose = four_blocks(apart)
+    found, openings, beside = marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose, False)
+    pockets = marks._pockets(assembly, found, beside, pose)
+    assert len(found) == 4
+    np.testing.assert_allclose(openings, 2.0 * apart, rtol=1e-9)
+    assert len(pockets) == 1
+    # The square in the middle, less the hair by which cracks are taken wider.
+    np.testing.assert_allclose(np.sqrt(area(pockets[0])), 2.0 * apart, atol=0.003)
+    np.testing.assert_allclose(pockets[0].mean(axis=0), [1.0, 1.0], atol=1e-9)
+    cut = cut_into_triangles(pockets)
+    np.testing.assert_allclose(sum(area(t) for t in cut), area(pockets[0]), rtol=1e-9)
+
+
+def test_an_opening_of_the_drawing_is_no_pocket():
+    ring = [((0, 0), (2, 1)), ((2, 0), (3, 2)), ((1, 2), (3, 3)), ((0, 1), (1, 3))]
+    assembly = solver.Assembly.from_outlines([[low, (high[0], low[1]), high, (low[0], high[1])] for low, high in ring])
+    away = 0.05 * np.sign(np.round(assembly.centroids - 1.5, 9))
+    pose = solver.Pose(assembly.centroids + away, np.zeros(4))
+    found, _, beside = marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose, False)
+    assert len(found) == 4
+    assert marks._pockets(assembly, found, beside, pose) == ()
+
+
+def test_joints_that_hardly_slide_are_not_marked():
+    response = arch_response()
+    last, joints = response.path[-1], marks.drawn_joints(response.assembly)
+    used_up = np.stack([last.forces[:, 0], last.friction * last.forces[:, 0]], axis=1)
+    fastest = np.abs(last.velocity[:, :2]).max()
+    for slip, drawn in ((0.5, True), (1e-4, False)):
+        sliding = replace(last, forces=used_up, displacements=np.full_like(last.displacements, slip * fastest))
+        assert (sliding.states == solver.ContactState.SLIDING).any()
+        assert (len(marks.marks_of(response.assembly, joints, sliding, last.pose).sliding) > 0) is drawn
 
 
 def test_resultants_balance_every_voussoir():

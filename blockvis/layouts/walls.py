@@ -122,6 +122,7 @@ def facade(
     window_courses: int = 12,
     sill_courses: int = 5,
     voussoirs: int = 15,
+    rise_courses: float = 2.5,
     settling_from: float | None = None,
     density: float = 1800.0,
     depth: float = 0.25,
@@ -140,7 +141,9 @@ def facade(
     window_courses, sill_courses : int
         Height of a window to the springing of its arch, and of the wall under its sill from the floor, in courses.
     voussoirs : int
-        Of each arch, which is one brick thick and rises by two and a half courses.
+        Of each arch, which is one brick thick.
+    rise_courses : float
+        Rise of each arch at the intrados, in courses.
     settling_from : float [m], optional
         The ground from this x to the right is a moving support; the right third by default.
     density : float [kg/m³]
@@ -163,6 +166,7 @@ def facade(
     storeys, windows = whole("storeys", storeys, 1), whole("windows", windows, 0)
     span = above_zero("window_bricks", window_bricks, "brick lengths")
     high, sill = whole("window_courses", window_courses, 1), whole("sill_courses", sill_courses, 0)
+    rise = course * above_zero("rise_courses", rise_courses, "courses")
     pier = (n - windows * span) / (windows + 1)
     if pier < 1.0:
         raise ValueError(
@@ -176,7 +180,7 @@ def facade(
             "width": length * span,
             "height": course * high,
             "head": "segmental arch",
-            "rise": 2.5 * course,
+            "rise": rise,
             "depth": length,
             "voussoirs": voussoirs,
         }
