@@ -5,9 +5,9 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,11 @@ import solver
 
 from . import drawing, layouts
 from .imperfections import Imperfection, imperfect, joint_scatter, read_imperfection
+from .loading import LoadCase, loads_of, nearest_name
 
 __all__ = [
     "ANALYSES",
+    "FLOWS",
     "Case",
     "LoadCase",
     "case_assembly",
@@ -30,34 +32,13 @@ __all__ = [
     "read_case",
 ]
 
-ANALYSES = ("settlement",)
+ANALYSES = ("settlement", "limit load", "pushover")
+
+#: How sliding joints of a limit load behave.
+FLOWS = ("associative", "non-associative")
 
 #: What a file's blocks are made of where nothing else is said [kg/m³, m].
 DENSITY, THICKNESS = 2000.0, 1.0
-
-
-@dataclass(frozen=True)
-class LoadCase:
-    """One ``[[loads]]`` entry.
-
-    Attributes
-    ----------
-    kind : str
-        "dead" or "live".
-    blocks : str
-        A name or pattern.
-    weight_fraction : (2,) tuple, optional
-    force : (2,) tuple [N]
-    point : (2,) tuple [m], optional
-    moment : float [N·m]
-    """
-
-    kind: str = "dead"
-    blocks: str = "*"
-    weight_fraction: tuple[float, float] | None = None
-    force: tuple[float, float] = (0.0, 0.0)
-    point: tuple[float, float] | None = None
-    moment: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -91,6 +72,10 @@ class Case:
     settlements: tuple[solver.Settlement, ...] = ()
     loads: tuple[LoadCase, ...] = ()
     analysis: str = "settlement"
+    flow: str = "associative"
+    capacity_at: tuple[float, ...] | None = None
+    displacement: float | None = None
+    control: solver.ControlDisplacement | None = None
     controls: solver.Controls = field(default_factory=solver.Controls)
     animation: str | None = "collapse.mp4"
 
@@ -134,8 +119,23 @@ class _Table:
         if not isinstance(value, str):
             raise self.error(key, f"is {value!r}; give a text in quotes")
         if among and value not in among:
-            raise self.error(key, f"is '{value}'{_nearest(value, among)}; choose from {', '.join(among)}")
+            raise self.error(key, f"is '{value}'{nearest_name(value, among)}; choose from {', '.join(among)}")
         return value
+
+    def numbers(self, key: str) -> tuple[float, ...] | None:
+        value = self.take(key)
+        if value is None:
+            return None
+        right = isinstance(value, Sequence) and not isinstance(value, str) and len(value) > 0
+        if not right or not all(type(v) in (int, float) and math.isfinite(v) for v in value):
+            raise self.error(key, f"is {value!r}; give a list of numbers")
+        return tuple(float(v) for v in value)
+
+    def whole(self, key: str, least: int) -> int | None:
+        value = self.number(key)
+        if value is not None and (value < least or value != int(value)):
+            raise self.error(key, f"is {value:g}; give a whole number of at least {least}")
+        return None if value is None else int(value)
 
     def table(self, key: str) -> _Table:
         return _Table(self.take(key, {}), f"{self.where}.{key}" if self.where else key, self.source)
@@ -157,12 +157,9 @@ class _Table:
         """Refuses keys nobody asked for, naming the nearest one that exists."""
         for key in self.values:
             if key not in self.known:
-                raise self.error(key, f"is not a key here{_nearest(key, self.known)}; keys are {', '.join(self.known)}")
-
-
-def _nearest(word: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
-    return f" (did you mean '{near[0]}'?)" if near else ""
+                raise self.error(
+                    key, f"is not a key here{nearest_name(key, self.known)}; keys are {', '.join(self.known)}"
+                )
 
 
 def read_case(path: str | Path) -> Case:
@@ -252,14 +249,69 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         settlements=tuple(_settlement(entry) for entry in top.tables("settlement")),
         loads=tuple(_load(entry) for entry in top.tables("loads")),
         analysis=analysis.text("kind", "settlement", among=ANALYSES),
+        flow=analysis.text("flow", "associative", among=FLOWS),
+        capacity_at=analysis.numbers("capacity_at"),
+        displacement=_displacement(analysis),
+        control=_control(top.table("control")),
         controls=_controls(analysis, geometry.number("overlap_tolerance", positive=True)),
         animation=animation or None,
     )
     for table in (geometry, material, analysis, output, top):
         table.finish()
-    if not case.settlements:
+    return _fitting(case)
+
+
+def _fitting(case: Case) -> Case:
+    """The case, once its keys fit the analysis that it asks for."""
+    source, kind = case.source, case.analysis
+    live = any(load.kind == "live" for load in case.loads)
+    moving = [k + 1 for k, load in enumerate(case.loads) if load.positions]
+    if kind == "settlement" and not case.settlements:
         raise ValueError(f"{source}: [settlement] is missing; say how the moving supports move, direction = [1, 0]")
-    return case
+    if kind == "settlement" and live:
+        warnings.warn(
+            f'{source}: a settlement analysis leaves the live loads out; give loads that act during it kind = "dead"',
+            stacklevel=4,
+        )
+    if kind != "settlement" and not live:
+        raise ValueError(
+            f'{source}: [analysis] kind is "{kind}", but no load is live; add [[loads]] with kind = "live", for '
+            "instance weight_fraction = [1.0, 0.0]"
+        )
+    if kind == "pushover" and case.control is None:
+        raise ValueError(
+            f'{source}: [control] is missing; a pushover needs the displacement that grows, block = "..." and '
+            "direction = [1, 0]"
+        )
+    if kind != "pushover" and case.control is not None:
+        raise ValueError(f'{source}: [control] belongs to [analysis] kind = "pushover", not "{kind}"')
+    if kind != "limit load" and case.flow != "associative":
+        raise ValueError(
+            f'{source}: [analysis] flow "{case.flow}" belongs to kind = "limit load"; a {kind} follows the geometry, '
+            "in which friction never dilates"
+        )
+    if case.displacement is not None and (kind != "limit load" or not case.settlements):
+        raise ValueError(
+            f"{source}: [analysis] displacement is that of a limit load after a settlement, in which open joints may "
+            "close"
+        )
+    if kind == "pushover" and moving:
+        raise ValueError(f'{source}: [loads {moving[0]}] positions belong to [analysis] kind = "limit load"')
+    if len(moving) > 1:
+        raise ValueError(f"{source}: [loads {moving[1]}] positions: only one load may move, and loads {moving[0]} does")
+    if case.capacity_at is None:
+        return case
+    if kind != "limit load" or not case.settlements or moving:
+        raise ValueError(
+            f'{source}: [analysis] capacity_at asks for limit loads (kind = "limit load") of loads that stand still, '
+            "along a [settlement]"
+        )
+    last = case.settlements[-1]
+    try:
+        stopping = replace(last, stops=case.capacity_at)
+    except ValueError as error:
+        raise ValueError(f"{source}: [analysis] capacity_at: {error}") from None
+    return replace(case, settlements=(*case.settlements[:-1], stopping))
 
 
 def _friction(table: _Table, default: float | None = 0.6) -> float:
@@ -326,7 +378,35 @@ def _settlement(table: _Table) -> solver.Settlement:
         raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 
 
+def _displacement(table: _Table) -> float | None:
+    value = table.number("displacement")
+    if value is not None and value < 0.0:
+        raise table.error("displacement", f"is {value:g}; give a length in m of at least 0")
+    return None if value is None else float(value)
+
+
+def _control(table: _Table) -> solver.ControlDisplacement | None:
+    if not table.values:
+        return None
+    keys = {
+        "direction": table.pair("direction", (1.0, 0.0)),
+        "point": table.pair("point"),
+        "increment": table.number("increment", 0.01, positive=True),
+        "limit": table.number("limit", 1.0, positive=True),
+        "tolerance": table.number("tolerance", positive=True),
+    }
+    block = table.text("block")
+    table.finish()
+    if block is None:
+        raise table.error("block", "is missing; name the block whose displacement grows")
+    try:
+        return solver.ControlDisplacement(block, **keys)
+    except ValueError as error:
+        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
+
+
 def _load(table: _Table) -> LoadCase:
+    given = set(table.values)
     load = LoadCase(
         kind=table.text("kind", "dead", among=("dead", "live")),
         blocks=table.text("blocks", "*"),
@@ -334,9 +414,37 @@ def _load(table: _Table) -> LoadCase:
         force=table.pair("force", (0.0, 0.0)),
         point=table.pair("point"),
         moment=table.number("moment", 0.0),
+        pressure=table.number("pressure"),
+        direction=table.pair("direction", (0.0, -1.0)),
+        edge=table.whole("edge", 1),
+        positions=_positions(table),
     )
     table.finish()
+    if load.direction == (0.0, 0.0):
+        raise table.error("direction", "is [0, 0]; give the direction in which the pressure pushes")
+    for key in ("direction", "edge"):
+        if key in given and load.pressure is None:
+            raise table.error(key, "is that of a pressure; add pressure = ... [Pa]")
+    if load.edge is not None and "direction" in given:
+        raise table.error("direction", "and edge are both given; pressure on an edge is perpendicular to it")
+    if load.positions:
+        if load.kind != "live" or load.force == (0.0, 0.0):
+            raise table.error("positions", 'are those of a live force; give kind = "live" and force = [fx, fy]')
+        for key in ("blocks", "weight_fraction", "point", "moment", "pressure"):
+            if key in given:
+                raise table.error(key, "does not go with positions: the force stands on what is topmost at each")
+    elif load.weight_fraction is None and load.pressure is None and load.force == (0.0, 0.0) and not load.moment:
+        raise table.error("force", "is missing or zero; give force, moment, weight_fraction or pressure")
     return load
+
+
+def _positions(table: _Table) -> tuple[float, ...]:
+    given = table.numbers("positions")
+    if given is None:
+        return ()
+    if len(given) != 3 or given[2] != int(given[2]) or given[2] < 2 or given[0] >= given[1]:
+        raise table.error("positions", f"is {list(given)}; give [first x, last x, number of places], at least 2 places")
+    return tuple(np.linspace(given[0], given[1], int(given[2])).tolist())
 
 
 def _controls(table: _Table, overlap_tolerance: float | None) -> solver.Controls:
@@ -365,7 +473,7 @@ def case_assembly(case: Case) -> solver.Assembly:
         joint_thickness=case.joint_thickness,
         overlap_tolerance=case.overlap_tolerance,
     )
-    if not assembly.moving.any():
+    if case.settlements and not assembly.moving.any():
         groups = sorted({g for g in sketch.groups if g} | {s["name"] for s in case.supports}) or list(sketch.names[:12])
         raise ValueError(
             f'{case.source}: no block is a moving support; give one of these the role "moving" under [roles] or add '
@@ -396,7 +504,7 @@ def _with_densities(case: Case, sketch: drawing.Drawing) -> drawing.Drawing:
         name = sorted(unknown)[0]
         known = sorted(set(sketch.materials))
         raise ValueError(
-            f"{case.source}: [materials.{name}] matches no block{_nearest(name, known)}; the file has {known}"
+            f"{case.source}: [materials.{name}] matches no block{nearest_name(name, known)}; the file has {known}"
         )
     density = np.full(sketch.n_blocks, np.nan) if sketch.density is None else sketch.density.copy()
     for i, material in enumerate(sketch.materials):
@@ -414,20 +522,5 @@ def case_interfaces(case: Case) -> solver.Interfaces:
 
 
 def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
-    """Self-weight and the loads of a case, in N."""
-    weight = solver.self_weight(assembly)
-    parts = {"dead": weight.dead.copy(), "live": weight.live.copy()}
-    for number, load in enumerate(case.loads):
-        where = f"{case.source}: [loads {number + 1}] blocks"
-        chosen = [i for i, name in enumerate(assembly.names) if fnmatchcase(name, load.blocks)]
-        chosen = [i for i in chosen if assembly.free[i]]
-        if not chosen:
-            raise ValueError(
-                f"{where} '{load.blocks}' matches no free block{_nearest(load.blocks, assembly.names)}; "
-                f"the layout has {', '.join(assembly.names[:12])}"
-            )
-        if load.weight_fraction is not None:
-            parts[load.kind] += solver.weight_fraction(assembly, load.weight_fraction, np.array(chosen))
-        for block in chosen if (load.force != (0.0, 0.0) or load.moment) else ():
-            parts[load.kind] += solver.point_load(assembly, block, load.force, point=load.point, moment=load.moment)
-    return solver.Loads(parts["dead"], parts["live"])
+    """Self-weight and the loads of a case that stand still, in N."""
+    return loads_of(case.loads, assembly, case.source)

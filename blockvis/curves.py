@@ -1,4 +1,4 @@
-"""The reaction curve: a file of its own, or a panel beside the blocks."""
+"""The curve of a response, reaction or load multiplier: a file of its own, or a panel beside the blocks."""
 
 from __future__ import annotations
 
@@ -16,11 +16,26 @@ from PIL import Image, ImageDraw
 import solver
 
 from . import palette
+from .series import (
+    POSITION,
+    force_unit,
+    governing,
+    parameter_label,
+    parameter_unit,
+    parameter_word,
+    path_parameters,
+    path_values,
+    reads_multipliers,
+    value_label,
+)
 
-__all__ = ["CurvePanel", "Event", "draw_curve", "events_of", "path_settlements", "settlement_text", "settlement_unit"]
+__all__ = ["CurvePanel", "Event", "draw_curve", "events_of"]
 
 #: Suffixes of the files that draw_curve writes.
 CURVE_SUFFIXES = (".png", ".svg", ".pdf")
+
+#: Multipliers of an envelope above this many times the lowest are cut off.
+MOST_OVER_LOWEST = 8.0
 
 #: More changes of hinges than this are not numbered one by one.
 MOST_EVENTS = 12
@@ -32,14 +47,15 @@ class Event:
 
     Attributes
     ----------
-    settlement : float [m or rad]
-        Over all phases.
-    reaction : float [N or N·m]
+    parameter : float [m or rad]
+        Settlement over all phases, or control displacement.
+    value : float
+        Reaction [N or N·m] or load multiplier.
     text : str
     """
 
-    settlement: float
-    reaction: float
+    parameter: float
+    value: float
     text: str
 
 
@@ -47,6 +63,9 @@ def draw_curve(
     response: solver.Response, path: str | os.PathLike[str], *, size: tuple[float, float] = (8.0, 5.0)
 ) -> Path:
     """Draws the reaction against the settlement, absolute and over the weight, with the events on the way.
+
+    For limit loads and pushovers the load multiplier against what they run over: settlement, position of the load or
+    control displacement; a single limit load as a rigid-plastic diagram.
 
     Parameters
     ----------
@@ -81,7 +100,7 @@ def events_of(response: solver.Response) -> list[Event]:
     response : solver.Response
     """
     path = response.path
-    total = path_settlements(path)
+    total, values = path_parameters(path), path_values(response)
     found = []
     for k in range(1, len(path)):
         text = []
@@ -91,37 +110,8 @@ def events_of(response: solver.Response) -> list[Event]:
                 some = f"{len(after) or 'no'} {word}{'s' if len(after) != 1 else ''}"
                 text.append(some if len(before) != len(after) else f"{word}s move")
         if text:
-            found.append(Event(float(total[k]), path[k].reaction, ", ".join(text)))
+            found.append(Event(float(total[k]), float(values[k]), ", ".join(text)))
     return found
-
-
-def path_settlements(path: tuple[solver.Increment, ...]) -> np.ndarray:
-    """(n,) array [m or rad]: settlement over all phases, one after another."""
-    total, before, last = np.zeros(len(path)), 0.0, 0.0
-    for k, increment in enumerate(path):
-        if k and increment.phase != path[k - 1].phase:
-            before = last
-        last = total[k] = before + increment.settlement
-    return total
-
-
-def settlement_text(settlement: float, response: solver.Response) -> str:
-    """A settlement with its unit, in mm where the whole response stays below a decimetre.
-
-    Parameters
-    ----------
-    settlement : float [m or rad]
-    response : solver.Response
-    """
-    factor, unit = settlement_unit(response)
-    return f"{settlement * factor:.2f} {unit}" if unit == "mm" else f"{settlement * factor:.4f} {unit}"
-
-
-def settlement_unit(response: solver.Response) -> tuple[float, str]:
-    """Factor and unit in which settlements of a response read well."""
-    unit = response.settlements[0].unit if response.settlements else "m"
-    largest = max((abs(i.settlement) for i in response.increments), default=0.0)
-    return (1e3, "mm") if unit == "m" and 0.0 < largest < 0.1 else (1.0, unit)
 
 
 class CurvePanel:
@@ -144,14 +134,12 @@ class CurvePanel:
         _draw(axes, response, events=False, text=text * 0.62)
         canvas.draw()
         self._picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
-        per_length, _ = settlement_unit(response)
-        total = path_settlements(response.path)
+        per_length, _ = parameter_unit(response)
+        total = path_parameters(response.path)
         factor, _ = force_unit(response)
-        reactions = np.array([i.reaction for i in response.path]) / factor
+        values = np.nan_to_num(path_values(response) / factor)
         places = (
-            axes.transData.transform(np.column_stack([total * per_length, reactions]))
-            if len(total)
-            else np.zeros((0, 2))
+            axes.transData.transform(np.column_stack([total * per_length, values])) if len(total) else np.zeros((0, 2))
         )
         self._total = total
         self._places = np.column_stack([places[:, 0], size[1] - places[:, 1]])
@@ -165,7 +153,9 @@ class CurvePanel:
         if len(self._total) == 0:
             return picture
         falling = increment.status == solver.Status.FALLING
-        at = self._total[-1] if falling else self._offsets.get(increment.phase, 0.0) + increment.settlement
+        at = self._offsets.get(increment.phase, 0.0) + increment.settlement
+        if falling and self._response.analysis != "limit load":
+            at = self._total[-1]
         x, y = (float(np.interp(at, self._total, self._places[:, k])) for k in (0, 1))
         r = 0.34 * self._text
         draw = ImageDraw.Draw(picture)
@@ -175,36 +165,83 @@ class CurvePanel:
 
 def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 11.0) -> None:
     path = response.path
-    factor, unit = force_unit(response)
+    factor, _ = force_unit(response)
     moment = any(s.unit == "rad" for s in response.settlements)
-    per_length, length_unit = settlement_unit(response)
-    total = path_settlements(path) * per_length
-    reactions = np.array([i.reaction for i in path]) / factor
-    blue = palette.hexadecimal(palette.FORCE)
-    axes.plot(total, reactions, "-", color=blue, linewidth=2.0, zorder=3)
-    if events:
-        axes.plot(total, reactions, "o", color=blue, markersize=3.0, zorder=3)
-    axes.set_xlabel(f"settlement [{length_unit}]", fontsize=text)
-    axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5))
-    axes.set_ylabel(f"reaction [{unit}]", fontsize=text)
+    per_length, _ = parameter_unit(response)
+    total = path_parameters(path) * per_length
+    values = path_values(response) / factor
+    known = values[np.isfinite(values)]
+    axes.set_ylabel(value_label(response), fontsize=text)
     axes.tick_params(labelsize=0.9 * text)
     axes.grid(color="#e4e4e4", linewidth=0.8)
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.02, y=0.12)
-    if not moment and response.total_weight > 0:
+    if len(known):
+        low, high = min(0.0, known.min()), max(0.0, known.max())
+        if parameter_word(response) == POSITION:
+            # Over a support the load may grow nearly without limit: what matters is where it may not.
+            high = min(high, MOST_OVER_LOWEST * max(known.min(), 0.0) or high)
+        axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
+    if parameter_word(response) == POSITION and len(path) == 1:
+        _draw_single(axes, known, text)
+        return
+    blue = palette.hexadecimal(palette.FORCE)
+    axes.plot(total, values, "-", color=blue, linewidth=2.0, zorder=3)
+    if events:
+        axes.plot(total, values, "o", color=blue, markersize=3.0, zorder=3)
+    axes.set_xlabel(parameter_label(response), fontsize=text)
+    axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5))
+    if not moment and not reads_multipliers(response) and response.total_weight > 0:
         weight = response.total_weight / factor
         over_weight = axes.secondary_yaxis(
             "right", functions=(lambda r: np.asarray(r) / weight, lambda w: np.asarray(w) * weight)
         )
         over_weight.set_ylabel("reaction / weight W", fontsize=text)
         over_weight.tick_params(labelsize=0.9 * text)
-    if len(path):
-        low, high = min(0.0, reactions.min()), max(0.0, reactions.max())
-        axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
-    if events:
+    if parameter_word(response) == POSITION:
+        _mark_lowest(axes, response, text, events)
+    elif events:
         _mark_events(axes, response, factor, text)
     if response.collapse is not None and len(path):
-        _mark_collapse(axes, response, total, reactions, text, events)
+        _mark_collapse(axes, response, total, values, text, events)
+
+
+def _draw_single(axes: Axes, known: np.ndarray, text: float) -> None:
+    """One limit load has no curve: rigid up to it, then a mechanism whose size is open."""
+    axes.set_xlim(0.0, 1.0)
+    axes.set_xticks([])
+    axes.set_xlabel("displacement of the mechanism (first order, any size)", fontsize=text)
+    if len(known) == 0:
+        axes.set_ylim(0.0, 1.0)
+        axes.set_yticks([])
+        axes.text(0.5, 0.5, "no finite limit load", transform=axes.transAxes, ha="center", fontsize=text)
+        return
+    alpha = float(known[0])
+    blue = palette.hexadecimal(palette.FORCE)
+    axes.plot([0.0, 0.0, 0.97], [0.0, alpha, alpha], "-", color=blue, linewidth=2.5, zorder=3, clip_on=False)
+    axes.annotate("", (1.0, alpha), (0.96, alpha), arrowprops={"arrowstyle": "->", "color": blue, "linewidth": 2.0})
+    axes.annotate(
+        f"α = {alpha:.6g}", (0.5, alpha), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=text
+    )
+
+
+def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool) -> None:
+    lowest = governing(response)
+    if lowest is None or not np.isfinite(lowest.load_multiplier):
+        return
+    red = palette.hexadecimal(palette.WARNING)
+    place = (lowest.settlement, lowest.load_multiplier)
+    axes.plot(*place, "o", color=red, markersize=8 if words else 5, zorder=4)
+    if words:
+        axes.annotate(
+            f"lowest α = {place[1]:.5g} at x = {place[0]:.4g} m",
+            (0.5, 0.96),
+            xycoords="axes fraction",
+            ha="center",
+            va="top",
+            fontsize=text,
+            color=red,
+        )
 
 
 def _mark_collapse(
@@ -213,8 +250,9 @@ def _mark_collapse(
     collapse = response.collapse
     assert collapse is not None
     red = palette.hexadecimal(palette.WARNING)
+    what = "no capacity" if response.analysis == "pushover" else "collapse"
     # Phases before the last shift the curve.
-    per_length, _ = settlement_unit(response)
+    per_length, _ = parameter_unit(response)
     low, middle, high = per_length * np.array([collapse.bracket[0], collapse.displacement, collapse.bracket[1]])
     start = total[-1] - per_length * response.path[-1].settlement
     axes.axvspan(start + low, start + high, color=red, alpha=0.25, linewidth=0)
@@ -222,7 +260,7 @@ def _mark_collapse(
     axes.plot(total[-1:], reactions[-1:], "X", color=red, markersize=9 if words else 6, zorder=4)
     if words:
         axes.annotate(
-            f"collapse at {collapse.displacement:.5g} {collapse.unit}\n"
+            f"{what} at {collapse.displacement:.5g} {collapse.unit}\n"
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]",
             (start + middle, 0.04),
             xycoords=("data", "axes fraction"),
@@ -240,8 +278,8 @@ def _mark_events(axes: Axes, response: solver.Response, factor: float, text: flo
     if not found:
         return
     ink = palette.hexadecimal(palette.INK)
-    per_length, _ = settlement_unit(response)
-    x, y = [e.settlement * per_length for e in found], [e.reaction / factor for e in found]
+    per_length, _ = parameter_unit(response)
+    x, y = [e.parameter * per_length for e in found], [e.value / factor for e in found]
     axes.plot(x, y, "o", color="white", markeredgecolor=ink, markersize=7, zorder=4, label="hinges or sliding change")
     if len(found) <= MOST_EVENTS:
         for number in range(1, len(found) + 1):
@@ -262,12 +300,3 @@ def _pairs(increment: solver.Increment, state: solver.ContactState) -> set[tuple
     chosen = increment.states == state
     a, b = increment.contacts.block_a[chosen], increment.contacts.block_b[chosen]
     return set(zip(np.minimum(a, b).tolist(), np.maximum(a, b).tolist(), strict=True))
-
-
-def force_unit(response: solver.Response) -> tuple[float, str]:
-    largest = max((abs(i.reaction) for i in response.path), default=0.0)
-    moment = "·m" if response.settlements and response.settlements[0].unit == "rad" else ""
-    for factor, unit in ((1e6, "MN"), (1e3, "kN")):
-        if largest >= factor:
-            return factor, unit + moment
-    return 1.0, "N" + moment

@@ -18,6 +18,7 @@ SLIDING = (126, 55, 178)
 FORCE = (20, 92, 168)
 HINGE = (17, 17, 17)
 SETTLEMENT = (0, 121, 107)
+LIVE = (190, 24, 118)
 WARNING = (190, 30, 30)
 
 #: Fills by material, in the order of their sorted names: sandstone, brick, slate, tuff, moss, ash.

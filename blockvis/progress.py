@@ -36,11 +36,18 @@ class Progress:
         self.count += 1
         if not self.shown or time.perf_counter() - self.last < REDRAW:
             return
+        falls = increment.status == solver.Status.FALLING
+        what = "falls" if falls else f"reaction {increment.reaction:.5g} N"
+        if increment.load_multiplier and not falls:
+            what = f"load multiplier {increment.load_multiplier:.5g}"
+        if not self.settlements:
+            self._line(f"{what}, {self.count} increments")
+            return
         settlement = self.settlements[increment.phase]
         part = min(increment.settlement / settlement.limit, 1.0)
-        what = "falls" if increment.status == solver.Status.FALLING else f"reaction {increment.reaction:.5g} N"
+        word = "settlement" if isinstance(settlement, solver.Settlement) else "control displacement"
         self._line(
-            f"[{'#' * int(24 * part):<24}] settlement {increment.settlement:.4g} of at most {settlement.limit:g} "
+            f"[{'#' * int(24 * part):<24}] {word} {increment.settlement:.4g} of at most {settlement.limit:g} "
             f"{settlement.unit}, {what}, {self.count} increments"
         )
 

@@ -14,6 +14,7 @@ from .film import write_film
 from .mechanism import swung, with_motion
 from .opengl import RenderingUnavailable, rendering_available
 from .scene import framed
+from .series import governing
 from .studio import MOST_PARTS, Look, Studio
 
 __all__ = ["Look", "RenderingUnavailable", "animate", "draw_mechanism", "draw_still", "rendering_available"]
@@ -92,7 +93,7 @@ def draw_mechanism(
     pathlib.Path
     """
     _check_response(response)
-    last = response.path[-1] if response.path else response.increments[0]
+    last = governing(response) or response.increments[0]
     motion = last.velocity if response.collapse is None else response.collapse.mechanism
     last = with_motion(last, motion)
     assembly = response.assembly
@@ -154,13 +155,17 @@ def animate(
 def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
     n = int(parts.max(initial=-1)) + 1
     bodies = f"{n} moving part{'s' if n != 1 else ''}{', darker where faster' if n > MOST_PARTS else ''}"
+    if response.collapse is None and response.analysis == "limit load" and response.limits:
+        return f"mechanism at the limit load   ·   {response.limits[-1].flow} friction   ·   {bodies}"
     if response.collapse is None:
         if response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM:
-            return f"no equilibrium before any settlement   ·   {bodies}"
+            when = "before any settlement" if response.analysis == "settlement" else "under the dead load"
+            return f"no equilibrium {when}   ·   {bodies}"
         return f"{response.stop}: the motion that would follow   ·   {bodies}"
     low, high = response.collapse.bracket
     unit = response.collapse.unit
-    return f"collapse mechanism   ·   equilibrium at {low:.5g} {unit}, none at {high:.5g} {unit}   ·   {bodies}"
+    what = "capacity" if response.analysis == "pushover" else "equilibrium"
+    return f"collapse mechanism   ·   {what} at {low:.5g} {unit}, none at {high:.5g} {unit}   ·   {bodies}"
 
 
 def _check_response(response: solver.Response) -> None:

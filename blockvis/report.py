@@ -18,8 +18,22 @@ from matplotlib.ticker import MaxNLocator
 import solver
 
 from . import marks, palette
-from .curves import force_unit, path_settlements, settlement_text, settlement_unit
+from .curves import MOST_OVER_LOWEST
 from .scene import framed
+from .series import (
+    POSITION,
+    badge_of,
+    force_unit,
+    governing,
+    parameter_label,
+    parameter_unit,
+    parameter_word,
+    path_parameters,
+    path_values,
+    reads_multipliers,
+    state_text,
+    value_label,
+)
 from .sheet import force_text
 
 __all__ = ["report_html", "write_report"]
@@ -78,6 +92,7 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
     model = json.dumps(_model(response), ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
     return Template((page / "player.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title or _title(response)),
+        badge=html.escape(badge_of(response)),
         style=(page / "player.css").read_text(encoding="utf-8"),
         script=(page / "player.js").read_text(encoding="utf-8"),
         summary=_rows(_summary(response)),
@@ -229,12 +244,7 @@ def _frames(response: solver.Response, shown: list[solver.Increment]) -> list[di
     frames = []
     for increment in shown:
         falling = increment.status == solver.Status.FALLING
-        caption = f"Settlement {settlement_text(increment.settlement, response)}"
-        if not falling:
-            moment = response.settlements[increment.phase].unit == "rad"
-            caption += f"  ·  reaction {force_text(increment.reaction, moment)}"
-            if not moment and response.total_weight > 0:
-                caption += f" = {increment.reaction / response.total_weight:.4f} W"
+        caption = state_text(increment, response).replace("   ·   ", "  ·  ")
         if len(response.settlements) > 1:
             caption += f"  ·  phase {increment.phase + 1}"
         frames.append({"caption": caption, "falling": falling, "curve": place.get(id(increment), len(response.path))})
@@ -243,7 +253,8 @@ def _frames(response: solver.Response, shown: list[solver.Increment]) -> list[di
 
 def _times(shown: list[solver.Increment]) -> list[float]:
     """Seconds at which each frame plays: even settlement, then the fall."""
-    path = path_settlements(tuple(i for i in shown if i.status != solver.Status.FALLING))
+    path = path_parameters(tuple(i for i in shown if i.status != solver.Status.FALLING))
+    path = path - path[:1]
     total = float(path[-1]) if len(path) and path[-1] > 0 else 1.0
     times: list[float] = []
     for k in range(len(shown)):
@@ -256,16 +267,20 @@ def _times(shown: list[solver.Increment]) -> list[float]:
 
 
 def _curve(response: solver.Response) -> dict[str, Any]:
-    per_length, length_unit = settlement_unit(response)
-    factor, unit = force_unit(response)
-    x = path_settlements(response.path) * per_length
-    y = np.array([i.reaction for i in response.path]) / factor
-    low, high = min(0.0, float(y.min(initial=0.0))), max(0.0, float(y.max(initial=0.0)))
+    per_length, _ = parameter_unit(response)
+    factor, _ = force_unit(response)
+    x = path_parameters(response.path) * per_length
+    y = path_values(response) / factor
+    known = y[np.isfinite(y)]
+    low, high = min(0.0, float(known.min(initial=0.0))), max(0.0, float(known.max(initial=0.0)))
+    if parameter_word(response) == POSITION and len(known):
+        high = min(high, MOST_OVER_LOWEST * max(float(known.min()), 0.0) or high)
     high = high + 0.08 * (high - low) if high > low else 1.0
     collapse = None
     if response.collapse is not None and len(x):
         start = float(x[-1]) - per_length * response.path[-1].settlement
         collapse = start + per_length * response.collapse.displacement
+    first = min(0.0, float(x.min(initial=0.0))) * 1.02
     widest = max([float(x.max(initial=0.0)), collapse or 0.0]) * 1.02 or 1.0
 
     def ticks(low: float, high: float, n: int) -> list[float]:
@@ -273,19 +288,22 @@ def _curve(response: solver.Response) -> dict[str, Any]:
 
     return {
         "settlement": [float(f"{v:.7g}") for v in x],
-        "reaction": [float(f"{v:.7g}") for v in y],
+        "reaction": [float(f"{v:.7g}") if np.isfinite(v) else None for v in y],
         "collapse": collapse,
+        "x_min": first,
         "x_max": widest,
         "y_min": low,
         "y_max": high,
-        "x_ticks": ticks(0.0, widest, 5),
+        "x_ticks": ticks(first, widest, 5),
         "y_ticks": ticks(low, high, 5),
-        "x_label": f"settlement [{length_unit}]",
-        "y_label": f"reaction [{unit}]",
+        "x_label": parameter_label(response),
+        "y_label": value_label(response),
     }
 
 
 def _title(response: solver.Response) -> str:
+    if reads_multipliers(response):
+        return _capacity_title(response)
     if response.collapse is not None:
         return f"Collapse at a settlement of {response.collapse.displacement:.5g} {response.collapse.unit}"
     return {
@@ -293,6 +311,48 @@ def _title(response: solver.Response) -> str:
         solver.Status.NO_INITIAL_EQUILIBRIUM: "No equilibrium before any settlement",
         solver.Status.SOLVER_FAILED: "The solver failed; the path up to there",
     }.get(response.stop, "Settling masonry")
+
+
+def _capacity_title(response: solver.Response) -> str:
+    state = governing(response)
+    if response.analysis == "pushover":
+        if response.collapse is not None:
+            return f"No capacity left at a control displacement of {response.collapse.displacement:.5g} m"
+        return f"Pushover: {response.stop}"
+    if state is None or not np.isfinite(state.load_multiplier):
+        return response.message or f"Limit load: {response.stop}"
+    where = ""
+    if len(response.path) > 1:
+        where = (
+            f" at {parameter_word(response)} {state.settlement:.5g} {parameter_unit(response)[1].replace('mm', 'm')}"
+        )
+    return f"Limit load: α = {state.load_multiplier:.5g}{where}"
+
+
+def _capacity_rows(response: solver.Response) -> list[tuple[str, str]]:
+    """The numbers of a limit load or a pushover."""
+    rows, path, state = [], response.path, governing(response)
+    if response.collapse is not None:
+        c = response.collapse
+        what = "zero capacity at" if response.analysis == "pushover" else "settlement alone: collapse at"
+        rows.append((what, f"{c.displacement:.6g} {c.unit}, between {c.bracket[0]:.6g} and {c.bracket[1]:.6g}"))
+    if response.analysis == "pushover" and path:
+        values = path_values(response)
+        rows.append(("load multiplier α at the start", f"{values[0]:.6g}"))
+        rows.append(("largest, last", f"{np.nanmax(values):.6g}, {values[-1]:.6g}"))
+    elif state is not None and np.isfinite(state.load_multiplier):
+        limit = next((limit for limit in response.limits if limit.forces is state.forces), None)
+        rows.append(("load multiplier α", f"{state.load_multiplier:.6g}"))
+        if limit is not None:
+            rows.append(("static, kinematic value", f"{limit.bounds[0]:.7g}, {limit.bounds[1]:.7g}"))
+            rows.append(("friction", limit.flow))
+            rows.append(("live load at α = 1", force_text(limit.live_force)))
+        if parameter_word(response) == POSITION and len(path) > 1:
+            rows.append(("lowest of", f"{len(path)} positions, at x = {state.settlement:.5g} m"))
+        elif response.settlements:
+            rows.append(("after a settlement of", f"{state.settlement:.6g} {response.settlements[-1].unit}"))
+            rows.append(("before it", f"{path[0].load_multiplier:.6g}"))
+    return rows
 
 
 def _summary(response: solver.Response) -> list[tuple[str, str]]:
@@ -303,12 +363,14 @@ def _summary(response: solver.Response) -> list[tuple[str, str]]:
         over = "" if moment or weight <= 0 else f" = {value / weight:.4f} W"
         return force_text(value, moment) + over
 
-    rows = [("status", str(response.stop))]
-    if response.collapse is not None:
+    rows = [("analysis", response.analysis), ("status", str(response.stop))]
+    if reads_multipliers(response):
+        rows += _capacity_rows(response)
+    elif response.collapse is not None:
         c = response.collapse
         rows.append(("collapse displacement", f"{c.displacement:.6g} {c.unit}"))
         rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))
-    if path:
+    if path and not reads_multipliers(response):
         rows.append(("first reaction", reaction(path[0].reaction)))
         rows.append(("last reaction", reaction(path[-1].reaction)))
     rows += [

@@ -17,10 +17,12 @@ import numpy as np
 
 import solver
 
+from .capacity import CAPACITY_TABLES, capacity_summary, stored_limits, stored_parameters, write_capacity
 from .record import RECORD, Record, read_record, versions
+from .series import POSITION, parameter_word
 from .stored_values import packed, unpacked
 
-__all__ = ["ResultsExist", "ResultsFolder", "open_results", "stored_case", "summary_of", "write"]
+__all__ = ["ResultsExist", "ResultsFolder", "open_results", "refuse_results", "stored_case", "summary_of", "write"]
 
 #: Columns of response.csv.
 COLUMNS = (
@@ -48,7 +50,7 @@ COLUMNS = (
 CHECKPOINT = "checkpoint.npz"
 
 #: Files that list or sum up others; what a run starts with; pictures of the results.
-_LISTS = ("summary.json", "response.csv", "blocks.pvd", "contacts.pvd")
+_LISTS = ("summary.json", "response.csv", "blocks.pvd", "contacts.pvd", *CAPACITY_TABLES)
 _STARTED = (RECORD, CHECKPOINT, "assembly.npz")
 _PICTURES = (
     *("report.html", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
@@ -71,6 +73,15 @@ def _written(path: Path, content: str | bytes) -> None:
     os.replace(partial, path)
 
 
+def refuse_results(path: str | Path, overwrite: bool = False) -> None:
+    """Raises :class:`ResultsExist` if a folder holds results that may not be replaced."""
+    path = Path(path)
+    if not overwrite and ((path / "summary.json").exists() or (path / "increments").exists()):
+        unfinished = not (path / "summary.json").exists() and (path / RECORD).exists()
+        go_on = f"go on with it by blockvis run --resume {path}, " if unfinished else ""
+        raise ResultsExist(f"'{path}' holds results already; {go_on}choose another folder with -o or add --force")
+
+
 class ResultsFolder:
     """A results folder that grows with the run: readable at every moment, whatever ends it.
 
@@ -82,6 +93,8 @@ class ResultsFolder:
         What the run is made from.
     overwrite : bool
         Whether results that are there already may be replaced.
+    parameter : {"settlement", "control displacement", "load position"}
+        What the path runs over.
 
     Raises
     ------
@@ -95,16 +108,18 @@ class ResultsFolder:
     """
 
     def __init__(
-        self, path: str | Path, assembly: solver.Assembly, *, record: Record | None = None, overwrite: bool = False
+        self,
+        path: str | Path,
+        assembly: solver.Assembly,
+        *,
+        record: Record | None = None,
+        overwrite: bool = False,
+        parameter: str = "settlement",
     ) -> None:
+        self.parameter = parameter
         self.path, self.assembly, self.record = Path(path), assembly, record or Record(versions=versions())
         self.increments: list[solver.Increment] = []
-        if not overwrite and ((self.path / "summary.json").exists() or (self.path / "increments").exists()):
-            unfinished = not (self.path / "summary.json").exists() and (self.path / RECORD).exists()
-            go_on = f"go on with it by blockvis run --resume {self.path}, " if unfinished else ""
-            raise ResultsExist(
-                f"'{self.path}' holds results already; {go_on}choose another folder with -o or add --force"
-            )
+        refuse_results(self.path, overwrite)
         (self.path / "increments").mkdir(parents=True, exist_ok=True)
         self._release = _held(self, self.path)
         # What lists others goes first, so that nothing ever points to a file that is gone.
@@ -116,7 +131,9 @@ class ResultsFolder:
         self._start_table()
 
     @classmethod
-    def reopened(cls, path: str | Path) -> tuple[ResultsFolder, solver.Checkpoint | None]:
+    def reopened(
+        cls, path: str | Path, parameter: str = "settlement"
+    ) -> tuple[ResultsFolder, solver.Checkpoint | None]:
         """The folder of a run that was stopped, as it was after its last checkpoint, and that checkpoint.
 
         Raises
@@ -125,7 +142,7 @@ class ResultsFolder:
             If the folder holds no run.
         """
         results = cls.__new__(cls)
-        results.path = Path(path)
+        results.path, results.parameter = Path(path), parameter
         results.record = read_record(results.path)
         results.assembly = _stored_assembly(results.path)
         results._release = _held(results, results.path)
@@ -165,6 +182,7 @@ class ResultsFolder:
     def finish(self, response: solver.Response, seconds: float) -> dict[str, Any]:
         """Writes and returns the summary."""
         self._write_lists()
+        write_capacity(response, self.path)
         summary = summary_of(response, seconds=seconds, record=self.record)
         _written(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
@@ -173,11 +191,12 @@ class ResultsFolder:
     def _start_table(self) -> None:
         self._rows = io.StringIO()
         self._table = csv.writer(self._rows, lineterminator="\n")
-        self._table.writerow(COLUMNS)
+        own = () if self.parameter == "settlement" else (self.parameter.replace(" ", "_"),)
+        self._table.writerow((*COLUMNS, *own))
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
-            self._table.writerow(_row(number, increment, solver.total_weight(self.assembly)))
+            self._table.writerow(_row(number, increment, solver.total_weight(self.assembly), self.parameter))
 
     def _write_lists(self) -> None:
         """The table and the lists of files, of everything so far."""
@@ -235,7 +254,7 @@ def write(response: solver.Response, folder: str | Path, *, overwrite: bool = Fa
     ------
     ResultsExist
     """
-    results = ResultsFolder(folder, response.assembly, overwrite=overwrite)
+    results = ResultsFolder(folder, response.assembly, overwrite=overwrite, parameter=parameter_word(response))
     for increment in response.increments:
         results.add(increment)
     results.finish(response, sum(i.seconds for i in response.increments))
@@ -273,6 +292,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record) -> 
         "initial_reaction": path[0].reaction if path else None,
         "collapse_reaction": collapse.reaction if collapse else None,
         "mechanism": collapse.words if collapse else None,
+        **capacity_summary(response),
         "last_settlement": path[-1].settlement if path else None,
         "last_reaction": path[-1].reaction if path else None,
         "total_weight": response.total_weight,
@@ -290,13 +310,15 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record) -> 
     }
 
 
-def _row(number: int, increment: solver.Increment, weight: float) -> Sequence[Any]:
+def _row(number: int, increment: solver.Increment, weight: float, parameter: str) -> Sequence[Any]:
     certificate = increment.certificate
+    settlement = 0.0 if parameter == POSITION else float(increment.settlement)
+    own = () if parameter == "settlement" else (repr(float(increment.settlement)),)
     counts = np.bincount(increment.states, minlength=len(solver.ContactState))
     return (
         number,
         increment.phase,
-        repr(float(increment.settlement)),
+        repr(settlement),
         repr(float(increment.reaction)),
         repr(float(increment.reaction) / weight),
         repr(float(increment.load_multiplier)),
@@ -308,6 +330,7 @@ def _row(number: int, increment: solver.Increment, weight: float) -> Sequence[An
         *(int(counts[state]) for state in (0, 1, 2, 3)),
         increment.programs,
         f"{increment.seconds:.4f}",
+        *own,
     )
 
 
@@ -417,12 +440,15 @@ def open_results(folder: str | Path) -> solver.Response:
     summary = {}
     if (folder / "summary.json").is_file():
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    settlements: tuple[solver.Settlement, ...] = ()
+    settlements = stored_parameters(summary)
     interfaces, loads = solver.Interfaces(), solver.self_weight(assembly)
     text = stored_case(folder)
     if text:
         case = parse_case(text, folder / "case.toml")
-        settlements, interfaces, loads = case.settlements, case_interfaces(case), case_loads(case, assembly)
+        interfaces, loads = case_interfaces(case), case_loads(case, assembly)
+        if "parameter" not in summary:
+            settlements = case.settlements
+    analysis = summary.get("analysis", "settlement")
     stop = solver.Status(summary.get("status", solver.Status.INTERRUPTED))
     return solver.Response(
         assembly=assembly,
@@ -433,6 +459,8 @@ def open_results(folder: str | Path) -> solver.Response:
         stop=stop,
         message=summary.get("message", ""),
         collapse=_collapse_of(summary, increments, assembly),
+        analysis=analysis,
+        limits=stored_limits(summary, increments),
     )
 
 

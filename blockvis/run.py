@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Generator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import solver
 
-from .case import Case, case_assembly, case_interfaces, case_loads, parse_case, read_case
+from .analyses import Plan, parameter_of, planned
+from .case import Case, case_assembly, parse_case, read_case
 from .progress import Progress
 from .record import read_record, record_of
-from .results import ResultsFolder, open_results
+from .results import ResultsFolder, open_results, refuse_results
 
 __all__ = ["Run", "draw_results", "resume_run", "run_case"]
 
@@ -66,11 +66,11 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
     if not isinstance(case, Case):
         case = read_case(case)
     folder = Path(f"{case.source.stem}-results") if folder is None else Path(folder)
+    refuse_results(folder, overwrite)
     assembly = case_assembly(case)
-    steps = _steps(case, assembly)
-    solver.check_settlement(assembly, case.settlements, case.controls)
-    results = ResultsFolder(folder, assembly, record=record_of(case), overwrite=overwrite)
-    return _followed(case, results, steps)
+    plan = planned(case, assembly)
+    results = ResultsFolder(folder, assembly, record=record_of(case), overwrite=overwrite, parameter=parameter_of(case))
+    return _followed(case, results, plan)
 
 
 def resume_run(folder: str | Path) -> Run:
@@ -109,8 +109,8 @@ def resume_run(folder: str | Path) -> Run:
         return Run(response, folder, finished, missing, had_finished=True)
     for note in record.changes():
         warnings.warn(note, stacklevel=2)
-    results, checkpoint = ResultsFolder.reopened(folder)
-    return _followed(case, results, _steps(case, results.assembly, checkpoint))
+    results, checkpoint = ResultsFolder.reopened(folder, parameter_of(case))
+    return _followed(case, results, planned(case, results.assembly, checkpoint))
 
 
 def _finished(folder: Path) -> dict[str, Any] | None:
@@ -125,47 +125,25 @@ def _drawn(case: Case) -> list[str]:
     return ["report.html", "mechanism.png", *([case.animation] if case.animation else [])]
 
 
-def _steps(
-    case: Case, assembly: solver.Assembly, resume: solver.Checkpoint | None = None
-) -> Generator[solver.Increment, None, solver.Ending]:
-    return solver.settlement_increments(
-        assembly,
-        case.settlements,
-        interfaces=case_interfaces(case),
-        loads=case_loads(case, assembly),
-        controls=case.controls,
-        resume=resume,
-    )
-
-
-def _followed(case: Case, results: ResultsFolder, steps: Generator[solver.Increment, None, solver.Ending]) -> Run:
+def _followed(case: Case, results: ResultsFolder, plan: Plan) -> Run:
     """Follows the increments to their end or to Ctrl-C, writing each, and draws what came out."""
-    folder, assembly = results.path, results.assembly
-    progress = Progress(case.settlements)
+    folder = results.path
+    progress = Progress(plan.settlements)
     ending = solver.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
     try:
         while True:
             try:
-                increment = next(steps)
+                increment = next(plan.steps)
             except StopIteration as stop:
                 ending = stop.value
                 break
             results.add(increment)
             progress.increment(increment)
     except KeyboardInterrupt:
-        steps.close()
+        plan.steps.close()
     finally:
         progress.done()
-    response = solver.Response(
-        assembly=assembly,
-        settlements=case.settlements,
-        interfaces=case_interfaces(case),
-        loads=case_loads(case, assembly),
-        increments=tuple(results.increments),
-        stop=ending.stop,
-        message=ending.message,
-        collapse=ending.collapse,
-    )
+    response = plan.response(results.increments, ending)
     summary = results.finish(response, sum(i.seconds for i in response.increments))
     missing: tuple[str, ...] = ()
     if ending.stop is not solver.Status.INTERRUPTED:

@@ -21,7 +21,8 @@ DEPTHS = {
     for k, name in enumerate(
         (
             "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding", "motion outline",
-            "force line", "force", "hinge", "hinge top", "motion rim", "motion top", "arrow rim", "arrow top",
+            "force line", "force", "hinge", "hinge top", "motion rim", "motion top", "live rim", "live top",
+            "arrow rim", "arrow top",
         )
     )
 }  # fmt: skip
@@ -44,6 +45,15 @@ class Frame:
     def size(self) -> np.ndarray:
         """(2,) array [m]: width and height."""
         return self.high - self.low
+
+    def holding(self, points: np.ndarray) -> Frame:
+        """This frame, grown where points (n, 2) [m] lie beyond it, with a margin."""
+        margin = 0.02 * float(self.size.max())
+        if len(points) == 0:
+            return self
+        return Frame(
+            np.minimum(self.low, points.min(axis=0) - margin), np.maximum(self.high, points.max(axis=0) + margin)
+        )
 
     def fitted(self, width: int, height: int) -> Frame:
         """The smallest frame around this one with the proportions of a picture of ``width`` × ``height`` pixels."""

@@ -12,15 +12,15 @@ from PIL import Image
 import solver
 
 from . import marks, palette
-from .curves import CurvePanel, settlement_text
+from .curves import CurvePanel
 from .fills import cut_into_triangles
+from .live_load import LiveLoad, live_load_of
 from .mechanism import part_outlines
 from .scene import Scene, framed, magnified
+from .series import POSITION, badge_of, governing, parameter_word, reads_multipliers, state_text
 from .sheet import ColourBar, Key, Sheet, force_text
 
 __all__ = ["Look", "Studio"]
-
-PSEUDO_TIME = "FALLING · pseudo-time"
 
 #: Resultants and hinges of more blocks than this hide what they stand on.
 FEW_BLOCKS = 300
@@ -30,6 +30,9 @@ FINE_CRACK = 0.01
 
 #: Up to this many parts of a mechanism are tinted one by one.
 MOST_PARTS = 16
+
+#: Length of the longest arrow of the live load, as a fraction of the picture.
+LIVE_LENGTH = 0.11
 
 #: Single pictures up to this size [pixels] are drawn at four times their size, so that flat slopes show no steps.
 FINE_UP_TO = 2600
@@ -93,6 +96,12 @@ class Studio:
         self.sheet = Sheet(size, bar, beside)
         self.panel = CurvePanel(response, _size_of(self.sheet.beside), self.sheet.text) if curve else None
         frame = framed(assembly, [solver.Pose.initial(assembly), *poses, *extra])
+        self.live = _live_loads(response, increments, float(frame.size.max()))
+        self.live_largest = max((load.largest for load in self.live.values()), default=0.0)
+        #: Length of the live load's arrows per force [m/N].
+        self.live_scale = LIVE_LENGTH * float(frame.size.max()) / (self.live_largest or 1.0)
+        tails = [load.points - load.forces * self.live_scale for load in self.live.values()]
+        frame = frame.holding(np.concatenate([np.zeros((0, 2)), *tails]))
         fill = palette.block_colours(assembly.materials, assembly.free)
         self.fill = fill
         self.tints: np.ndarray | None = None
@@ -121,13 +130,14 @@ class Studio:
         self._draw_forces(at, shown)
         self._draw_ground(shown)
         self._draw_settlement_arrow(at, shown)
+        self._draw_live_load(increment, shown)
         falling = increment.status == solver.Status.FALLING
         title, detail = _caption(self.response, at, self.look, s)
         return self.sheet.composed(
             self.scene.image(),
             title=title,
             detail=note or detail,
-            badge=PSEUDO_TIME if falling else "",
+            badge=badge_of(self.response) if falling else "",
             keys=self.keys(),
             pixel=self.scene.pixel,
             beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, settlement=s)),
@@ -194,6 +204,9 @@ class Studio:
                 )
                 length = self.force_shown * self.force_scale / self.scene.pixel
                 keys.append(Key("bar", text, palette.FORCE, length))
+            if self.live_largest > 0.0:
+                shown = force_text(self.live_largest)
+                keys.append(Key("line", f"live load · α, longest arrow {shown}", palette.LIVE))
             if any(layer.startswith("motion") for layer in self.scene.layers):
                 keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT))
             self._keys = keys
@@ -292,8 +305,21 @@ class Studio:
             lines.append(np.stack(ends, axis=1))
         self.scene.lines("ground", np.concatenate(lines), palette.INK, max(1.2, self.scene.size[1] / 320.0))
 
+    def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose) -> None:
+        """The live load times its multiplier, arrows to scale that end where it acts."""
+        load = self.live[id(increment.forces)]
+        if self.live_largest == 0.0:
+            return
+        swinging = self.response.analysis == "limit load" and self.response.collapse is None
+        if increment.status == solver.Status.FALLING and not swinging:
+            load = LiveLoad.none()
+        tips = marks.carried(load.points, load.blocks, load.pose, shown) if len(load.points) else load.points
+        self._arrows("live", tips - load.forces * self.live_scale, tips, 0.55, palette.LIVE)
+
     def _draw_settlement_arrow(self, increment: solver.Increment, shown: solver.Pose) -> None:
         assembly, scene = self.assembly, self.scene
+        if not self.response.settlements:
+            return
         phase = self.response.settlements[min(increment.phase, len(self.response.settlements) - 1)]
         part = np.flatnonzero(phase.taking_part(assembly))
         rate = phase.rate(assembly, solver.Pose.initial(assembly), 0.0)
@@ -317,13 +343,31 @@ class Studio:
                 tips.append(place + along / 2.0)
         self._arrows("arrow", np.array(tails).reshape(-1, 2), np.array(tips).reshape(-1, 2), 1.0)
 
-    def _arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, weight: float) -> None:
+    def _arrows(
+        self,
+        layer: str,
+        tails: np.ndarray,
+        tips: np.ndarray,
+        weight: float,
+        fill: tuple[int, int, int] = palette.SETTLEMENT,
+    ) -> None:
         scene = self.scene
         thick = weight * scene.size[1] / 110.0 * scene.pixel
-        for name, grown, colour in (("rim", 1.0, palette.PAPER), ("top", 0.0, palette.SETTLEMENT)):
+        for name, grown, colour in (("rim", 1.0, palette.PAPER), ("top", 0.0, fill)):
             shafts, heads = _arrow_shapes(tails, tips, thick, grown * weight * scene.size[1] / 360.0 * scene.pixel)
             scene.polygons(f"{layer} {name}/shaft", shafts, colour)
             scene.polygons(f"{layer} {name}/head", heads, colour)
+
+
+def _live_loads(
+    response: solver.Response, increments: tuple[solver.Increment, ...], extent: float
+) -> dict[int, LiveLoad]:
+    """The live load of each increment by its forces, which frames of a swinging mechanism share with their state."""
+    found: dict[int, LiveLoad] = {}
+    for increment in increments:
+        if id(increment.forces) not in found:
+            found[id(increment.forces)] = live_load_of(response, increment, extent)
+    return found
 
 
 def _arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: float) -> tuple[np.ndarray, np.ndarray]:
@@ -406,22 +450,32 @@ def _even_motion(
 
 
 def _caption(response: solver.Response, increment: solver.Increment, look: Look, s: float | None) -> tuple[str, str]:
-    phase = response.settlements[min(increment.phase, len(response.settlements) - 1)]
-    settlement = increment.settlement if s is None else s
-    title = f"Settlement {settlement_text(settlement, response)}"
-    if increment.status == solver.Status.FALLING:
-        detail = "no equilibrium, no dynamics: the mechanism followed step by step"
-    else:
-        title += f"   ·   Reaction {force_text(increment.reaction, phase.unit == 'rad')}"
-        if phase.unit == "m":
-            title += f" = {increment.reaction / response.total_weight:.4f} W"
-        detail = "equilibrium"
-        if response.stop == solver.Status.COLLAPSED and increment.settlement == response.path[-1].settlement:
-            detail = "last equilibrium before collapse"
+    title = state_text(increment, response, s)
+    detail = _state(response, increment)
     if len(response.settlements) > 1:
         detail += f"   ·   phase {increment.phase + 1} of {len(response.settlements)}"
     scale = "true scale" if look.magnification == 1.0 else f"displacements × {look.magnification:g}"
     return title, f"{detail}   ·   {scale}   ·   W = {force_text(response.total_weight)}"
+
+
+def _state(response: solver.Response, increment: solver.Increment) -> str:
+    swung = response.analysis == "limit load" and response.collapse is None
+    if increment.status == solver.Status.FALLING:
+        if swung and response.path:
+            return "pseudo-motion: the mechanism at the limit load, followed to first order and out of scale"
+        return "no equilibrium, no dynamics: the mechanism followed step by step"
+    if response.analysis == "limit load":
+        flow = f"limit state, {response.limits[0].flow} friction" if response.limits else "limit state"
+        lowest = len(response.path) > 1 and parameter_word(response) == POSITION and _decides(response, increment)
+        return flow + (f"   ·   the lowest of {len(response.path)} positions" if lowest else "")
+    if response.stop == solver.Status.COLLAPSED and increment.settlement == response.path[-1].settlement:
+        return "last equilibrium before " + ("capacity is lost" if reads_multipliers(response) else "collapse")
+    return "equilibrium"
+
+
+def _decides(response: solver.Response, increment: solver.Increment) -> bool:
+    lowest = governing(response)
+    return lowest is not None and lowest.settlement == increment.settlement
 
 
 def _largest_displacement(assembly: solver.Assembly, increment: solver.Increment) -> float:

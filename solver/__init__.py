@@ -16,6 +16,7 @@ from .analysis import Controls, Ending, check_settlement, settle, settlement_inc
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly
 from .checkpoint import Checkpoint
 from .contact import Contacts, InterfaceLaw, Interfaces, JointScatter, find_contacts, measure_contacts
+from .equilibrium import block_forces
 from .kinematics import Pose, moved_vertices
 from .limit import Envelope, LimitLoad, LimitStatus, limit_load, limit_load_envelope
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
@@ -55,6 +56,7 @@ __all__ = [
     "Settlement",
     "SolveError",
     "Status",
+    "block_forces",
     "check_settlement",
     "edge_pressure",
     "find_contacts",

@@ -338,7 +338,7 @@ class _Path:
         rest = self.first_without - self.here.s
         if np.isfinite(rest):
             step = rest if rest <= self.tolerance else min(step, rest / 2.0)
-        return min(step, self.phase.limit - self.here.s)
+        return min(step, self.phase.limit - self.here.s, self.phase.step_to_stop(self.here.s))
 
     def _go_back(self) -> float:
         """Returns to the place before; gives the step to try from there."""

@@ -25,6 +25,9 @@ __all__ = ["Envelope", "LimitLoad", "LimitStatus", "checked_live", "limit_load",
 DRAWN_GAP = 1e-3
 COMPUTED_GAP = 1e-6
 
+#: Largest gap, in block sizes, of a contact point that may close within a displacement.
+REACH = 0.25
+
 #: Non-associative flow: part of the new normal forces in the next program, while wandering and while settling, and
 #: part of the dilatancy that is kept.
 RELAXATION, SETTLING_RELAXATION = 0.5, 0.9
@@ -154,6 +157,7 @@ def limit_load(
     pose: Pose | None = None,
     flow: str = "associative",
     closed_gap: float | None = None,
+    displacement: float = 0.0,
     overlap_tolerance: float | None = None,
 ) -> LimitLoad:
     """The largest multiplier of the live loads at which the structure can be in equilibrium.
@@ -174,6 +178,10 @@ def limit_load(
     closed_gap : float, optional [m]
         Contact points with a larger gap are open and carry nothing. By default a thousandth of the width of the
         thinnest block in the drawing, a millionth of the block size at a given pose.
+    displacement : float [m]
+        How far the live loads may move along themselves, on average, while joints close. 0: what is open carries
+        nothing. A wall of many bricks whose joints slide has openings of hundredths of a millimetre after a settlement,
+        and its strict limit load is that of the one loosest brick.
     overlap_tolerance : float, optional [m]
         Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
 
@@ -199,6 +207,11 @@ def limit_load(
     bounds are recomputed from the forces and from the mechanism. The multiplier is the exact limit load of the model
     with associative flow, and an upper bound for every other flow rule with the same friction.
 
+    With a displacement δ, points that are open by a gap g carry at a price: maximise α - Σ g N / w, where w is δ times
+    the sum of the live forces; its dual has N(q) + g ≥ μ |T(q)| and live · q = w. That is the first program of a
+    pushover with an increment δ. At closed joints it is the limit load, whatever δ is; the two values then enclose the
+    optimum of this program.
+
     Non-associative flow is a sequence of such programs in the manner of Gilbert, Casapulla & Ahmed (2006),
     https://doi.org/10.1016/j.compstruc.2006.02.005: the friction cone of each point is replaced by
     |T| ≤ μ N⁰ + ψ (N - N⁰), with N⁰ out of the normal forces of the programs before and a dilatancy ψ that falls from
@@ -219,7 +232,9 @@ def limit_load(
     if closed_gap is None:
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else pose
-    problem = _Problem.stated(assembly, interfaces, loads, pose, closed_gap)
+    if not (np.isfinite(displacement) and displacement >= 0.0):
+        raise ValueError(f"displacement is {displacement:g} m; it must be a finite number of at least 0")
+    problem = _Problem.stated(assembly, interfaces, loads, pose, closed_gap, displacement)
     balanced, status = problem.balanced(with_live=False), LimitStatus.FOUND
     if balanced.falls:
         falling, status = balanced, LimitStatus.HELD
@@ -267,18 +282,31 @@ class _Problem:
     live: np.ndarray
     live_size: float
     live_force: float
+    price: np.ndarray
 
     @classmethod
     def stated(
-        cls, assembly: Assembly, interfaces: Interfaces, loads: Loads, pose: Pose, closed_gap: float
+        cls,
+        assembly: Assembly,
+        interfaces: Interfaces,
+        loads: Loads,
+        pose: Pose,
+        closed_gap: float,
+        displacement: float,
     ) -> _Problem:
-        contacts = find_contacts(assembly, moved_vertices(assembly, pose), closed_gap)
         length, free = assembly.block_size, assembly.free
+        reach = max(closed_gap, REACH * length) if displacement > 0.0 else closed_gap
+        contacts = find_contacts(assembly, moved_vertices(assembly, pose), reach)
         units = np.array([1.0, 1.0, length])
         weights = np.abs(loads.dead[free] / units)
         live = loads.live[free] / units
         force = float(weights.sum() / len(weights)) or float(np.abs(live).max())
         size = float(np.abs(live).max())
+        # What a unit of normal force costs in multipliers of the scaled live load.
+        price = np.zeros(len(contacts))
+        if displacement > 0.0:
+            total = float(np.hypot(*live[:, :2].T).sum() + np.abs(live[:, 2]).sum())
+            price = np.where(contacts.gaps > closed_gap, contacts.gaps, 0.0) / displacement * (size / total)
         return cls(
             assembly=assembly,
             pose=pose,
@@ -291,6 +319,7 @@ class _Problem:
             live=(live / size).ravel(),
             live_size=size / force,
             live_force=float(np.hypot(*loads.live[free, :2].sum(axis=0))),
+            price=price,
         )
 
     def balanced(self, *, with_live: bool) -> _State:
@@ -314,7 +343,7 @@ class _Problem:
         """The program of the limit load; what the dead load leaves unbalanced by rounding it may leave too."""
         rays = cone_rays(self.friction)
         program = LinearProgram(
-            cost=np.append(np.zeros(rays.shape[1]), -1.0),
+            cost=np.append(rays.T @ np.stack([self.price, np.zeros_like(self.price)], axis=1).ravel(), -1.0),
             matrix=sp.csc_array(sp.hstack([self.matrix @ rays, sp.csc_array(self.live[:, None])], format="csc")),
             lower=-self.dead - balanced.unbalanced,
             upper=-self.dead + balanced.unbalanced,
@@ -369,7 +398,7 @@ class _Problem:
         change = [eye, None, None, -eye, eye, None, None, None]
         program = LinearProgram(
             cost=np.concatenate(
-                [np.zeros(3 * n), np.full(2 * n, change_cost), [-1.0], np.full(2 * rows, UNBALANCED_COST)]
+                [self.price, np.zeros(2 * n), np.full(2 * n, change_cost), [-1.0], np.full(2 * rows, UNBALANCED_COST)]
             ),
             matrix=sp.csc_array(sp.block_array([balance, cone, change], format="csc")),
             lower=np.concatenate([-self.dead - unbalanced, 2.0 * constant, normal]),
@@ -399,6 +428,9 @@ class _Problem:
         taken = float(drag @ np.abs(relative[:, 1]))
         live_power = float(self.live @ velocity)
         kinematic = (taken - float(self.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
+        kinematic += float(self.price @ state.forces[:, 0])
+        # Points that are open may close by their gap in a motion whose live power is 1.
+        relative[:, 0] += self.price * max(live_power, 0.0)
         slope = self.friction if state.drag is None else np.zeros(len(relative))
         room = np.stack([relative[:, 0] - slope * relative[:, 1], relative[:, 0] + slope * relative[:, 1]], axis=1)
         normal, shear = state.forces.T

@@ -72,6 +72,8 @@ class Settlement:
         Width of the collapse bracket; a hundredth of the increment by default.
     blocks : sequence of str, optional
         Names of the moving supports that take part; all by default, the others stand still in this phase.
+    stops : sequence of float [m or rad]
+        Settlements that no step goes across: the path has an increment at each of them that it reaches.
     """
 
     direction: Sequence[float] | None = None
@@ -81,6 +83,7 @@ class Settlement:
     limit: float = 1.0
     tolerance: float | None = None
     blocks: tuple[str, ...] | None = None
+    stops: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if self.direction is None and self.rotation_centre is None:
@@ -109,6 +112,14 @@ class Settlement:
                 raise ValueError(f"settlement {name} is {value:g}; it must be a positive number")
         if self.rotation_centre is not None and self.direction is None:
             object.__setattr__(self, "rotation", float(np.sign(self.rotation)))
+        for stop in self.stops:
+            if not 0.0 <= stop <= self.limit:
+                raise ValueError(f"settlement stop {stop:g} is not between 0 and the limit of {self.limit:g}")
+        object.__setattr__(self, "stops", tuple(sorted(float(stop) for stop in self.stops)))
+
+    def step_to_stop(self, s: float) -> float:
+        """From s to the next stop; infinite where none is ahead. A hair before a stop counts as on it."""
+        return min((stop - s for stop in self.stops if stop - s > 1e-9 * self.increment), default=np.inf)
 
     @property
     def unit(self) -> str:

@@ -15,6 +15,7 @@ from .kinematics import Pose, moved, rotation_matrices
 from .limit import checked_live
 from .loads import Loads
 from .lp import SolveError
+from .mechanism import mechanism_of
 from .program import Locked, Model, Solved, point_velocities, solve_program
 from .response import Collapse, Increment, Response, Status
 
@@ -191,6 +192,7 @@ def pushover(
         stop=ending.stop,
         message=ending.message,
         collapse=ending.collapse,
+        analysis="pushover",
     )
 
 
@@ -505,12 +507,14 @@ class _Path:
             part = last.multiplier / (last.multiplier - lost.multiplier)
             what = "no capacity is left"
         assert self.model.live is not None
+        falls = _increment(falling_model, fall, self.first_without, 1.0, Status.FALLING)
         collapse = Collapse(
             displacement=last.d + part * (self.first_without - last.d),
             bracket=(last.d, self.first_without),
             reaction=last.multiplier * float(np.hypot(*self.model.live[:, :2].sum(axis=0))),
             mechanism=fall.motion / self._length(fall),
             unit="m",
+            words=str(mechanism_of(self.model.assembly, falls)),
         )
         yield from self._fall(falling_model, fall)
         return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)

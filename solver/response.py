@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from .checkpoint import Checkpoint
 from .contact import Contacts, Interfaces
 from .kinematics import Pose
 from .loads import Loads, Settlement
+
+if TYPE_CHECKING:
+    from .limit import LimitLoad
 
 __all__ = ["Certificate", "Collapse", "ContactState", "Increment", "Response", "Status", "total_weight"]
 
@@ -204,6 +208,12 @@ class Response:
     message : str
         Why it stopped, in words.
     collapse : Collapse or None
+    analysis : str
+        "settlement"; "pushover", whose ``settlement`` is a control displacement; or "limit load", whose increments in
+        equilibrium are limit states: after settlements where there are any, else one for each position x [m] of a
+        load that moves, kept in ``settlement``.
+    limits : tuple of LimitLoad
+        Of a limit load analysis, one per limit state, in their order.
     """
 
     assembly: Assembly
@@ -214,6 +224,8 @@ class Response:
     stop: Status
     message: str = ""
     collapse: Collapse | None = field(default=None)
+    analysis: str = "settlement"
+    limits: tuple[LimitLoad, ...] = ()
 
     @property
     def path(self) -> tuple[Increment, ...]:
@@ -229,6 +241,11 @@ class Response:
     def reaction(self) -> np.ndarray:
         """(n,) array [N or N·m]: reaction of each increment in equilibrium."""
         return np.array([i.reaction for i in self.path])
+
+    @property
+    def load_multiplier(self) -> np.ndarray:
+        """(n,) array: load multiplier of each increment in equilibrium."""
+        return np.array([i.load_multiplier for i in self.path])
 
     @property
     def total_weight(self) -> float:

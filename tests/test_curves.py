@@ -9,7 +9,8 @@ from PIL import Image
 from structures import arch_response, parted, wall
 
 from blockvis import palette
-from blockvis.curves import CurvePanel, draw_curve, events_of, settlement_text
+from blockvis.curves import CurvePanel, draw_curve, events_of
+from blockvis.series import parameter_text
 
 
 def test_png_has_a_curve_and_the_collapse(tmp_path):
@@ -48,8 +49,8 @@ def test_hinges_of_the_arch_stay_the_same_on_its_path():
 
 def test_small_settlements_are_told_in_millimetres():
     response = parted(wall(4, 3), 3, 0, settlement=0.005)
-    assert settlement_text(0.0025, response) == "2.50 mm"
-    assert settlement_text(0.0025, arch_response()) == "0.0025 m"
+    assert parameter_text(0.0025, response) == "2.50 mm"
+    assert parameter_text(0.0025, arch_response()) == "0.0025 m"
 
 
 def test_the_dot_moves_along_the_panel():

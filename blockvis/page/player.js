@@ -210,8 +210,8 @@
   function drawCurve(k) {
     const target = $("curve"), pen = sharp(target), w = target.clientWidth, h = target.clientHeight, c = model.curve;
     if (!c.settlement.length) return;
-    const left = 62, right = 12, top = 14, bottom = 44, [xMax, yLow, yHigh] = [c.x_max || 1, c.y_min, c.y_max];
-    const X = (s) => left + (w - left - right) * s / xMax, Y = (r) => h - bottom - (h - top - bottom) * (r - yLow) / (yHigh - yLow);
+    const left = 62, right = 12, top = 14, bottom = 44, [xMin, xMax, yLow, yHigh] = [c.x_min, c.x_max || 1, c.y_min, c.y_max];
+    const X = (s) => left + (w - left - right) * (s - xMin) / (xMax - xMin), Y = (r) => h - bottom - (h - top - bottom) * (r - yLow) / (yHigh - yLow);
     pen.font = "12.5px system-ui, DejaVu Sans, sans-serif"; pen.lineWidth = 1;
     pen.strokeStyle = "#e4e4e4"; pen.fillStyle = model.colours.ink;
     pen.textAlign = "right"; pen.textBaseline = "middle";
@@ -227,15 +227,20 @@
     pen.fillText(c.x_label, (left + w - right) / 2, h - 17);
     pen.save(); pen.translate(13, (h - bottom + top) / 2); pen.rotate(-Math.PI / 2); pen.textBaseline = "middle"; pen.fillText(c.y_label, 0, 0); pen.restore();
     pen.strokeStyle = model.colours.force; pen.lineWidth = 2; pen.lineJoin = "round"; pen.beginPath();
-    c.settlement.forEach((s, i) => (i ? pen.lineTo(X(s), Y(c.reaction[i])) : pen.moveTo(X(s), Y(c.reaction[i]))));
-    pen.stroke();
+    pen.save(); pen.beginPath(); pen.rect(left - 3, top - 3, w - left - right + 6, h - top - bottom + 6); pen.clip(); pen.beginPath();
+    // An unbounded multiplier is null: the line stops before it and starts again after it.
+    c.settlement.forEach((s, i) => {
+      if (c.reaction[i] === null) return;
+      if (i && c.reaction[i - 1] !== null) pen.lineTo(X(s), Y(c.reaction[i])); else pen.moveTo(X(s), Y(c.reaction[i]));
+    });
+    pen.stroke(); pen.restore();
     if (c.collapse !== null) {
       pen.strokeStyle = model.colours.warning; pen.lineWidth = 1; pen.setLineDash([5, 4]);
       pen.beginPath(); pen.moveTo(X(c.collapse), top); pen.lineTo(X(c.collapse), h - bottom); pen.stroke(); pen.setLineDash([]);
     }
     const at = Math.min(model.frames[k].curve, c.settlement.length - 1);
     pen.fillStyle = model.frames[k].falling ? model.colours.warning : model.colours.settlement;
-    pen.beginPath(); pen.arc(X(c.settlement[at]), Y(c.reaction[at]), 5.5, 0, 2 * Math.PI); pen.fill();
+    pen.beginPath(); if (c.reaction[at] !== null && c.reaction[at] <= yHigh) pen.arc(X(c.settlement[at]), Y(c.reaction[at]), 5.5, 0, 2 * Math.PI); pen.fill();
     state.curveX = X;
   }
 

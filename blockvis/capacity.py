@@ -1,0 +1,153 @@
+"""Limit loads and pushovers in the results folder: their numbers in the summary, their tables, and back."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solver
+
+from .series import POSITION, governing, parameter_word, path_values
+
+__all__ = ["CAPACITY_TABLES", "capacity_summary", "stored_limits", "stored_parameters", "write_capacity"]
+
+#: Limit loads over the positions of a load that moves, and over the settlement.
+CAPACITY_TABLES = ("envelope.csv", "capacity.csv")
+
+
+def write_capacity(response: solver.Response, folder: Path) -> None:
+    """Writes envelope.csv, a row per position, or capacity.csv, a row per settlement, where there are limit loads.
+
+    Parameters
+    ----------
+    response : solver.Response
+    folder : Path
+    """
+    if response.analysis != "limit load":
+        return
+    word = parameter_word(response)
+    rows = io.StringIO()
+    table = csv.writer(rows, lineterminator="\n")
+    first = ["position"] if word == POSITION else ["phase", "settlement"]
+    table.writerow([*first, "load_multiplier", "static", "kinematic", "status", "flow", "mechanism"])
+    for limit, state in _states(response):
+        place = [repr(float(state.settlement))]
+        numbers = [repr(float(v)) for v in (limit.multiplier, *limit.bounds)]
+        words = str(solver.mechanism_of(response.assembly, state)) if limit.mechanism.any() else ""
+        where = place if word == POSITION else [str(state.phase), *place]
+        table.writerow([*where, *numbers, str(limit.status), limit.flow, words])
+    name = CAPACITY_TABLES[0] if word == POSITION else CAPACITY_TABLES[1]
+    if word == POSITION and len(response.limits) < 2:
+        return
+    (folder / name).write_text(rows.getvalue(), encoding="utf-8")
+
+
+def capacity_summary(response: solver.Response) -> dict[str, Any]:
+    """What the summary says of the analysis, its parameter and its multipliers; None where nothing finite is known.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    summary: dict[str, Any] = {"analysis": response.analysis, "parameter": parameter_word(response)}
+    motions = [asdict(motion) for motion in response.settlements]
+    if response.analysis == "pushover":
+        values = path_values(response)
+        largest = int(np.nanargmax(values)) if np.isfinite(values).any() else None
+        return summary | {
+            "control": motions[0],
+            "limit_load_multiplier": _finite(values[0]) if len(values) else None,
+            "largest_load_multiplier": None if largest is None else _finite(values[largest]),
+            "largest_load_multiplier_at": None if largest is None else float(response.settlement[largest]),
+        }
+    summary["settlements"] = motions
+    if response.analysis != "limit load":
+        return summary
+    chosen = governing(response)
+    states = _states(response)
+    limit = next((limit for limit, state in states if state is chosen), states[0][0] if states else None)
+    summary |= {
+        "limit_load_multiplier": None if limit is None else _finite(limit.multiplier),
+        "limit_load_bounds": None if limit is None else [_finite(bound) for bound in limit.bounds],
+        "limit_load_flow": None if limit is None else limit.flow,
+        "limit_load_status": None if limit is None else str(limit.status),
+        "live_load": None if limit is None else limit.live_force,
+        "limit_loads": [
+            {
+                "increment": number,
+                "multiplier": _finite(limit.multiplier),
+                "bounds": [_finite(bound) for bound in limit.bounds],
+                "status": str(limit.status),
+                "flow": limit.flow,
+                "live_load": limit.live_force,
+                "programs": limit.programs,
+            }
+            for number, limit in _numbered(response)
+        ],
+    }
+    if chosen is not None and response.collapse is None:
+        summary["mechanism"] = str(solver.mechanism_of(response.assembly, chosen)) if chosen.velocity.any() else None
+    if parameter_word(response) == POSITION and len(response.limits) > 1:
+        summary["governing_position"] = None if chosen is None else chosen.settlement
+    return summary
+
+
+def stored_parameters(summary: Mapping[str, Any]) -> tuple[solver.Settlement, ...]:
+    """What the parameter of a stored response runs over, from :func:`capacity_summary`."""
+    if summary.get("control"):
+        return (solver.ControlDisplacement(**summary["control"]),)  # type: ignore[return-value]
+    motions = [dict(motion) for motion in summary.get("settlements", [])]
+    for motion in motions:
+        motion["blocks"] = None if motion["blocks"] is None else tuple(motion["blocks"])
+    return tuple(solver.Settlement(**motion) for motion in motions)
+
+
+def stored_limits(summary: Mapping[str, Any], increments: Sequence[solver.Increment]) -> tuple[solver.LimitLoad, ...]:
+    """The limit loads of a stored response."""
+    limits = []
+    for stored in summary.get("limit_loads", []):
+        state = increments[stored["increment"]]
+        status = solver.LimitStatus(stored["status"])
+        nothing = math.inf if status is solver.LimitStatus.UNBOUNDED else math.nan
+        low, high = (nothing if bound is None else bound for bound in stored["bounds"])
+        limits.append(
+            solver.LimitLoad(
+                multiplier=nothing if stored["multiplier"] is None else stored["multiplier"],
+                bounds=(low, high),
+                mechanism=state.velocity,
+                contacts=state.contacts,
+                forces=state.forces,
+                certificate=state.certificate,
+                status=status,
+                flow=stored["flow"],
+                pose=state.pose,
+                friction=state.friction,
+                live_force=stored["live_load"],
+                programs=stored["programs"],
+            )
+        )
+    return tuple(limits)
+
+
+def _numbered(response: solver.Response) -> list[tuple[int, solver.LimitLoad]]:
+    """Each limit load with the number of the increment that tells it; one found in an interruption has none yet."""
+    first: dict[int, int] = {}
+    for number, increment in enumerate(response.increments):
+        # The swung frames that follow share the forces.
+        first.setdefault(id(increment.forces), number)
+    return [(first[id(limit.forces)], limit) for limit in response.limits if id(limit.forces) in first]
+
+
+def _states(response: solver.Response) -> list[tuple[solver.LimitLoad, solver.Increment]]:
+    return [(limit, response.increments[number]) for number, limit in _numbered(response)]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

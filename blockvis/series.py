@@ -1,0 +1,149 @@
+"""What the path of a response runs over and what is read along it, in the words of its analysis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import solver
+
+from .sheet import force_text
+
+__all__ = [
+    "POSITION",
+    "badge_of",
+    "force_unit",
+    "governing",
+    "parameter_label",
+    "parameter_text",
+    "parameter_unit",
+    "parameter_word",
+    "path_parameters",
+    "path_values",
+    "reads_multipliers",
+    "state_text",
+    "value_label",
+]
+
+#: The word for what the limit loads of a load that moves run over.
+POSITION = "load position"
+
+
+def reads_multipliers(response: solver.Response) -> bool:
+    """Whether what is read along the path is a load multiplier, not the reaction of a support."""
+    return response.analysis != "settlement"
+
+
+def parameter_word(response: solver.Response) -> str:
+    """What the path runs over: "settlement", "control displacement" or "load position"."""
+    if response.analysis == "pushover":
+        return "control displacement"
+    if response.analysis == "limit load" and not response.settlements:
+        return POSITION
+    return "settlement"
+
+
+def parameter_unit(response: solver.Response) -> tuple[float, str]:
+    """Factor and unit in which the parameter reads well."""
+    unit = response.settlements[0].unit if response.settlements else "m"
+    largest = max((abs(i.settlement) for i in response.increments), default=0.0)
+    millimetres = unit == "m" and 0.0 < largest < 0.1 and parameter_word(response) != POSITION
+    return (1e3, "mm") if millimetres else (1.0, unit)
+
+
+def parameter_text(value: float, response: solver.Response) -> str:
+    """A parameter with its unit, in mm where the whole response stays below a decimetre.
+
+    Parameters
+    ----------
+    value : float [m or rad]
+    response : solver.Response
+    """
+    factor, unit = parameter_unit(response)
+    return f"{value * factor:.2f} {unit}" if unit == "mm" else f"{value * factor:.4f} {unit}"
+
+
+def parameter_label(response: solver.Response) -> str:
+    """For the axis of a diagram."""
+    return f"{parameter_word(response)} [{parameter_unit(response)[1]}]"
+
+
+def path_parameters(path: tuple[solver.Increment, ...]) -> np.ndarray:
+    """(n,) array [m or rad]: the parameter, settlements of several phases one after another."""
+    total, before, last = np.zeros(len(path)), 0.0, 0.0
+    for k, increment in enumerate(path):
+        if k and increment.phase != path[k - 1].phase:
+            before = last
+        last = total[k] = before + increment.settlement
+    return total
+
+
+def path_values(response: solver.Response) -> np.ndarray:
+    """(n,) array: the load multiplier, nan where unbounded, or the reaction [N or N·m] along the path."""
+    if not reads_multipliers(response):
+        return response.reaction
+    multipliers = response.load_multiplier
+    return np.where(np.isfinite(multipliers), multipliers, np.nan)
+
+
+def force_unit(response: solver.Response) -> tuple[float, str]:
+    """What to divide :func:`path_values` by, and the unit; a multiplier has none."""
+    if reads_multipliers(response):
+        return 1.0, ""
+    largest = max((abs(i.reaction) for i in response.path), default=0.0)
+    moment = "·m" if response.settlements and response.settlements[0].unit == "rad" else ""
+    for factor, unit in ((1e6, "MN"), (1e3, "kN")):
+        if largest >= factor:
+            return factor, unit + moment
+    return 1.0, "N" + moment
+
+
+def value_label(response: solver.Response) -> str:
+    """For the axis of a diagram."""
+    return "load multiplier α" if reads_multipliers(response) else f"reaction [{force_unit(response)[1]}]"
+
+
+def governing(response: solver.Response) -> solver.Increment | None:
+    """The increment that decides: of limit loads at several positions the lowest, else the last in equilibrium."""
+    path = response.path
+    if not path:
+        return None
+    if parameter_word(response) != POSITION:
+        return path[-1]
+    return path[int(np.argmin(np.nan_to_num(response.load_multiplier, nan=-np.inf, posinf=np.inf)))]
+
+
+def state_text(increment: solver.Increment, response: solver.Response, at: float | None = None) -> str:
+    """The first line of a caption: the parameter and what is read there.
+
+    Parameters
+    ----------
+    increment : solver.Increment
+    response : solver.Response
+    at : float, optional [m or rad]
+        The parameter, of frames in between increments.
+    """
+    place = parameter_text(increment.settlement if at is None else at, response)
+    falling = increment.status == solver.Status.FALLING
+    if not reads_multipliers(response):
+        text = f"Settlement {place}"
+        if falling:
+            return text
+        moment = response.settlements[min(increment.phase, len(response.settlements) - 1)].unit == "rad"
+        text += f"   ·   Reaction {force_text(increment.reaction, moment)}"
+        return text if moment else text + f" = {increment.reaction / response.total_weight:.4f} W"
+    if parameter_word(response) == POSITION:
+        text = f"Load at x = {place}" if len(response.path) > 1 else "Limit load"
+    else:
+        text = f"{parameter_word(response).capitalize()} {place}"
+    if falling and response.analysis == "pushover":
+        return text
+    if not np.isfinite(increment.load_multiplier):
+        return f"{text}   ·   Load multiplier α unbounded"
+    text += f"   ·   Load multiplier α = {increment.load_multiplier:.5g}"
+    return text + (f"   ·   Live load {force_text(increment.reaction)}" if increment.reaction else "")
+
+
+def badge_of(response: solver.Response) -> str:
+    """The warning on frames that are no equilibrium."""
+    swung = response.analysis == "limit load" and response.collapse is None and bool(response.path)
+    return "MECHANISM · pseudo-motion" if swung else "FALLING · pseudo-time"
