@@ -22,8 +22,8 @@ __all__ = ["Plan", "parameter_of", "planned"]
 #: structure.
 SWINGING_FRAMES, SWING = 30, 0.05
 
-#: Displacement within which joints that a settlement has opened may close, in block sizes: the accuracy to which
-#: drawn joints are taken as closed.
+#: Displacement within which joints that a settlement has opened may close, in block sizes. An arch whose hinges have
+#: opened does not notice it; a wall of many bricks needs more, lest its capacity be that of its loosest brick.
 CLOSING = 1e-3
 
 Steps = Generator[solver.Increment, None, solver.Ending]

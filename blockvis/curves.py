@@ -17,6 +17,7 @@ import solver
 
 from . import palette
 from .series import (
+    MOST_OVER_LOWEST,
     POSITION,
     force_unit,
     governing,
@@ -33,9 +34,6 @@ __all__ = ["CurvePanel", "Event", "draw_curve", "events_of"]
 
 #: Suffixes of the files that draw_curve writes.
 CURVE_SUFFIXES = (".png", ".svg", ".pdf")
-
-#: Multipliers of an envelope above this many times the lowest are cut off.
-MOST_OVER_LOWEST = 8.0
 
 #: More changes of hinges than this are not numbered one by one.
 MOST_EVENTS = 12
@@ -179,7 +177,6 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
     if len(known):
         low, high = min(0.0, known.min()), max(0.0, known.max())
         if parameter_word(response) == POSITION:
-            # Over a support the load may grow nearly without limit: what matters is where it may not.
             high = min(high, MOST_OVER_LOWEST * max(known.min(), 0.0) or high)
         axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
     if parameter_word(response) == POSITION and len(path) == 1:
@@ -262,12 +259,12 @@ def _mark_collapse(
         axes.annotate(
             f"{what} at {collapse.displacement:.5g} {collapse.unit}\n"
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]",
-            (start + middle, 0.04),
+            (start + middle, 0.96 if response.analysis == "pushover" else 0.04),
             xycoords=("data", "axes fraction"),
             xytext=(-6, 0),
             textcoords="offset points",
             ha="right",
-            va="bottom",
+            va="top" if response.analysis == "pushover" else "bottom",
             fontsize=0.9 * text,
             color=red,
         )

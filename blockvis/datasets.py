@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pyvista as pv
+from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkStringArray
 
 import solver
@@ -100,7 +101,10 @@ def contact_dataset(assembly: solver.Assembly, increment: solver.Increment) -> p
         "block_b": contacts.block_b.astype(np.int32),
     }
     for name, array in points.items():
-        grid.point_data[name] = array
+        # Blocks in the air have no contact point; pyvista refuses empty arrays, VTK and ParaView do not.
+        values = numpy_to_vtk(np.ascontiguousarray(array), deep=True)
+        values.SetName(name)
+        grid.GetPointData().AddArray(values)
     grid.GetFieldData().AddArray(_strings("state_names", [state.name.lower() for state in solver.ContactState]))
     _describe(grid, increment)
     return grid

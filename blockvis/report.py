@@ -18,9 +18,9 @@ from matplotlib.ticker import MaxNLocator
 import solver
 
 from . import marks, palette
-from .curves import MOST_OVER_LOWEST
 from .scene import framed
 from .series import (
+    MOST_OVER_LOWEST,
     POSITION,
     badge_of,
     force_unit,
@@ -373,11 +373,12 @@ def _summary(response: solver.Response) -> list[tuple[str, str]]:
     if path and not reads_multipliers(response):
         rows.append(("first reaction", reaction(path[0].reaction)))
         rows.append(("last reaction", reaction(path[-1].reaction)))
+    frames = "of pseudo-motion" if badge_of(response).startswith("MECHANISM") else "falling"
     rows += [
         ("weight W", force_text(weight)),
         ("blocks", f"{assembly.n_blocks} ({int(assembly.free.sum())} free)"),
         ("contact points", str(len(response.increments[0].contacts.points))),
-        ("increments", f"{len(path)} in equilibrium, {len(response.increments) - len(path)} falling"),
+        ("increments", f"{len(path)} in equilibrium, {len(response.increments) - len(path)} {frames}"),
         ("solver time", f"{sum(i.seconds for i in response.increments):.1f} s"),
     ]
     if response.message and response.collapse is None:

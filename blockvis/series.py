@@ -9,10 +9,12 @@ import solver
 from .sheet import force_text
 
 __all__ = [
+    "MOST_OVER_LOWEST",
     "POSITION",
     "badge_of",
     "force_unit",
     "governing",
+    "matters",
     "parameter_label",
     "parameter_text",
     "parameter_unit",
@@ -23,6 +25,10 @@ __all__ = [
     "state_text",
     "value_label",
 ]
+
+#: Multipliers above this many times the lowest of an envelope are not shown: over a support a load may grow nearly
+#: without limit.
+MOST_OVER_LOWEST = 8.0
 
 #: The word for what the limit loads of a load that moves run over.
 POSITION = "load position"
@@ -63,8 +69,11 @@ def parameter_text(value: float, response: solver.Response) -> str:
 
 
 def parameter_label(response: solver.Response) -> str:
-    """For the axis of a diagram."""
-    return f"{parameter_word(response)} [{parameter_unit(response)[1]}]"
+    """For the axis of a diagram; empty for a single limit load, which has none."""
+    word = parameter_word(response)
+    if word == POSITION and len(response.path) == 1:
+        return ""
+    return f"{word}{' x' if word == POSITION else ''} [{parameter_unit(response)[1]}]"
 
 
 def path_parameters(path: tuple[solver.Increment, ...]) -> np.ndarray:
@@ -110,6 +119,16 @@ def governing(response: solver.Response) -> solver.Increment | None:
     if parameter_word(response) != POSITION:
         return path[-1]
     return path[int(np.argmin(np.nan_to_num(response.load_multiplier, nan=-np.inf, posinf=np.inf)))]
+
+
+def matters(increment: solver.Increment, response: solver.Response) -> bool:
+    """Whether an increment is in equilibrium and, of limit loads at several positions, not far above the lowest."""
+    if increment.status == solver.Status.FALLING:
+        return False
+    lowest = governing(response)
+    if lowest is None or parameter_word(response) != POSITION or not lowest.load_multiplier > 0.0:
+        return True
+    return increment.load_multiplier <= MOST_OVER_LOWEST * lowest.load_multiplier
 
 
 def state_text(increment: solver.Increment, response: solver.Response, at: float | None = None) -> str:

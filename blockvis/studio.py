@@ -17,7 +17,7 @@ from .fills import cut_into_triangles
 from .live_load import LiveLoad, live_load_of
 from .mechanism import part_outlines
 from .scene import Scene, framed, magnified
-from .series import POSITION, badge_of, governing, parameter_word, reads_multipliers, state_text
+from .series import POSITION, badge_of, governing, matters, parameter_word, reads_multipliers, state_text
 from .sheet import ColourBar, Key, Sheet, force_text
 
 __all__ = ["Look", "Studio"]
@@ -145,7 +145,7 @@ class Studio:
 
     def frames(self, fps: float, seconds: float) -> Iterator[Image.Image]:
         """The frames of the film."""
-        path = [i for i in self.increments if i.status != solver.Status.FALLING]
+        path = [i for i in self.increments if matters(i, self.response)]
         fall = [i for i in self.increments if i.status == solver.Status.FALLING]
         picture = None
         for increment, pose, s in _even_motion(path, max(2, round(fps * seconds))):
@@ -205,8 +205,10 @@ class Studio:
                 length = self.force_shown * self.force_scale / self.scene.pixel
                 keys.append(Key("bar", text, palette.FORCE, length))
             if self.live_largest > 0.0:
-                shown = force_text(self.live_largest)
-                keys.append(Key("line", f"live load · α, longest arrow {shown}", palette.LIVE))
+                scale = f", longest arrow {force_text(self.live_largest)}"
+                if parameter_word(self.response) == POSITION and len(self.live) > 1:
+                    scale = " (not to scale)"
+                keys.append(Key("line", f"live load · α{scale}", palette.LIVE))
             if any(layer.startswith("motion") for layer in self.scene.layers):
                 keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT))
             self._keys = keys
@@ -275,7 +277,7 @@ class Studio:
         """Length per force [m/N] and the force of the legend [N]; 0 where none is drawn."""
         if self.look.forces == "none":
             return 0.0, 0.0
-        path = [i for i in self.increments if i.status != solver.Status.FALLING]
+        path = [i for i in self.increments if matters(i, self.response)]
         sizes = [np.hypot(*_joint_forces(i, self.look.forces)[1].T) for i in path]
         every = np.concatenate([np.zeros(0), *sizes])
         largest = float(every.max(initial=0.0))
@@ -367,6 +369,9 @@ def _live_loads(
     for increment in increments:
         if id(increment.forces) not in found:
             found[id(increment.forces)] = live_load_of(response, increment, extent)
+    if parameter_word(response) == POSITION and len(found) > 1:
+        # From place to place the limit differs a hundredfold; what shall be seen is where the load is.
+        found = {key: replace(load, forces=load.forces / (load.largest or 1.0)) for key, load in found.items()}
     return found
 
 

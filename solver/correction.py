@@ -267,6 +267,9 @@ def _closing_motion(model: Model, pose: Pose, contacts: Contacts, solved: Solved
 
 def solve_again(model: Model, pose: Pose, solved: Solved) -> Solved:
     """The program at a pose that another led to, supports at rest, its contacts and their drift carried over."""
+    if len(solved.contacts) == 0:
+        # Everything was in the air: there is nothing to carry over.
+        return solve_program(model, pose)
     contacts = _contacts_after(model, pose, solved)
     drift, _ = _carried(model.assembly, contacts, solved)
     return solve_program(model, pose, contacts=contacts, drift=drift)

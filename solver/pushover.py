@@ -311,8 +311,9 @@ class _Path:
                     return Ending(Status.SOLVER_FAILED, f"at a control displacement of {self.here.d:.6g} m: {error}")
                 continue
             except (Locked, _Lost, SolveError) as error:
+                ending = self._stopped(error)
                 yield from self._tell_last()
-                return self._stopped(error)
+                return ending
             if verdict == "stay":
                 continue
             if verdict == "lost":

@@ -20,6 +20,9 @@ ENDS = {
     "wall_self_weight": (solver.Status.LIMIT_REACHED, 0.2069),
     "wall_loaded": (solver.Status.LIMIT_REACHED, 0.2215),
     "wall_with_arch": (solver.Status.COLLAPSED, None),
+    "arch_moving_load": (solver.Status.COLLAPSED, None),
+    "wall_horizontal_acceleration": (solver.Status.COLLAPSED, 0.509956),
+    "wall_horizontal_after_settlement": (solver.Status.COLLAPSED, 0.509956),
 }
 
 

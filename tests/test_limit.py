@@ -90,6 +90,34 @@ def test_an_open_joint_carries_nothing():
     assert len(limit_load(assembly, loads=loads, pose=pose, closed_gap=0.05).contacts) == 2
 
 
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+def test_a_joint_that_is_open_by_less_than_the_displacement_counts_by_its_gap(flow):
+    """A brick a hair away from a heavy stop: free of it, it slides at μ; with it, it has to push it by part of δ.
+
+    In the program α = μ + Σ g N / w, and the stop slides at μ of its own weight, which the brick then carries too.
+    """
+    mu, gap = 0.5, 1e-3
+    outlines = [[[0, 0], [1, 0], [1, 0.5], [0, 0.5]], [[1 + gap, 0], [3 + gap, 0], [3 + gap, 0.5], [1 + gap, 0.5]]]
+    assembly = solver.Assembly.from_outlines(
+        [*outlines, [[-1, -1], [5, -1], [5, 0], [-1, 0]]], roles=["free", "free", "fixed"]
+    )
+    brick = solver.total_weight(assembly) / 3.0
+    live = solver.point_load(assembly, 0, (brick, 0.0))
+    options = {"loads": pushed(assembly, live), "friction_coefficient": mu, "pose": solver.Pose.initial(assembly)}
+    strict = limit_load(assembly, flow=flow, **options)
+    assert strict.multiplier == pytest.approx(mu, rel=1e-6)
+    # N of the stop costs N · g / (δ · brick); up to 2 μ brick of it gains N / brick: worth it once δ exceeds the gap.
+    short = limit_load(assembly, displacement=0.5 * gap, flow=flow, **options)
+    assert short.multiplier == pytest.approx(mu, rel=1e-6)
+    long = limit_load(assembly, displacement=2.0 * gap, flow=flow, **options)
+    assert long.multiplier == pytest.approx(3.0 * mu, rel=1e-6)
+    if flow == "associative":
+        assert abs(long.gap) < 1e-9
+        assert long.certificate.kinematic_violation < 1e-9
+    with pytest.raises(ValueError, match=r"displacement is -1 m; it must be a finite number of at least 0"):
+        limit_load(assembly, displacement=-1.0, **options)
+
+
 def test_input_is_refused_with_a_remedy():
     assembly = block()
     dead = solver.self_weight(assembly)
