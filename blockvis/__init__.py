@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .results import open_results as open_results
     from .results import write as write
     from .run import run_case as run_case
+    from .studies.campaign import study as study
 
 #: Public names and where they live; loaded when first used, because VTK takes seconds to import.
 _HOMES = {
@@ -41,6 +42,7 @@ _HOMES = {
     "run_case": "run",
     "save_layout": "drawing",
     "show": "notebook",
+    "study": "studies.campaign",
     "write": "results",
     "write_drawing": "drawing",
     "write_report": "report",

@@ -95,7 +95,57 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
+    _add_sweep(verbs)
     return parser
+
+
+def _add_sweep(verbs: Any) -> None:
+    sweep = verbs.add_parser("sweep", help="many runs of one case, on this machine or a Dask cluster")
+    sweep.add_argument("study", metavar="STUDY.toml")
+    sweep.add_argument("-o", "--output", metavar="OUT", help="folder of the study (default: <study>-study)")
+    sweep.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster that exists, tcp://host:8786")
+    sweep.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: one per core)")
+    sweep.add_argument("--retry-failed", action="store_true", help="make runs again that had no result")
+    sweep.add_argument("--keep", metavar="RUNS", default="", help="runs whose results folder is wanted, as 0,17,42")
+    sweep.add_argument("--force", action="store_true", help="throw away the runs of another study in OUT")
+    sweep.set_defaults(verb=_sweep)
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    from .studies.campaign import run_study
+    from .studies.plan import read_study
+    from .studies.summary import in_words, stored_summary
+
+    study = read_study(options.study)
+    folder = Path(options.output or f"{study.source.stem}-study")
+    try:
+        run_study(
+            study,
+            folder,
+            scheduler=options.scheduler,
+            workers=options.workers,
+            force=options.force,
+            retry_failed=options.retry_failed,
+            keep=_run_numbers(options.keep),
+        )
+    except KeyboardInterrupt:
+        done = len(list((folder / "runs").glob("[0-9]*.json")))
+        print(
+            f"blockvis: interrupted; {done} of {study.n_runs} runs are kept, the same command goes on with the others",
+            file=sys.stderr,
+        )
+        return INTERRUPTED
+    print(in_words(stored_summary(folder)))
+    print(f"table and pictures in {folder}/")
+    return 0
+
+
+def _run_numbers(text: str) -> tuple[int, ...]:
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    for part in parts:
+        if not part.isdecimal():
+            raise ValueError(f"--keep names '{part}', no number of a run; write them like 0,17,42")
+    return tuple(int(part) for part in parts)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from typing import TextIO
 
 import solver
 
-__all__ = ["Progress"]
+__all__ = ["Progress", "StudyProgress"]
 
 #: Seconds between two redrawings of the bar.
 REDRAW = 0.1
@@ -66,3 +66,47 @@ class Progress:
         self.last = time.perf_counter()
         self.stream.write(f"\r\x1b[K{text}, {self.last - self.started:.1f} s")
         self.stream.flush()
+
+
+class StudyProgress:
+    """A bar that counts the runs of a study; in a terminal or a notebook.
+
+    Parameters
+    ----------
+    total : int
+        Runs of the study.
+    before : int
+        Of these, finished earlier.
+    shown : bool, optional
+        By default, where somebody watches.
+    stream : text stream, optional
+        stderr by default.
+    """
+
+    def __init__(self, total: int, before: int = 0, *, shown: bool | None = None, stream: TextIO | None = None) -> None:
+        self.total, self.before, self.count, self.failed = total, before, 0, 0
+        self.stream = sys.stderr if stream is None else stream
+        watched = self.stream.isatty() or "ipykernel" in sys.modules
+        self.shown = watched if shown is None else shown and watched
+        self.started = time.perf_counter()
+        self.last = -1.0
+
+    def finished(self, *, failed: bool = False) -> None:
+        """Counts a run."""
+        self.count += 1
+        self.failed += failed
+        now, done = time.perf_counter(), self.before + self.count
+        if not self.shown or (now - self.last < REDRAW and done < self.total):
+            return
+        self.last = now
+        rest = (self.total - done) * (now - self.started) / self.count
+        without = f", {self.failed} without result" if self.failed else ""
+        bar = "#" * (24 * done // max(self.total, 1))
+        self.stream.write(f"\r\x1b[K[{bar:<24}] run {done} of {self.total}{without}, about {rest:.0f} s left")
+        self.stream.flush()
+
+    def done(self) -> None:
+        """Clears the bar."""
+        if self.shown:
+            self.stream.write("\r\x1b[K")
+            self.stream.flush()

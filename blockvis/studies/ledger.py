@@ -1,0 +1,212 @@
+"""Ledger: the folder of a study. A finished run is a file of its own, written whole or not at all, and never lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import solver
+
+from .plan import RESERVED, Study
+from .single import FAILED
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Ledger", "StudyExists", "has_failed"]
+
+#: Status of a run without result.
+NO_RESULT = (FAILED, str(solver.Status.SOLVER_FAILED), str(solver.Status.INTERRUPTED))
+
+_TEXTS = ("status", "unit", "mechanism_class", "mechanism", "message")
+_COUNTS = ("run", "seed", "macro_blocks", "hinges", "sliding_joints", "increments", "programs")
+
+
+class StudyExists(ValueError):
+    """The folder holds something else already."""
+
+
+def has_failed(row: Mapping[str, Any]) -> bool:
+    """Whether a run gave no result."""
+    return row["status"] in NO_RESULT
+
+
+class Ledger:
+    """The folder of a study.
+
+    Parameters
+    ----------
+    folder : str or Path
+    study : Study
+    force : bool
+        Whether rows of another study may be thrown away.
+
+    Raises
+    ------
+    StudyExists
+        If the folder holds rows of another study, or something that is no study.
+    """
+
+    def __init__(self, folder: str | Path, study: Study, *, force: bool = False) -> None:
+        self.folder, self.study = Path(folder), study
+        self.rows: dict[int, dict[str, Any]] = {}
+        record, definition = self.folder / "study.json", study.definition()
+        if self.folder.exists() and not self.folder.is_dir():
+            raise StudyExists(f"'{self.folder}' is a file; choose another folder with -o")
+        if record.is_file():
+            stored = _read(record) or {}
+            changed = [k for k, v in definition.items() if stored.get("definition", {}).get(k) != v]
+            if changed and not force:
+                raise StudyExists(
+                    f"'{self.folder}' holds {len(self._files())} finished runs of another study: {', '.join(changed)} "
+                    f"{'has' if len(changed) == 1 else 'have'} changed; choose another folder with -o, or throw these "
+                    "runs away with --force"
+                )
+            if force:
+                self._clear()
+        elif self.folder.is_dir() and any(self.folder.iterdir()):
+            raise StudyExists(f"'{self.folder}' holds something that is no study; choose another folder with -o")
+        for name in ("runs", "mechanisms"):
+            (self.folder / name).mkdir(parents=True, exist_ok=True)
+        _write(
+            record,
+            _json(
+                {
+                    "study": str(study.source),
+                    "case": str(study.case_source),
+                    "values": study.values,
+                    "n_runs": study.n_runs,
+                    "method": study.method,
+                    "seed": study.seed,
+                    "definition": definition,
+                    "versions": {name: version(name) for name in ("blockvis", "numpy", "scipy", "highspy", "dask")},
+                }
+            ),
+        )
+        for file in self._files():
+            row = _read(file)
+            # A file that some accident has broken counts as a run that was never made.
+            if isinstance(row, dict) and row.get("run") == int(file.stem):
+                self.rows[row["run"]] = row
+
+    def missing(self, *, retry_failed: bool = False) -> list[int]:
+        """The runs still to be made, in order."""
+        done = {run for run, row in self.rows.items() if not (retry_failed and has_failed(row))}
+        return [run for run in range(self.study.n_runs) if run not in done]
+
+    def add(self, row: dict[str, Any], shape: bytes = b"") -> None:
+        """Records a finished run, and its mechanism if no earlier run shows this class."""
+        if shape:
+            file = self.shape_file(row["mechanism_class"])
+            first = _first_run(file)
+            if first is None or row["run"] < first:
+                with np.load(_buffer(shape)) as stored:
+                    arrays = {name: stored[name] for name in stored.files}
+                _write(file, _packed({**arrays, "run": np.array(row["run"])}))
+        self.rows[row["run"]] = row
+        _write(self.folder / "runs" / f"{row['run']:06d}.json", _json(row))
+
+    def shape_file(self, mechanism_class: str) -> Path:
+        """Where the picture of a class is kept."""
+        return self.folder / "mechanisms" / f"{sha256(mechanism_class.encode()).hexdigest()[:12]}.npz"
+
+    def table(self) -> pd.DataFrame:
+        """The finished runs, a row each, in order."""
+        import pandas as pd
+
+        names = [p.name for p in self.study.parameters]
+        columns = ["run", "status", *names, *RESERVED[2:]]
+        records = [
+            {**{name: _plain(row["parameters"].get(name)) for name in names}, **row}
+            for _, row in sorted(self.rows.items())
+        ]
+        table = pd.DataFrame.from_records(records, columns=columns)
+        for column in RESERVED:
+            if column in _COUNTS:
+                table[column] = table[column].astype("Int64")
+            elif column in _TEXTS:
+                table[column] = table[column].astype("string").fillna("")
+            else:
+                table[column] = table[column].astype("float64")
+        return table
+
+    def write_table(self) -> pd.DataFrame:
+        """Writes table.csv and table.parquet, each whole or not at all, and returns the table."""
+        table = self.table()
+        for name, save in (("table.csv", table.to_csv), ("table.parquet", table.to_parquet)):
+            partial = self.folder / f".{name}.part"
+            save(partial, index=False)
+            os.replace(partial, self.folder / name)
+        return table
+
+    def write_summary(self, summary: Mapping[str, Any]) -> None:
+        """Writes summary.json."""
+        finished = {"finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
+        _write(self.folder / "summary.json", _json({**summary, **finished}))
+
+    def _files(self) -> list[Path]:
+        return sorted((self.folder / "runs").glob("[0-9]*.json"))
+
+    def _clear(self) -> None:
+        """Removes what a study writes, and nothing else."""
+        for file in [*self._files(), *(self.folder / "mechanisms").glob("*.npz")]:
+            file.unlink()
+        for name in ("table.csv", "table.parquet", "summary.json", *(f"{p}.png" for p in PICTURES)):
+            (self.folder / name).unlink(missing_ok=True)
+
+
+#: The pictures of a study.
+PICTURES = ("fragility", "sensitivity", "scatter", "mechanisms")
+
+
+def _plain(value: Any) -> Any:
+    """A list or table as text, because a column holds numbers or texts."""
+    return json.dumps(value) if isinstance(value, (list, dict)) else value
+
+
+def _first_run(file: Path) -> int | None:
+    if not file.is_file():
+        return None
+    with np.load(file) as stored:
+        return int(stored["run"])
+
+
+def _buffer(data: bytes) -> Any:
+    from io import BytesIO
+
+    return BytesIO(data)
+
+
+def _packed(arrays: Mapping[str, Any]) -> bytes:
+    buffer = _buffer(b"")
+    np.savez_compressed(buffer, **arrays)
+    return bytes(buffer.getvalue())
+
+
+def _json(value: Any) -> bytes:
+    return (json.dumps(value, indent=1, ensure_ascii=False, default=str) + "\n").encode()
+
+
+def _read(file: Path) -> Any:
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _write(file: Path, data: bytes) -> None:
+    """Whole or not at all, also when the machine goes down."""
+    partial = file.with_name(f".{file.name}.part")
+    with open(partial, "wb") as stream:
+        stream.write(data)
+        stream.flush()
+        os.fsync(stream.fileno())
+    os.replace(partial, file)

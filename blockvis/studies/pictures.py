@@ -1,0 +1,334 @@
+"""The pictures of a study: fragility, sensitivity, where which mechanism occurs, and what the mechanisms look like."""
+
+from __future__ import annotations
+
+import os
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+
+from blockvis import palette
+
+from .fragility import Fragility, fragility_of
+from .ledger import NO_RESULT, Ledger
+from .plan import Study
+from .sensitivity import first_order, outcome, swings
+from .summary import classes_of, independent_rows
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["draw_fragility", "draw_mechanisms", "draw_scatter", "draw_sensitivity", "draw_study"]
+
+#: Classes with a colour of their own in the scatter, and classes drawn.
+COLOURED, DRAWN = 6, 12
+
+#: Panels of the scatter, for the parameters that matter most.
+PANELS = 3
+
+#: Colours and marks of the classes, the most frequent first; told apart also in grey.
+CLASSES = ("#145ca8", "#e24e1b", "#00796b", "#7e37b2", "#b08a00", "#7a4a2b")
+MARKS = ("o", "s", "^", "D", "v", "P")
+
+TEXT = 11.0
+
+HEADING: dict[str, Any] = {"fontsize": 0.95 * TEXT, "loc": "left", "color": "#4a4a4a"}
+
+
+def draw_study(ledger: Ledger, table: pd.DataFrame) -> list[Path]:
+    """Draws what the table has to tell, and returns the files.
+
+    Parameters
+    ----------
+    ledger : Ledger
+    table : pandas.DataFrame
+    """
+    study, folder = ledger.study, ledger.folder
+    drawn = []
+    if (~table["status"].isin(NO_RESULT)).any():
+        drawn.append(draw_fragility(study, table, folder / "fragility.png"))
+        if swings(study, table):
+            drawn.append(draw_sensitivity(study, table, folder / "sensitivity.png"))
+    if classes_of(table):
+        drawn.append(draw_scatter(study, table, folder / "scatter.png"))
+        drawn.append(draw_mechanisms(ledger, table, folder / "mechanisms.png"))
+    return drawn
+
+
+def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
+    """Draws the probability of collapse against the settlement, with its confidence band.
+
+    Parameters
+    ----------
+    study : Study
+    table : pandas.DataFrame
+    path : path
+        Of a PNG, SVG or PDF.
+    """
+    curve = fragility_of(independent_rows(study, table))
+    factor, unit = _length(table)
+    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    axes = figure.add_subplot()
+    colour = palette.hexadecimal(palette.FORCE)
+    x = factor * np.concatenate([[0.0], curve.settlement, [curve.furthest]])
+    level = np.concatenate([[0.0], curve.probability, curve.probability[-1:] if len(curve.probability) else [0.0]])
+    if len(curve.settlement):
+        ends = factor * np.append(curve.settlement, curve.furthest)
+        low, high = np.append(curve.lower, curve.lower[-1]), np.append(curve.upper, curve.upper[-1])
+        axes.fill_between(
+            ends, low, high, step="post", color=colour, alpha=0.18, linewidth=0,
+            label=f"{100 * curve.confidence:g} % confidence, point by point",
+        )  # fmt: skip
+    axes.step(x, level, where="post", color=colour, linewidth=2.2, label=_what(study))
+    for share, words in ((0.05, "5 %"), (0.5, "half")):
+        at = curve.quantile(share)
+        if at is None:
+            continue
+        axes.plot([0.0, factor * at, factor * at], [share, share, 0.0], color="#7a7a7a", linewidth=0.9, dashes=(4, 3))
+        axes.annotate(
+            f"{words} by {factor * at:.3g} {unit}", (factor * at, share), xytext=(6, -4), textcoords="offset points",
+            va="top", fontsize=0.9 * TEXT, color="#4a4a4a",
+        )  # fmt: skip
+    axes.set_ylim(0.0, 1.02)
+    axes.set_xlim(0.0, 1.03 * factor * max(_interesting(curve), 1e-12))
+    axes.set_xlabel(f"settlement of the support [{unit}]", fontsize=TEXT)
+    axes.set_ylabel(_what(study), fontsize=TEXT)
+    _plain_frame(axes)
+    axes.legend(loc="upper left", frameon=False, fontsize=0.9 * TEXT)
+    axes.set_title(_counts(curve, table, factor, unit), **HEADING)
+    return _saved(figure, path)
+
+
+def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
+    """Draws the swing of the collapse displacement with every parameter, and Sobol' indices beside it.
+
+    Parameters
+    ----------
+    study : Study
+    table : pandas.DataFrame
+    path : path
+    """
+    found, indices = swings(study, table)[:12], first_order(study, table)
+    factor, unit = _length(table)
+    rest = [name for name in indices if name not in {s.name for s in found}]
+    names = [*(s.name for s in found), *rest]
+    figure = Figure(figsize=(10.0, 1.9 + 0.6 * len(names)), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.6, 1.0))
+    centre = factor * float(np.nanmean(outcome(table)))
+    for place, swing in enumerate(found):
+        ends = ((swing.low, swing.low_value, swing.low_error, "#9bc0e0"),
+                (swing.high, swing.high_value, swing.high_error, palette.hexadecimal(palette.FORCE)))  # fmt: skip
+        for mean, value, error, colour in ends:
+            left.barh(place, factor * mean - centre, left=centre, color=colour, height=0.52, zorder=2)
+            left.errorbar(
+                factor * mean, place, xerr=factor * error, color="#333333", linewidth=1.0, capsize=3, zorder=3
+            )
+            outwards = 1 if factor * mean >= centre else -1
+            edge = factor * (mean + outwards * (0.0 if np.isnan(error) else error))
+            left.annotate(
+                _short(value), (edge, place), xytext=(6 * outwards, 0), textcoords="offset points", va="center",
+                ha="left" if outwards > 0 else "right", fontsize=0.85 * TEXT,
+            )  # fmt: skip
+    left.axvline(centre, color="#333333", linewidth=1.0)
+    left.margins(x=0.22)
+    left.set_yticks(range(len(names)), [textwrap.shorten(name, 40) for name in names], fontsize=0.95 * TEXT)
+    left.set_ylim(len(names) - 0.4, -0.6)
+    left.set_xlabel(f"mean collapse displacement [{unit}]", fontsize=TEXT)
+    extreme = "fifth of the values" if study.method != "grid" else "value"
+    left.set_title(f"mean of the runs with the lowest and the highest {extreme}", **HEADING)
+    for place, name in enumerate(names):
+        if name in indices:
+            share, error = indices[name]
+            right.barh(place, share, color=palette.hexadecimal(palette.SETTLEMENT), height=0.52, zorder=2)
+            right.errorbar(share, place, xerr=error, color="#333333", linewidth=1.0, capsize=3, zorder=3)
+    right.set_xlim(min(0.0, *(s - e for s, e in indices.values()), 0.0) if indices else 0.0, 1.0)
+    right.set_xlabel("first-order Sobol’ index", fontsize=TEXT)
+    title = "share of the variance" if indices else "too few runs for indices"
+    if indices:
+        remaining = max(1.0 - sum(s for s, _ in indices.values()), 0.0)
+        words = "interactions" if study.design.factors or not study.n_seeded else "imperfections, interactions"
+        title += f"\n{words}: {100 * remaining:.0f} %"
+    right.set_title(title, **HEADING)
+    for axes in (left, right):
+        _plain_frame(axes)
+        axes.grid(visible=False, axis="y")
+    return _saved(figure, path)
+
+
+def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
+    """Draws the collapse displacement of every run against the parameters that matter most, by mechanism.
+
+    Parameters
+    ----------
+    study : Study
+    table : pandas.DataFrame
+    path : path
+    """
+    factor, unit = _length(table)
+    numeric = {p.name for p in study.parameters if p.numeric}
+    names = [s.name for s in swings(study, table) if s.name in numeric][:PANELS] or ["run"]
+    classes = classes_of(table)
+    shown = list(classes)[:COLOURED]
+    width = 8.0 if len(names) == 1 else 2.0 + 3.6 * len(names)
+    labels = [textwrap.fill(f"{k + 1}: {one} ({classes[one]})", round(11.5 * width)) for k, one in enumerate(shown)]
+    lines = sum(label.count("\n") + 1 for label in labels) + 2
+    figure = Figure(figsize=(width, 4.6 + 0.2 * lines), layout="constrained")
+    panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
+    y = factor * outcome(table)
+    stood = table["collapse_displacement"].isna().to_numpy(dtype=bool) & np.isfinite(y)
+    kind = table["mechanism_class"].to_numpy(dtype=object)
+    for axes, name in zip(panels, names, strict=True):
+        x = table[name].to_numpy(dtype=float)
+        other = np.isfinite(y) & ~stood & ~np.isin(kind, shown)
+        axes.scatter(x[other], y[other], s=18, color="#b5b5b5", linewidth=0, zorder=2)
+        for k, one in enumerate(shown):
+            here = (kind == one) & np.isfinite(y)
+            axes.scatter(x[here], y[here], s=24, color=CLASSES[k], marker=MARKS[k], alpha=0.85, linewidth=0, zorder=3)
+        axes.scatter(x[stood], y[stood], s=26, facecolor="none", edgecolor="#333333", marker="^", zorder=3)
+        axes.set_xlabel(name, fontsize=TEXT)
+        _plain_frame(axes)
+    panels[0].set_ylabel(f"collapse displacement [{unit}]", fontsize=TEXT)
+    panels[0].set_ylim(bottom=0.0)
+    handles = [_mark(CLASSES[k], MARKS[k], label) for k, label in enumerate(labels)]
+    rest = sum(classes.values()) - sum(classes[one] for one in shown)
+    if rest:
+        handles.append(_mark("#b5b5b5", "o", f"{len(classes) - len(shown)} other mechanisms ({rest})"))
+    if stood.any():
+        handles.append(_mark("#333333", "^", f"stood as far as it was followed ({int(stood.sum())})", hollow=True))
+    figure.legend(handles=handles, loc="outside lower left", frameon=False, fontsize=0.82 * TEXT)
+    return _saved(figure, path)
+
+
+def draw_mechanisms(ledger: Ledger, table: pd.DataFrame, path: str | Path) -> Path:
+    """Draws one run of each mechanism found, the most frequent first.
+
+    Parameters
+    ----------
+    ledger : Ledger
+    table : pandas.DataFrame
+    path : path
+    """
+    classes = classes_of(table)
+    factor, unit = _length(table)
+    shown = [one for one in classes if ledger.shape_file(one).is_file()][:DRAWN]
+    columns = min(3, max(1, len(shown)))
+    rows = -(-len(shown) // columns) if shown else 1
+    shapes = []
+    for one in shown:
+        with np.load(ledger.shape_file(one)) as stored:
+            shapes.append({name: stored[name] for name in stored.files})
+    tall = _aspect(shapes[0]) if shapes else 0.6
+    figure = Figure(figsize=(4.0 * columns, (4.0 * min(max(tall, 0.35), 1.6) + 1.0) * rows + 0.3), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for place, (one, shape) in enumerate(zip(shown, shapes, strict=True)):
+        axes = panels[place]
+        _draw_shape(axes, shape)
+        median = factor * float(table.loc[table["mechanism_class"] == one, "collapse_displacement"].median())
+        number, share = classes[one], 100 * classes[one] / sum(classes.values())
+        runs = f"{number} run{'' if number == 1 else 's'}, {share:.2g} %"
+        axes.set_title(f"{place + 1}: {runs}; median {median:.3g} {unit}", fontsize=0.95 * TEXT, loc="left")
+        words = textwrap.wrap(one, 54)[:3]
+        axes.text(
+            0.0, -0.02, "\n".join(words), transform=axes.transAxes, va="top", fontsize=0.72 * TEXT, color="#4a4a4a"
+        )
+    for axes in panels[len(shown) :]:
+        axes.axis("off")
+    if len(classes) > len(shown):
+        rest = sum(classes.values()) - sum(classes[one] for one in shown)
+        figure.supxlabel(f"{len(classes) - len(shown)} more mechanisms in {rest} runs", fontsize=0.9 * TEXT)
+    return _saved(figure, path)
+
+
+def _draw_shape(axes: Axes, shape: dict[str, np.ndarray]) -> None:
+    fills = np.tile(np.array(palette.STONES[0]), (len(shape["free"]), 1))
+    fills = np.where(shape["free"][:, None], fills, palette.SUPPORT).astype(np.uint8)
+    fills = palette.part_colours(fills, shape["parts"].astype(int))
+    cuts = shape["offsets"][1:-1]
+    ghost = [ring for ring, free in zip(np.split(shape["at_rest"], cuts), shape["free"], strict=True) if free]
+    axes.add_collection(PolyCollection(ghost, facecolor="none", edgecolor="#cfcfcf", linewidth=0.5, zorder=1))
+    rings = np.split(shape["vertices"], cuts)
+    width = 0.7 if len(rings) < 300 else 0.25
+    axes.add_collection(
+        PolyCollection(
+            rings, facecolor=fills / 255.0, edgecolor=palette.hexadecimal(palette.OUTLINE), linewidth=width, zorder=2
+        )
+    )
+    low, high = _frame(shape)
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal")
+    axes.axis("off")
+
+
+def _frame(shape: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of what is shown [m]: the free blocks, and as much of the supports as stands near them."""
+    free = np.repeat(shape["free"], np.diff(shape["offsets"]))
+    points = np.concatenate([shape["vertices"][free], shape["at_rest"][free]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.08 * float((high - low).max())
+    return low - margin, high + margin
+
+
+def _aspect(shape: dict[str, np.ndarray]) -> float:
+    low, high = _frame(shape)
+    return float((high[1] - low[1]) / (high[0] - low[0]))
+
+
+def _interesting(curve: Fragility) -> float:
+    """Where the axis ends: at the last collapse if all collapsed, else as far as runs were followed [m or rad]."""
+    if curve.n_stood == 0 and len(curve.settlement):
+        return float(curve.settlement[-1])
+    return curve.furthest
+
+
+def _what(study: Study) -> str:
+    drawn = any(p.distribution is not None for p in study.parameters) or study.method != "grid"
+    return "probability of collapse" if drawn else "share of the runs collapsed"
+
+
+def _counts(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> str:
+    words = [f"{curve.n_runs} runs", f"{curve.n_collapsed} collapsed"]
+    if curve.n_stood:
+        words.append(f"{curve.n_stood} stood (up to {factor * curve.furthest:.3g} {unit})")
+    failed = int(table["status"].isin(NO_RESULT).sum())
+    words.append(f"{failed} without result" + (" are left out" if failed else ""))
+    return ", ".join(words)
+
+
+def _length(table: pd.DataFrame) -> tuple[float, str]:
+    """Factor and unit in which the settlements read well."""
+    units = [u for u in table["unit"].unique().tolist() if u]
+    unit = units[0] if units else "m"
+    largest = float(np.nanmax(np.append(outcome(table), 0.0)))
+    return (1e3, "mm") if unit == "m" and largest < 1.0 else (1.0, unit)
+
+
+def _short(value: float | str) -> str:
+    return textwrap.shorten(value, 16) if isinstance(value, str) else f"{value:.3g}"
+
+
+def _mark(colour: str, mark: str, label: str, *, hollow: bool = False):  # type: ignore[no-untyped-def]
+    from matplotlib.lines import Line2D
+
+    face = "none" if hollow else colour
+    return Line2D([], [], linestyle="", marker=mark, color=colour, markerfacecolor=face, label=label)
+
+
+def _plain_frame(axes: Axes) -> None:
+    axes.grid(color="#e4e4e4", linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(labelsize=0.9 * TEXT)
+
+
+def _saved(figure: Figure, path: str | Path) -> Path:
+    path = Path(path)
+    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
+    figure.savefig(partial, dpi=150)
+    os.replace(partial, path)
+    return path

@@ -1,0 +1,117 @@
+"""Sampling: which runs a study has; every number from its seed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+__all__ = ["METHODS", "Design", "designed"]
+
+#: Ways to choose the runs; "saltelli" is for Sobol' indices of first order and total.
+METHODS = ("grid", "latin hypercube", "sobol", "random", "saltelli")
+
+
+@dataclass(frozen=True)
+class Design:
+    """The runs of a study.
+
+    Attributes
+    ----------
+    probabilities : (n_runs, n_parameters) array
+        Inside 0 to 1; the distribution of each parameter makes values of them.
+    seeds : (n_runs,) int array
+        Of the imperfections.
+    factors : int
+        Of a "saltelli" design: what is exchanged one by one, the parameters and, where there are any, the imperfections
+        together; 0 for other designs.
+    """
+
+    probabilities: np.ndarray
+    seeds: np.ndarray
+    factors: int = 0
+
+    @property
+    def independent(self) -> np.ndarray:
+        """(n_runs,) bool array: the runs that are a random sample; the others of a "saltelli" design mix these."""
+        if self.factors == 0:
+            return np.ones(len(self.seeds), dtype=bool)
+        place = np.arange(len(self.seeds)) % (self.factors + 2)
+        return (place == 0) | (place == self.factors + 1)
+
+
+def designed(method: str, runs: int, levels: Sequence[int], repeats: int, seed: int, *, scattered: bool) -> Design:
+    """The runs of a study.
+
+    Parameters
+    ----------
+    method : str
+        One of :data:`METHODS`.
+    runs : int
+        For "saltelli" the size N of the two independent samples: the study has N (factors + 2) runs.
+    levels : sequence of int
+        For a grid, how many values each parameter takes.
+    repeats : int
+        Of every point of a grid.
+    seed : int
+    scattered : bool
+        Whether there are imperfections.
+
+    Raises
+    ------
+    ValueError
+        For a number of runs that a Sobol' sequence cannot have.
+
+    Notes
+    -----
+    "saltelli": A. Saltelli et al., Variance based sensitivity analysis of model output, Computer Physics
+    Communications 181 (2010) 259-270, https://doi.org/10.1016/j.cpc.2009.09.018: for each point of two independent
+    samples A and B the rows A, A with one column from B for each factor, B. The seed of the imperfections is a column.
+
+    Examples
+    --------
+    >>> designed("grid", 1, [2, 3], 1, 0, scattered=False).probabilities.shape
+    (6, 2)
+    """
+    n = len(levels)
+    if method == "grid":
+        axes = [(np.arange(k) + 0.5) / k for k in levels]
+        points = np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=1) if n else np.zeros((1, 0))
+        points = np.repeat(points, repeats, axis=0)
+        return Design(points, _seeds(seed, len(points)))
+    if method in ("sobol", "saltelli") and runs & (runs - 1):
+        near = 1 << (runs.bit_length() - 1)
+        raise ValueError(f"runs is {runs}; a Sobol' sequence is balanced for powers of 2: give {near} or {2 * near}")
+    random = np.random.default_rng([seed, 0])
+    if method == "saltelli":
+        return _saltelli(runs, n, random, seed, scattered)
+    if n == 0 or method == "random":
+        return Design(_inside(random.random((runs, n))), _seeds(seed, runs))
+    sampler = qmc.LatinHypercube(n, rng=random) if method == "latin hypercube" else qmc.Sobol(n, rng=random)
+    return Design(_inside(sampler.random(runs)), _seeds(seed, runs))
+
+
+def _saltelli(runs: int, n: int, random: np.random.Generator, seed: int, scattered: bool) -> Design:
+    both = _inside(qmc.Sobol(2 * n, rng=random).random(runs)) if n else np.zeros((runs, 0))
+    first, second = both[:, :n], both[:, n:]
+    first_seed, second_seed = _seeds(seed, runs), _seeds(seed, runs, stream=1)
+    factors = n + int(scattered)
+    points, seeds = np.repeat(first, factors + 2, axis=0), np.repeat(first_seed, factors + 2)
+    for j in range(n):
+        points[j + 1 :: factors + 2, j] = second[:, j]
+    if scattered:
+        seeds[n + 1 :: factors + 2] = second_seed
+    points[factors + 1 :: factors + 2] = second
+    seeds[factors + 1 :: factors + 2] = second_seed
+    return Design(points, seeds, factors)
+
+
+def _inside(probabilities: np.ndarray) -> np.ndarray:
+    """Not 0 or 1 itself, where many distributions have no value."""
+    return np.clip(probabilities, 1e-12, 1.0 - 1e-12)
+
+
+def _seeds(seed: int, runs: int, stream: int = 0) -> np.ndarray:
+    return np.random.default_rng([seed, 1, stream]).integers(0, 2**32, size=runs)

@@ -1,0 +1,192 @@
+"""Sensitivity: which of the unknown numbers decides how far the supports may move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .ledger import NO_RESULT
+from .plan import Parameter, Study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["IMPERFECTIONS", "Swing", "first_order", "outcome", "swings"]
+
+#: What the exchange of all imperfections together is called.
+IMPERFECTIONS = "imperfections"
+
+#: A swing compares the runs with the lowest and the highest values of a parameter: this share of them on either side.
+FIFTH = 0.2
+
+#: Fewer runs than this tell nothing of an index: of a linear function the error is then a tenth and more.
+FEWEST_RUNS = 64
+
+
+@dataclass(frozen=True)
+class Swing:
+    """How the outcome differs between low and high values of a parameter, everything else as it comes.
+
+    Attributes
+    ----------
+    name : str
+    low_value, high_value : float or str
+        Mean of the parameter in the compared runs, or the value itself where it takes few.
+    low, high : float [m or rad]
+        Mean outcome of the runs with the lowest and with the highest values.
+    low_error, high_error : float [m or rad]
+        Half the 95 % interval of these means.
+    """
+
+    name: str
+    low_value: float | str
+    high_value: float | str
+    low: float
+    high: float
+    low_error: float
+    high_error: float
+
+    @property
+    def size(self) -> float:
+        """Difference of the two means [m or rad]."""
+        return abs(self.high - self.low)
+
+
+def outcome(table: pd.DataFrame) -> np.ndarray:
+    """(n_rows,) array [m or rad]: collapse displacement, or how far a run that stood was followed; nan of a failure.
+
+    Where runs stood, the outcome is the displacement the structure bears within the limit, a lower bound of its own.
+    """
+    stood = table["collapse_displacement"].isna()
+    value = np.where(stood, table["last_settlement"], table["collapse_displacement"]).astype(float)
+    value[table["status"].isin(NO_RESULT).to_numpy(dtype=bool)] = np.nan
+    return value
+
+
+def swings(study: Study, table: pd.DataFrame) -> list[Swing]:
+    """The swing of every parameter, the largest first.
+
+    Parameters
+    ----------
+    study : Study
+    table : pandas.DataFrame
+        Its table.
+    """
+    y = outcome(table)
+    table, y = table[np.isfinite(y)], y[np.isfinite(y)]
+    found = []
+    for parameter in study.parameters:
+        x = table[parameter.name].to_numpy()
+        few = parameter.distribution is None
+        pairs: list[tuple[float | str, np.ndarray]] = []
+        if few and not parameter.numeric:
+            groups = {str(value): y[x == value] for value in dict.fromkeys(x.tolist())}
+            groups = {value: group for value, group in groups.items() if len(group)}
+            ends = sorted(groups, key=lambda value: float(groups[value].mean()))
+            if len(ends) > 1:
+                pairs = [(ends[0], groups[ends[0]]), (ends[-1], groups[ends[-1]])]
+        elif few:
+            x = x.astype(float)
+            if len(x) and np.ptp(x) > 0:
+                pairs = [(float(v), y[x == v]) for v in (x.min(), x.max())]
+        else:
+            x = x.astype(float)
+            order = np.argsort(x, kind="stable")
+            n = max(1, round(FIFTH * len(x)))
+            if len(x) > 1:
+                pairs = [(float(x[k].mean()), y[k]) for k in (order[:n], order[-n:])]
+        if not pairs:
+            continue
+        (low_value, low), (high_value, high) = pairs
+        found.append(
+            Swing(
+                parameter.name, low_value, high_value, float(low.mean()), float(high.mean()), _error(low), _error(high)
+            )
+        )
+    return sorted(found, key=lambda swing: -swing.size)
+
+
+def first_order(study: Study, table: pd.DataFrame) -> dict[str, tuple[float, float]]:
+    """Sobol' indices of first order: the share of the variance of the outcome that each parameter alone accounts for.
+
+    Parameters
+    ----------
+    study : Study
+    table : pandas.DataFrame
+        Its table.
+
+    Returns
+    -------
+    dict
+        By name of the parameter, and for a "saltelli" study also of the imperfections together, the index and half its
+        95 % interval; empty where there are too few runs, or the outcome is the same in all.
+
+    Notes
+    -----
+    Of a "saltelli" study as Saltelli et al., Computer Physics Communications 181 (2010) 259-270; of other samples by
+    RBD-FAST with the correction of its bias: J.-Y. Tissot and C. Prieur, Reliability Engineering and System Safety 107
+    (2012) 205-213, https://doi.org/10.1016/j.ress.2012.06.010; both by SALib. Of a grid, whose values are all alike in
+    number, the variance of the means over the variance, the error by leaving out one run in turn (jackknife).
+    """
+    y = np.full(study.n_runs, np.nan)
+    y[table["run"].to_numpy(dtype=int)] = outcome(table)
+    few = np.isfinite(y).sum() < FEWEST_RUNS and study.method != "grid"
+    if few or not np.isfinite(y).any() or np.nanstd(y) <= 1e-9 * max(abs(float(np.nanmean(y))), 1e-300):
+        return {}
+    if study.design.factors:
+        return _exchanged(study, y)
+    known = np.isfinite(y)
+    u = study.design.probabilities[known]
+    if study.method == "grid":
+        return {p.name: _of_groups(u[:, k], y[known]) for k, p in enumerate(study.parameters) if p.n_levels > 1}
+    return _of_sample(study.parameters, u, y[known], study.seed)
+
+
+def _exchanged(study: Study, y: np.ndarray) -> dict[str, tuple[float, float]]:
+    from SALib.analyze import sobol
+
+    groups = y.reshape(-1, study.design.factors + 2)
+    # A point of which one run has no result is left out whole.
+    groups = groups[np.isfinite(groups).all(axis=1)]
+    names = [*(p.name for p in study.parameters), IMPERFECTIONS][: study.design.factors]
+    if len(groups) < 4:
+        return {}
+    problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
+    found = sobol.analyze(problem, groups.ravel(), calc_second_order=False, num_resamples=200, seed=study.seed)
+    return {name: (float(s), float(e)) for name, s, e in zip(names, found["S1"], found["S1_conf"], strict=True)}
+
+
+def _of_sample(
+    parameters: tuple[Parameter, ...], u: np.ndarray, y: np.ndarray, seed: int
+) -> dict[str, tuple[float, float]]:
+    from SALib.analyze import rbd_fast
+
+    if not parameters:
+        return {}
+    names = [p.name for p in parameters]
+    problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
+    # The harmonics must stay few against the runs.
+    found = rbd_fast.analyze(problem, u, y, M=max(4, min(10, len(y) // 25)), num_resamples=200, seed=seed)
+    return {name: (float(s), float(e)) for name, s, e in zip(names, found["S1"], found["S1_conf"], strict=True)}
+
+
+def _of_groups(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    levels, group = np.unique(x, return_inverse=True)
+    count, total = np.bincount(group).astype(float), np.bincount(group, weights=y)
+
+    def index(count: np.ndarray, total: np.ndarray, n: np.ndarray, s: np.ndarray, squares: np.ndarray) -> np.ndarray:
+        mean = s / n
+        between = (total**2 / np.maximum(count, 1.0)).sum(axis=-1) / n - mean**2
+        return np.asarray(between / np.maximum(squares / n - mean**2, 1e-300))
+
+    n, s, squares = float(len(y)), y.sum(), (y**2).sum()
+    whole = float(index(count, total, np.array(n), s, squares))
+    here = np.eye(len(levels))[group]
+    without = index(count - here, total - here * y[:, None], np.array(n - 1.0), s - y, squares - y**2)
+    return whole, float(1.96 * np.sqrt((n - 1.0) / n * ((without - without.mean()) ** 2).sum()))
+
+
+def _error(values: np.ndarray) -> float:
+    return float(1.96 * values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")

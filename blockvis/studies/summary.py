@@ -1,0 +1,118 @@
+"""What came out of a study, in numbers and in words."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .fragility import fragility_of
+from .ledger import NO_RESULT
+from .plan import Study
+from .sensitivity import first_order, swings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["classes_of", "in_words", "independent_rows", "stored_summary", "summary_of"]
+
+#: Mechanisms that are told one by one.
+MOST_TOLD = 6
+
+#: Reasons that are told one by one.
+MOST_REASONS = 5
+
+
+def independent_rows(study: Study, table: pd.DataFrame) -> pd.DataFrame:
+    """The rows that are a random sample, without those by which a "saltelli" design mixes them."""
+    return table[study.design.independent[table["run"].to_numpy(dtype=int)]]
+
+
+def classes_of(table: pd.DataFrame) -> dict[str, int]:
+    """How many runs show each mechanism, the most frequent first."""
+    counts = table.loc[table["mechanism_class"] != "", "mechanism_class"].value_counts()
+    return {str(k): int(v) for k, v in sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))}
+
+
+def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
+    """What summary.json of a study holds; lengths in m, angles in rad.
+
+    Parameters
+    ----------
+    study : Study
+    table : pandas.DataFrame
+        Its table.
+    """
+    curve = fragility_of(independent_rows(study, table))
+    units = [u for u in table["unit"].unique().tolist() if u]
+    failed = table[table["status"].isin(NO_RESULT)]
+    reasons = failed["message"].value_counts().head(MOST_REASONS)
+    return {
+        "n_runs": study.n_runs,
+        "n_finished": len(table),
+        "n_collapsed": curve.n_collapsed,
+        "n_stood": curve.n_stood,
+        "n_without_result": len(failed),
+        "reasons": {str(k): int(v) for k, v in reasons.items()},
+        "status": {str(k): int(v) for k, v in table["status"].value_counts().items()},
+        "unit": units[0] if units else "m",
+        "quantiles": {str(p): curve.quantile(p) for p in (0.05, 0.5, 0.95)},
+        "probability_at_the_end": float(curve.probability[-1]) if len(curve.probability) else 0.0,
+        "furthest_settlement": curve.furthest,
+        "first_order_indices": {k: list(v) for k, v in first_order(study, table).items()},
+        "swings": [
+            {"parameter": s.name, "at": [s.low_value, s.high_value], "mean": [s.low, s.high]}
+            for s in swings(study, table)
+        ],
+        "mechanism_classes": classes_of(table),
+        "run_seconds": float(np.nansum(table["seconds"].to_numpy(dtype=float))),
+    }
+
+
+def stored_summary(folder: str | Path) -> dict[str, Any]:
+    """What summary.json in the folder of a study holds."""
+    found: dict[str, Any] = json.loads((Path(folder) / "summary.json").read_text(encoding="utf-8"))
+    return found
+
+
+def in_words(summary: dict[str, Any]) -> str:
+    """The summary for a reader."""
+    unit = summary["unit"]
+    lines = [
+        f"{summary['n_finished']} of {summary['n_runs']} runs, {summary['run_seconds']:.1f} s of run time: "
+        + ", ".join(f"{n} {status}" for status, n in summary["status"].items())
+    ]
+    for reason, n in summary["reasons"].items():
+        lines.append(f"without result, {n} times: {reason}")
+    if summary["n_collapsed"]:
+        quantiles = [
+            f"{100 * float(p):g} % at {value:.4g} {unit}" if value is not None else f"{100 * float(p):g} % not reached"
+            for p, value in summary["quantiles"].items()
+        ]
+        lines.append(f"probability of collapse: {', '.join(quantiles)}")
+    elif summary["n_stood"]:
+        lines.append(f"no run collapsed up to {summary['furthest_settlement']:.4g} {unit}")
+    for swing in summary["swings"]:
+        (low_at, high_at), (low, high) = swing["at"], swing["mean"]
+        index = summary["first_order_indices"].get(swing["parameter"])
+        share = f", {100 * index[0]:.0f} ± {100 * index[1]:.0f} % of the variance" if index else ""
+        lines.append(
+            f"{swing['parameter']}: {low:.4g} {unit} on average at {_value(low_at)}, {high:.4g} {unit} at "
+            f"{_value(high_at)}{share}"
+        )
+    told = {swing["parameter"] for swing in summary["swings"]}
+    for name, (share, error) in summary["first_order_indices"].items():
+        if name not in told:
+            lines.append(f"{name}: {100 * share:.0f} ± {100 * error:.0f} % of the variance")
+    classes = summary["mechanism_classes"]
+    for number, (name, count) in enumerate(list(classes.items())[:MOST_TOLD], 1):
+        lines.append(f"mechanism {number}, {count} times: {name}")
+    if len(classes) > MOST_TOLD:
+        lines.append(f"and {len(classes) - MOST_TOLD} more mechanisms")
+    return "\n".join(lines)
+
+
+def _value(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.3g}"
