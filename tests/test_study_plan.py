@@ -68,7 +68,7 @@ def test_paths_lead_into_tables_lists_and_quoted_names():
 
 @pytest.mark.parametrize("path", ["", ".a", "a..b", "a b", "[0]", "a.[0]", 'a"b"', "a[x]"])
 def test_what_is_no_path(path):
-    with pytest.raises(ValueError, match="no|not"):
+    with pytest.raises(ValueError, match=r"path into a case file"):
         parse_path(path)
 
 

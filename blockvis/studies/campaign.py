@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from distributed import Client, Future
 
-__all__ = ["run_study", "study"]
+__all__ = ["carry_out", "local_cluster", "run_study", "study"]
 
 #: Runs given to the scheduler at a time: enough for a thousand workers, little for its memory.
 WINDOW = 2000
@@ -117,13 +117,13 @@ def run_study(
         ledger = Ledger(folder, plan, force=force)
         todo = ledger.missing(retry_failed=retry_failed)
         if todo:
-            with _local_cluster(min(workers or _cores(), len(todo))) as client:
-                _carry_out(ledger, todo, client, progress)
+            with local_cluster(min(workers or _cores(), len(todo))) as client:
+                carry_out(ledger, todo, client, progress)
     else:
         # The scheduler answers before the folder is touched.
         with _existing_cluster(scheduler, plan) as client:
             ledger = Ledger(folder, plan, force=force)
-            _carry_out(ledger, ledger.missing(retry_failed=retry_failed), client, progress)
+            carry_out(ledger, ledger.missing(retry_failed=retry_failed), client, progress)
     _finish(ledger, sorted({*plan.keep, *keep}))
     return ledger
 
@@ -167,20 +167,28 @@ def _cores() -> int:
 
 
 @contextmanager
-def _local_cluster(workers: int) -> Iterator[Client]:
+def local_cluster(workers: int) -> Iterator[Client]:
     """A cluster of this machine: processes of one thread each, restarted when they die."""
     import dask
     from distributed import Client, LocalCluster
 
-    # A worker holds one run and no other waits there, so that a run that kills its worker takes no other along.
-    settings = {"distributed.scheduler.worker-saturation": 1.0, "distributed.scheduler.allowed-failures": 1}
+    settings = {
+        # A worker holds one run and no other waits there, so that a run that kills its worker takes no other along.
+        "distributed.scheduler.worker-saturation": 1.0,
+        "distributed.scheduler.allowed-failures": 1,
+        # What nobody looks at here takes processor time from the runs.
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.system-monitor.interval": "5s",
+        "distributed.admin.tick.interval": "1s",
+        "distributed.scheduler.active-memory-manager.start": False,
+    }
     with dask.config.set(settings):
         try:
             cluster = LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
-                dashboard_address=None,
+                dashboard_address="127.0.0.1:0",
                 silence_logs=logging.CRITICAL,
             )
         except RuntimeError as error:
@@ -254,7 +262,7 @@ def _probe(file: str) -> tuple[str, bool]:
     return version("blockvis"), not file or Path(file).is_file()
 
 
-def _carry_out(ledger: Ledger, todo: Sequence[int], client: Client, progress: bool) -> None:
+def carry_out(ledger: Ledger, todo: Sequence[int], client: Client, progress: bool) -> None:
     """Makes the runs; every row is on the disk before the next is taken."""
     bar = StudyProgress(ledger.study.n_runs, ledger.study.n_runs - len(todo), shown=None if progress else False)
     suspects: list[int] = []

@@ -58,6 +58,8 @@ class Ledger:
     def __init__(self, folder: str | Path, study: Study, *, force: bool = False) -> None:
         self.folder, self.study = Path(folder), study
         self.rows: dict[int, dict[str, Any]] = {}
+        # The run that shows each mechanism, by the file of its picture.
+        self._first: dict[Path, int | None] = {}
         record, definition = self.folder / "study.json", study.definition()
         if self.folder.exists() and not self.folder.is_dir():
             raise StudyExists(f"'{self.folder}' is a file; choose another folder with -o")
@@ -106,8 +108,11 @@ class Ledger:
         """Records a finished run, and its mechanism if no earlier run shows this class."""
         if shape:
             file = self.shape_file(row["mechanism_class"])
-            first = _first_run(file)
+            if file not in self._first:
+                self._first[file] = _first_run(file)
+            first = self._first[file]
             if first is None or row["run"] < first:
+                self._first[file] = row["run"]
                 with np.load(_buffer(shape)) as stored:
                     arrays = {name: stored[name] for name in stored.files}
                 _write(file, _packed({**arrays, "run": np.array(row["run"])}))

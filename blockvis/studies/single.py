@@ -130,6 +130,7 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
         offset = before[path[-1].phase]
         low, high = (float(offset + s) for s in ending.collapse.bracket)
         found |= {"collapse_displacement": (low + high) / 2.0, "bracket_low": low, "bracket_high": high}
+        found["last_settlement"] = low
         found["collapse_reaction"] = float(ending.collapse.reaction)
     elif ending.stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
         # It falls before anything has settled.
