@@ -7,8 +7,8 @@ Dask; every worker has imported what it needs before the clock starts. Printed a
 
     efficiency = time of the same runs in one process / (workers × wall time of the study)
 
-and the overhead per run: the rest of the workers' time, shared out among the runs. Use a machine that does nothing else:
-the time in one process is processor time, which a busy machine does not lengthen, the wall time is what it is.
+and the overhead per run: the rest of the workers' time, shared out among the runs. Use a machine that does nothing
+else: the time in one process is processor time, which a busy machine does not lengthen, the wall time is what it is.
 """
 
 from __future__ import annotations

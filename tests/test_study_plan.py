@@ -1,6 +1,7 @@
 """The study file: what it makes of a case, and what it refuses before anything starts."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -225,6 +226,12 @@ def test_an_unreachable_scheduler_is_one_message_and_nothing_started(study_file,
     assert "no Dask scheduler answers at 'tcp://127.0.0.1:9'" in message
     assert "dask scheduler" in message
     assert not out.exists()
+
+
+@pytest.mark.parametrize(("name", "runs"), [("arch_friction", 256), ("panel_settlement_friction", 100)])
+def test_shipped_studies_are_studies(name, runs):
+    study = read_study(Path(__file__).parent.parent / "examples" / "studies" / f"{name}.toml")
+    assert study.n_runs == runs
 
 
 def test_the_study_is_public():
