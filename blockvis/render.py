@@ -97,10 +97,12 @@ def draw_mechanism(
     motion = last.velocity if response.collapse is None else response.collapse.mechanism
     last = with_motion(last, motion)
     assembly = response.assembly
-    block, free = assembly.block_of_vertex, assembly.free
-    arms = solver.moved_vertices(assembly, last.pose) - last.pose.positions[block]
-    velocity = motion[block, :2] + motion[block, 2:] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
-    fastest = float(np.hypot(*velocity.T)[free[block]].max(initial=0.0))
+    speeds = _speeds(assembly, last.pose, motion)
+    fastest = float(speeds.max(initial=0.0))
+    if response.collapse is None and fastest > 0.0:
+        # A brick that rattles in its place shall not make the motion of the whole vanish.
+        fastest = _exceeded_by(0.01, speeds, assembly.areas) or fastest
+        motion = motion * np.minimum(1.0, fastest / np.maximum(speeds, fastest))[:, None]
     reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
     displaced = swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
     parts = solver.rigid_parts(assembly, last)
@@ -108,6 +110,22 @@ def draw_mechanism(
         if fastest > 0:
             studio.show_motion(last.pose, displaced, parts)
         return _save(studio.picture(last, note=_mechanism_note(response, parts)), path)
+
+
+def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
+    """(n_blocks,) array: speed of the fastest corner of each free block, zero for supports."""
+    block = assembly.block_of_vertex
+    arms = solver.moved_vertices(assembly, pose) - pose.positions[block]
+    velocity = motion[block, :2] + motion[block, 2:] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+    speeds = np.maximum.reduceat(np.hypot(*velocity.T), assembly.offsets[:-1])
+    return np.where(assembly.free, speeds, 0.0)
+
+
+def _exceeded_by(share: float, speeds: np.ndarray, areas: np.ndarray) -> float:
+    """The speed that blocks of this share of the moving area reach or exceed."""
+    order = np.argsort(speeds)[::-1]
+    moving = np.where(speeds[order] > 0.0, areas[order], 0.0).cumsum()
+    return float(speeds[order[np.searchsorted(moving, share * moving[-1])]])
 
 
 def animate(

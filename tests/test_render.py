@@ -1,5 +1,7 @@
 """Stills, the mechanism and the film, pixel by pixel; skipped without OpenGL, but for the message about it."""
 
+from dataclasses import replace
+
 import imageio_ffmpeg
 import numpy as np
 import pytest
@@ -128,6 +130,21 @@ def test_mechanism_shows_parts_and_motion(tmp_path):
     for tint in tinted:
         assert alike(body, tint, 6).sum() > 2000
     assert alike(body, palette.SETTLEMENT).sum() > 500
+
+
+@drawing
+def test_one_rattling_brick_does_not_hide_the_motion_of_a_wall(tmp_path):
+    calm = parted(wall(24, 16), 2, 0)
+    calm = replace(calm, collapse=None, stop=solver.Status.LIMIT_REACHED)
+    last = calm.path[-1]
+    velocity = last.velocity.copy()
+    middle = np.argmin(np.hypot(*(calm.assembly.centroids - [4.8, 0.8]).T))
+    assert velocity[middle, 1] < 0.0
+    velocity[middle, 0] = 30.0
+    rattling = replace(calm, increments=(*calm.increments[:-1], replace(last, velocity=velocity)))
+    one, other = (pixels(draw_mechanism(r, tmp_path / "mechanism.png", size=SMALL))[70:300] for r in (calm, rattling))
+    assert alike(one, palette.SETTLEMENT).sum() > 50
+    assert (np.abs(one - other).max(axis=2) > 30).mean() < 0.01
 
 
 @drawing
