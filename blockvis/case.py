@@ -37,6 +37,12 @@ ANALYSES = ("settlement", "limit load", "pushover")
 #: How sliding joints of a limit load behave.
 FLOWS = ("associative", "non-associative")
 
+#: Endings of animations.
+FILMS = (".mp4", ".gif", ".webp")
+
+#: More increments or frames than this are a slip of the pen.
+MOST_STEPS = 1_000_000
+
 #: What a file's blocks are made of where nothing else is said [kg/m³, m].
 DENSITY, THICKNESS = 2000.0, 1.0
 
@@ -97,8 +103,8 @@ class _Table:
         value = self.take(key, default)
         if value is None:
             return None
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise self.error(key, f"is {value!r}; give a number")
+        if not _is_number(value):
+            raise self.error(key, f"is {_short(value)}; give a number")
         if positive and value <= 0.0:
             raise self.error(key, f"is {value:g}; give a positive number")
         return float(value)
@@ -107,9 +113,8 @@ class _Table:
         value = self.take(key, default)
         if value is None:
             return None
-        numbers = isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2
-        if not numbers or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in value):
-            raise self.error(key, f"is {value!r}; give two numbers [x, y]")
+        if not isinstance(value, (list, tuple)) or len(value) != 2 or not all(map(_is_number, value)):
+            raise self.error(key, f"is {_short(value)}; give two numbers [x, y]")
         return float(value[0]), float(value[1])
 
     def text(self, key: str, default: str | None = None, *, among: Sequence[str] = ()) -> Any:
@@ -162,6 +167,24 @@ class _Table:
                 )
 
 
+def _is_number(value: object) -> bool:
+    """Whether it is a number that a double holds; TOML has whole numbers of any size."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def _short(value: object) -> str:
+    """A value as an error message shows it."""
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**30:
+        return "a number too large for any length or force"
+    words = repr(value)
+    return words if len(words) <= 120 else f"{words[:100]} ..."
+
+
 def read_case(path: str | Path) -> Case:
     """Reads and checks a case file.
 
@@ -192,7 +215,9 @@ def parse_case(text: str, source: Path) -> Case:
     """As :func:`read_case`, from the text of a case file; paths in it are relative to the folder of ``source``."""
     try:
         values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise ValueError(f"{source}: nests lists or tables without end; a case file has a handful of them") from None
+    except ValueError as error:
         raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"') from None
     return case_of(values, source, text)
 
@@ -216,7 +241,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     roles = top.table("roles").values
     for name, role in roles.items():
         if role not in solver.ROLES:
-            raise ValueError(f'{source}: [roles] "{name}" is {role!r}; a role is {", ".join(solver.ROLES)}')
+            raise ValueError(f'{source}: [roles] "{name}" is {_short(role)}; a role is {", ".join(solver.ROLES)}')
     material = top.table("material")
     materials = top.table("materials")
     densities = {}
@@ -229,6 +254,12 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     animation = output.take("animation", "collapse.mp4")
     if animation is not False:
         animation = output.text("animation", "collapse.mp4")
+        if not Path(animation).name == animation or "\\" in animation or not animation.lower().endswith(FILMS):
+            raise output.error(
+                "animation",
+                f"is {_short(animation)}; give a name ending in {', '.join(FILMS)}, without a folder: it is written "
+                "into the results folder",
+            )
     case = Case(
         source=source,
         text=text,
@@ -330,7 +361,10 @@ def _support(table: _Table) -> Mapping[str, Any]:
         "outline": table.take("outline"),
     }
     if not isinstance(support["outline"], list) or len(support["outline"]) < 3:
-        raise table.error("outline", f"is {support['outline']!r}; give at least three corners [[x, y], ...]")
+        raise table.error("outline", f"is {_short(support['outline'])}; give at least three corners [[x, y], ...]")
+    for corner in support["outline"]:
+        if not isinstance(corner, (list, tuple)) or len(corner) != 2 or not all(map(_is_number, corner)):
+            raise table.error("outline", f"has the corner {_short(corner)}; give two numbers [x, y]")
     material = table.text("material")
     if material is not None:
         support["material"] = material
@@ -360,7 +394,9 @@ def _imperfections(top: _Table) -> tuple[Imperfection, ...]:
 def _settlement(table: _Table) -> solver.Settlement:
     blocks = table.take("blocks")
     if blocks is not None:
-        blocks = tuple([blocks] if isinstance(blocks, str) else blocks)
+        blocks = tuple([blocks] if isinstance(blocks, str) else blocks if isinstance(blocks, (list, tuple)) else [None])
+        if not all(isinstance(name, str) for name in blocks):
+            raise table.error("blocks", f"is {_short(table.values['blocks'])}; give names of supports in quotes")
     keys = {
         "direction": table.pair("direction"),
         "rotation_centre": table.pair("rotation_centre"),
@@ -370,6 +406,12 @@ def _settlement(table: _Table) -> solver.Settlement:
         "tolerance": table.number("tolerance", positive=True),
     }
     table.finish()
+    if keys["limit"] / keys["increment"] > MOST_STEPS:
+        raise table.error(
+            "increment",
+            f"is {keys['increment']:g}: {keys['limit'] / keys['increment']:.3g} of them make the limit of "
+            f"{keys['limit']:g}; at most {MOST_STEPS} do",
+        )
     if keys["rotation"] is None:
         keys["rotation"] = 1.0 if keys["rotation_centre"] is not None else 0.0
     try:
@@ -454,6 +496,8 @@ def _controls(table: _Table, overlap_tolerance: float | None) -> solver.Controls
         value = table.number(key, getattr(default, key))
         if value < (0 if key == "falling_frames" else 1) or value != int(value):
             raise table.error(key, f"is {value:g}; give a whole number")
+        if value > MOST_STEPS:
+            raise table.error(key, f"is {value:g}; give at most {MOST_STEPS}")
         counts[key] = int(value)
     trust_region = table.number("trust_region", positive=True)
     return solver.Controls(trust_region=trust_region, overlap_tolerance=overlap_tolerance, **counts)

@@ -37,6 +37,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, OSError) as error:
         print(f"blockvis: {error}", file=sys.stderr)
         return BAD_INPUT
+    except MemoryError:
+        print("blockvis: there is not enough memory for what the input asks for", file=sys.stderr)
+        return BAD_INPUT
     except solver.SolveError as error:
         print(f"blockvis: the linear program could not be solved: {error}", file=sys.stderr)
         return SOLVER_FAILED

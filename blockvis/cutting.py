@@ -177,7 +177,7 @@ def welded(
     points = np.concatenate([rings[i] for i in near])
     index = cKDTree(points)
     shared = {i: _with_corners_on_edges(rings[i], points, index, max(10 * closed, 1e-7 * reach)) for i in near}
-    movable = np.concatenate([shared[i] for i in involved if not still[i]])
+    movable = np.concatenate([np.zeros((0, 2)), *(shared[i] for i in involved if not still[i] and i in shared)])
     movable = np.unique(np.round(movable, 12), axis=0)
     if len(movable) < 2:
         return rings
@@ -196,7 +196,11 @@ def welded(
         distance, nearest = lookup.query(shared[i])
         moved = np.where((distance <= max(10 * closed, 1e-7 * reach))[:, None], centre[group[nearest]], shared[i])
         apart = np.hypot(*(moved - np.roll(moved, 1, axis=0)).T) > closed
-        ring = without_collinear(moved[apart], 10 * closed / float(np.ptp(moved, axis=0).max()))
+        extent = float(np.ptp(moved, axis=0).max())
+        if extent <= closed:
+            # Joints wider than the block: it keeps its outline, and the overlap is refused by name.
+            continue
+        ring = without_collinear(moved[apart], 10 * closed / extent)
         if len(ring) >= 3 and shapely.Polygon(ring).is_valid:
             result[i] = ring
     return result

@@ -107,7 +107,7 @@ def mended(
             f"block {i} ('{assembly.names[i]}') overlaps block {j} ('{assembly.names[j]}') by {depth:.3g} m near "
             f"({x:.6g}, {y:.6g}); move them apart or raise overlap_tolerance ({tolerance:.3g} m){others}"
         )
-    thickness, notes = _thickness(joint_thickness, [outlines[i] for i in np.flatnonzero(free)])
+    thickness, notes = _thickness(joint_thickness, [outlines[i] for i in np.flatnonzero(free)], width)
     if not found and thickness == 0:
         return outlines, notes
     depth = min(tolerance, 1.01 * found[0][2]) if found else 0.0
@@ -116,7 +116,7 @@ def mended(
     return list(closing.outlines), notes
 
 
-def _thickness(asked: float | str, outlines: list[np.ndarray]) -> tuple[float, list[str]]:
+def _thickness(asked: float | str, outlines: list[np.ndarray], usual: float) -> tuple[float, list[str]]:
     if isinstance(asked, str):
         if asked.strip().lower() != "auto":
             raise ValueError(f"joint_thickness is '{asked}'; give a length in m or \"auto\"")
@@ -125,6 +125,11 @@ def _thickness(asked: float | str, outlines: list[np.ndarray]) -> tuple[float, l
     thickness = float(asked)
     if not (np.isfinite(thickness) and thickness >= 0):
         raise ValueError(f"joint_thickness is {thickness:g} m; it must be a length of at least 0")
+    if thickness > usual:
+        raise ValueError(
+            f"joint_thickness is {thickness:g} m, more than the usual block is wide ({usual:.3g} m); give the width of "
+            "the mortar joints in m"
+        )
     return thickness, []
 
 

@@ -10,6 +10,7 @@ import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ import solver
 from .capacity import CAPACITY_TABLES, capacity_summary, stored_limits, stored_parameters, write_capacity
 from .record import RECORD, Record, read_record, versions
 from .series import POSITION, parameter_word
-from .stored_values import packed, unpacked
+from .stored_values import checked_arrays, packed, unpacked
 
 __all__ = ["ResultsExist", "ResultsFolder", "open_results", "refuse_results", "stored_case", "summary_of", "write"]
 
@@ -389,21 +390,33 @@ def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
 def _stored_assembly(folder: Path) -> solver.Assembly:
     if not (folder / "assembly.npz").is_file():
         raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
-    with np.load(folder / "assembly.npz", allow_pickle=False) as stored:
-        return solver.Assembly(
-            vertices=stored["vertices"],
-            offsets=stored["offsets"],
-            names=tuple(map(str, stored["names"])),
-            roles=stored["roles"],
+    try:
+        stored = checked_arrays(folder / "assembly.npz")
+        offsets = stored["offsets"].tolist()
+        # Checked like a drawing: the file may come from anywhere.
+        return solver.Assembly.from_outlines(
+            [stored["vertices"][first:last] for first, last in pairwise(offsets)],
+            names=list(map(str, stored["names"])),
+            roles=list(map(str, stored["roles"])),
             density=stored["density"],
             thickness=stored["thickness"],
-            materials=tuple(map(str, stored["materials"])),
+            materials=list(map(str, stored["materials"])),
         )
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise ValueError(f"'{folder / 'assembly.npz'}' cannot be read ({error}); run the case again") from None
 
 
 def _stored_increment(folder: Path, number: int) -> solver.Increment:
-    with np.load(folder / "increments" / f"state_{number:05d}.npz", allow_pickle=False) as stored:
-        return _increment_of(stored)
+    path = folder / "increments" / f"state_{number:05d}.npz"
+    try:
+        arrays = checked_arrays(path)
+        n, k = len(arrays["rotations"]), len(arrays["gaps"])
+        for name, shape in (("positions", (n, 2)), ("velocity", (n, 3)), ("points", (k, 2)), ("forces", (k, 2))):
+            if arrays[name].shape != shape:
+                raise ValueError(f"{name} has shape {arrays[name].shape}, not {shape}")
+        return _increment_of(arrays)
+    except (ValueError, KeyError, TypeError, IndexError, FileNotFoundError) as error:
+        raise ValueError(f"'{path}' cannot be read ({error}); run the case again") from None
 
 
 def stored_case(folder: str | Path) -> str:

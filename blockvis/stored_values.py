@@ -5,16 +5,22 @@ from __future__ import annotations
 import dataclasses
 import io
 import json
+import math
 import zipfile
+import zlib
 from collections.abc import Mapping
+from pathlib import Path
 from types import UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import IO, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-__all__ = ["packed", "unpacked"]
+__all__ = ["checked_arrays", "packed", "unpacked"]
 
 T = TypeVar("T")
+
+#: An .npz file of a run never comes near this many bytes unpacked; a bomb does.
+MOST_BYTES = 1 << 30
 
 #: Entry of the archive that holds everything but the arrays.
 _TREE = "tree"
@@ -46,12 +52,45 @@ def unpacked(data: bytes, kind: type[T]) -> tuple[T, dict[str, Any]]:
         If the bytes are no such file, or hold a value of other fields (another version wrote them).
     """
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-            tree = json.loads(str(stored[_TREE]))
-            arrays = {name: stored[name] for name in stored.files if name != _TREE}
+        arrays = checked_arrays(io.BytesIO(data))
+        tree = json.loads(str(arrays.pop(_TREE)))
         return _built(tree["value"], kind, arrays), dict(tree["extra"])
-    except (KeyError, TypeError, AttributeError, EOFError, OSError, zipfile.BadZipFile) as error:
+    except (KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"no stored {kind.__name__}: {error}") from None
+
+
+def checked_arrays(source: str | Path | io.BytesIO) -> dict[str, np.ndarray]:
+    """All arrays of an .npz file, with nothing in it that could run.
+
+    Raises
+    ------
+    ValueError
+        If it is no such file, or announces more than :data:`MOST_BYTES`.
+    """
+    try:
+        with zipfile.ZipFile(source) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+            if size > MOST_BYTES:
+                raise ValueError(f"it unpacks to {size} bytes")
+            for name in archive.namelist():
+                with archive.open(name) as entry:
+                    version = np.lib.format.read_magic(entry)
+                    reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else _header_2
+                    shape, _, kind = reader(entry)
+                    if math.prod(shape) * kind.itemsize > MOST_BYTES:
+                        raise ValueError(f"it announces an array of shape {shape}")
+        if isinstance(source, io.BytesIO):
+            source.seek(0)
+        with np.load(source, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except (KeyError, TypeError, AttributeError, EOFError, SyntaxError, RuntimeError, NotImplementedError) as error:
+        raise ValueError(f"it is not what a run wrote: {error}") from None
+    except (zipfile.BadZipFile, zlib.error, OverflowError, MemoryError) as error:
+        raise ValueError(f"it is damaged: {error}") from None
+
+
+def _header_2(entry: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
+    return np.lib.format.read_array_header_2_0(entry)
 
 
 def _plain(value: Any, arrays: dict[str, np.ndarray]) -> Any:

@@ -14,6 +14,7 @@ from .contact import InterfaceLaw, Interfaces
 from .correction import Falls, NotConverged, at_rest, corrected, solve_again
 from .kinematics import Pose, moved, moved_vertices
 from .loads import Loads, Settlement, checked_loads
+from .local_origin import at_origin, told_from, without_origin
 from .lp import SolveError
 from .mechanism import mechanism_of
 from .polygons import overlap_depths
@@ -179,8 +180,13 @@ def settlement_increments(
             f"the checkpoint is of phase {resume.phase + 1} with {len(resume.here.pose.rotations)} blocks; there are "
             f"{len(phases)} phases and {assembly.n_blocks} blocks: it belongs to another run"
         )
-    model = _model(assembly, phases, interfaces, loads, controls)
-    return (yield from timed(_increments(model, phases, controls, resume)))
+    origin = at_origin(assembly)
+    if not origin.any():
+        model = _model(assembly, phases, interfaces, loads, controls)
+        return (yield from timed(_increments(model, phases, controls, resume)))
+    near, phases = without_origin(origin, assembly, phases)
+    model = _model(near, phases, interfaces, loads, controls)
+    return (yield from told_from(timed(_increments(model, phases, controls, resume)), origin))
 
 
 def timed(steps: Generator[Increment, None, Ending]) -> Generator[Increment, None, Ending]:

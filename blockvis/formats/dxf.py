@@ -125,8 +125,18 @@ def _flat(entities: Any, depth: int, path: Path, parent: str = "") -> Iterator[t
             continue
         copies = entity.multi_insert() if entity.mcount > 1 else [entity]
         for k, copy in enumerate(copies):
-            inner = copy.virtual_entities()
+            inner = _inserted(copy, path)
             yield from _flat(inner, depth + 1, path, f"{handle}.{k}" if entity.mcount > 1 else handle)
+
+
+def _inserted(insert: Any, path: Path) -> Iterator[Any]:
+    """The entities of an inserted block where it is; ezdxf lets whatever a damaged one runs into through."""
+    try:
+        yield from insert.virtual_entities()
+    except (TypeError, AttributeError, ValueError, KeyError, IndexError, ArithmeticError) as error:
+        raise ValueError(
+            f"'{path}': block reference '{insert.dxf.get('name', '?')}' cannot be resolved ({error}); explode it"
+        ) from None
 
 
 def _points(curve: Any, tolerance: float | None) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +27,15 @@ def read(path: Path, reading: Reading) -> Drawing:
     """Reads a mesh through meshio; it does not say its unit."""
     import meshio
 
+    _check_text(path)
     said = io.StringIO()
     try:
         # meshio prints to the terminal and on some files leaves the program by SystemExit.
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            mesh = meshio.read(path)
+            if path.suffix.lower() in (".tec", ".dat"):
+                mesh = meshio.read(_Ending(path.read_text(encoding="utf-8", errors="replace")), "tecplot")
+            else:
+                mesh = meshio.read(path)
     except (SystemExit, Exception) as error:  # noqa: BLE001
         if isinstance(error, ModuleNotFoundError):
             raise ValueError(f"'{path}' needs the package {error.name}: pip install {error.name}") from None
@@ -56,6 +61,39 @@ def read(path: Path, reading: Reading) -> Drawing:
     if "block_id" not in data:
         data.update(_sets(mesh, chosen))
     return drawing_of_cells(np.asarray(mesh.points, dtype=float), rings, data, path)
+
+
+class _Ending(io.StringIO):
+    """A text whose end is an error when it is read on and on: meshio's reader of Tecplot files waits for more."""
+
+    ends = 0
+
+    def readline(self, size: int | None = -1, /) -> str:  # type: ignore[override]
+        """The next line."""
+        line = super().readline(-1 if size is None else size)
+        self.ends = 0 if line else self.ends + 1
+        if self.ends > 100:
+            raise EOFError("the file ends too early")
+        return line
+
+
+def _check_text(path: Path) -> None:
+    """Refuses what a reader would follow out of the folder, or count to without end."""
+    suffix = path.suffix.lower()
+    if suffix in (".inp", ".xdmf", ".xmf"):
+        text = path.read_text(encoding="utf-8", errors="replace")
+        named = re.findall(r"(?im)^\s*\*\s*include\s*,.*?input\s*=\s*([^,\r\n]+)", text)
+        named += re.findall(r"(?i)<DataItem[^>]*Format\s*=\s*[\"'](?:HDF|Binary)[\"'][^>]*>\s*([^<:]+)", text)
+        for name in (name.strip().strip("\"'") for name in named):
+            if Path(name).is_absolute() or not (path.parent / name).resolve().is_relative_to(path.parent.resolve()):
+                raise ValueError(f"'{path}' names '{name}', which is outside its folder; keep the files together")
+    if suffix in (".tec", ".dat"):
+        size = path.stat().st_size
+        with path.open("rb") as stream:
+            head = stream.read(1_000_000)
+        for match in re.finditer(rb"(?i)\b(N|E|I|J|K|NODES|ELEMENTS)\s*=\s*(\d+)", head):
+            if int(match[2][:18]) > size:
+                raise ValueError(f"'{path}' announces {match[0].decode()} in {size} bytes; export it again")
 
 
 def _sets(mesh: Any, chosen: list[tuple[int, int]]) -> dict[str, np.ndarray]:

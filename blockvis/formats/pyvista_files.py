@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.parsers import expat
+from xml.sax.saxutils import unescape
 
 import numpy as np
 
@@ -13,6 +17,7 @@ from blockvis.drawing import Drawing
 from blockvis.formats import Reading
 from blockvis.formats.cells import drawing_of_cells, merged, row_of
 from blockvis.formats.layout_json import rows_of
+from blockvis.formats.vtk_arrays import largest_number
 
 if TYPE_CHECKING:
     import pyvista
@@ -30,6 +35,12 @@ SOLID_CELLS = {10, 11, 12, 13, 14, 15, 16, 24, 25, 26, 27, 29, 41, 42, 71, 72}
 #: zlib packs no better than 1032 to 1: a file that announces more than this many numbers per byte lies.
 MOST_PER_BYTE = 1100
 
+#: Numbers that all arrays of a file may hold together: 400 MB, a thousand times a large drawing.
+MOST_NUMBERS = 50_000_000
+
+#: Elements of an XML file of VTK are nested a handful deep.
+DEEPEST = 64
+
 
 def read(path: Path, reading: Reading) -> Drawing:
     """Reads a file of VTK; it does not say its unit."""
@@ -37,15 +48,15 @@ def read(path: Path, reading: Reading) -> Drawing:
     from vtkmodules.vtkCommonCore import vtkObject
 
     _check_counts(path)
+    if path.suffix.lower() in (".pvd", ".vtm"):
+        _check_parts(path)
     try:
         # VTK writes every fault of a file to the terminal as well; the reason below is enough.
         with warnings.catch_warnings(), pyvista.vtk_verbosity("off"):
             warnings.simplefilter("ignore")
             vtkObject.GlobalWarningDisplayOff()
             if path.suffix.lower() == ".pvd":
-                reader = pyvista.PVDReader(str(path))
-                _check_parts(reader.datasets, path)
-                data: Any = reader.read()
+                data: Any = pyvista.PVDReader(str(path)).read()
             else:
                 data = pyvista.read(str(path))
     except (OSError, ValueError, RuntimeError, KeyError, TypeError, AttributeError, IndexError, SyntaxError) as error:
@@ -56,31 +67,164 @@ def read(path: Path, reading: Reading) -> Drawing:
 
 
 def _check_counts(path: Path) -> None:
-    """Refuses counts that the file cannot hold, before VTK reserves memory for them and ends the process."""
-    size = path.stat().st_size
-    with path.open("rb") as stream:
-        head = stream.read(4_000_000)
-    legacy = path.suffix.lower() == ".vtk"
-    if not head.lstrip().startswith(b"# vtk DataFile" if legacy else b"<"):
-        raise ValueError(f"'{path}' is not a file of VTK: it starts with {head[:16]!r}; export it again")
-    if re.search(rb"<!\s*(DOCTYPE|ENTITY)", head):
+    """Refuses what the file cannot hold or should not, before VTK reserves memory for it and ends the process."""
+    if path.suffix.lower() == ".vtk":
+        _check_legacy(path)
+    else:
+        _check_xml(path)
+
+
+def _check_legacy(path: Path) -> None:
+    data = path.read_bytes()
+    if not data.lstrip().startswith(b"# vtk DataFile"):
+        raise _not_vtk(path, data)
+    found = re.finditer(
+        rb"(?im)^[ \t]*(?:POINTS|VERTICES|LINES|POLYGONS|TRIANGLE_STRIPS|CELLS|CELL_TYPES|CELL_DATA|POINT_DATA|METADATA"
+        rb"|FIELD[ \t]+\S+|LOOKUP_TABLE[ \t]+\S+|[XYZ]_COORDINATES|OFFSETS|CONNECTIVITY)[ \t]+(-?\d+)"
+        rb"(?:[ \t]+(-?\d+))?",
+        data,
+    )
+    counts = [int(number[:18]) for match in found for number in match.groups() if number]
+    # An array of a FIELD: name, components, tuples, type.
+    for match in re.finditer(rb"(?im)^[ \t]*\S+[ \t]+(-?\d+)[ \t]+(-?\d+)[ \t]+[a-z_]+[ \t]*\r?$", data):
+        components, tuples = (int(number[:18]) for number in match.groups())
+        counts += [components, tuples, components * tuples]
+    for match in re.finditer(rb"(?im)^[ \t]*DIMENSIONS((?:[ \t]+-?\d+)+)", data):
+        sizes = [int(number[:18]) for number in match[1].split()]
+        counts += [min(sizes), math.prod(sizes)]
+    _refuse(path, [count for count in counts if not 0 <= count <= MOST_PER_BYTE * len(data)], len(data))
+    _refuse(path, [count for count in counts if count > MOST_NUMBERS], len(data))
+
+
+def _check_xml(path: Path) -> None:
+    """One pass with a parser of the standard library, which keeps nothing: entities, nesting, counts."""
+    data = path.read_bytes()
+    if not data.lstrip().startswith(b"<"):
+        raise _not_vtk(path, data)
+    parser = expat.ParserCreate()
+    held = _Held(path, len(data))
+
+    def doctype(*_: object) -> None:
         raise ValueError(f"'{path}' has an XML document type; no VTK file needs one: export it again")
-    counts = [m[1] for m in re.finditer(rb'(?:NumberOf\w+|NumberOfTuples)\s*=\s*"\s*(\d+)', head)]
-    counts += [m[1] for m in re.finditer(rb"(?m)^(?:POINTS|CELLS|POLYGONS|CELL_TYPES|CELL_DATA)\s+(\d+)", head)]
-    for match in re.finditer(rb'(?:DIMENSIONS|WholeExtent\s*=\s*")\s*([-\d ]+)', head):
-        values = [abs(int(v)) + 1 for v in match[1].split() if len(v) < 12]
-        counts.append(str(int(np.prod(np.array(values, dtype=float).clip(max=1e12)[-3:]))).encode() if values else b"0")
-    for count in counts:
-        if int(count[:18]) > MOST_PER_BYTE * size:
-            raise ValueError(f"'{path}' announces {count.decode()} items in {size} bytes; export it again")
+
+    parser.StartDoctypeDeclHandler = doctype
+    parser.StartElementHandler, parser.EndElementHandler = held.start, held.end
+    parser.CharacterDataHandler = held.text
+    try:
+        # In pieces: what has been refused is not read on; raw data may follow, which are no XML.
+        for first in range(0, len(data), 1 << 20):
+            if not held.appended:
+                parser.Parse(data[first : first + (1 << 20)], False)
+        if not held.appended:
+            parser.Parse(b"", True)
+    except expat.ExpatError as error:
+        if not held.appended:
+            raise ValueError(f"'{path}' cannot be read as {path.suffix} ({error}); export it again") from None
+    if held.appended and held.later:
+        start = data.index(b"_", data.index(b"<AppendedData")) + 1
+        for attributes in held.later:
+            way = "raw" if held.appended == "raw" else "binary"
+            held.check_offsets(data[start + int(attributes.get("offset", 0)) :], attributes | {"format": way})
 
 
-def _check_parts(parts: Any, path: Path) -> None:
-    for part in parts:
-        target = path.parent / str(part.path)
-        if not target.exists():
-            raise ValueError(f"'{path}' names '{part.path}', which does not exist; keep the files together")
+class _Held:
+    """What an XML file says that it holds, added up as its elements come."""
+
+    def __init__(self, path: Path, size: int) -> None:
+        self.path, self.size = path, size
+        self.points = self.cells = self.numbers = self.depth = 0
+        self.file: dict[str, str] = {}
+        self.appended = ""
+        self.later: list[dict[str, str]] = []
+        self.offsets: dict[str, str] | None = None
+        self.content: list[str] = []
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise ValueError(
+                f"'{self.path}' nests elements more than {DEEPEST} deep; no VTK file does: export it again"
+            )
+        counts = {key: value for key, value in attributes.items() if key.startswith("NumberOf")}
+        for key, value in counts.items():
+            if not re.fullmatch(r"\s*\d{1,15}\s*", value) or int(value) > MOST_PER_BYTE * self.size:
+                raise ValueError(
+                    f"'{self.path}' announces {value[:20]} items in {self.size} bytes ({key}); export it again"
+                )
+        for key in ("WholeExtent", "Extent"):
+            ends = [int(end[:15]) for end in re.findall(r"-?\d+", attributes.get(key, ""))]
+            if ends:
+                self.points = math.prod(abs(b - a) + 1 for a, b in zip(ends[::2], ends[1::2], strict=False))
+                self._bound(self.points)
+        if tag == "VTKFile":
+            self.file = attributes
+        elif tag == "Piece":
+            self.points = int(counts.pop("NumberOfPoints", self.points))
+            self.cells = sum(int(value) for value in counts.values())
+        elif tag in ("DataArray", "Array"):
+            components = int(counts.get("NumberOfComponents", 1))
+            self.numbers += components * int(counts.get("NumberOfTuples", max(self.points, self.cells)))
+            self._bound(self.numbers)
+            if attributes.get("Name") == "offsets":
+                if attributes.get("format") == "appended":
+                    self.later.append(attributes)
+                else:
+                    self.offsets, self.content = attributes, []
+        elif tag == "AppendedData":
+            self.appended = attributes.get("encoding", "base64")
+
+    def end(self, tag: str) -> None:
+        self.depth -= 1
+        if self.offsets is not None:
+            self.check_offsets("".join(self.content).strip().encode(), self.offsets)
+            self.offsets = None
+
+    def text(self, data: str) -> None:
+        if self.offsets is not None:
+            self.content.append(data)
+
+    def check_offsets(self, content: bytes, attributes: dict[str, str]) -> None:
+        """The last offset is how many numbers VTK makes room for; it believes it."""
+        try:
+            largest = largest_number(content, attributes, self.file, 8 * MOST_NUMBERS)
+        except (ValueError, KeyError, OverflowError, zlib.error) as error:
+            raise ValueError(
+                f"'{self.path}' has cells whose offsets cannot be read ({error}); export it again"
+            ) from None
+        self._bound(largest)
+        if largest > MOST_PER_BYTE * self.size:
+            _refuse(self.path, [largest], self.size)
+
+    def _bound(self, count: int) -> None:
+        _refuse(self.path, [count] if count > MOST_NUMBERS else [], self.size)
+
+
+def _refuse(path: Path, counts: list[int], size: int) -> None:
+    if counts:
+        raise ValueError(f"'{path}' announces {counts[0]} items in {size} bytes; export it again")
+
+
+def _not_vtk(path: Path, data: bytes) -> ValueError:
+    return ValueError(f"'{path}' is not a file of VTK: it starts with {data[:16]!r}; export it again")
+
+
+def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
+    """Refuses lists of files (.pvd, .vtm) that name what is not there, not beside them, or not to be read."""
+    if path in seen:
+        raise ValueError(f"'{path}' names itself; export it again")
+    data = path.read_text(encoding="utf-8", errors="replace")
+    for name in re.findall(r"""<DataSet\b[^>]*?\bfile\s*=\s*["']([^"']*)["']""", data):
+        name = unescape(name, {"&quot;": '"', "&apos;": "'"})
+        target = path.parent / name
+        if Path(name).is_absolute() or not target.resolve().is_relative_to(path.parent.resolve()):
+            raise ValueError(f"'{path}' names '{name}', which is outside its folder; keep the files together")
+        if target.suffix.lower() not in (".vtu", ".vtp", ".vtk", ".vtm"):
+            raise ValueError(f"'{path}' names '{name}', which is no .vtu, .vtp, .vtk or .vtm; export it again")
+        if not target.is_file():
+            raise ValueError(f"'{path}' names '{name}', which does not exist; keep the files together")
         _check_counts(target)
+        if target.suffix.lower() == ".vtm":
+            _check_parts(target, (*seen, path))
 
 
 def drawing_of_dataset(data: Any, path: Path | str = "dataset") -> Drawing:

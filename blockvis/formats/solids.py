@@ -63,6 +63,13 @@ def read(path: Path, reading: Reading) -> Drawing:
     if not np.isfinite(every).all():
         bad = every[~np.isfinite(every).all(axis=1)][0]
         raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+    for name, points, faces in parts:
+        outside = faces[(faces < 0) | (faces >= len(points))]
+        if len(outside):
+            raise ValueError(
+                f"'{path}': a face of '{name}' uses point {int(outside[0])}, but there are {len(points)}; "
+                "export it again"
+            )
     size = float(np.ptp(every, axis=0).max())
     unit = "m" if suffix == ".glb" else ""
     rows = _own_rows(path)

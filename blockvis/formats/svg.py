@@ -70,6 +70,8 @@ class _Where:
 def read(path: Path, reading: Reading) -> Drawing:
     """Reads a .svg drawing; width and height beside the viewBox name its unit."""
     text = path.read_bytes()
+    if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise ValueError(f"'{path}' is not in UTF-8; save it as plain SVG")
     if re.search(rb"<!\s*(DOCTYPE|ENTITY)[^>]*(\[|ENTITY)", text, re.IGNORECASE):
         raise ValueError(f"'{path}' defines XML entities; save it as plain SVG without a document type")
     try:
@@ -349,6 +351,9 @@ def _arc(start: np.ndarray, end: np.ndarray, v: list[float], where: _Where) -> l
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     half = rotation.T @ (start - end) / 2.0 / [rx, ry]
     grow = float(half @ half)
+    if not (math.isfinite(grow) and grow > 1e-24):
+        # Ends that coincide against the radii, or numbers beyond the largest: a straight line.
+        return [end]
     if grow > 1:
         rx, ry, half = rx * math.sqrt(grow), ry * math.sqrt(grow), half / math.sqrt(grow)
     factor = math.sqrt(max(0.0, 1.0 / float(half @ half) - 1.0)) * (-1.0 if bool(v[3]) == bool(v[4]) else 1.0)

@@ -61,8 +61,7 @@ def arch(
     """
     if not 0.0 < embrace <= 180.0:
         raise ValueError(f"embrace is {embrace:g} degrees; give an angle above 0 and up to 180")
-    if voussoirs < 2:
-        raise ValueError(f"an arch needs at least 2 voussoirs, not {voussoirs}")
+    voussoirs = whole("voussoirs", voussoirs, 2)
     if not 0.0 < thickness_ratio < 2.0:
         raise ValueError(f"thickness_ratio is {thickness_ratio:g}; give thickness / radius between 0 and 2")
     half = math.radians(embrace) / 2.0

@@ -6,14 +6,21 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-__all__ = ["above_zero", "at_least_zero", "choice", "finite", "pair", "whole"]
+__all__ = ["MOST_BLOCKS", "above_zero", "at_least_zero", "choice", "finite", "pair", "whole"]
+
+#: Blocks in a layout, or along a side of it: beyond anything that could be solved.
+MOST_BLOCKS = 100_000
 
 
 def finite(name: str, value: Any, unit: str = "m") -> float:
     """The value as a float; raises ``ValueError`` unless it is a finite number."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ValueError(f"{name} is {value!r}; give a finite number{f' in {unit}' if unit else ''}")
-    return float(value)
+    try:
+        number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"{name} is {str(value)[:60]!r}; give a finite number{f' in {unit}' if unit else ''}")
+    return number
 
 
 def above_zero(name: str, value: Any, unit: str = "m") -> float:
@@ -37,6 +44,8 @@ def whole(name: str, value: Any, least: int) -> int:
     number = finite(name, value, "")
     if number != int(number) or number < least:
         raise ValueError(f"{name} is {number:g}; give a whole number of at least {least}")
+    if number > MOST_BLOCKS:
+        raise ValueError(f"{name} is {number:g}; a layout has at most {MOST_BLOCKS} blocks")
     return int(number)
 
 

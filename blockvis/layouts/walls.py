@@ -14,7 +14,7 @@ import solver
 
 from .bonds import BONDS, SHORTEST_BRICK
 from .bricks import LOWEST_BRICK, Bond, brick_outline, cut_bricks, lay_bricks
-from .dimensions import above_zero, choice, finite, pair, whole
+from .dimensions import MOST_BLOCKS, above_zero, choice, finite, pair, whole
 from .openings import Opening, checked_opening, head_joints_of, head_outlines, opening_ring
 
 __all__ = ["facade", "panel", "wall"]
@@ -80,6 +80,11 @@ def wall(
         choice("bond", bond, BONDS), above_zero("brick_length", brick_length), above_zero("brick_height", brick_height)
     )
     width, courses = _size(bonded, bricks, courses, width, height)
+    if courses * width / bonded.brick_length > MOST_BLOCKS:
+        raise ValueError(
+            f"the wall has {courses:g} courses of {width / bonded.brick_length:.4g} bricks; a layout has at most "
+            f"{MOST_BLOCKS} blocks"
+        )
     height = courses * bonded.brick_height
     holes = _placed(bonded, openings, width, height)
     rings = [opening_ring(opening, joints) for opening, joints in holes]

@@ -1,0 +1,83 @@
+"""Files made to harm and files with bytes changed: read or refused, within 2 GiB and 20 s, without a traceback."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hostile import FILES, npz_absurd, npz_bomb, written
+from mutations import MEMORY, SECONDS, fixtures, mutated, read_all
+
+import blockvis
+import solver
+from blockvis import layouts
+from blockvis.cli import main
+from blockvis.stored_values import checked_arrays
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are set the way Linux has them")
+
+#: Of the hostile files those that hold a drawing all the same: what is hostile in them is not followed.
+HARMLESS = {"uses.svg": "1 blocks", "face.off": "1 blocks"}
+
+
+def test_hostile_files_are_refused_within_bounds(tmp_path):
+    paths = written(tmp_path)
+    outcomes = {Path(str(o["file"])).name: o for o in read_all(paths, tmp_path)}
+    assert set(outcomes) == set(FILES)
+    for name, outcome in outcomes.items():
+        expected = "read" if name in HARMLESS else "refused"
+        assert outcome["outcome"] == expected, (name, outcome)
+        assert HARMLESS.get(name, name) in str(outcome["message"]) or "block '" in str(outcome["message"]), outcome
+        assert len(str(outcome["message"])) < 1000, name
+        assert float(str(outcome["seconds"])) < SECONDS
+    assert not list(tmp_path.rglob("harmed"))
+    for name in ("outside.pvd", "outside.vtm", "include.inp", "outside.xdmf"):
+        assert "outside its folder" in str(outcomes[name]["message"])
+
+
+def test_changed_bytes_are_read_or_refused(tmp_path):
+    random, paths = np.random.default_rng(2026), []
+    for name, data in fixtures(tmp_path).items():
+        for k in range(5):
+            paths.append(tmp_path / f"{Path(name).stem}-{k}{Path(name).suffix}")
+            paths[-1].write_bytes(mutated(data, random))
+    outcomes = read_all(paths, tmp_path)
+    assert len(outcomes) == len(paths)
+    assert [o for o in outcomes if o["outcome"] not in ("read", "refused")] == []
+
+
+@pytest.mark.parametrize("name", ["assembly.npz", "increments/state_00000.npz"])
+@pytest.mark.parametrize("content", [npz_absurd, npz_bomb, lambda: b"", lambda: bytes(5000)])
+def test_hostile_results_are_refused(tmp_path, capsys, name, content):
+    spread = solver.Settlement(direction=(1, 0), increment=0.05, limit=0.05)
+    folder = blockvis.write(solver.settle(layouts.arch(), spread), tmp_path / "out")
+    (folder / name).write_bytes(content())
+    assert main(["render", str(folder)]) == 2
+    assert f"{Path(name).name}' cannot be read" in capsys.readouterr().err
+
+
+def test_what_the_limits_of_stored_arrays_are(tmp_path):
+    np.savez(tmp_path / "a.npz", x=np.arange(3.0))
+    assert checked_arrays(tmp_path / "a.npz")["x"].tolist() == [0.0, 1.0, 2.0]
+    for content, words in ((npz_bomb(), "unpacks to"), (npz_absurd(), "announces an array of shape"), (b"", "damaged")):
+        (tmp_path / "b.npz").write_bytes(content)
+        with pytest.raises(ValueError, match=words):
+            checked_arrays(tmp_path / "b.npz")
+    np.savez(tmp_path / "c.npz", x=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(ValueError, match="allow_pickle"):
+        checked_arrays(tmp_path / "c.npz")
+
+
+def test_the_limits_bind(tmp_path):
+    """The bounds above are real: more memory or time than allowed is seen."""
+    assert MEMORY == 2 << 30
+    (tmp_path / "a.py").write_text(
+        "import sys; sys.argv = ['', str(64 << 20), '1']; sys.path.insert(0, sys.argv[0])\n"
+        f"sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "import reader\nreader.main(str(64 << 20), '1', [])\n"
+        "try:\n    bytearray(256 << 20)\nexcept MemoryError:\n    print('bound')\n"
+    )
+    import subprocess
+
+    done = subprocess.run([sys.executable, str(tmp_path / "a.py")], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "bound", done.stderr
