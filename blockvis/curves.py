@@ -279,10 +279,15 @@ def _mark_events(axes: Axes, response: solver.Response, factor: float, text: flo
     x, y = [e.parameter * per_length for e in found], [e.value / factor for e in found]
     axes.plot(x, y, "o", color="white", markeredgecolor=ink, markersize=7, zorder=4, label="hinges or sliding change")
     if len(found) <= MOST_EVENTS:
+        low, high = axes.get_xlim()
+        above = True
         for number in range(1, len(found) + 1):
+            # Under the curve where it would run into the number before.
+            close = number > 1 and abs(x[number - 1] - x[number - 2]) < 0.03 * (high - low)
+            above = not (close and above)
             axes.annotate(
-                str(number), (x[number - 1], y[number - 1]), xytext=(0, 8), textcoords="offset points", ha="center",
-                fontsize=0.8 * text,
+                str(number), (x[number - 1], y[number - 1]), xytext=(0, 8 if above else -8),
+                textcoords="offset points", ha="center", va="bottom" if above else "top", fontsize=0.8 * text,
             )  # fmt: skip
         lines = [f"{n}  {e.text}" for n, e in enumerate(found, 1)]
         axes.text(

@@ -28,6 +28,9 @@ FEW_BLOCKS = 300
 #: Joints open by less than this fraction of the block size are drawn half as wide: not every hair is a crack.
 FINE_CRACK = 0.01
 
+#: Joints open by more than this fraction need no line: the middle of a wide crack may lie on a third block.
+WIDE_CRACK = 0.2
+
 #: Up to this many parts of a mechanism are tinted one by one.
 MOST_PARTS = 16
 
@@ -238,8 +241,9 @@ class Studio:
         scene.polygons("crack", found.cracks, palette.OPEN)
         scene.polygons("crack/pocket", cut_into_triangles(found.pockets), palette.OPEN)
         middle = (found.cracks[:, [0, 1]] + found.cracks[:, [3, 2]]) / 2.0 if len(found.cracks) else found.cracks
-        fine = found.openings < FINE_CRACK * self.assembly.block_size
-        scene.lines("crack edge", middle[~fine], palette.OPEN, self._line(2.2 * thin))
+        width = found.openings / self.assembly.block_size
+        fine, wide = width < FINE_CRACK, width * self.look.magnification > WIDE_CRACK
+        scene.lines("crack edge", middle[~fine & ~wide], palette.OPEN, self._line(2.2 * thin))
         scene.lines("crack edge/fine", middle[fine], palette.OPEN, self._line(1.1 * thin))
         scene.lines("sliding", found.sliding, palette.SLIDING, self._line(5.0 * thin))
         radius = float(np.clip(0.09 * self.assembly.block_size / scene.pixel, 3.0 * thin, 11.0 * thin))
