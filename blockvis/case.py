@@ -73,7 +73,9 @@ class Case:
     density: float | None = None
     densities: Mapping[str, float] = field(default_factory=dict)
     friction_coefficient: float = 0.6
-    interfaces: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    cohesion: float = 0.0
+    compressive_strength: float = math.inf
+    interfaces: Mapping[tuple[str, str], solver.InterfaceLaw] = field(default_factory=dict)
     imperfections: tuple[Imperfection, ...] = ()
     settlements: tuple[solver.Settlement, ...] = ()
     loads: tuple[LoadCase, ...] = ()
@@ -275,6 +277,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         density=material.number("density", positive=True),
         densities=densities,
         friction_coefficient=_friction(material),
+        **_strength(material),
         interfaces=dict(_interface(entry) for entry in top.tables("interfaces")),
         imperfections=_imperfections(top),
         settlements=tuple(_settlement(entry) for entry in top.tables("settlement")),
@@ -308,6 +311,12 @@ def _fitting(case: Case) -> Case:
         raise ValueError(
             f'{source}: [analysis] kind is "{kind}", but no load is live; add [[loads]] with kind = "live", for '
             "instance weight_fraction = [1.0, 0.0]"
+        )
+    laws = [solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength)]
+    if not all(law.dry for law in [*laws, *case.interfaces.values()]) and (kind != "limit load" or case.settlements):
+        raise ValueError(
+            f"{source}: cohesion and compressive_strength are for limit loads without a settlement; what follows the "
+            "geometry follows dry joints"
         )
     if kind == "pushover" and case.control is None:
         raise ValueError(
@@ -372,13 +381,22 @@ def _support(table: _Table) -> Mapping[str, Any]:
     return support
 
 
-def _interface(table: _Table) -> tuple[tuple[str, str], float]:
+def _strength(table: _Table) -> dict[str, float]:
+    """Cohesion and compressive strength [Pa], where they are given."""
+    cohesion = table.number("cohesion", 0.0)
+    if cohesion < 0.0:
+        raise table.error("cohesion", f"is {cohesion:g}; give a stress in Pa of at least 0")
+    strength = table.number("compressive_strength", positive=True)
+    return {"cohesion": cohesion, "compressive_strength": math.inf if strength is None else strength}
+
+
+def _interface(table: _Table) -> tuple[tuple[str, str], solver.InterfaceLaw]:
     pair = table.take("materials")
     if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(name, str) for name in pair)):
         raise table.error("materials", f'is {pair!r}; name two materials ["stone", "brick"]')
-    friction = _friction(table, None)
+    law = solver.InterfaceLaw(_friction(table, None), **_strength(table))
     table.finish()
-    return (pair[0], pair[1]), friction
+    return (pair[0], pair[1]), law
 
 
 def _imperfections(top: _Table) -> tuple[Imperfection, ...]:
@@ -559,8 +577,8 @@ def _with_densities(case: Case, sketch: drawing.Drawing) -> drawing.Drawing:
 def case_interfaces(case: Case) -> solver.Interfaces:
     """The laws of the interfaces of a case."""
     return solver.Interfaces(
-        solver.InterfaceLaw(case.friction_coefficient),
-        {pair: solver.InterfaceLaw(friction) for pair, friction in case.interfaces.items()},
+        solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength),
+        dict(case.interfaces),
         scatter=joint_scatter(case.imperfections),
     )
 

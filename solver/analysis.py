@@ -175,6 +175,7 @@ def settlement_increments(
     """
     controls = controls or Controls()
     check_settlement(assembly, phases, controls)
+    interfaces.refuse_strength("a settlement")
     if resume is not None and (resume.phase >= len(phases) or len(resume.here.pose.rotations) != assembly.n_blocks):
         raise ValueError(
             f"the checkpoint is of phase {resume.phase + 1} with {len(resume.here.pose.rotations)} blocks; there are "

@@ -41,14 +41,29 @@ class InterfaceLaw:
     ----------
     friction_coefficient : float
         Ratio of shear to normal force at sliding, from 0 to anything finite.
+    cohesion : float [Pa]
+        Shear strength without compression, in limit loads only; none by default.
+    compressive_strength : float [Pa]
+        In limit loads only; infinite by default.
     """
 
     friction_coefficient: float = 0.6
+    cohesion: float = 0.0
+    compressive_strength: float = np.inf
 
     def __post_init__(self) -> None:
         mu = self.friction_coefficient
         if not (np.isfinite(mu) and mu >= 0):
             raise ValueError(f"friction_coefficient is {mu:g}; it must be a finite number of at least 0")
+        if not (np.isfinite(self.cohesion) and self.cohesion >= 0.0):
+            raise ValueError(f"cohesion is {self.cohesion:g} Pa; it must be a finite number of at least 0")
+        if not self.compressive_strength > 0.0:
+            raise ValueError(f"compressive_strength is {self.compressive_strength:g} Pa; it must be positive")
+
+    @property
+    def dry(self) -> bool:
+        """Whether there is neither cohesion nor crushing."""
+        return self.cohesion == 0.0 and self.compressive_strength == np.inf
 
 
 @dataclass(frozen=True)
@@ -110,17 +125,36 @@ class Interfaces:
 
     def friction(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
         """(n,) array: friction coefficient between the blocks of each pair."""
-        alike = self._by_material(assembly, block_a, block_b)
+        alike = self._by_material("friction_coefficient", assembly, block_a, block_b)
         return alike if self.scatter is None else alike * self.scatter.factors(block_a, block_b)
 
-    def _by_material(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
+    def strength(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Two (n,) arrays [Pa]: cohesion and compressive strength between the blocks of each pair."""
+        cohesion, compressive = (
+            self._by_material(name, assembly, block_a, block_b) for name in ("cohesion", "compressive_strength")
+        )
+        return cohesion, compressive
+
+    @property
+    def dry(self) -> bool:
+        """Whether no interface has cohesion or crushes."""
+        return self.default.dry and all(law.dry for law in self.pairs.values())
+
+    def refuse_strength(self, analysis: str) -> None:
+        """Raises ``ValueError`` for cohesion or compressive strength in an analysis that follows dry joints."""
+        if not self.dry:
+            raise ValueError(
+                f"{analysis} follows dry joints; leave cohesion and compressive_strength out, which limit loads take"
+            )
+
+    def _by_material(self, name: str, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
         if not self.pairs:
-            return np.full(len(block_a), self.default.friction_coefficient)
+            return np.full(len(block_a), getattr(self.default, name))
         kinds = sorted({*assembly.materials, *(m for pair in self.pairs for m in pair)})
         number = {kind: k for k, kind in enumerate(kinds)}
-        table = np.full((len(kinds), len(kinds)), self.default.friction_coefficient)
+        table = np.full((len(kinds), len(kinds)), getattr(self.default, name))
         for (first, second), law in self.pairs.items():
-            table[number[first], number[second]] = table[number[second], number[first]] = law.friction_coefficient
+            table[number[first], number[second]] = table[number[second], number[first]] = getattr(law, name)
         material = np.array([number[m] for m in assembly.materials])
         return table[material[block_a], material[block_b]]
 

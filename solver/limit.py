@@ -11,12 +11,13 @@ import scipy.sparse as sp
 
 from .assembly import Assembly, check_blocks
 from .contact import Contacts, InterfaceLaw, Interfaces, find_contacts
-from .equilibrium import cone_rays, equilibrium_matrix
+from .equilibrium import equilibrium_matrix
 from .kinematics import Pose, moved_vertices
 from .loads import Loads, checked_loads
 from .lp import LinearProgram, Unbounded, solve_lp
 from .program import FALLING_FRACTION, point_velocities
 from .response import Certificate, Increment, Status
+from .strength import Admissible, point_strength
 
 __all__ = ["Envelope", "LimitLoad", "LimitStatus", "checked_live", "limit_load", "limit_load_envelope"]
 
@@ -207,6 +208,12 @@ def limit_load(
     bounds are recomputed from the forces and from the mechanism. The multiplier is the exact limit load of the model
     with associative flow, and an upper bound for every other flow rule with the same friction.
 
+    Cohesion c and compressive strength σ of the interfaces, off by default, give each contact point its part A of the
+    face between two blocks (half the distance to its neighbours, times the thickness): |T| ≤ μ N + c A and
+    0 ≤ N ≤ σ A, joints still without tension. A face of two corners thus carries moments up to σ A b / 2 with all of
+    its force at the ends: more than the stress block of a continuous face, so that crushing at a toe is found later
+    than it comes. What crushes moves by the same flow rule.
+
     With a displacement δ, points that are open by a gap g carry at a price: maximise α - Σ g N / w, where w is δ times
     the sum of the live forces; its dual has N(q) + g ≥ μ |T(q)| and live · q = w. That is the first program of a
     pushover with an increment δ. At closed joints it is the limit load, whatever δ is; the two values then enclose the
@@ -283,6 +290,8 @@ class _Problem:
     live_size: float
     live_force: float
     price: np.ndarray
+    cohesion: np.ndarray
+    crushing: np.ndarray
 
     @classmethod
     def stated(
@@ -296,7 +305,10 @@ class _Problem:
     ) -> _Problem:
         length, free = assembly.block_size, assembly.free
         reach = max(closed_gap, REACH * length) if displacement > 0.0 else closed_gap
-        contacts = find_contacts(assembly, moved_vertices(assembly, pose), reach)
+        vertices = moved_vertices(assembly, pose)
+        contacts = find_contacts(assembly, vertices, reach)
+        around = contacts if interfaces.dry else find_contacts(assembly, vertices, max(reach, REACH * length))
+        cohesion, crushing = point_strength(assembly, interfaces, contacts, around)
         units = np.array([1.0, 1.0, length])
         weights = np.abs(loads.dead[free] / units)
         live = loads.live[free] / units
@@ -320,37 +332,49 @@ class _Problem:
             live_size=size / force,
             live_force=float(np.hypot(*loads.live[free, :2].sum(axis=0))),
             price=price,
+            cohesion=cohesion / force,
+            crushing=crushing / force,
         )
+
+    @property
+    def admissible(self) -> Admissible:
+        """What the contact points can carry, associative."""
+        return Admissible.of(self.friction, self.cohesion, self.crushing)
 
     def balanced(self, *, with_live: bool) -> _State:
         """The least unbalanced force that the dead load leaves, and how the blocks move where it is not nothing."""
-        rays, rows = cone_rays(self.friction), len(self.dead)
+        carried, rows = self.admissible, len(self.dead)
+        columns = carried.columns
+        n = columns.shape[1]
         identity = sp.identity(rows, format="csc")
         live = sp.csc_array(self.live[:, None] * float(with_live))
+        balance = [self.matrix @ columns, live, identity, -identity]
         program = LinearProgram(
-            cost=np.concatenate([np.zeros(rays.shape[1] + 1), np.ones(2 * rows)]),
-            matrix=sp.csc_array(sp.hstack([self.matrix @ rays, live, identity, -identity], format="csc")),
-            lower=-self.dead,
-            upper=-self.dead,
+            cost=np.concatenate([np.zeros(n + 1), np.ones(2 * rows)]),
+            matrix=sp.csc_array(sp.block_array([balance, [carried.limits, None, None, None]], format="csc")),
+            lower=np.append(-self.dead, np.zeros(len(carried.most))),
+            upper=np.append(-self.dead, carried.most),
         )
         solution = solve_lp(program)
-        forces, multiplier = rays @ solution.x[: rays.shape[1]], float(solution.x[rays.shape[1]]) * with_live
+        forces, multiplier = columns @ solution.x[:n], float(solution.x[n]) * with_live
         unbalanced = np.abs(self.matrix @ forces + self.dead + multiplier * self.live)
         falls = float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * float(np.abs(self.dead).sum())
-        return _State(forces.reshape(-1, 2), multiplier, -solution.row_dual, unbalanced, solution.gap, falls)
+        return _State(forces.reshape(-1, 2), multiplier, -solution.row_dual[:rows], unbalanced, solution.gap, falls)
 
     def associative(self, balanced: _State) -> _State:
         """The program of the limit load; what the dead load leaves unbalanced by rounding it may leave too."""
-        rays = cone_rays(self.friction)
+        carried, rows = self.admissible, len(self.dead)
+        columns = carried.columns
+        balance = [self.matrix @ columns, sp.csc_array(self.live[:, None])]
         program = LinearProgram(
-            cost=np.append(rays.T @ np.stack([self.price, np.zeros_like(self.price)], axis=1).ravel(), -1.0),
-            matrix=sp.csc_array(sp.hstack([self.matrix @ rays, sp.csc_array(self.live[:, None])], format="csc")),
-            lower=-self.dead - balanced.unbalanced,
-            upper=-self.dead + balanced.unbalanced,
+            cost=np.append(columns.T @ np.stack([self.price, np.zeros_like(self.price)], axis=1).ravel(), -1.0),
+            matrix=sp.csc_array(sp.block_array([balance, [carried.limits, None]], format="csc")),
+            lower=np.append(-self.dead - balanced.unbalanced, np.zeros(len(carried.most))),
+            upper=np.append(-self.dead + balanced.unbalanced, carried.most),
         )
         solution = solve_lp(program)
-        forces = (rays @ solution.x[:-1]).reshape(-1, 2)
-        return _State(forces, float(solution.x[-1]), -solution.row_dual, balanced.unbalanced, solution.gap)
+        forces = (columns @ solution.x[:-1]).reshape(-1, 2)
+        return _State(forces, float(solution.x[-1]), -solution.row_dual[:rows], balanced.unbalanced, solution.gap)
 
     def non_associative(self, start: _State, found: LimitStatus) -> LimitLoad:
         """The sequence of programs with normal forces carried over and dilatancy taken away."""
@@ -364,7 +388,7 @@ class _Problem:
                 normal = lowest[1]
             state = self._without_dilatancy(normal, dilatancy, start.unbalanced, 0.0 if wandering else CHANGE_COST)
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
-            excess = np.abs(state.forces[:, 1]) - self.friction * state.forces[:, 0]
+            excess = np.abs(state.forces[:, 1]) - self.friction * state.forces[:, 0] - self.cohesion
             change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
             if (
                 not (wandering or state.falls)
@@ -384,25 +408,28 @@ class _Problem:
     def _without_dilatancy(
         self, normal: np.ndarray, dilatancy: np.ndarray, unbalanced: np.ndarray, change_cost: float
     ) -> _State:
-        """Maximises α with |T| ≤ μ N⁰ + ψ (N - N⁰); where changes cost, takes of equal α the forces nearest to N⁰.
+        """Maximises α with |T| ≤ c + μ N⁰ + ψ (N - N⁰); where changes cost, takes of equal α the forces nearest to N⁰.
 
-        Columns N, u, v, then p, m, α and unbalanced forces: T = (u - v) / 2, u + v = 2 (c + ψ N), N - N⁰ = p - m.
+        Columns N, u, v, then p, m, α and unbalanced forces: T = (u - v) / 2, u + v = 2 (k + ψ N) with the constant
+        k = c + (μ - ψ) N⁰, N - N⁰ = p - m, and a row N for each point that may crush.
         """
         n, rows = len(normal), len(self.dead)
         a_normal, a_shear = self.matrix[:, 0::2], self.matrix[:, 1::2]
-        constant = (self.friction - dilatancy) * normal
+        constant = self.cohesion + (self.friction - dilatancy) * normal
+        brittle = np.flatnonzero(np.isfinite(self.crushing))
         identity, eye = sp.identity(rows, format="csr"), sp.identity(n, format="csr")
         live = sp.csr_array(self.live[:, None])
         balance = [a_normal, a_shear / 2.0, -a_shear / 2.0, None, None, live, identity, -identity]
         cone = [sp.diags_array(-2.0 * dilatancy), eye, eye, None, None, None, None, None]
         change = [eye, None, None, -eye, eye, None, None, None]
+        crush = [sp.csr_array(eye)[brittle], None, None, None, None, None, None, None]
         program = LinearProgram(
             cost=np.concatenate(
                 [self.price, np.zeros(2 * n), np.full(2 * n, change_cost), [-1.0], np.full(2 * rows, UNBALANCED_COST)]
             ),
-            matrix=sp.csc_array(sp.block_array([balance, cone, change], format="csc")),
-            lower=np.concatenate([-self.dead - unbalanced, 2.0 * constant, normal]),
-            upper=np.concatenate([-self.dead + unbalanced, 2.0 * constant, normal]),
+            matrix=sp.csc_array(sp.block_array([balance, cone, change, crush], format="csc")),
+            lower=np.concatenate([-self.dead - unbalanced, 2.0 * constant, normal, np.zeros(len(brittle))]),
+            upper=np.concatenate([-self.dead + unbalanced, 2.0 * constant, normal, self.crushing[brittle]]),
         )
         solution = solve_lp(program)
         x = solution.x
@@ -424,17 +451,21 @@ class _Problem:
         if status is LimitStatus.UNBOUNDED:
             velocity = np.zeros_like(velocity)
         relative = (self.matrix.T @ velocity).reshape(-1, 2)
-        drag = np.zeros(len(relative)) if state.drag is None else state.drag
-        taken = float(drag @ np.abs(relative[:, 1]))
         live_power = float(self.live @ velocity)
-        kinematic = (taken - float(self.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
-        kinematic += float(self.price @ state.forces[:, 0])
         # Points that are open may close by their gap in a motion whose live power is 1.
         relative[:, 0] += self.price * max(live_power, 0.0)
+        drag = self.cohesion if state.drag is None else state.drag
         slope = self.friction if state.drag is None else np.zeros(len(relative))
-        room = np.stack([relative[:, 0] - slope * relative[:, 1], relative[:, 0] + slope * relative[:, 1]], axis=1)
+        slip, brittle = np.abs(relative[:, 1]), np.isfinite(self.crushing)
+        # What crushes may come closer than what is rigid, at the price of its strength.
+        closer = np.where(brittle, np.maximum(slope * slip - relative[:, 0], 0.0), 0.0)
+        crushed = np.where(brittle, self.crushing, 0.0) * closer
+        taken = float(drag @ slip + crushed.sum())
+        kinematic = (taken - float(self.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
+        kinematic += float(self.price @ state.forces[:, 0])
+        room = relative[:, 0] + closer - slope * slip
         normal, shear = state.forces.T
-        lost = normal * relative[:, 0] + shear * relative[:, 1] + drag * np.abs(relative[:, 1])
+        lost = normal * relative[:, 0] + shear * relative[:, 1] + drag * slip + crushed
         balance = self.matrix @ state.forces.ravel() + self.dead + multiplier * self.live
         total = float(np.abs(self.dead).sum()) or 1.0
         mechanism = np.zeros((self.assembly.n_blocks, 3))

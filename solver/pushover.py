@@ -208,6 +208,7 @@ def pushover_increments(
     """The increment loop of :func:`pushover` as a generator: yields each Increment, returns the Ending."""
     controls = controls or Controls()
     check_blocks(assembly, controls.overlap_tolerance)
+    interfaces.refuse_strength("a pushover")
     loads = checked_live(assembly, loads)
     if not assembly.free[assembly.index(control.block)]:
         raise ValueError(f"control block '{control.block}' is a support; name a free block")
