@@ -31,7 +31,8 @@ def block_dataset(assembly: solver.Assembly, increment: solver.Increment | None 
     pyvista.UnstructuredGrid
         Cell arrays ``block_id``, ``name``, ``role`` (number), ``role_name``, ``material_id``, ``material``,
         ``displacement`` (n_blocks, 3) of the centroids [m] and ``rotation`` [rad]; point array ``displacement``
-        (n_vertices, 3) [m]; field arrays ``settlement`` [m or rad], ``phase``, ``load_multiplier``,
+        (n_vertices, 3) [m]; field arrays ``settlement`` [m or rad] (of a pushover the control displacement, of a load
+        that moves its position), ``phase``, ``load_multiplier``,
         ``reaction`` [N or N·m], ``status``, ``role_names`` and ``material_names``.
 
     Examples

@@ -12,7 +12,7 @@ import numpy as np
 
 import solver
 
-__all__ = ["LoadCase", "loads_of", "moving_loads", "nearest_name"]
+__all__ = ["LoadCase", "loads_of", "moving_loads", "nearest_name", "with_moving_load"]
 
 
 @dataclass(frozen=True)
@@ -118,6 +118,16 @@ def moving_loads(
                     raise ValueError(f"{source}: [loads {number + 1}] positions: {error}") from None
             return np.array(load.positions), live
     return np.zeros(0), []
+
+
+def with_moving_load(
+    loads: solver.Loads, entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path, x: float | None
+) -> solver.Loads:
+    """The loads with the one that moves standing at x [m]; as they are where there is no such place."""
+    places, live = moving_loads(entries, assembly, source)
+    if x is None or len(places) == 0:
+        return loads
+    return solver.Loads(loads.dead, loads.live + live[int(np.argmin(np.abs(places - x)))])
 
 
 def _chosen(load: LoadCase, assembly: solver.Assembly, where: str) -> np.ndarray:

@@ -19,6 +19,7 @@ import numpy as np
 import solver
 
 from .capacity import CAPACITY_TABLES, capacity_summary, stored_limits, stored_parameters, write_capacity
+from .loading import with_moving_load
 from .record import RECORD, Record, read_record, versions
 from .series import POSITION, parameter_word
 from .stored_values import checked_arrays, packed, unpacked
@@ -461,6 +462,7 @@ def open_results(folder: str | Path) -> solver.Response:
         interfaces, loads = case_interfaces(case), case_loads(case, assembly)
         if "parameter" not in summary:
             settlements = case.settlements
+        loads = with_moving_load(loads, case.loads, assembly, case.source, summary.get("governing_position"))
     analysis = summary.get("analysis", "settlement")
     stop = solver.Status(summary.get("status", solver.Status.INTERRUPTED))
     return solver.Response(

@@ -81,7 +81,7 @@ class Increment:
     Attributes
     ----------
     settlement : float [m or rad]
-        Parameter s of the moving supports within its phase.
+        Parameter s of the moving supports within its phase; see :attr:`Response.analysis` for other analyses.
     phase : int
         Which of several settlements, from 0.
     load_multiplier : float

@@ -127,6 +127,8 @@ def test_envelope_of_a_load_that_moves_over_an_arch(tmp_path, capsys):
     assert f"the lowest of 5 positions: load at x = {summary['governing_position']:g} m" in capsys.readouterr().out
     response = blockvis.open_results(folder)
     assert governing(response).load_multiplier == min(multipliers)
+    place = summary["governing_position"]
+    assert np.array_equal(response.loads.live, solver.load_on_top(arch, place, (0.0, -1000.0)))
     assert parameter_label(response) == "load position x [m]"
     assert value_label(response) == "load multiplier α"
 

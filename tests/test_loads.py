@@ -102,6 +102,7 @@ def test_direction_counts_as_a_direction_only():
         ({"direction": (1, 0), "increment": -0.1}, "increment"),
         ({"direction": (1, 0), "limit": np.nan}, "limit"),
         ({"direction": (1, 0), "tolerance": -1e-4}, "tolerance"),
+        ({"direction": (1, 0), "limit": 0.5, "stops": (0.1, 0.6)}, r"stop 0.6 is not between 0 and the limit of 0.5"),
     ],
 )
 def test_refused_settlements(given, message):
