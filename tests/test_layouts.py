@@ -362,9 +362,12 @@ def _generated() -> list[str]:
 def test_examples_of_layouts_build_and_their_loads_find_their_blocks(file):
     case = tomllib.loads((EXAMPLES / file).read_text(encoding="utf-8"))
     assembly = layouts.build(case["geometry"]["layout"], case["geometry"].get("parameters"))
-    assert assembly.moving.any()
+    assert assembly.moving.any() or "settlement" not in case
     _assert_no_overlap(assembly)
     for load in case.get("loads", ()):
+        if "blocks" not in load:
+            # On every block, or moving over the structure.
+            continue
         prefix = load["blocks"].removesuffix("*")
         carrying = [i for i, name in enumerate(assembly.names) if name.startswith(prefix)]
         top = assembly.vertices[assembly.free[assembly.block_of_vertex], 1].max()
