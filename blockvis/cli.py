@@ -116,6 +116,7 @@ def _add_sweep(verbs: Any) -> None:
 
 def _sweep(options: argparse.Namespace) -> int:
     from .studies.campaign import run_study
+    from .studies.ledger import finished_runs
     from .studies.plan import read_study
     from .studies.summary import in_words, stored_summary
 
@@ -132,9 +133,9 @@ def _sweep(options: argparse.Namespace) -> int:
             keep=_run_numbers(options.keep),
         )
     except KeyboardInterrupt:
-        done = len(list((folder / "runs").glob("[0-9]*.json")))
         print(
-            f"blockvis: interrupted; {done} of {study.n_runs} runs are kept, the same command goes on with the others",
+            f"blockvis: interrupted; {finished_runs(folder)} of {study.n_runs} runs are kept, "
+            "the same command goes on with the others",
             file=sys.stderr,
         )
         return INTERRUPTED

@@ -18,7 +18,7 @@ import blockvis
 from blockvis.cli import main
 from blockvis.studies import campaign
 from blockvis.studies.fragility import fragility_of
-from blockvis.studies.ledger import Ledger
+from blockvis.studies.ledger import Ledger, finished_runs
 from blockvis.studies.plan import read_study
 from blockvis.studies.single import run_once
 
@@ -76,7 +76,7 @@ def _made_here(study, folder, runs):
     """Some runs of a study, without any cluster."""
     ledger = Ledger(folder, study)
     for run in runs:
-        ledger.add(*run_once(study.values, str(study.case_source), study.order(run), study.n_seeded))
+        ledger.add([run_once(study.values, str(study.case_source), study.order(run), study.n_seeded)])
     return ledger
 
 
@@ -148,7 +148,7 @@ def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tm
             [*command, "--workers", "1"], cwd=tmp_path, start_new_session=True, stderr=subprocess.PIPE, text=True
         )
         deadline = time.monotonic() + 120
-        while len(list(out.glob("runs/[0-9]*.json"))) < after and process.poll() is None:
+        while finished_runs(out) < after and process.poll() is None:
             assert time.monotonic() < deadline
             time.sleep(0.02)
         # As a terminal does: Ctrl-C reaches the workers too.
@@ -160,15 +160,17 @@ def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tm
     code, message = stopped(signal.SIGINT, 6)
     assert code == 130
     assert re.fullmatch(r"blockvis: interrupted; \d+ of 24 runs are kept, .* goes on with the others\n", message)
-    done = {f.name: f.stat().st_mtime_ns for f in out.glob("runs/[0-9]*.json")}
-    assert 6 <= len(done) < 24
-    assert len(pd.read_csv(out / "table.csv")) == len(done), "the table is there too"
+    done = (out / "runs.jsonl").read_bytes()
+    assert 6 <= done.count(b"\n") < 24
+    assert len(pd.read_csv(out / "table.csv")) == done.count(b"\n"), "the table is there too"
 
     assert main(["sweep", str(arches), "-o", str(out), "--workers", "2", "--keep", "5"]) == 0
     printed = capsys.readouterr().out
     assert "24 of 24 runs" in printed
     assert "probability of collapse: 5 %" in printed
-    assert {n: (out / "runs" / n).stat().st_mtime_ns for n in done} == done, "finished runs are not made again"
+    rows = (out / "runs.jsonl").read_bytes()
+    assert rows.startswith(done)
+    assert rows.count(b"\n") == 24, "finished runs are not made again"
     table = pd.read_parquet(out / "table.parquet")
     assert table["run"].tolist() == list(range(24))
     assert (table["status"] == "collapsed").all()
@@ -188,7 +190,7 @@ def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tm
     message = capsys.readouterr().err
     assert "24 finished runs of another study: parameters has changed" in message
     assert "--force" in message
-    assert len(list(out.glob("runs/[0-9]*.json"))) == 24
+    assert finished_runs(out) == 24
     assert Ledger(out, read_study(arches), force=True).missing() == list(range(24))
 
 
@@ -200,11 +202,15 @@ def test_a_folder_that_is_no_study_is_refused(arches, tmp_path, capsys):
     assert (tmp_path / "out" / "thesis.tex").read_text() == "precious"
 
 
-def test_a_broken_row_is_made_again(arches, tmp_path):
+def test_a_row_half_written_is_made_again(arches, tmp_path):
     study = read_study(arches)
     _made_here(study, tmp_path / "out", [0, 1])
-    (tmp_path / "out" / "runs" / "000001.json").write_text('{"run": 1, "sta')
-    assert Ledger(tmp_path / "out", study).missing() == list(range(1, 24))
+    file = tmp_path / "out" / "runs.jsonl"
+    file.write_bytes(file.read_bytes()[:-40])
+    ledger = Ledger(tmp_path / "out", study)
+    assert ledger.missing() == list(range(1, 24))
+    ledger.add([run_once(study.values, str(study.case_source), study.order(1), study.n_seeded)])
+    assert Ledger(tmp_path / "out", study).missing() == list(range(2, 24)), "half a line spoils none after it"
 
 
 def _deadly(values, source, order, n_seeded, seconds):
@@ -256,11 +262,11 @@ def test_a_worker_killed_during_the_study_costs_nothing(arches, tmp_path, cluste
     command = [sys.executable, "-m", "blockvis", "sweep", str(arches), "-o", str(out), "--scheduler", address]
     study = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 120
-    while len(list(out.glob("runs/[0-9]*.json"))) < 4 and study.poll() is None:
+    while finished_runs(out) < 4 and study.poll() is None:
         assert time.monotonic() < deadline
         time.sleep(0.02)
     workers[0].kill()
-    at_the_kill = len(list(out.glob("runs/[0-9]*.json")))
+    at_the_kill = finished_runs(out)
     printed, complaint = study.communicate(timeout=120)
     assert study.returncode == 0, complaint
     assert at_the_kill < 24, "it was killed during the study"
@@ -277,7 +283,7 @@ def test_a_scheduler_that_goes_away_leaves_the_finished_runs(arches, tmp_path, c
     command = [sys.executable, "-m", "blockvis", "sweep", str(arches), "-o", str(out), "--scheduler", address]
     study = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 120
-    while len(list(out.glob("runs/[0-9]*.json"))) < 3 and study.poll() is None:
+    while finished_runs(out) < 3 and study.poll() is None:
         assert time.monotonic() < deadline
         time.sleep(0.02)
     scheduler.kill()
@@ -285,4 +291,4 @@ def test_a_scheduler_that_goes_away_leaves_the_finished_runs(arches, tmp_path, c
     assert study.returncode == 2
     last = complaint.strip().splitlines()[-1]
     assert re.match(r"blockvis: the scheduler .*finished runs are kept, the same command goes on", last), complaint
-    assert len(pd.read_csv(out / "table.csv")) == len(list(out.glob("runs/[0-9]*.json"))) >= 3
+    assert len(pd.read_csv(out / "table.csv")) == finished_runs(out) >= 3

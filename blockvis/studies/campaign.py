@@ -10,7 +10,7 @@ import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,6 +29,9 @@ __all__ = ["carry_out", "local_cluster", "run_study", "study"]
 
 #: Runs given to the scheduler at a time: enough for a thousand workers, little for its memory.
 WINDOW = 2000
+
+#: Finished runs that are recorded together at most.
+BATCH = 500
 
 #: Seconds to wait for a scheduler to answer, for the first worker, and for one to come back when all are gone.
 ANSWER, FIRST_WORKER, LAST_WORKER = 10.0, 60.0, 120.0
@@ -268,19 +271,17 @@ def carry_out(ledger: Ledger, todo: Sequence[int], client: Client, progress: boo
     suspects: list[int] = []
     written = time.monotonic()
     try:
-        for run, row, shape in _rows(ledger.study, todo, client, WINDOW):
-            if row is None:
-                suspects.append(run)
-                continue
-            ledger.add(row, shape)
-            bar.finished(failed=has_failed(row))
+        window = max(WINDOW, 2 * sum(client.nthreads().values()))
+        for batch in _batches(ledger.study, todo, client, window):
+            suspects += [run for run, row, _ in batch if row is None]
+            _record(ledger, bar, [(row, shape) for _, row, shape in batch if row is not None])
             if time.monotonic() - written > TABLE_EVERY:
                 ledger.write_table()
                 written = time.monotonic()
         # A worker that dies may take runs along that only waited there: those suspected get a last try, each alone.
-        for run, row, shape in _rows(ledger.study, suspects, client, 1):
-            ledger.add(row or failed_row(ledger.study.order(run), KILLED), shape)
-            bar.finished(failed=row is None or has_failed(row))
+        for batch in _batches(ledger.study, suspects, client, 1):
+            rows = [(row or failed_row(ledger.study.order(run), KILLED), shape) for run, row, shape in batch]
+            _record(ledger, bar, rows)
     except BaseException:
         ledger.write_table()
         raise
@@ -288,16 +289,21 @@ def carry_out(ledger: Ledger, todo: Sequence[int], client: Client, progress: boo
         bar.done()
 
 
+def _record(ledger: Ledger, bar: StudyProgress, rows: Sequence[tuple[dict[str, Any], bytes]]) -> None:
+    ledger.add(rows)
+    for row, _ in rows:
+        bar.finished(failed=has_failed(row))
+
+
 #: Why a run that no worker survives has no result.
 KILLED = "every worker that took this run died, perhaps out of memory; make it alone with --keep to see why"
 
 
-def _rows(
-    plan: Study, todo: Sequence[int], client: Client, window: int
-) -> Iterator[tuple[int, dict[str, Any] | None, bytes]]:
-    """The runs as they finish: number, row, shape; without a row where the workers died."""
-    from distributed import KilledWorker
+_Finished = tuple[int, dict[str, Any] | None, bytes]
 
+
+def _batches(plan: Study, todo: Sequence[int], client: Client, window: int) -> Iterator[list[_Finished]]:
+    """The runs as they finish: number, row, shape; without a row where the workers died."""
     finished: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
     token = uuid.uuid4().hex[:8]
     waiting = iter(todo)
@@ -328,11 +334,31 @@ def _rows(
     last_worker = time.monotonic()
     while flying:
         try:
-            run, future = finished.get(timeout=1.0)
+            done = [finished.get(timeout=1.0)]
         except queue.Empty:
             last_worker = _still_there(client, last_worker)
             continue
-        del flying[run]
+        # Those that have finished meanwhile come along: one message and one write for many short runs.
+        while len(done) < BATCH and not finished.empty():
+            done.append(finished.get())
+        for run, _ in done:
+            del flying[run]
+        yield _gathered(plan, client, done)
+        for _, future in done:
+            future.release()
+        fill()
+
+
+def _gathered(plan: Study, client: Client, done: Sequence[tuple[int, Future]]) -> list[_Finished]:
+    from distributed import KilledWorker
+
+    if len(done) > 1 and all(future.status == "finished" for _, future in done):
+        # Anything that goes wrong is looked at one by one.
+        with suppress(Exception):
+            found = client.gather([future for _, future in done])
+            return [(run, *result) for (run, _), result in zip(done, found, strict=True)]
+    rows: list[_Finished] = []
+    for run, future in done:
         try:
             row, shape = future.result()
         except KilledWorker:
@@ -341,9 +367,8 @@ def _rows(
             raise ConnectionError(f"the scheduler does not answer any more; {_GO_ON}") from None
         except Exception as error:  # noqa: BLE001 - what a worker could not even load or send is this run's result
             row, shape = failed_row(plan.order(run), f"{type(error).__name__}: {error}"), b""
-        future.release()
-        yield run, row, shape
-        fill()
+        rows.append((run, row, shape))
+    return rows
 
 
 _GO_ON = "finished runs are kept, the same command goes on with the others"

@@ -1,11 +1,11 @@
-"""Ledger: the folder of a study. A finished run is a file of its own, written whole or not at all, and never lost."""
+"""Ledger: the folder of a study. A finished run is a line of a file that only grows, and is never lost."""
 
 from __future__ import annotations
 
 import json
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -21,7 +21,10 @@ from .single import FAILED
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Ledger", "StudyExists", "has_failed"]
+__all__ = ["Ledger", "StudyExists", "finished_runs", "has_failed"]
+
+#: The file of the rows, one JSON object per line.
+RUNS = "runs.jsonl"
 
 #: Status of a run without result.
 NO_RESULT = (FAILED, str(solver.Status.SOLVER_FAILED), str(solver.Status.INTERRUPTED))
@@ -37,6 +40,12 @@ class StudyExists(ValueError):
 def has_failed(row: Mapping[str, Any]) -> bool:
     """Whether a run gave no result."""
     return row["status"] in NO_RESULT
+
+
+def finished_runs(folder: str | Path) -> int:
+    """How many runs the folder of a study holds."""
+    file = Path(folder) / RUNS
+    return file.read_bytes().count(b"\n") if file.is_file() else 0
 
 
 class Ledger:
@@ -60,6 +69,7 @@ class Ledger:
         self.rows: dict[int, dict[str, Any]] = {}
         # The run that shows each mechanism, by the file of its picture.
         self._first: dict[Path, int | None] = {}
+        self._whole = True
         record, definition = self.folder / "study.json", study.definition()
         if self.folder.exists() and not self.folder.is_dir():
             raise StudyExists(f"'{self.folder}' is a file; choose another folder with -o")
@@ -68,7 +78,7 @@ class Ledger:
             changed = [k for k, v in definition.items() if stored.get("definition", {}).get(k) != v]
             if changed and not force:
                 raise StudyExists(
-                    f"'{self.folder}' holds {len(self._files())} finished runs of another study: {', '.join(changed)} "
+                    f"'{self.folder}' holds {len(self._stored())} finished runs of another study: {', '.join(changed)} "
                     f"{'has' if len(changed) == 1 else 'have'} changed; choose another folder with -o, or throw these "
                     "runs away with --force"
                 )
@@ -76,8 +86,7 @@ class Ledger:
                 self._clear()
         elif self.folder.is_dir() and any(self.folder.iterdir()):
             raise StudyExists(f"'{self.folder}' holds something that is no study; choose another folder with -o")
-        for name in ("runs", "mechanisms"):
-            (self.folder / name).mkdir(parents=True, exist_ok=True)
+        (self.folder / "mechanisms").mkdir(parents=True, exist_ok=True)
         _write(
             record,
             _json(
@@ -93,31 +102,44 @@ class Ledger:
                 }
             ),
         )
-        for file in self._files():
-            row = _read(file)
-            # A file that some accident has broken counts as a run that was never made.
-            if isinstance(row, dict) and row.get("run") == int(file.stem):
-                self.rows[row["run"]] = row
+        self.rows |= self._stored()
 
     def missing(self, *, retry_failed: bool = False) -> list[int]:
         """The runs still to be made, in order."""
         done = {run for run, row in self.rows.items() if not (retry_failed and has_failed(row))}
         return [run for run in range(self.study.n_runs) if run not in done]
 
-    def add(self, row: dict[str, Any], shape: bytes = b"") -> None:
-        """Records a finished run, and its mechanism if no earlier run shows this class."""
-        if shape:
-            file = self.shape_file(row["mechanism_class"])
-            if file not in self._first:
-                self._first[file] = _first_run(file)
-            first = self._first[file]
-            if first is None or row["run"] < first:
-                self._first[file] = row["run"]
-                with np.load(_buffer(shape)) as stored:
-                    arrays = {name: stored[name] for name in stored.files}
-                _write(file, _packed({**arrays, "run": np.array(row["run"])}))
-        self.rows[row["run"]] = row
-        _write(self.folder / "runs" / f"{row['run']:06d}.json", _json(row))
+    def add(self, finished: Sequence[tuple[dict[str, Any], bytes]]) -> None:
+        """Records finished runs, and the mechanism of a run if no earlier one shows this class.
+
+        Parameters
+        ----------
+        finished : sequence of (dict, bytes)
+            Rows and shapes, as :func:`blockvis.studies.single.run_once` gives them.
+        """
+        for row, shape in finished:
+            if shape:
+                self._add_shape(row, shape)
+        lines = "".join(json.dumps(row, ensure_ascii=False) + "\n" for row, _ in finished)
+        with open(self.folder / RUNS, "ab") as stream:
+            if stream.tell() and not self._whole:
+                stream.write(b"\n")
+            self._whole = True
+            stream.write(lines.encode())
+            stream.flush()
+            os.fsync(stream.fileno())
+        self.rows |= {row["run"]: row for row, _ in finished}
+
+    def _add_shape(self, row: Mapping[str, Any], shape: bytes) -> None:
+        file = self.shape_file(row["mechanism_class"])
+        if file not in self._first:
+            self._first[file] = _first_run(file)
+        first = self._first[file]
+        if first is None or row["run"] < first:
+            self._first[file] = row["run"]
+            with np.load(_buffer(shape)) as stored:
+                arrays = {name: stored[name] for name in stored.files}
+            _write(file, _packed({**arrays, "run": np.array(row["run"])}))
 
     def shape_file(self, mechanism_class: str) -> Path:
         """Where the picture of a class is kept."""
@@ -157,14 +179,26 @@ class Ledger:
         finished = {"finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
         _write(self.folder / "summary.json", _json({**summary, **finished}))
 
-    def _files(self) -> list[Path]:
-        return sorted((self.folder / "runs").glob("[0-9]*.json"))
+    def _stored(self) -> dict[int, dict[str, Any]]:
+        """The rows that are there; a line that some accident has broken counts as a run that was never made."""
+        file, rows = self.folder / RUNS, {}
+        lines = file.read_bytes().split(b"\n") if file.is_file() else [b""]
+        # The last line is whole if it ends: a run killed while it was written has left half of it.
+        self._whole = not lines[-1]
+        for line in lines:
+            try:
+                row = json.loads(line)
+            except ValueError:
+                continue
+            if isinstance(row, dict) and isinstance(row.get("run"), int) and 0 <= row["run"] < self.study.n_runs:
+                rows[row["run"]] = row
+        return rows
 
     def _clear(self) -> None:
         """Removes what a study writes, and nothing else."""
-        for file in [*self._files(), *(self.folder / "mechanisms").glob("*.npz")]:
+        for file in (self.folder / "mechanisms").glob("*.npz"):
             file.unlink()
-        for name in ("table.csv", "table.parquet", "summary.json", *(f"{p}.png" for p in PICTURES)):
+        for name in (RUNS, "table.csv", "table.parquet", "summary.json", *(f"{p}.png" for p in PICTURES)):
             (self.folder / name).unlink(missing_ok=True)
 
 

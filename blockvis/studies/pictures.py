@@ -175,7 +175,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     classes = classes_of(table)
     shown = list(classes)[:COLOURED]
     width = 8.0 if len(names) == 1 else 2.0 + 3.6 * len(names)
-    labels = [textwrap.fill(f"{k + 1}: {one} ({classes[one]})", round(11.5 * width)) for k, one in enumerate(shown)]
+    labels = [textwrap.fill(f"{k + 1}: {one} ({classes[one]})", round(13.5 * width)) for k, one in enumerate(shown)]
     lines = sum(label.count("\n") + 1 for label in labels) + 2
     figure = Figure(figsize=(width, 4.6 + 0.2 * lines), layout="constrained")
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
@@ -193,7 +193,7 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
         axes.set_xlabel(name, fontsize=TEXT)
         _plain_frame(axes)
     panels[0].set_ylabel(f"collapse displacement [{unit}]", fontsize=TEXT)
-    panels[0].set_ylim(bottom=0.0)
+    panels[0].set_ylim(bottom=-0.02 * float(np.nanmax(y)))
     handles = [_mark(CLASSES[k], MARKS[k], label) for k, label in enumerate(labels)]
     rest = sum(classes.values()) - sum(classes[one] for one in shown)
     if rest:
