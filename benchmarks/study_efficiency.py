@@ -16,12 +16,21 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from blockvis.studies import campaign
 from blockvis.studies.campaign import carry_out, local_cluster
 from blockvis.studies.ledger import Ledger
 from blockvis.studies.plan import read_study
 from blockvis.studies.single import run_once
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+
+CASE = {"geometry": {"layout": "arch"}, "settlement": {"direction": [1, 0], "increment": 0.01, "limit": 0.5}}
 
 
 def main() -> None:
@@ -32,10 +41,7 @@ def main() -> None:
     study = read_study(
         {
             "study": {
-                "case": {
-                    "geometry": {"layout": "arch"},
-                    "settlement": {"direction": [1, 0], "increment": 0.01, "limit": 0.5},
-                },
+                "case": CASE,
                 "runs": given.runs,
             },
             "parameters": {
@@ -57,6 +63,7 @@ def main() -> None:
         carry_out(ledger, range(study.n_runs), client, progress=False)
         wall, here = time.perf_counter() - started, time.process_time() - here
         inside = sum(row["seconds"] for row in ledger.rows.values())
+        cost = per_empty_run(Path(folder), client)
     n = study.n_runs
     print(f"runs                                 {n:10d}")
     print(f"workers                              {given.workers:10d}")
@@ -67,6 +74,30 @@ def main() -> None:
     print(f"scheduler and rows, processor time   {here:10.2f} s   {1e3 * here / n:8.1f} ms per run")
     print(f"efficiency                           {work / (given.workers * wall):10.3f}")
     print(f"overhead besides the runs            {1e3 * (given.workers * wall - inside) / n:10.2f} ms per run")
+    print(f"scheduler and rows, empty runs       {1e3 * cost:10.2f} ms of processor time per run")
+
+
+def per_empty_run(folder: Path, client: Client) -> float:
+    """Processor time [s] that scheduler, client and ledger take for a run that does nothing."""
+    study = read_study(
+        {
+            "study": {"case": CASE, "runs": 600, "method": "random"},
+            "parameters": {"material.friction_coefficient": {"distribution": "uniform", "lower": 0.6, "upper": 1.0}},
+        }
+    )
+    row, shape = run_once(study.values, str(study.case_source), study.order(0), study.n_seeded)
+    original, campaign.run_once = campaign.run_once, partial(_nothing, row, shape)
+    try:
+        ledger = Ledger(folder / "empty", study)
+        started = time.process_time()
+        carry_out(ledger, range(study.n_runs), client, progress=False)
+        return (time.process_time() - started) / study.n_runs
+    finally:
+        campaign.run_once = original
+
+
+def _nothing(row: dict[str, Any], shape: bytes, values: Any, source: str, order: Any, *_: Any) -> Any:
+    return {**row, "run": order["run"]}, shape
 
 
 if __name__ == "__main__":

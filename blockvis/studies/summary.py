@@ -81,7 +81,7 @@ def in_words(summary: dict[str, Any]) -> str:
     """The summary for a reader."""
     unit = summary["unit"]
     lines = [
-        f"{summary['n_finished']} of {summary['n_runs']} runs, {summary['run_seconds']:.1f} s of run time: "
+        f"{summary['n_finished']} of {summary['n_runs']} runs: "
         + ", ".join(f"{n} {status}" for status, n in summary["status"].items())
     ]
     for reason, n in summary["reasons"].items():
