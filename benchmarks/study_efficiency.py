@@ -7,6 +7,7 @@ Dask; every worker has imported what it needs before the clock starts. Printed a
 
     efficiency = time of the same runs in one process / (workers × wall time of the study)
 
+the same in processor time, which a busy machine does not change (one process / workers, scheduler and recording),
 and the overhead per run: the rest of the workers' time, shared out among the runs. Use a machine that does nothing
 else: the time in one process is processor time, which a busy machine does not lengthen, the wall time is what it is.
 """
@@ -59,9 +60,11 @@ def main() -> None:
     work, alone = time.process_time() - work, time.perf_counter() - started
     with tempfile.TemporaryDirectory() as folder, local_cluster(given.workers) as client:
         ledger = Ledger(Path(folder) / "study", study)
+        there = sum(client.run(time.process_time).values())
         started, here = time.perf_counter(), time.process_time()
         carry_out(ledger, range(study.n_runs), client, progress=False)
         wall, here = time.perf_counter() - started, time.process_time() - here
+        there = sum(client.run(time.process_time).values()) - there
         inside = sum(row["seconds"] for row in ledger.rows.values())
         cost = per_empty_run(Path(folder), client)
     n = study.n_runs
@@ -72,6 +75,8 @@ def main() -> None:
     print(f"study, wall time                     {wall:10.2f} s")
     print(f"study, time inside runs              {inside:10.2f} s   {1e3 * inside / n:8.1f} ms per run")
     print(f"scheduler and rows, processor time   {here:10.2f} s   {1e3 * here / n:8.1f} ms per run")
+    print(f"workers, processor time              {there:10.2f} s   {1e3 * there / n:8.1f} ms per run")
+    print(f"efficiency in processor time         {work / (there + here):10.3f}")
     print(f"efficiency                           {work / (given.workers * wall):10.3f}")
     print(f"overhead besides the runs            {1e3 * (given.workers * wall - inside) / n:10.2f} ms per run")
     print(f"scheduler and rows, empty runs       {1e3 * cost:10.2f} ms of processor time per run")
