@@ -183,6 +183,8 @@ def local_cluster(workers: int) -> Iterator[Client]:
         "distributed.worker.profile.enabled": False,
         "distributed.admin.system-monitor.interval": "5s",
         "distributed.admin.tick.interval": "1s",
+        # Ten looks a second at the memory cost two per cent of a core each; runs grow slowly.
+        "distributed.worker.memory.monitor-interval": "1s",
         "distributed.scheduler.active-memory-manager.start": False,
     }
     with dask.config.set(settings):
