@@ -68,20 +68,30 @@ def _written(path: Path, content: str | bytes) -> None:
     """Writes a whole file or nothing: a reader never sees half of it, a killed run leaves the one before."""
     data = content.encode() if isinstance(content, str) else content
     partial = path.with_name(f".{path.name}.part")
-    with open(partial, "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(partial, path)
+    try:
+        with open(partial, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(partial, path)
+    except OSError:
+        partial.unlink(missing_ok=True)
+        raise
 
 
 def refuse_results(path: str | Path, overwrite: bool = False) -> None:
     """Raises :class:`ResultsExist` if a folder holds results that may not be replaced."""
     path = Path(path)
-    if not overwrite and ((path / "summary.json").exists() or (path / "increments").exists()):
+    if path.exists() and not path.is_dir():
+        raise ResultsExist(f"'{path}' is a file; choose a folder with -o")
+    names = ("increments", *_LISTS, *_STARTED, *_PICTURES)
+    if not overwrite and any((path / name).exists() for name in names):
         unfinished = not (path / "summary.json").exists() and (path / RECORD).exists()
         go_on = f"go on with it by blockvis run --resume {path}, " if unfinished else ""
-        raise ResultsExist(f"'{path}' holds results already; {go_on}choose another folder with -o or add --force")
+        found = next(name for name in names if (path / name).exists())
+        raise ResultsExist(
+            f"'{path}' holds results already ({found}); {go_on}choose another folder with -o or add --force"
+        )
 
 
 class ResultsFolder:

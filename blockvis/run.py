@@ -69,7 +69,12 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
     refuse_results(folder, overwrite)
     assembly = case_assembly(case)
     plan = planned(case, assembly)
-    results = ResultsFolder(folder, assembly, record=record_of(case), overwrite=overwrite, parameter=parameter_of(case))
+    try:
+        results = ResultsFolder(
+            folder, assembly, record=record_of(case), overwrite=overwrite, parameter=parameter_of(case)
+        )
+    except OSError as error:
+        raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
     return _followed(case, results, plan)
 
 
@@ -141,14 +146,33 @@ def _followed(case: Case, results: ResultsFolder, plan: Plan) -> Run:
             progress.increment(increment)
     except KeyboardInterrupt:
         plan.steps.close()
+    except OSError as error:
+        raise _given_up(folder, error) from None
     finally:
         progress.done()
     response = plan.response(results.increments, ending)
-    summary = results.finish(response, sum(i.seconds for i in response.increments))
     missing: tuple[str, ...] = ()
-    if ending.stop is not solver.Status.INTERRUPTED:
-        missing = draw_results(response, folder, animation=case.animation, case_text=case.text)
+    try:
+        summary = results.finish(response, sum(i.seconds for i in response.increments))
+        if ending.stop is not solver.Status.INTERRUPTED:
+            missing = draw_results(response, folder, animation=case.animation, case_text=case.text)
+    except OSError as error:
+        raise _given_up(folder, error) from None
     return Run(response, folder, summary, missing)
+
+
+def _given_up(folder: Path, error: OSError) -> OSError:
+    """Takes away half a file when the disk is full or gone in the middle of a run; what to say and do about it."""
+    for half in folder.rglob(".*.part*"):
+        half.unlink(missing_ok=True)
+    return OSError(
+        f"could not write to '{folder}': {_reason(error)}; what is there stays as it is: make room and go on with "
+        f"blockvis run --resume {folder}"
+    )
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error).strip().partition("\n")[0]
 
 
 def draw_results(

@@ -33,17 +33,27 @@ def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str]) -> Pat
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = _partial(path)
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(dataset)
-    writer.SetFileName(str(partial))
+    # Into memory first: on a full disk VTK's writer ends the process.
+    writer.WriteToOutputStringOn()
     writer.SetDataModeToBinary()
     writer.SetCompressorTypeToZLib()
     writer.SetHeaderTypeToUInt64()
     if writer.Write() != 1:
+        raise OSError(f"VTK could not write {path}")
+    return _written(path, writer.GetOutputString())
+
+
+def _written(path: Path, text: str) -> Path:
+    """Writes a text whole or not at all, under a name beside the target, so that replacing stays on one file system."""
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        partial.write_text(text, encoding="utf-8")
+        os.replace(partial, path)
+    except OSError:
         partial.unlink(missing_ok=True)
-        raise OSError(f"could not write {path}: check that the folder is writable and the disk not full")
-    os.replace(partial, path)
+        raise
     return path
 
 
@@ -73,12 +83,4 @@ def write_pvd(path: str | os.PathLike[str], entries: Iterable[tuple[float, str |
         "  </Collection>",
         "</VTKFile>",
     ]
-    partial = _partial(path)
-    partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    os.replace(partial, path)
-    return path
-
-
-def _partial(path: Path) -> Path:
-    """A name beside the target, so that replacing it stays on one file system."""
-    return path.with_name(f".{path.name}.partial")
+    return _written(path, "\n".join(lines) + "\n")

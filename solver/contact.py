@@ -28,6 +28,9 @@ STEEPEST_LANDING = 0.25
 #: Cosine up to which two faces that leave a corner count as perpendicular, as those of diagonal neighbours are.
 PERPENDICULAR = 1e-6
 
+#: Difference of cosines up to which two pairs of faces at a corner are open alike.
+SAME_OPENING = 1e-9
+
 #: Penetration up to this fraction of the width of the thinner block is a contact to be corrected; beyond, the
 #: corner belongs to another face behind.
 PENETRATION_FRACTION = 0.1
@@ -272,6 +275,8 @@ def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Con
     pair_a, pair_b = _near_blocks(assembly, vertices, reach)
     vertex, edge = _vertex_edge_candidates(assembly, vertices, pair_a, pair_b, reach)
     vertex, edge, corner = _settle_ends(assembly, vertices, vertex, edge, reach)
+    kept = _closest_faces(assembly, vertices, vertex, edge, corner)
+    vertex, edge, corner = vertex[kept], edge[kept], corner[kept]
     order = np.lexsort((edge, vertex))
     return measure_contacts(assembly, vertices, vertex[order], edge[order], corner[order])
 
@@ -389,6 +394,30 @@ def _settle_ends(
     keep = ~past
     vertex, edge, corner = vertex[keep], edge[keep], corner[keep]
     return _once(assembly, vertex, edge, corner)
+
+
+def _closest_faces(
+    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
+) -> np.ndarray:
+    """Whether to keep each pair: of two corners that meet along two pairs of faces, only where these are closest.
+
+    Where three blocks meet, the faces that two of them turn to the third also face each other across its corner. Two
+    corners are held apart by one pair of faces or the other; held by both they could not slide along the closed one.
+    """
+    kept = np.ones(len(vertex), dtype=bool)
+    k = np.flatnonzero(corner >= 0)
+    if len(k) < 2:
+        return kept
+    facing = _facing_edge(assembly, vertex[k], edge[k], corner[k])
+    following = assembly.next_vertex
+    along = _unit(vertices[following[edge[k]]] - vertices[edge[k]])
+    back = -_unit(vertices[following[facing]] - vertices[facing])
+    closeness = (along * back).sum(axis=1)
+    _, pair = np.unique(np.stack([vertex[k], corner[k]], axis=1), axis=0, return_inverse=True)
+    best = np.full(int(pair.max()) + 1, -np.inf)
+    np.maximum.at(best, pair.ravel(), closeness)
+    kept[k] = closeness >= best[pair.ravel()] - SAME_OPENING
+    return kept
 
 
 def _once(

@@ -307,3 +307,17 @@ def test_overlaps_are_those_of_shapely():
         shared = polygons[i].intersection(polygons[j])
         assert depth <= np.sqrt(polygons[i].area + polygons[j].area)
         assert shared.area > 0.1 * depth**2
+
+
+def test_where_three_blocks_meet_two_corners_touch_along_their_closest_faces_only():
+    """A slab, a post that leans over it, a wedge between them: the wedge's faces do not hold slab and post apart."""
+    slab = [[0, 0], [2.4, 0], [2, 1], [0, 1]]
+    post = [[2.4, 0], [3, 0], [3, 2], [1.61, 2], [2, 1]]
+    wedge = [[0, 1], [2, 1], [1.61, 2], [0, 2]]
+    assembly = solver.Assembly.from_outlines([slab, post, wedge])
+    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-3)
+    pair = {*zip(contacts.block_a.tolist(), contacts.block_b.tolist(), strict=True)} & {(0, 1), (1, 0)}
+    chosen = np.array([(a, b) in pair for a, b in zip(contacts.block_a, contacts.block_b, strict=True)])
+    assert sorted(contacts.points[chosen].tolist()) == [[2.0, 1.0], [2.4, 0.0]]
+    across = np.array([1.0, 0.4]) / np.hypot(1.0, 0.4)
+    np.testing.assert_allclose(np.abs(contacts.frames[chosen, 0] @ across), 1.0)

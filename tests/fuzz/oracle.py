@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linprog
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 GRAVITY = 9.81
 
@@ -100,10 +100,15 @@ def _corners_on_faces(
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the kinematic program says: ``falls`` is the work that gravity can do for nothing, relative to the weight."""
+    """What the kinematic program says.
+
+    ``falls`` is the work that gravity can do for nothing, relative to the weight; ``motion`` (n_blocks, 3) how all
+    blocks move with the supports, per unit of settlement.
+    """
 
     falls: float
     reaction: float | None
+    motion: np.ndarray | None = None
 
 
 def judged(
@@ -159,23 +164,32 @@ def judged(
     gain[1::3] = weights[free] / mean
     mu = np.broadcast_to(np.asarray(friction, dtype=float), (n,))
     each = csr_array((mu, (np.arange(n), np.arange(n))), shape=(n, n)) @ shear_part
-    from scipy.sparse import vstack
-
     held = vstack([each - normal_part, -each - normal_part], format="csr")
     total = float(weights[free].sum()) / mean
-    falls = reaction = None
-    rest = _solved(gain, held, np.zeros(2 * n), 1.0)
-    falls = rest / total
+    found = _solved(gain, held, np.zeros(2 * n), 1.0)
+    if found is None:
+        raise ArithmeticError("linprog could not decide whether the blocks stand")
+    falls, reaction, motion = found[0] / total, None, None
     if support_velocity is not None:
         limits = np.concatenate([fixed[0] - mu * fixed[1], fixed[0] + mu * fixed[1]])
-        best = _solved(gain, held, limits, None)
-        # Gravity acts downwards: what it does is minus what the weights were counted for.
-        reaction = None if best is None else best * mean
-    return Verdict(falls, reaction)
+        found = _solved(gain, held, limits, None)
+        if found is not None:
+            reaction, motion = found[0] * mean, support_velocity.copy()
+            motion[free] = found[1].reshape(-1, 3) / [1.0, 1.0, length]
+    return Verdict(falls, reaction, motion)
 
 
-def _solved(gain: np.ndarray, held, limits: np.ndarray, bound: float | None) -> float | None:
-    """The largest downward work, with movements within a bound; None where it has none."""
+def moved_on(rings: Sequence[np.ndarray], motion: np.ndarray) -> list[np.ndarray]:
+    """The blocks after a motion (n_blocks, 3) about their centroids, rotations exact."""
+    moved = []
+    for ring, (x, y, turn) in zip(rings, motion, strict=True):
+        centre, (c, s) = _centroid(ring), (np.cos(turn), np.sin(turn))
+        moved.append(centre + [x, y] + (ring - centre) @ np.array([[c, s], [-s, c]]))
+    return moved
+
+
+def _solved(gain: np.ndarray, held, limits: np.ndarray, bound: float | None) -> tuple[float, np.ndarray] | None:
+    """The largest downward work and its movement, within a bound; None where there is none."""
     result = linprog(
         gain,
         A_ub=held,
@@ -184,9 +198,9 @@ def _solved(gain: np.ndarray, held, limits: np.ndarray, bound: float | None) -> 
         method="highs",
         options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
     )
-    if result.status in (2, 3, 4):
+    if result.status != 0:
         return None
-    return float(-result.fun)
+    return float(-result.fun), np.asarray(result.x)
 
 
 def support_velocities(

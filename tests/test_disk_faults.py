@@ -1,0 +1,96 @@
+"""Full disks, folders that cannot be written, results that are there: one message, and what is there stays."""
+
+import os
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+import blockvis
+from blockvis.cli import main
+
+CASE = """
+[geometry]
+layout = "arch"
+[geometry.parameters]
+voussoirs = 8
+[settlement]
+direction = [1.0, 0.0]
+increment = 0.02
+limit = 0.06
+[output]
+animation = "collapse.gif"
+"""
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(CASE, encoding="utf-8")
+    return path
+
+
+@contextmanager
+def _mounted(folder: Path, options: str):
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
+    if sys.platform != "linux" or os.geteuid() != 0 or subprocess.run(command, capture_output=True).returncode != 0:
+        pytest.skip("only root on Linux can mount a small disk")
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+def _run(*arguments):
+    """The command line in a process of its own: VTK's writer used to end it on a full disk."""
+    command = [sys.executable, "-m", "blockvis", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+
+
+def test_full_disk_leaves_what_is_there_and_the_run_goes_on(case, tmp_path):
+    disk = tmp_path / "disk"
+    with _mounted(disk, "size=100k"):
+        for size in ("100k", "160k", "300k"):
+            subprocess.run(["mount", "-o", f"remount,size={size}", str(disk)], check=True)
+            done = _run("run", case, "-o", disk / "out", "--force")
+            assert done.returncode == 2, (size, done.stderr)
+            assert "No space left on device" in done.stderr
+            assert f"blockvis run --resume {disk / 'out'}" in done.stderr
+            assert "Traceback" not in done.stderr
+            assert not list((disk / "out").rglob(".*part*")), "half files are taken away"
+            if (disk / "out" / "assembly.npz").exists():
+                blockvis.open_results(disk / "out")
+        subprocess.run(["mount", "-o", "remount,size=50m", str(disk)], check=True)
+        assert main(["run", "--resume", str(disk / "out")]) == 0
+        assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 0
+        whole, rest = (
+            (f / "response.csv").read_text(encoding="utf-8").splitlines() for f in (tmp_path / "out", disk / "out")
+        )
+        assert [row.rsplit(",", 1)[0] for row in whole] == [row.rsplit(",", 1)[0] for row in rest]
+
+
+def test_read_only_folder(case, tmp_path, capsys):
+    with _mounted(tmp_path / "disk", "ro"):
+        assert main(["run", str(case), "-o", str(tmp_path / "disk" / "out")]) == 2
+    assert "Read-only file system; choose another folder with -o" in capsys.readouterr().err
+
+
+def test_a_file_where_the_folder_should_be(case, tmp_path, capsys):
+    (tmp_path / "out").write_text("mine", encoding="utf-8")
+    for name in ("out", "out/below"):
+        assert main(["run", str(case), "-o", str(tmp_path / name)]) == 2
+        assert "choose" in capsys.readouterr().err
+    assert (tmp_path / "out").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize("name", ["report.html", "curve.png", "response.csv", "assembly.npz", "blocks.pvd"])
+def test_nothing_of_that_name_is_overwritten_without_force(case, tmp_path, capsys, name):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / name).write_text("mine", encoding="utf-8")
+    assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 2
+    assert f"({name})" in capsys.readouterr().err
+    assert [p.name for p in (tmp_path / "out").iterdir()] == [name]
+    assert (tmp_path / "out" / name).read_text(encoding="utf-8") == "mine"
