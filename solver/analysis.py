@@ -35,6 +35,10 @@ OVERLAP = 2e-3
 #: Places kept to go back to.
 PLACES = 16
 
+#: Work that contact forces do on joints which close within an increment, as a fraction of the reaction's, from which on
+#: the forces are read again before any has closed; the second in large models, whose corrections leave as much open.
+CLOSING_WORK, CLOSING_WORK_LARGE = 1e-3, 1e-2
+
 #: Step by which a reaction is read off at the last equilibrium, in block sizes.
 PROBE = 1e-6
 
@@ -276,7 +280,7 @@ class _Path:
             here = self.here
             # The last place is looked at like any other: as if the path went on.
             at_limit = here.s >= phase.limit * (1.0 - 1e-12)
-            step = self.finest if at_limit else self._shortened(step)
+            step = (here.step or phase.increment) if at_limit else self._shortened(step)
             try:
                 predictor = self._predict(here, step)
                 changed = predictor.falling or self._mechanism_changed(predictor, step)
@@ -396,11 +400,16 @@ class _Path:
 
     def _left(self, predictor: Solved, step: float) -> Increment:
         """The increment at the place that is left; its forces are the predictor's unless joints close on the way."""
+        increment = self._increment(predictor, step)
         left = max(1e-6 * self.model.length, 0.2 * _largest_movement(self.model, predictor.motion))
         closing = predictor.contacts.gaps > left
-        if (predictor.forces[closing, 0] > 0.0).any():
-            return self._increment(self._read(self.here.s, self.here.pose), self.probe)
-        return self._increment(predictor, step)
+        work = float(predictor.forces[closing, 0] @ predictor.contacts.gaps[closing])
+        allowed = CLOSING_WORK_LARGE if self.model.large else CLOSING_WORK
+        if work > allowed * abs(increment.reaction) * step:
+            # So small a step that none of them closes, not so small that it cannot close what corrections have left.
+            again = self._increment(self._predict(self.here, step / 10.0), step / 10.0)
+            return replace(again, programs=increment.programs + again.programs)
+        return increment
 
     def _tell_last(self) -> Iterator[Increment]:
         if self.here.s > self.told:

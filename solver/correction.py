@@ -12,7 +12,8 @@ from .assembly import Assembly
 from .contact import CORNER_TOLERANCE, Contacts, end_zone, feature_pairs, find_contacts, measure_contacts
 from .equilibrium import equilibrium_matrix
 from .kinematics import Pose, moved, moved_vertices
-from .lp import CROSSOVER_ROWS
+from .lp import SolveError
+from .macroblocks import MacroBlocks, macro_blocks
 from .program import Model, Solved, closing_program, matched_contacts, solve_program
 
 __all__ = ["Falls", "NotConverged", "at_rest", "corrected", "solve_again"]
@@ -54,6 +55,10 @@ CLOSINGS = 4
 #: clearly what sticks, ten times as much of either.
 GAP_LEFT, GAP_LEFT_LARGE, PENETRATION_LEFT = 1e-2, 1e-1, 5e-7
 
+#: Exact geometries from which a program still moves on, before it is followed in small steps: friction at the edge of
+#: its cone may lead it round in a circle.
+RESTLESS = 8
+
 #: Part of the expected lift that is taken off: all of it could end in penetration, which a wedge locked by friction
 #: cannot give back.
 ALLOWED = 0.999
@@ -63,6 +68,15 @@ STEEPEST_CLOSING = 30.0
 
 #: Part of the gap left that the last program must have closed, lest rounding be extrapolated.
 SMALLEST_CLOSING = 0.01
+
+
+#: Blocks whose joint moves by less than this part of the increment's movement are closed up as one.
+TOGETHER = 1e-3
+
+
+#: Large models are closed up, in so many programs over their macro-blocks, until the contact forces would do less than
+#: this part of the reaction's work on the gaps that are left; the reaction counts as at least this part of the loads.
+MACRO_CLOSINGS, WORK_LEFT, LEAST_REACTION = 6, 1e-2, 1e-2
 
 
 class NotConverged(Exception):
@@ -139,7 +153,7 @@ def at_rest(model: Model, pose: Pose, correctors: int, nudge: np.ndarray | None 
     return _settled(model, _moved_freely(model, pose, solved), solved, correctors, nudge)
 
 
-def _descended(model: Model, start: Pose) -> Pose:
+def _descended(model: Model, start: Pose, deepest: float) -> Pose:
     """Follows the blocks downhill by small steps until they rest, or have moved by more than a block size.
 
     Friction at the edge of its cone may keep a pose in a small cycle; that is rest, too.
@@ -153,33 +167,44 @@ def _descended(model: Model, start: Pose) -> Pose:
         solved = solve_again(slow, pose, solved)
     if solved.falling or np.abs(pose.positions - start.positions).max() > model.length / 2.0:
         raise Falls(solved)
-    return _without_penetration(model, pose, solved)
+    return _without_penetration(model, pose, solved, deepest)
 
 
-def _without_penetration(model: Model, pose: Pose, solved: Solved) -> Pose:
-    """The pose with what the last steps left of penetration closed, as far as a few programs can."""
+def _without_penetration(model: Model, pose: Pose, solved: Solved, deepest: float) -> Pose:
+    """The pose with what the last steps left of penetration closed."""
     for _ in range(2 * CLOSINGS):
         pose, contacts, _ = _closed(model, pose, solved)
-        if float(-contacts.gaps.min(initial=0.0)) <= PENETRATION_LEFT * float(np.sqrt(model.assembly.areas.min())):
-            break
+        if float(-contacts.gaps.min(initial=0.0)) <= deepest:
+            return pose
         drift, _ = _carried(model.assembly, contacts, solved)
         solved = closing_program(model, pose, contacts, drift, solved)
         pose = _moved_freely(model, pose, solved)
+    pose, contacts, _ = _closed(model, pose, solved)
+    depth = float(-contacts.gaps.min(initial=0.0))
+    if depth > 2.0 * deepest:
+        raise NotConverged(f"where blocks came to rest they penetrate by {depth:.3g} m (accepted: {deepest:.3g} m)")
     return pose
 
 
 def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, nudge: np.ndarray | None) -> Pose:
     tolerance = exact = GEOMETRY_TOLERANCE * model.length
-    large = 3 * int(model.assembly.free.sum()) > CROSSOVER_ROWS
-    enough = max(tolerance, (GAP_LEFT_LARGE if large else GAP_LEFT) * _size(model, solved.motion))
-    deepest = PENETRATION_LEFT * float(np.sqrt(model.assembly.areas.min())) * (10.0 if large else 1.0)
-    closings = 0
+    enough = max(tolerance, (GAP_LEFT_LARGE if model.large else GAP_LEFT) * _size(model, solved.motion))
+    deepest = PENETRATION_LEFT * float(np.sqrt(model.assembly.areas.min())) * (10.0 if model.large else 1.0)
+    if model.large:
+        pose, solved, closed = _closed_up(model, pose, solved, deepest)
+        if closed and nudge is None:
+            return pose
+    closings, exact_poses = 0, 0
     for attempt in range(correctors):
         pose, contacts, error = _closed(model, pose, solved)
         shallow = float(-contacts.gaps.min(initial=0.0)) <= deepest
         tolerance = enough if attempt >= CLOSINGS and shallow else exact
         if error <= tolerance and nudge is None:
             return pose
+        if error <= tolerance:
+            exact_poses, exact_pose = exact_poses + 1, pose
+            if exact_poses > RESTLESS:
+                break
         drift, allowance = _carried(model.assembly, contacts, solved)
         if error > tolerance and closings < CLOSINGS:
             closings += 1
@@ -193,10 +218,50 @@ def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, nudge: n
         if error <= tolerance and _size(model, solved.motion) <= STILL * model.length:
             return pose
         pose = _moved_freely(model, pose, solved)
-    if nudge is not None and error <= tolerance:
-        return _descended(model, pose)
+    if exact_poses > 0:
+        return _descended(model, exact_pose, deepest)
     raise NotConverged(
         f"after {correctors} corrections a contact point is still off by {error:.3g} m (accepted: {tolerance:.3g} m)"
+    )
+
+
+def _closed_up(model: Model, pose: Pose, solved: Solved, deepest: float) -> tuple[Pose, Solved, bool]:
+    """Closes a large model by programs over its macro-blocks; tells whether that was enough.
+
+    What counts is the work that the contact forces would do on the gaps: where much force waits for a gap to close, the
+    next program finds another mechanism, and its reaction is wrong by as much.
+    """
+    bodies = _macro_blocks(model, solved)
+    movement = _size(model, solved.motion)
+    reaction = abs(float((solved.support_forces * solved.motion).sum()))
+    work = WORK_LEFT * max(reaction, LEAST_REACTION * model.total_load * model.force * movement)
+    for attempt in range(MACRO_CLOSINGS + 1):
+        contacts = _contacts_after(model, pose, solved)
+        carrying, _ = _carrying_and_sticking(model.assembly, contacts, solved)
+        place, _ = matched_contacts(model.assembly, contacts, solved.contacts)
+        normal = np.where(carrying, solved.forces[place, 0], 0.0)
+        gap, depth = float(np.abs(contacts.gaps[carrying]).max(initial=0.0)), -float(contacts.gaps.min(initial=0.0))
+        acceptable = gap <= GAP_LEFT_LARGE * movement and depth <= deepest
+        if acceptable and (normal @ np.abs(contacts.gaps) <= work or attempt == MACRO_CLOSINGS):
+            return pose, solved, True
+        if attempt == MACRO_CLOSINGS:
+            break
+        drift, _ = _carried(model.assembly, contacts, solved)
+        try:
+            solved = closing_program(model, pose, contacts, drift, solved, bodies)
+        except SolveError:
+            # A macro-block would have to come apart.
+            break
+        pose = _moved_freely(model, pose, solved)
+    return pose, solved, False
+
+
+def _macro_blocks(model: Model, solved: Solved) -> MacroBlocks:
+    """Blocks that a program moves together, or nearly so: their joints are left as they are."""
+    apart = np.maximum(np.abs(solved.opening), np.abs(solved.slip))
+    together = TOGETHER * _size(model, solved.motion)
+    return macro_blocks(
+        model.assembly, solved.pose, solved.contacts, apart, solved.motion[:, 2], model.length, together
     )
 
 

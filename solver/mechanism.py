@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from .assembly import Assembly
+from .macroblocks import moving_together
 from .response import ContactState, Increment
 
 __all__ = ["Mechanism", "mechanism_of", "rigid_parts"]
@@ -64,17 +63,10 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     fastest = float(np.abs(increment.velocity[:, :2]).max(initial=0.0))
     if fastest == 0.0 or len(contacts) == 0:
         return np.full(n, -1)
-    low, high = np.minimum(contacts.block_a, contacts.block_b), np.maximum(contacts.block_a, contacts.block_b)
-    pair, which = np.unique(low.astype(np.int64) * n + high, return_inverse=True)
-    apart = np.zeros(len(pair))
-    np.maximum.at(apart, which.ravel(), np.abs(increment.displacements).max(axis=1))
-    spin = np.abs(increment.velocity[pair // n, 2] - increment.velocity[pair % n, 2])
-    together = (apart < TOGETHER * fastest) & (spin * assembly.block_size < TOGETHER * fastest)
-    a, b = (pair // n)[together], (pair % n)[together]
-    _, part = connected_components(sp.coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)
+    turned = increment.velocity[:, 2] * assembly.block_size
+    part = moving_together(n, contacts, np.abs(increment.displacements).max(axis=1), turned, TOGETHER * fastest)
     # Corners, not centroids: a block may turn about its own centroid.
-    turning = np.abs(increment.velocity[:, 2]) * assembly.block_size
-    moves = np.maximum(np.abs(increment.velocity[:, :2]).max(axis=1), turning) > 10.0 * TOGETHER * fastest
+    moves = np.maximum(np.abs(increment.velocity[:, :2]).max(axis=1), np.abs(turned)) > 10.0 * TOGETHER * fastest
     moves &= assembly.free
     area = np.bincount(part, weights=assembly.areas * moves, minlength=int(part.max()) + 1)
     rank = np.empty(len(area), dtype=int)

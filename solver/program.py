@@ -11,7 +11,8 @@ from .assembly import Assembly
 from .contact import Contacts, Interfaces, find_contacts
 from .equilibrium import cone_rays, equilibrium_matrix
 from .kinematics import Pose, moved_vertices
-from .lp import LinearProgram, LPSolution, SolveError, Unbounded, solve_lp
+from .lp import CROSSOVER_ROWS, INTERIOR_ROUTES, LinearProgram, LPSolution, SolveError, Unbounded, solve_lp
+from .macroblocks import MacroBlocks, free_blocks
 from .response import Certificate
 
 __all__ = [
@@ -98,6 +99,11 @@ class Model:
     reach: float
     tally: Tally = field(default_factory=Tally)
     live: np.ndarray | None = None
+
+    @property
+    def large(self) -> bool:
+        """Whether programs are too large for vertex solutions, and corrections therefore stop before they are exact."""
+        return 3 * int(self.assembly.free.sum()) > CROSSOVER_ROWS
 
     @property
     def lengths(self) -> np.ndarray:
@@ -287,7 +293,9 @@ def solve_program(
     )
 
 
-def closing_program(model: Model, pose: Pose, contacts: Contacts, drift: np.ndarray, before: Solved) -> Solved:
+def closing_program(
+    model: Model, pose: Pose, contacts: Contacts, drift: np.ndarray, before: Solved, bodies: MacroBlocks | None = None
+) -> Solved:
     """Closes the gaps that sliding and finite rotation have left, without a lift of its own.
 
     Parameters
@@ -299,6 +307,8 @@ def closing_program(model: Model, pose: Pose, contacts: Contacts, drift: np.ndar
     drift : (n_contacts,) array [m]
     before : Solved
         The last program; its forces say which points are to be closed, and how much each counts.
+    bodies : MacroBlocks, optional
+        What moves as one; every free block moves for itself by default.
 
     Returns
     -------
@@ -317,33 +327,38 @@ def closing_program(model: Model, pose: Pose, contacts: Contacts, drift: np.ndar
     friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
     place, same = matched_contacts(assembly, contacts, before.contacts)
     sticking = same & before.sticking[place]
+    parts = bodies or free_blocks(assembly)
+    # Points within a macro-block say nothing about its movement.
+    across = parts.part[contacts.block_a] != parts.part[contacts.block_b]
     matrix = equilibrium_matrix(contacts, pose, model.length)
-    rays = cone_rays(np.where(sticking, friction, 0.0))
-    rays = rays[:, np.repeat(sticking, 2) | (np.arange(2 * len(contacts)) % 2 == 0)]
+    columns = np.repeat(across, 2)
+    columns[1::2] &= sticking
+    rays = cone_rays(np.where(sticking, friction, 0.0))[:, columns]
     distance = np.zeros(2 * len(contacts))
     distance[0::2] = _beyond_rounding(contacts.gaps / model.length)
     distance[1::2] = np.where(sticking, _beyond_rounding(drift / model.length), 0.0)
     weights = np.where(same[:, None], before.forces[place], 0.0) / model.force
     weights[:, 1] = np.where(sticking, weights[:, 1], 0.0)
-    by_row = sp.csr_array(matrix)[np.repeat(assembly.free, 3)]
-    balance = sp.csc_array(by_row @ rays)
-    load = by_row @ weights.ravel()
+    by_body = sp.csr_array(parts.motions.T @ matrix)
+    balance = sp.csc_array(by_body @ rays)
+    load = by_body @ np.where(across[:, None], weights, 0.0).ravel()
     rows = balance.shape[0]
     identity = sp.identity(rows, format="csc")
+    resistance = CLOSING_FRICTION * np.abs(parts.motions).sum(axis=0)
     program = LinearProgram(
         cost=np.concatenate([rays.T @ distance, np.full(2 * rows, model.trust / model.length)]),
         matrix=sp.csc_array(sp.hstack([balance, identity, -identity], format="csc")),
-        lower=load - CLOSING_FRICTION,
-        upper=load + CLOSING_FRICTION,
+        lower=load - resistance,
+        upper=load + resistance,
     )
     try:
-        solution = solve_lp(program)
+        solution = solve_lp(program, None if bodies is None else INTERIOR_ROUTES)
     except Unbounded:
         # A corner that has gone in too deep, wedged between blocks that cannot give way: a smaller step may not.
         raise SolveError("gaps that an increment has left cannot be closed: blocks are wedged") from None
-    motion = np.zeros((assembly.n_blocks, 3))
-    motion[assembly.free] = -solution.row_dual.reshape(-1, 3) * model.lengths
+    motion = -(parts.motions @ solution.row_dual).reshape(-1, 3) * model.lengths
     forces = (rays @ solution.x[: rays.shape[1]]).reshape(-1, 2)
+    forces = np.where(across[:, None], forces, weights)
     relative = matrix.T @ (motion / model.lengths).ravel() * model.length
     return replace(
         before,

@@ -42,7 +42,8 @@ def test_example_runs_and_every_increment_proves_itself(path, tmp_path):
         certificate = increment.certificate
         assert certificate.equilibrium_residual < 1e-8
         assert certificate.duality_gap < 1e-7
-        assert certificate.largest_penetration < 1e-6 * smallest
+        # Near its end a corner may count as on the edge or on the corner there: twice what a correction accepts.
+        assert certificate.largest_penetration < 2e-6 * smallest
     if ending is solver.Status.COLLAPSED:
         assert "macro-block" in run.summary["mechanism"]
 

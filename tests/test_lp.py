@@ -88,6 +88,15 @@ def test_unbounded_program_is_proved_by_a_ray():
     assert program.cost @ ray < 0
 
 
+def test_large_unknowns_at_small_entries_count():
+    """A force of hundreds of blocks at an arm of 1e-9: HiGHS would leave the entry out and call the rest optimal."""
+    entry, large = 8e-10, 1e3
+    matrix = sp.csc_array(np.array([[1.0, 0.0], [entry, 1.0]]))
+    sides = np.array([large, 1.0])
+    solution = solve_lp(LinearProgram(np.array([0.0, 1.0]), matrix, sides, sides))
+    assert solution.x == pytest.approx([large, 1.0 - entry * large], rel=1e-9)
+
+
 def test_infeasible_program_is_an_error_that_lists_the_routes():
     program = LinearProgram(np.ones(2), sp.csc_array(np.array([[1.0, 1.0]])), np.array([-2.0]), np.array([-1.0]))
     with pytest.raises(SolveError, match="1 rows and 2 columns") as raised:
