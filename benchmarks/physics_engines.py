@@ -1,0 +1,302 @@
+"""Physics engines that push the supports of an assembly slowly: pymunk, MuJoCo and LMGC90.
+
+Each is a generator of samples (displacement of the moving supports, centroids of all blocks, force of the structure on
+the moving supports), so that whoever looks at them decides when to stop. The settings are those of somebody who knows
+the engine and wants statics from it: exact outlines, contacts as stiff as the time step allows, no restitution,
+converged contact solvers, and the supports at rest for ``REST`` before they move.
+"""
+
+from __future__ import annotations
+
+import importlib
+import multiprocessing
+import multiprocessing.connection
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+import solver
+
+__all__ = ["ENGINES", "Sample", "in_a_process"]
+
+#: Time at rest before the supports move, and between two samples [s]; forces are means between samples.
+REST = 0.3
+SAMPLING = 0.01
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What an engine shows at one time.
+
+    Attributes
+    ----------
+    time : float [s]
+        Since the supports began to move; negative before.
+    displacement : float [m]
+        Of the moving supports.
+    positions : (n_blocks, 2) array [m]
+        Centroids.
+    force : (2,) array [N]
+        Of the structure on the moving supports, mean since the last sample.
+    """
+
+    time: float
+    displacement: float
+    positions: np.ndarray
+    force: np.ndarray
+
+
+def pymunk_path(
+    assembly: solver.Assembly,
+    direction: tuple[float, float],
+    speed: float,
+    time_step: float,
+    friction: float,
+    sampling: float,
+) -> Iterator[Sample]:
+    """Chipmunk: sequential impulses in two dimensions; polygons of zero radius."""
+    import pymunk
+
+    space = pymunk.Space()
+    space.gravity = (0.0, -solver.GRAVITY)
+    space.iterations = 200
+    space.collision_slop = 1e-5 * assembly.block_size  # 0.1 by default, made for pixels
+    bodies, shapes = [], []
+    for i in range(assembly.n_blocks):
+        outline = [tuple(map(float, p)) for p in assembly.outline(i) - assembly.centroids[i]]
+        if assembly.free[i]:
+            mass = float(assembly.masses[i])
+            body = pymunk.Body(mass, pymunk.moment_for_poly(mass, outline))
+        else:
+            body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        body.position = tuple(map(float, assembly.centroids[i]))
+        shape = pymunk.Poly(body, outline, radius=0.0)
+        shape.friction = friction**0.5  # Chipmunk multiplies those of both shapes
+        space.add(body, shape)
+        bodies.append(body)
+        shapes.append(shape)
+    moving = np.flatnonzero(assembly.moving)
+    impulse = np.zeros(2)
+
+    def gather(arbiter: pymunk.Arbiter, body: pymunk.Body) -> None:
+        impulse[:] += np.array(arbiter.total_impulse)  # on the body by which the arbiter was asked for
+
+    per_sample = max(1, round(sampling / time_step))
+    start = assembly.centroids[moving[0]]
+    for sample in range(10**9):
+        clock = sample * per_sample * time_step - REST
+        velocity = tuple(speed * np.array(direction)) if clock > -1e-9 else (0.0, 0.0)
+        for i in moving:
+            bodies[i].velocity = velocity
+        impulse[:] = 0.0
+        for _ in range(per_sample):
+            space.step(time_step)
+            for i in moving:
+                bodies[i].each_arbiter(gather, bodies[i])
+        positions = np.array([tuple(body.position) for body in bodies])
+        displacement = float((positions[moving[0]] - start) @ direction)
+        yield Sample(clock + per_sample * time_step, displacement, positions, impulse / (per_sample * time_step))
+
+
+def mujoco_path(
+    assembly: solver.Assembly,
+    direction: tuple[float, float],
+    speed: float,
+    time_step: float,
+    friction: float,
+    sampling: float,
+) -> Iterator[Sample]:
+    """MuJoCo: convex contact optimisation; prisms whose bodies have the three joints of plane motion."""
+    import mujoco
+
+    meshes, bodies = [], []
+    half = float(np.max(assembly.thickness)) / 2.0
+    for i in range(assembly.n_blocks):
+        outline = assembly.outline(i) - assembly.centroids[i]
+        corners = [(x, y, z) for z in (-half, half) for x, y in outline]
+        meshes.append(
+            f'<mesh name="m{i}" inertia="exact" vertex="{" ".join(f"{c:.17g}" for p in corners for c in p)}"/>'
+        )
+        x, y = assembly.centroids[i]
+        joints = ""
+        if assembly.free[i]:
+            joints = (
+                '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="hinge" axis="0 0 1"/>'
+            )
+        elif assembly.moving[i]:
+            # so heavy that contact forces do not slow it down; a mocap body would move without dragging anything along
+            joints = f'<joint name="drive{i}" type="slide" axis="{direction[0]} {direction[1]} 0" armature="1e8"/>'
+        # supports meet blocks, not each other
+        meets = 1 if assembly.free[i] else 0
+        gravity = "" if assembly.free[i] else ' gravcomp="1"'
+        bodies.append(
+            f'<body name="b{i}" pos="{x:.17g} {y:.17g} 0"{gravity}>{joints}'
+            f'<geom type="mesh" mesh="m{i}" contype="1" conaffinity="{meets}"/></body>'
+        )
+    density = float(np.unique(assembly.density)[0])
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco>
+        <option timestep="{time_step}" gravity="0 {-solver.GRAVITY} 0" cone="elliptic" impratio="100" solver="Newton"
+                iterations="200" tolerance="1e-12" integrator="implicitfast"><flag nativeccd="enable"/></option>
+        <default><geom condim="3" friction="{friction} 0 0" density="{density}"
+                 solref="{2 * time_step} 1" solimp="0.99 0.9999 1e-5"/></default>
+        <asset>{"".join(meshes)}</asset><worldbody>{"".join(bodies)}</worldbody></mujoco>"""
+    )
+    # several contact points where faces meet: to be asked for up to some version, the default in later ones
+    model.opt.enableflags |= int(getattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD", 0))
+    data = mujoco.MjData(model)
+    moving = np.flatnonzero(assembly.moving)
+    drives = [model.joint(f"drive{i}") for i in moving]
+    ids = np.array([model.body(f"b{i}").id for i in range(assembly.n_blocks)])
+    is_moving = np.zeros(model.nbody, dtype=bool)
+    is_moving[ids[moving]] = True
+    per_sample = max(1, round(sampling / time_step))
+    wrench, force = np.zeros(6), np.zeros(2)
+    for sample in range(10**9):
+        clock = sample * per_sample * time_step - REST
+        now = speed if clock > -1e-9 else 0.0
+        force[:] = 0.0
+        for step in range(per_sample):
+            for joint in drives:
+                data.qpos[joint.qposadr[0]] = now * (max(clock, 0.0) + step * time_step)
+                data.qvel[joint.dofadr[0]] = now
+            mujoco.mj_step(model, data)
+            touching = is_moving[model.geom_bodyid[data.contact.geom]]
+            for k in np.flatnonzero(touching.any(axis=1)):
+                mujoco.mj_contactForce(model, data, k, wrench)
+                # the frame's first axis points from the first geom to the second, on which the force acts
+                on_second = data.contact.frame[k].reshape(3, 3).T @ wrench[:3]
+                force += on_second[:2] if touching[k, 1] else -on_second[:2]
+        positions = data.xpos[ids, :2].copy()
+        displacement = float(data.qpos[drives[0].qposadr[0]])
+        yield Sample(clock + per_sample * time_step, displacement, positions, force / per_sample)
+
+
+def _strips(outline: np.ndarray, width: float, gap: float) -> list[np.ndarray]:
+    """An upright rectangle cut into strips of about a width with gaps between; any other outline as it is."""
+    (left, low), (right, high) = outline.min(axis=0), outline.max(axis=0)
+    n = round(float(right - left) / width)
+    area = np.sum(outline[:, 0] * np.roll(outline[:, 1], -1) - outline[:, 1] * np.roll(outline[:, 0], -1)) / 2.0
+    if n < 2 or not np.isclose(area, (right - left) * (high - low)):
+        return [outline]
+    edges = np.linspace(left, right, n + 1)
+    ends = [(a + gap / 2.0, b - gap / 2.0) for a, b in pairwise(edges)]
+    return [np.array([[a, low], [b, low], [b, high], [a, high]]) for a, b in ends]
+
+
+def lmgc90_path(
+    assembly: solver.Assembly,
+    direction: tuple[float, float],
+    speed: float,
+    time_step: float,
+    friction: float,
+    sampling: float,
+) -> Iterator[Sample]:
+    """LMGC90: non-smooth contact dynamics; polyhedra that cannot move out of the plane."""
+    from compas_lmgc90.solver import Solver
+
+    # its search for neighbours ends the process where blocks are much longer than wide: a slice of the wall will do
+    thickness = float(np.max(assembly.thickness))
+    depth = min(thickness, assembly.block_size)
+    engine = Solver(dt=time_step, theta=0.5, density=float(np.unique(assembly.density)[0]))
+    reach = 0.02 * assembly.block_size
+    blocks, owners = [], []
+    for i in range(assembly.n_blocks):
+        # and where a support is much longer than the blocks; pieces of supports must not touch each other
+        pieces = [assembly.outline(i)]
+        if not assembly.free[i]:
+            pieces = _strips(pieces[0], 2.0 * assembly.block_size, 2.5 * reach)
+        for outline in pieces:
+            n = len(outline)
+            vertices = [
+                [float(x), y, float(z)] for y in (-depth / 2.0, depth / 2.0) for x, z in outline
+            ]  # gravity is along -z
+            sides = [[n + k, n + (k + 1) % n, (k + 1) % n, k] for k in range(n)]
+            blocks.append({"vertices": vertices, "faces": [list(range(n)), list(range(n, 2 * n))[::-1], *sides]})
+            owners.append(i)
+    owner = np.array(owners)
+    engine.geometry_from_v_f(blocks)
+    engine.contact_law("IQS_CLB", friction, alert=reach)
+    for body, i in enumerate(owners):
+        # rotations are about the principal axes of a block, in LMGC90's own order: those of free blocks are left alone
+        held = ("Vy",) if assembly.free[i] else ("Vx", "Vy", "Vz", "Rx", "Ry", "Rz")
+        for component in held:
+            engine.apply_velocity(body, component, 0.0)
+        if assembly.moving[i]:
+            for component, part in zip(("Vx", "Vz"), direction, strict=True):
+                if part:
+                    v = speed * part
+                    evolution = [[0.0, REST, REST + time_step, 1e6], [0.0, 0.0, v, v]]
+                    engine.apply_velocity(body, component, np.array(evolution))
+    engine.preprocess()
+    moving = np.flatnonzero(assembly.moving[owner])
+    first_piece = np.searchsorted(owner, np.arange(assembly.n_blocks))
+    start = np.array(engine.init_coor)[:, [0, 2]]  # centres of mass, which engine.centroids are not
+    per_sample = max(1, round(sampling / time_step))
+    for sample in range(10**9):
+        force = np.zeros(2)
+        for _ in range(per_sample):
+            state = engine.lmgc90.compute_one_step()  # run() would also move the meshes, which nobody looks at
+            if len(state.interaction_bodies):
+                pairs = np.array(state.interaction_bodies) - 1
+                on_first = np.array(state.interaction_force_global)[:, [0, 2]]
+                force += on_first[np.isin(pairs[:, 0], moving)].sum(axis=0)
+                force -= on_first[np.isin(pairs[:, 1], moving)].sum(axis=0)
+        moved = np.array(state.bodies)[:, [0, 2]] - start
+        clock = (sample + 1) * per_sample * time_step - REST
+        displacement = float(moved[moving[0]] @ direction)
+        yield Sample(
+            clock, displacement, assembly.centroids + moved[first_piece], force * thickness / (depth * per_sample)
+        )
+
+
+def _report(pipe: multiprocessing.connection.Connection, name: str, given: tuple[Any, ...], sampling: float) -> None:
+    """The child's work: sends (processor time, sample) until somebody ends it."""
+    importlib.import_module(name)
+    pipe.send((0.0, None))
+    started = time.process_time()
+    for sample in ENGINES[name](*given, sampling):
+        pipe.send((time.process_time() - started, sample))
+
+
+def in_a_process(
+    name: str,
+    assembly: solver.Assembly,
+    direction: tuple[float, float],
+    speed: float,
+    time_step: float,
+    friction: float,
+    *,
+    budget: float,
+    sampling: float = SAMPLING,
+) -> Iterator[tuple[float, Sample]]:
+    """Runs an engine in a process of its own, since LMGC90 ends its process where something is wrong.
+
+    Yields the processor time so far [s] and a sample; stops after a budget of processor time [s], after four times
+    as long without a sample, or where the engine ends its process.
+    """
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe(duplex=False)
+    given = (assembly, direction, speed, time_step, friction)
+    child = context.Process(target=_report, args=(there, name, given, sampling), daemon=True)
+    child.start()
+    there.close()
+    try:
+        while here.poll(60.0 + 4.0 * budget):
+            seconds, sample = here.recv()
+            if sample is not None:
+                yield seconds, sample
+            if seconds > budget:
+                return
+    except EOFError:
+        return
+    finally:
+        child.terminate()
+        child.join()
+
+
+ENGINES = {"pymunk": pymunk_path, "mujoco": mujoco_path, "compas_lmgc90": lmgc90_path}
