@@ -119,7 +119,14 @@ def test_runs_without_result_are_counted_and_left_out():
     summary = summary_of(study, table)
     assert summary["n_without_result"] == 1
     assert "1 failed" in in_words(summary)
-    assert "without result, 1 times: out of memory" in in_words(summary)
+    assert "without result, 1 time: out of memory" in in_words(summary)
+
+
+def test_reasons_that_differ_in_numbers_only_are_counted_together():
+    study = _study(runs=8)
+    table = _table(study, np.full(8, np.nan), ["failed"] * 8)
+    table["message"] = [f"off by {k}.5e-0{k} m" for k in range(1, 8)] + ["out of memory"]
+    assert summary_of(study, table)["reasons"] == {"off by 1.5e-01 m": 7, "out of memory": 1}
 
 
 def test_first_order_indices_of_a_linear_function():

@@ -18,7 +18,7 @@ from .fragility import Fragility, fragility_of
 from .ledger import NO_RESULT, Ledger
 from .plan import Study
 from .sensitivity import first_order, outcome, swings
-from .summary import classes_of, independent_rows
+from .summary import classes_of, curve_name, independent_rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,7 +84,7 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
             ends, low, high, step="post", color=colour, alpha=0.18, linewidth=0,
             label=f"{100 * curve.confidence:g} % confidence, point by point",
         )  # fmt: skip
-    axes.step(x, level, where="post", color=colour, linewidth=2.2, label=_what(study))
+    axes.step(x, level, where="post", color=colour, linewidth=2.2, label=curve_name(study))
     for share, words in ((0.05, "5 %"), (0.5, "half")):
         at = curve.quantile(share)
         if at is None:
@@ -97,7 +97,7 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     axes.set_ylim(0.0, 1.02)
     axes.set_xlim(0.0, 1.03 * factor * max(_interesting(curve), 1e-12))
     axes.set_xlabel(f"settlement of the support [{unit}]", fontsize=TEXT)
-    axes.set_ylabel(_what(study), fontsize=TEXT)
+    axes.set_ylabel(curve_name(study), fontsize=TEXT)
     _plain_frame(axes)
     axes.legend(loc="upper left", frameon=False, fontsize=0.9 * TEXT)
     axes.set_title(_counts(curve, table, factor, unit), **HEADING)
@@ -284,11 +284,6 @@ def _interesting(curve: Fragility) -> float:
     if curve.n_stood == 0 and len(curve.settlement):
         return float(curve.settlement[-1])
     return curve.furthest
-
-
-def _what(study: Study) -> str:
-    drawn = any(p.distribution is not None for p in study.parameters) or study.method != "grid"
-    return "probability of collapse" if drawn else "share of the runs collapsed"
 
 
 def _counts(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> str:

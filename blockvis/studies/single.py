@@ -163,7 +163,8 @@ def mechanism_class(mechanism: solver.Mechanism) -> str:
     n, hinges, sliding = len(mechanism.motions), mechanism.hinges, mechanism.sliding
     parts = f"{n} part{'' if n == 1 else 's'}"
     if len(hinges) + len(sliding) > NAMED_JOINTS:
-        return f"{parts}, {len(hinges)} hinges, {len(sliding)} sliding joints"
+        counted = ((len(hinges), "hinge"), (len(sliding), "sliding joint"))
+        return ", ".join([parts, *(f"{k} {what}{'' if k == 1 else 's'}" for k, what in counted if k)])
     words = [parts] if len(hinges) + len(sliding) == 0 else []
     words += [
         f"{what} {_joints(mechanism.names, pairs.tolist())}"

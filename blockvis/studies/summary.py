@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +18,7 @@ from .sensitivity import first_order, swings
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["classes_of", "in_words", "independent_rows", "stored_summary", "summary_of"]
+__all__ = ["classes_of", "curve_name", "in_words", "independent_rows", "stored_summary", "summary_of"]
 
 #: Mechanisms that are told one by one.
 MOST_TOLD = 6
@@ -36,6 +38,12 @@ def classes_of(table: pd.DataFrame) -> dict[str, int]:
     return {str(k): int(v) for k, v in sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))}
 
 
+def curve_name(study: Study) -> str:
+    """What the fragility curve of a study is: of values somebody has chosen it is no probability."""
+    drawn = any(p.distribution is not None for p in study.parameters) or study.method != "grid"
+    return "probability of collapse" if drawn else "share of the runs collapsed"
+
+
 def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     """What summary.json of a study holds; lengths in m, angles in rad.
 
@@ -48,15 +56,15 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     curve = fragility_of(independent_rows(study, table))
     units = [u for u in table["unit"].unique().tolist() if u]
     failed = table[table["status"].isin(NO_RESULT)]
-    reasons = failed["message"].value_counts().head(MOST_REASONS)
     return {
         "n_runs": study.n_runs,
         "n_finished": len(table),
         "n_collapsed": curve.n_collapsed,
         "n_stood": curve.n_stood,
         "n_without_result": len(failed),
-        "reasons": {str(k): int(v) for k, v in reasons.items()},
+        "reasons": _reasons(failed["message"].tolist()),
         "status": {str(k): int(v) for k, v in table["status"].value_counts().items()},
+        "curve": curve_name(study),
         "unit": units[0] if units else "m",
         "quantiles": {str(p): curve.quantile(p) for p in (0.05, 0.5, 0.95)},
         "probability_at_the_end": float(curve.probability[-1]) if len(curve.probability) else 0.0,
@@ -69,6 +77,13 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
         "mechanism_classes": classes_of(table),
         "run_seconds": float(np.nansum(table["seconds"].to_numpy(dtype=float))),
     }
+
+
+def _reasons(messages: list[str]) -> dict[str, int]:
+    """How often each reason occurs, told by its first message: those that differ in numbers only are one reason."""
+    kinds = [re.sub(r"\d[\d.e+-]*", "#", message) for message in messages]
+    first = dict(zip(reversed(kinds), reversed(messages), strict=True))
+    return {first[kind]: number for kind, number in Counter(kinds).most_common(MOST_REASONS)}
 
 
 def stored_summary(folder: str | Path) -> dict[str, Any]:
@@ -85,13 +100,13 @@ def in_words(summary: dict[str, Any]) -> str:
         + ", ".join(f"{n} {status}" for status, n in summary["status"].items())
     ]
     for reason, n in summary["reasons"].items():
-        lines.append(f"without result, {n} times: {reason}")
+        lines.append(f"without result, {n} time{'' if n == 1 else 's'}: {reason}")
     if summary["n_collapsed"]:
         quantiles = [
             f"{100 * float(p):g} % at {value:.4g} {unit}" if value is not None else f"{100 * float(p):g} % not reached"
             for p, value in summary["quantiles"].items()
         ]
-        lines.append(f"probability of collapse: {', '.join(quantiles)}")
+        lines.append(f"{summary['curve']}: {', '.join(quantiles)}")
     elif summary["n_stood"]:
         lines.append(f"no run collapsed up to {summary['furthest_settlement']:.4g} {unit}")
     for swing in summary["swings"]:
@@ -108,7 +123,7 @@ def in_words(summary: dict[str, Any]) -> str:
             lines.append(f"{name}: {100 * share:.0f} ± {100 * error:.0f} % of the variance")
     classes = summary["mechanism_classes"]
     for number, (name, count) in enumerate(list(classes.items())[:MOST_TOLD], 1):
-        lines.append(f"mechanism {number}, {count} times: {name}")
+        lines.append(f"mechanism {number}, {count} time{'' if count == 1 else 's'}: {name}")
     if len(classes) > MOST_TOLD:
         lines.append(f"and {len(classes) - MOST_TOLD} more mechanisms")
     return "\n".join(lines)
