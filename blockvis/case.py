@@ -43,6 +43,12 @@ FILMS = (".mp4", ".gif", ".webp")
 #: More increments or frames than this are a slip of the pen.
 MOST_STEPS = 1_000_000
 
+#: A block lighter than this part of the whole is not held in balance: twice what an equilibrium leaves open.
+LIGHTEST = 2e-9
+
+#: Blocks that are all smaller than this [m] are a drawing in another unit.
+SMALLEST_BLOCKS = 2e-3
+
 #: What a file's blocks are made of where nothing else is said [kg/m³, m].
 DENSITY, THICKNESS = 2000.0, 1.0
 
@@ -541,7 +547,28 @@ def case_assembly(case: Case) -> solver.Assembly:
             f'{case.source}: no block is a moving support; give one of these the role "moving" under [roles] or add '
             f"[[supports]]: {', '.join(groups)}"
         )
+    _note_numbers(assembly, case.source)
     return imperfect(assembly, case.imperfections)
+
+
+def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
+    """Says so where numbers are not what was meant, or beyond what double precision solves."""
+    weight = np.where(assembly.free, assembly.masses, 0.0)
+    light = np.flatnonzero(assembly.free & (weight < LIGHTEST * weight.sum()))
+    if len(light):
+        shown = ", ".join(f"'{assembly.names[i]}'" for i in light[:6].tolist()) + (" ..." if len(light) > 6 else "")
+        warnings.warn(
+            f"{source}: {len(light)} blocks weigh less than {LIGHTEST:g} of the whole ({shown}), which the solver does "
+            "not see: they may stay in the air; remove them or check their size and density",
+            stacklevel=3,
+        )
+    largest = float(np.sqrt(assembly.areas[assembly.free].max(initial=0.0)))
+    if 0.0 < largest < SMALLEST_BLOCKS:
+        warnings.warn(
+            f"{source}: the largest block is {largest:.3g} m across; if the file is not in the unit it was read in, "
+            "say so under [geometry] unit",
+            stacklevel=3,
+        )
 
 
 def _case_drawing(case: Case) -> drawing.Drawing:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import solver
 
 from .analyses import Plan, parameter_of, planned
@@ -17,6 +19,9 @@ from .record import read_record, record_of
 from .results import ResultsFolder, open_results, refuse_results
 
 __all__ = ["Run", "draw_results", "resume_run", "run_case"]
+
+#: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
+AS_DRAWN = 0.02
 
 
 @dataclass(frozen=True)
@@ -143,6 +148,8 @@ def _followed(case: Case, results: ResultsFolder, plan: Plan) -> Run:
                 ending = stop.value
                 break
             results.add(increment)
+            if len(results.increments) == 1:
+                _note_settled(results.assembly, increment)
             progress.increment(increment)
     except KeyboardInterrupt:
         plan.steps.close()
@@ -159,6 +166,18 @@ def _followed(case: Case, results: ResultsFolder, plan: Plan) -> Run:
     except OSError as error:
         raise _given_up(folder, error) from None
     return Run(response, folder, summary, missing)
+
+
+def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
+    """Says so where the blocks as drawn were in no equilibrium and found one a little further."""
+    moved = np.hypot(*first.pose.displacements(assembly)[:, :2].T)
+    block = int(np.argmax(moved))
+    if first.status == solver.Status.EQUILIBRIUM and moved[block] > AS_DRAWN * assembly.block_size:
+        warnings.warn(
+            f"before any settlement '{assembly.names[block]}' moved by {moved[block]:.3g} m until it came to rest: as "
+            "drawn the blocks do not stand; look for gaps between them (joint_thickness) or a missing support",
+            stacklevel=2,
+        )
 
 
 def _given_up(folder: Path, error: OSError) -> OSError:
