@@ -1,12 +1,13 @@
 """Whole runs: the arch of twelve voussoirs to its collapse, and a wall of 1,500 bricks over fifty increments.
 
-    python benchmarks/runs.py [--arch] [--wall [increments]]
+    python benchmarks/runs.py [--arch] [--wall [increments [blocks]]]
 
 Seconds are those of the solver, certificates included, output not: wall-clock and processor time.
 """
 
 from __future__ import annotations
 
+import resource
 import sys
 import time
 from pathlib import Path
@@ -24,24 +25,26 @@ def arch(repeats: int = 7) -> None:
     """The README's arch from its start to its collapse, several times in one process."""
     assembly = blockvis.read(ARCH, roles={"right springer": "moving", "left springer": "fixed"})
     spread = solver.Settlement(direction=(1.0, 0.0), increment=0.01, limit=0.5, tolerance=1e-4)
-    seconds = []
-    for _ in range(repeats):
-        started = time.perf_counter()
-        response = solver.settle(assembly, spread, friction_coefficient=2.0)
-        seconds.append(time.perf_counter() - started)
-    programs = sum(increment.programs for increment in response.increments)
-    assert response.collapse is not None
-    print(
-        f"arch of 12 voussoirs: collapse at {response.collapse.displacement:.6f} m, {programs} programs, "
-        f"{min(seconds):.3f} s (median {np.median(seconds):.3f} s, {repeats} runs)"
-    )
+    for frames in (0, 40):
+        seconds = []
+        controls = solver.Controls(falling_frames=frames)
+        for _ in range(repeats):
+            started = time.perf_counter()
+            response = solver.settle(assembly, spread, friction_coefficient=2.0, controls=controls)
+            seconds.append(time.perf_counter() - started)
+        programs = sum(increment.programs for increment in response.increments)
+        assert response.collapse is not None
+        print(
+            f"arch of 12 voussoirs: collapse at {response.collapse.displacement:.6f} m, {frames} frames of the fall, "
+            f"{programs} programs, {min(seconds):.3f} s (median {np.median(seconds):.3f} s, {repeats} runs)"
+        )
 
 
-def wall(increments: int) -> None:
-    """A wall of 1,500 bricks; where the seconds of an increment go."""
+def wall(increments: int, blocks: int) -> None:
+    """A running-bond wall; where the seconds of an increment go."""
     clock = Clock()
     solver.program.solve_lp = clock.timed("programs", solver.program.solve_lp)
-    assembly = wall_of(1500)
+    assembly = wall_of(blocks)
     weight = solver.total_weight(assembly)
     last = [time.process_time(), 0.0, 0]
 
@@ -65,7 +68,8 @@ def wall(increments: int) -> None:
         f"{clock.seconds['programs']:.1f} s of it in programs), "
         f"residual {max(c.equilibrium_residual for c in certificates):.1e} W, "
         f"gap {max(c.duality_gap for c in certificates):.1e}, "
-        f"penetration {max(c.largest_penetration for c in certificates):.1e} m"
+        f"penetration {max(c.largest_penetration for c in certificates):.1e} m, "
+        f"at most {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB"
     )
 
 
@@ -74,5 +78,5 @@ if __name__ == "__main__":
     if "--arch" in chosen:
         arch()
     if "--wall" in chosen:
-        following = chosen[chosen.index("--wall") + 1 :]
-        wall(int(following[0]) if following and following[0].isdigit() else 50)
+        numbers = [int(given) for given in chosen[chosen.index("--wall") + 1 :] if given.isdigit()]
+        wall(*(numbers + [50, 1500][len(numbers) :]))

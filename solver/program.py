@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from .assembly import Assembly
 from .contact import Contacts, Interfaces, find_contacts
-from .equilibrium import cone_rays, equilibrium_matrix
+from .equilibrium import cone_rays, equilibrium_matrix, with_slack
 from .kinematics import Pose, moved_vertices
 from .lp import CROSSOVER_ROWS, INTERIOR_ROUTES, LinearProgram, LPSolution, SolveError, Unbounded, solve_lp
 from .macroblocks import MacroBlocks, free_blocks
@@ -237,11 +237,10 @@ def solve_program(
     rays = cone_rays(friction)
     balance = sp.csc_array(sp.csr_array(matrix)[np.repeat(assembly.free, 3)] @ rays)
     rows = balance.shape[0]
-    identity = sp.identity(rows, format="csc")
     external = model.scaled_load[assembly.free].ravel()
     tolerance = BALANCE_TOLERANCE * model.total_load
     cost = [rays.T @ distance, np.full(2 * rows, model.trust / model.length)]
-    columns = [balance, identity, -identity]
+    columns = [balance]
     live, live_size = model.scaled_live
     if live_size > 0.0:
         column = sp.csc_array(live[assembly.free].reshape(-1, 1))
@@ -249,7 +248,7 @@ def solve_program(
         cost.append(np.array([-1.0, 1.0]) * work / (model.force * model.length * live_size))
     program = LinearProgram(
         cost=np.concatenate(cost),
-        matrix=sp.csc_array(sp.hstack(columns, format="csc")),
+        matrix=with_slack(*columns),
         lower=-external - tolerance,
         upper=-external + tolerance,
     )
@@ -343,11 +342,10 @@ def closing_program(
     balance = sp.csc_array(by_body @ rays)
     load = by_body @ np.where(across[:, None], weights, 0.0).ravel()
     rows = balance.shape[0]
-    identity = sp.identity(rows, format="csc")
     resistance = CLOSING_FRICTION * np.abs(parts.motions).sum(axis=0)
     program = LinearProgram(
         cost=np.concatenate([rays.T @ distance, np.full(2 * rows, model.trust / model.length)]),
-        matrix=sp.csc_array(sp.hstack([balance, identity, -identity], format="csc")),
+        matrix=with_slack(balance),
         lower=load - resistance,
         upper=load + resistance,
     )
