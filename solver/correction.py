@@ -76,7 +76,7 @@ TOGETHER = 1e-3
 
 #: Large models are closed up, in so many programs over their macro-blocks, until the contact forces would do less than
 #: this part of the reaction's work on the gaps that are left; the reaction counts as at least this part of the loads.
-MACRO_CLOSINGS, WORK_LEFT, LEAST_REACTION = 6, 1e-2, 1e-2
+MACRO_CLOSINGS, WORK_LEFT, LEAST_REACTION = 12, 1e-2, 1e-2
 
 
 class NotConverged(Exception):
