@@ -24,6 +24,10 @@ ACCEPTED_VIOLATION = 1e-7
 #: Relative difference of the two objectives that our own check accepts.
 ACCEPTED_GAP = 1e-7
 
+#: Iterations after which a route is given up: twenty times what interior methods need, and simplex iterations per row
+#: and column.
+IPM_ITERATIONS, SIMPLEX_ITERATIONS = 1000, 200
+
 #: Up to this many rows the simplex method is the fastest; up to the second number crossover from an interior solution
 #: to a vertex costs little, beyond it twenty times the program itself (measured on running-bond walls).
 SIMPLEX_ROWS, CROSSOVER_ROWS = 250, 1500
@@ -181,6 +185,9 @@ def _run(program: LinearProgram, route: str) -> tuple[LPSolution | None, str]:
         "ipm_optimality_tolerance": FEASIBILITY_TOLERANCE,
         # HiGHS drops entries below 1e-9 otherwise, and forces of hundreds of blocks at such arms are missing.
         "small_matrix_value": 1e-12,
+        # An interior method that stalls goes round for ever; a simplex method that cycles, too.
+        "ipm_iteration_limit": IPM_ITERATIONS,
+        "simplex_iteration_limit": SIMPLEX_ITERATIONS * sum(program.matrix.shape),
         **ROUTES[route],
     }
     for name, value in options.items():
