@@ -20,6 +20,11 @@ from scipy.sparse import csr_array, vstack
 GRAVITY = 9.81
 
 
+#: Work over the weight below which blocks stand, and the bound on their velocities, per unit of the supports', where
+#: they do: blocks that stand cannot gain by moving further, but for rounding times this.
+ROUNDING, FARTHEST = 1e-8, 1e3
+
+
 @dataclass(frozen=True)
 class Touching:
     """Contact points of an oracle: blocks a and b, point, unit normal from b into a."""
@@ -173,6 +178,9 @@ def judged(
     if support_velocity is not None:
         limits = np.concatenate([fixed[0] - mu * fixed[1], fixed[0] + mu * fixed[1]])
         found = _solved(gain, held, limits, None)
+        if found is None and falls <= ROUNDING:
+            # Without friction, a face that is off the level by rounding lets a block slide as far as it may.
+            found = _solved(gain, held, limits, FARTHEST)
         if found is not None:
             reaction, motion = found[0] * mean, support_velocity.copy()
             motion[free] = found[1].reshape(-1, 3) / [1.0, 1.0, length]
