@@ -37,7 +37,8 @@ PLACES = 16
 
 #: Work that contact forces do on joints which close within an increment, as a fraction of the reaction's, from which on
 #: the forces are read again before any has closed; the second in large models, whose corrections leave as much open.
-CLOSING_WORK, CLOSING_WORK_LARGE = 1e-3, 1e-2
+#: At the start nothing is left open.
+CLOSING_WORK, CLOSING_WORK_LARGE, CLOSING_WORK_AT_START = 1e-3, 1e-2, 1e-6
 
 #: Step by which a reaction is read off at the last equilibrium, in block sizes.
 PROBE = 1e-6
@@ -401,13 +402,15 @@ class _Path:
     def _left(self, predictor: Solved, step: float) -> Increment:
         """The increment at the place that is left; its forces are the predictor's unless joints close on the way."""
         increment = self._increment(predictor, step)
-        left = max(1e-6 * self.model.length, 0.2 * _largest_movement(self.model, predictor.motion))
+        at_start, least = not self.left, 1e-6 * self.model.length
+        left = least if at_start else max(least, 0.2 * _largest_movement(self.model, predictor.motion))
         closing = predictor.contacts.gaps > left
         work = float(predictor.forces[closing, 0] @ predictor.contacts.gaps[closing])
         allowed = CLOSING_WORK_LARGE if self.model.large else CLOSING_WORK
-        if work > allowed * abs(increment.reaction) * step:
+        if work > (CLOSING_WORK_AT_START if at_start else allowed) * abs(increment.reaction) * step:
             # So small a step that none of them closes, not so small that it cannot close what corrections have left.
-            again = self._increment(self._predict(self.here, step / 10.0), step / 10.0)
+            smaller = self.probe if at_start else step / 10.0
+            again = self._increment(self._predict(self.here, smaller), smaller)
             return replace(again, programs=increment.programs + again.programs)
         return increment
 
