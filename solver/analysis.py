@@ -37,7 +37,7 @@ PLACES = 16
 
 #: Work that contact forces do on joints which close within an increment, as a fraction of the reaction's, from which on
 #: the forces are read again before any has closed; the second in large models, whose corrections leave as much open.
-#: At the start nothing is left open.
+#: At the start of the first phase nothing is left open.
 CLOSING_WORK, CLOSING_WORK_LARGE, CLOSING_WORK_AT_START = 1e-3, 1e-2, 1e-6
 
 #: Step by which a reaction is read off at the last equilibrium, in block sizes.
@@ -402,7 +402,7 @@ class _Path:
     def _left(self, predictor: Solved, step: float) -> Increment:
         """The increment at the place that is left; its forces are the predictor's unless joints close on the way."""
         increment = self._increment(predictor, step)
-        at_start, least = not self.left, 1e-6 * self.model.length
+        at_start, least = self.number == 0 and not self.left, 1e-6 * self.model.length
         left = least if at_start else max(least, 0.2 * _largest_movement(self.model, predictor.motion))
         closing = predictor.contacts.gaps > left
         work = float(predictor.forces[closing, 0] @ predictor.contacts.gaps[closing])

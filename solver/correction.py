@@ -69,10 +69,8 @@ STEEPEST_CLOSING = 30.0
 #: Part of the gap left that the last program must have closed, lest rounding be extrapolated.
 SMALLEST_CLOSING = 0.01
 
-
 #: Blocks whose joint moves by less than this part of the increment's movement are closed up as one.
 TOGETHER = 1e-3
-
 
 #: Large models are closed up, in so many programs over their macro-blocks, until the contact forces would do less than
 #: this part of the reaction's work on the gaps that are left; the reaction counts as at least this part of the loads.
