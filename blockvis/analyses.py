@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from .loading import moving_loads, nearest_name
 from .marks import carried
 from .mechanism import swung
 from .series import POSITION
+from .stored_increments import StoredLimit
 
 __all__ = ["Plan", "parameter_of", "planned"]
 
@@ -54,6 +55,18 @@ class Plan:
     settlements: tuple[solver.Settlement, ...]
     steps: Steps
     limits: list[solver.LimitLoad] = field(default_factory=list)
+
+    def told(self, increment: solver.Increment) -> None:
+        """Forgets the arrays of the last limit load: those of the increment that tells it are kept.
+
+        Parameters
+        ----------
+        increment : solver.Increment
+            As it is kept.
+        """
+        last = self.limits[-1]
+        numbers = ("multiplier", "bounds", "status", "flow", "live_force", "programs")
+        self.limits[-1] = StoredLimit.of(increment, **{name: getattr(last, name) for name in numbers})
 
     def response(self, increments: Sequence[solver.Increment], ending: solver.Ending) -> solver.Response:
         """The increments so far and how they ended."""
@@ -198,11 +211,12 @@ def _not_reached(before: solver.Ending, what: str) -> solver.Ending:
     return solver.Ending(before.stop, f"during the settlement: {before.message}")
 
 
-def _limit_loads(case: Case, plan: Plan, places: np.ndarray, live: list[np.ndarray]) -> Steps:
+def _limit_loads(case: Case, plan: Plan, places: np.ndarray, live: Callable[[int], np.ndarray]) -> Steps:
     """Limit states: at each wanted settlement, or at the end of the settlements for each place of a moving load."""
     assembly, standing = plan.assembly, plan.loads
     pose, steps = None, _settled(case, assembly, plan.interfaces, standing)
-    found: list[solver.Increment] = []
+    # Of all states the one whose mechanism is shown: the lowest of several places, else the last.
+    chosen, shown, least = 0, None, np.inf
     programs = 0
     while True:
         try:
@@ -217,28 +231,31 @@ def _limit_loads(case: Case, plan: Plan, places: np.ndarray, live: list[np.ndarr
         elif len(places) == 0 and _wanted(case, increment):
             # In equilibrium under the dead load: the settlement has proved it.
             state = _limit_state(case, plan, standing, pose, increment, programs)
-            found.append(replace(state, status=solver.Status.EQUILIBRIUM))
-            programs = 0
-            yield found[-1]
+            shown, programs = replace(state, status=solver.Status.EQUILIBRIUM), 0
+            yield shown
     if ending.stop is not solver.Status.LIMIT_REACHED:
-        if ending.stop is solver.Status.COLLAPSED and found:
+        if ending.stop is solver.Status.COLLAPSED and shown is not None:
             return replace(ending, message=f"the settlement alone brings it down: {ending.message}")
         return _not_reached(ending, "it carries no live load")
     if not case.settlements and len(places) == 0:
-        found.append(_limit_state(case, plan, standing, None, None, 0))
-        yield found[-1]
-    for x, moving in zip(places, live, strict=True):
-        loads = replace(standing, live=standing.live + moving)
-        found.append(replace(_limit_state(case, plan, loads, pose, None, programs), settlement=float(x)))
+        shown = _limit_state(case, plan, standing, None, None, 0)
+        yield shown
+    for number, x in enumerate(places):
+        loads = replace(standing, live=standing.live + live(number))
+        state = replace(_limit_state(case, plan, loads, pose, None, programs), settlement=float(x))
         programs = 0
-        yield found[-1]
+        multiplier = float(np.nan_to_num(state.load_multiplier, nan=-np.inf, posinf=np.inf))
+        if shown is None or multiplier < least:
+            chosen, shown, least = number, state, multiplier
+        yield state
         if plan.limits[-1].status is solver.LimitStatus.NO_EQUILIBRIUM:
             break
-    lowest = int(np.argmin(np.nan_to_num([i.load_multiplier for i in found], nan=-np.inf, posinf=np.inf)))
-    chosen = lowest if len(places) else len(found) - 1
     if len(places):
-        plan.loads = replace(standing, live=standing.live + live[chosen])
-    yield from _swinging(assembly, found[chosen])
+        plan.loads = replace(standing, live=standing.live + live(chosen))
+    else:
+        chosen = len(plan.limits) - 1
+    assert shown is not None
+    yield from _swinging(assembly, shown)
     return _limit_ending(plan.limits[chosen])
 
 

@@ -15,8 +15,16 @@ import numpy as np
 import solver
 
 from .series import POSITION, governing, parameter_word, path_values
+from .stored_increments import StoredLimit
 
-__all__ = ["CAPACITY_TABLES", "capacity_summary", "stored_limits", "stored_parameters", "write_capacity"]
+__all__ = [
+    "CAPACITY_TABLES",
+    "capacity_summary",
+    "limit_states",
+    "stored_limits",
+    "stored_parameters",
+    "write_capacity",
+]
 
 #: Limit loads over the positions of a load that moves, and over the settlement.
 CAPACITY_TABLES = ("envelope.csv", "capacity.csv")
@@ -37,7 +45,7 @@ def write_capacity(response: solver.Response, folder: Path) -> None:
     table = csv.writer(rows, lineterminator="\n")
     first = ["position"] if word == POSITION else ["phase", "settlement"]
     table.writerow([*first, "load_multiplier", "static", "kinematic", "status", "flow", "mechanism"])
-    for limit, state in _states(response):
+    for limit, state in limit_states(response):
         place = [repr(float(state.settlement))]
         numbers = [repr(float(v)) for v in (limit.multiplier, *limit.bounds)]
         words = str(solver.mechanism_of(response.assembly, state)) if limit.mechanism.any() else ""
@@ -71,7 +79,7 @@ def capacity_summary(response: solver.Response) -> dict[str, Any]:
     if response.analysis != "limit load":
         return summary
     chosen = governing(response)
-    states = _states(response)
+    states = limit_states(response)
     limit = next((limit for limit, state in states if state is chosen), states[0][0] if states else None)
     summary |= {
         "limit_load_multiplier": None if limit is None else _finite(limit.multiplier),
@@ -89,7 +97,7 @@ def capacity_summary(response: solver.Response) -> dict[str, Any]:
                 "live_load": limit.live_force,
                 "programs": limit.programs,
             }
-            for number, limit in _numbered(response)
+            for number, (limit, _) in enumerate(states)
         ],
     }
     if chosen is not None and response.collapse is None:
@@ -118,17 +126,12 @@ def stored_limits(summary: Mapping[str, Any], increments: Sequence[solver.Increm
         nothing = math.inf if status is solver.LimitStatus.UNBOUNDED else math.nan
         low, high = (nothing if bound is None else bound for bound in stored["bounds"])
         limits.append(
-            solver.LimitLoad(
+            StoredLimit.of(
+                state,
                 multiplier=nothing if stored["multiplier"] is None else stored["multiplier"],
                 bounds=(low, high),
-                mechanism=state.velocity,
-                contacts=state.contacts,
-                forces=state.forces,
-                certificate=state.certificate,
                 status=status,
                 flow=stored["flow"],
-                pose=state.pose,
-                friction=state.friction,
                 live_force=stored["live_load"],
                 programs=stored["programs"],
             )
@@ -136,17 +139,15 @@ def stored_limits(summary: Mapping[str, Any], increments: Sequence[solver.Increm
     return tuple(limits)
 
 
-def _numbered(response: solver.Response) -> list[tuple[int, solver.LimitLoad]]:
-    """Each limit load with the number of the increment that tells it; one found in an interruption has none yet."""
-    first: dict[int, int] = {}
-    for number, increment in enumerate(response.increments):
-        # The swung frames that follow share the forces.
-        first.setdefault(id(increment.forces), number)
-    return [(first[id(limit.forces)], limit) for limit in response.limits if id(limit.forces) in first]
+def limit_states(response: solver.Response) -> list[tuple[solver.LimitLoad, solver.Increment]]:
+    """Each limit load with the increment that tells it; one found in an interruption has none yet.
 
-
-def _states(response: solver.Response) -> list[tuple[solver.LimitLoad, solver.Increment]]:
-    return [(limit, response.increments[number]) for number, limit in _numbered(response)]
+    Parameters
+    ----------
+    response : solver.Response
+        Whose limit states come first, in the order of the limit loads, frames of a fall or a mechanism behind them.
+    """
+    return list(zip(response.limits, response.increments, strict=False))
 
 
 def _finite(value: float) -> float | None:

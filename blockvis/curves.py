@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -100,10 +101,12 @@ def events_of(response: solver.Response) -> list[Event]:
     path = response.path
     total, values = path_parameters(path), path_values(response)
     found = []
-    for k in range(1, len(path)):
+    kinds = ((solver.ContactState.HINGING, "hinge"), (solver.ContactState.SLIDING, "sliding joint"))
+    # Each is asked for its contact points once: they may come from a file.
+    pairs = ([_pairs(increment.states, increment.contacts, state) for state, _ in kinds] for increment in path)
+    for k, (earlier, later) in enumerate(pairwise(pairs), start=1):
         text = []
-        for state, word in ((solver.ContactState.HINGING, "hinge"), (solver.ContactState.SLIDING, "sliding joint")):
-            before, after = (_pairs(i, state) for i in (path[k - 1], path[k]))
+        for (_, word), before, after in zip(kinds, earlier, later, strict=True):
             if before != after:
                 some = f"{len(after) or 'no'} {word}{'s' if len(after) != 1 else ''}"
                 text.append(some if len(before) != len(after) else f"{word}s move")
@@ -298,7 +301,7 @@ def _mark_events(axes: Axes, response: solver.Response, factor: float, text: flo
         axes.legend(loc="upper left", fontsize=0.8 * text, frameon=False)
 
 
-def _pairs(increment: solver.Increment, state: solver.ContactState) -> set[tuple[int, int]]:
-    chosen = increment.states == state
-    a, b = increment.contacts.block_a[chosen], increment.contacts.block_b[chosen]
+def _pairs(states: np.ndarray, contacts: solver.Contacts, state: solver.ContactState) -> set[tuple[int, int]]:
+    chosen = states == state
+    a, b = contacts.block_a[chosen], contacts.block_b[chosen]
     return set(zip(np.minimum(a, b).tolist(), np.maximum(a, b).tolist(), strict=True))

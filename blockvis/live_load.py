@@ -8,6 +8,8 @@ import numpy as np
 
 import solver
 
+from .marks import carried
+
 __all__ = ["LiveLoad", "live_load_of"]
 
 #: Loads below this fraction of the largest are rounding.
@@ -29,6 +31,7 @@ class LiveLoad:
     blocks : (n,) int array
         The block each acts on, or one of those whose resultant it is.
     pose : solver.Pose
+        Of these blocks alone.
     """
 
     points: np.ndarray
@@ -41,6 +44,13 @@ class LiveLoad:
         """No load."""
         nowhere = solver.Pose(np.zeros((0, 2)), np.zeros(0))
         return cls(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, dtype=int), nowhere)
+
+    def carried(self, pose: solver.Pose) -> np.ndarray:
+        """(n, 2) array [m]: where the points are when all blocks are at another pose."""
+        if len(self.points) == 0:
+            return self.points
+        there = solver.Pose(pose.positions[self.blocks], pose.rotations[self.blocks])
+        return carried(self.points, np.arange(len(self.blocks)), self.pose, there)
 
     @property
     def largest(self) -> float:
@@ -78,7 +88,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     forces = live[blocks, :2]
     if len(blocks) > MOST_ARROWS:
         return _gathered(points, forces, blocks, pose, CELL * extent)
-    return LiveLoad(points, forces, blocks, pose)
+    return LiveLoad(points, forces, blocks, _of(blocks, pose))
 
 
 def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.ndarray) -> np.ndarray:
@@ -113,4 +123,8 @@ def _gathered(points: np.ndarray, forces: np.ndarray, blocks: np.ndarray, pose: 
     weight = np.bincount(which, weights=size, minlength=n)
     sums = [np.bincount(which, weights=forces[:, k], minlength=n) for k in (0, 1)]
     middles = [np.bincount(which, weights=size * points[:, k], minlength=n) / weight for k in (0, 1)]
-    return LiveLoad(np.stack(middles, axis=1), np.stack(sums, axis=1), blocks[first], pose)
+    return LiveLoad(np.stack(middles, axis=1), np.stack(sums, axis=1), blocks[first], _of(blocks[first], pose))
+
+
+def _of(blocks: np.ndarray, pose: solver.Pose) -> solver.Pose:
+    return solver.Pose(pose.positions[blocks], pose.rotations[blocks])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -98,8 +98,8 @@ def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Pat
 
 def moving_loads(
     entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path
-) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Positions (n,) [m] of the load that moves, and the live load (n_blocks, 3) at each; both empty without one.
+) -> tuple[np.ndarray, Callable[[int], np.ndarray]]:
+    """Positions (n,) [m] of the load that moves, none without one, and the live load (n_blocks, 3) at the k-th of them.
 
     Parameters are those of :func:`loads_of`.
 
@@ -108,16 +108,17 @@ def moving_loads(
     ValueError
         For a position at which nothing, or a support, is below.
     """
-    for number, load in enumerate(entries):
-        if load.positions:
-            live = []
-            for x in load.positions:
-                try:
-                    live.append(solver.load_on_top(assembly, x, load.force))
-                except ValueError as error:
-                    raise ValueError(f"{source}: [loads {number + 1}] positions: {error}") from None
-            return np.array(load.positions), live
-    return np.zeros(0), []
+    moving = next(((number, load) for number, load in enumerate(entries, start=1) if load.positions), None)
+    if moving is None:
+        return np.zeros(0), lambda k: np.zeros((assembly.n_blocks, 3))
+    number, load = moving
+    for x in load.positions:
+        try:
+            solver.load_on_top(assembly, x, load.force)
+        except ValueError as error:
+            raise ValueError(f"{source}: [loads {number}] positions: {error}") from None
+    # One at a time: each is as long as the list of blocks.
+    return np.array(load.positions), lambda k: solver.load_on_top(assembly, load.positions[k], load.force)
 
 
 def with_moving_load(
@@ -127,7 +128,7 @@ def with_moving_load(
     places, live = moving_loads(entries, assembly, source)
     if x is None or len(places) == 0:
         return loads
-    return solver.Loads(loads.dead, loads.live + live[int(np.argmin(np.abs(places - x)))])
+    return solver.Loads(loads.dead, loads.live + live(int(np.argmin(np.abs(places - x)))))
 
 
 def _chosen(load: LoadCase, assembly: solver.Assembly, where: str) -> np.ndarray:

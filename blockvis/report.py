@@ -7,6 +7,7 @@ import html
 import json
 import os
 import zlib
+from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -18,7 +19,8 @@ from matplotlib.ticker import MaxNLocator
 import solver
 
 from . import marks, palette
-from .scene import framed
+from .capacity import limit_states
+from .scene import Frame, framed
 from .series import (
     MOST_OVER_LOWEST,
     POSITION,
@@ -38,8 +40,9 @@ from .sheet import force_text
 
 __all__ = ["report_html", "write_report"]
 
-#: Increments beyond this many are thinned out evenly; the page stays below 2 MB for a thousand blocks.
-MOST_FRAMES = 160
+#: Increments beyond this many are thinned out evenly; the page stays below 2 MB for a thousand blocks. Of more than
+#: four thousand blocks fewer are shown, so that poses times blocks stay what a browser can hold.
+MOST_FRAMES, MOST_POSES, FEWEST_FRAMES = 160, 640_000, 24
 
 #: Lengths are stored in this fraction of the extent of the structure, rotations in this many radians.
 FINENESS, TURN_UNIT = 1e-6, 1e-6
@@ -105,16 +108,15 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
 
 def _model(response: solver.Response) -> dict[str, Any]:
     assembly = response.assembly
-    shown = _thinned(response.increments)
-    frame = framed(assembly, [solver.Pose.initial(assembly), *(i.pose for i in shown)])
+    shown = _thinned(response.increments, assembly.n_blocks)
+    frame, largest = _surveyed(assembly, shown)
     # Coordinates far from the origin (UTM) would waste the digits.
     origin = np.round(frame.low, 3)
     unit = FINENESS * float(frame.size.max())
-    packed = _packed_geometry(assembly, origin, unit)
-    packed |= _packed_motion(assembly, shown, unit)
-    force_arrays, force_unit_, force_length = _packed_forces(shown, origin, unit, assembly.block_size, frame.size.max())
-    shown_force = marks.rounded_length(force_unit_ / FORCE_FINENESS)
-    packed |= force_arrays | _packed_marks(shown, origin, unit)
+    tables = _Tables(assembly, shown, origin, unit, largest)
+    force_length = tables.force_length(assembly.block_size, float(frame.size.max()))
+    shown_force = marks.rounded_length(largest)
+    packed = _packed_geometry(assembly, origin, unit) | tables.packed()
     materials = list(assembly.materials)
     roles = {role: number for number, role in enumerate(solver.ROLES)}
     fills = palette.block_colours(assembly.materials, assembly.free)
@@ -139,7 +141,7 @@ def _model(response: solver.Response) -> dict[str, Any]:
         "frames": _frames(response, shown),
         "times": _times(shown),
         "curve": _curve(response),
-        "force_unit": force_unit_,
+        "force_unit": FORCE_FINENESS * largest,
         "force_length": force_length,
         "force_scale": [shown_force, force_text(shown_force)],
         "legend": [
@@ -152,26 +154,43 @@ def _model(response: solver.Response) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _thinned(increments: tuple[solver.Increment, ...]) -> list[solver.Increment]:
+def _thinned(increments: tuple[solver.Increment, ...], n_blocks: int) -> list[solver.Increment]:
     """All increments, or an even choice of them with the last equilibrium kept."""
-    if len(increments) <= MOST_FRAMES:
+    most = max(FEWEST_FRAMES, min(MOST_FRAMES, MOST_POSES // n_blocks))
+    if len(increments) <= most:
         return list(increments)
     last = max((k for k, i in enumerate(increments) if i.status == solver.Status.EQUILIBRIUM), default=0)
-    chosen = np.unique([*np.linspace(0, len(increments) - 1, MOST_FRAMES - 1).round().astype(int), last])
+    chosen = np.unique([*np.linspace(0, len(increments) - 1, most - 1).round().astype(int), last])
     return [increments[k] for k in chosen]
+
+
+def _surveyed(assembly: solver.Assembly, shown: list[solver.Increment]) -> tuple[Frame, float]:
+    """The frame that holds all poses, and the largest resultant of a joint in equilibrium [N], or 1."""
+    largest = 0.0
+
+    def poses() -> Iterator[solver.Pose]:
+        nonlocal largest
+        yield solver.Pose.initial(assembly)
+        for increment in shown:
+            yield increment.pose
+            if increment.status != solver.Status.FALLING:
+                largest = max(largest, float(np.hypot(*marks.resultants(increment)[1].T).max(initial=0.0)))
+
+    frame = framed(assembly, poses())
+    return frame, largest or 1.0
 
 
 def _packed(values: np.ndarray, rows: int) -> dict[str, Any]:
     """Integers as differences along the first axis, split in planes of bytes, deflated, in base 64."""
-    table = np.asarray(values, dtype=np.int64).reshape(rows, -1) if rows else np.zeros((0, 1), dtype=np.int64)
-    steps = np.diff(table, axis=0, prepend=np.zeros((1, table.shape[1]), dtype=np.int64)).astype("<i4")
+    table = np.asarray(values).astype("<i4").reshape(rows, -1) if rows else np.zeros((0, 1), dtype="<i4")
+    steps = np.diff(table, axis=0, prepend=np.zeros((1, table.shape[1]), dtype="<i4"))
     planes = steps.reshape(-1, 1).view(np.uint8).T
     data = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
     return {"rows": rows, "columns": table.shape[1], "data": data}
 
 
 def _rounded(values: np.ndarray, unit: float) -> np.ndarray:
-    return np.rint(np.asarray(values, dtype=float) / unit).astype(np.int64)
+    return np.rint(np.asarray(values, dtype=float) / unit).astype(np.int64).astype(np.int32)
 
 
 def _packed_geometry(assembly: solver.Assembly, origin: np.ndarray, unit: float) -> dict[str, Any]:
@@ -186,57 +205,67 @@ def _packed_geometry(assembly: solver.Assembly, origin: np.ndarray, unit: float)
     }
 
 
-def _packed_motion(assembly: solver.Assembly, shown: list[solver.Increment], unit: float) -> dict[str, Any]:
-    moved = np.stack([i.pose.displacements(assembly) for i in shown])
-    return {
-        "travel": _packed(_rounded(moved[:, :, :2], unit), len(shown)),
-        "turn": _packed(_rounded(moved[:, :, 2], TURN_UNIT), len(shown)),
-    }
+class _Tables:
+    """What changes from frame to frame, as integers: motion, resultants of the joints, hinges (1), sliding points (2).
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    shown : list of solver.Increment
+        Gone through once.
+    origin : (2,) array [m]
+    unit : float [m]
+    largest : float [N]
+        Resultant; a part of it is the unit of force.
+    """
+
+    def __init__(
+        self, assembly: solver.Assembly, shown: list[solver.Increment], origin: np.ndarray, unit: float, largest: float
+    ) -> None:
+        # A thousandth of the picture is where a force sits; finer places would only fill the file.
+        coarse = round(FORCE_FINENESS / FINENESS / 4.0)
+        self.n, self.largest = len(shown), largest
+        self.travel, self.turn = [], []
+        self.places, self.vectors, self.sizes = _empty(2), _empty(2), [np.zeros(0)]
+        self.mark_places, self.mark_kinds = _empty(2), [np.zeros(0, dtype=np.int32)]
+        for increment in shown:
+            moved = increment.pose.displacements(assembly)
+            self.travel.append(_rounded(moved[:, :2], unit))
+            self.turn.append(_rounded(moved[:, 2], TURN_UNIT))
+            points, forces, _ = marks.resultants(increment)
+            size = np.hypot(*forces.T) * (increment.status != solver.Status.FALLING)
+            kept = size > marks.SMALLEST_RESULTANT * largest
+            self.places.append(_rounded(points[kept] - origin, unit * coarse) * coarse)
+            self.vectors.append(_rounded(forces[kept], FORCE_FINENESS * largest))
+            self.sizes.append(size[kept])
+            hinging, sliding = increment.states == solver.ContactState.HINGING, marks.slipping(increment)
+            places = np.concatenate([increment.contacts.points[hinging], increment.contacts.points[sliding]])
+            self.mark_places.append(_rounded(places - origin, unit))
+            self.mark_kinds.append(np.repeat([1, 2], [hinging.sum(), sliding.sum()]))
+
+    def force_length(self, block_size: float, extent: float) -> float:
+        """Length per force [m/N]."""
+        sizes, largest = np.concatenate(self.sizes), self.largest
+        usual = float(np.quantile(sizes, 0.9)) if len(sizes) else largest
+        return min(max(1.5 * block_size, 0.015 * extent) / usual, 0.12 * extent / largest)
+
+    def packed(self) -> dict[str, Any]:
+        """As the page unpacks them."""
+        forces, found = (np.cumsum([len(k) for k in rows]).tolist() for rows in (self.sizes, self.mark_kinds))
+        return {
+            "travel": _packed(np.stack(self.travel), self.n),
+            "turn": _packed(np.stack(self.turn), self.n),
+            "force_first": _packed(forces, len(forces)),
+            "force_place": _packed(np.concatenate(self.places), forces[-1]),
+            "force_vector": _packed(np.concatenate(self.vectors), forces[-1]),
+            "mark_first": _packed(found, len(found)),
+            "mark_place": _packed(np.concatenate(self.mark_places), found[-1]),
+            "mark_kind": _packed(np.concatenate(self.mark_kinds), found[-1]),
+        }
 
 
-def _packed_forces(
-    shown: list[solver.Increment], origin: np.ndarray, unit: float, block_size: float, extent: float
-) -> tuple[dict[str, Any], float, float]:
-    """Resultants of the joints, frame after frame; the unit of force [N], and length per force [m/N]."""
-    found = [marks.resultants(i) for i in shown]
-    sizes = [
-        np.hypot(*forces.T) * (i.status != solver.Status.FALLING)
-        for i, (_, forces, _) in zip(shown, found, strict=True)
-    ]
-    largest = max((float(size.max(initial=0.0)) for size in sizes), default=0.0) or 1.0
-    kept = [size > marks.SMALLEST_RESULTANT * largest for size in sizes]
-    places = np.concatenate([np.zeros((0, 2)), *(p[k] for (p, _, _), k in zip(found, kept, strict=True))])
-    vectors = np.concatenate([np.zeros((0, 2)), *(f[k] for (_, f, _), k in zip(found, kept, strict=True))])
-    first = np.concatenate([[0], np.cumsum([int(k.sum()) for k in kept])])
-    usual = float(np.quantile(np.hypot(*vectors.T), 0.9)) if len(vectors) else largest
-    length = min(max(1.5 * block_size, 0.015 * extent) / usual, 0.12 * extent / largest)
-    # A thousandth of the picture is where a force sits; finer places would only fill the file.
-    coarse = round(FORCE_FINENESS / FINENESS / 4.0)
-    places = _rounded(places - origin, unit * coarse) * coarse
-    force = FORCE_FINENESS * largest
-    packed = {
-        "force_first": _packed(first, len(first)),
-        "force_place": _packed(places, len(places)),
-        "force_vector": _packed(_rounded(vectors, force), len(vectors)),
-    }
-    return packed, force, length
-
-
-def _packed_marks(shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
-    """Hinges (1) and sliding points (2), frame after frame."""
-    places, kinds, counts = [np.zeros((0, 2))], [np.zeros(0, dtype=int)], []
-    for increment in shown:
-        hinging, sliding = increment.states == solver.ContactState.HINGING, marks.slipping(increment)
-        places += [increment.contacts.points[hinging], increment.contacts.points[sliding]]
-        kinds.append(np.repeat([1, 2], [hinging.sum(), sliding.sum()]))
-        counts.append(int(hinging.sum() + sliding.sum()))
-    first = np.concatenate([[0], np.cumsum(counts)]).astype(int)
-    place, kind = np.concatenate(places), np.concatenate(kinds)
-    return {
-        "mark_first": _packed(first, len(first)),
-        "mark_place": _packed(_rounded(place - origin, unit), len(place)),
-        "mark_kind": _packed(kind, len(kind)),
-    }
+def _empty(columns: int) -> list[np.ndarray]:
+    return [np.zeros((0, columns), dtype=np.int32)]
 
 
 def _frames(response: solver.Response, shown: list[solver.Increment]) -> list[dict[str, Any]]:
@@ -341,7 +370,7 @@ def _capacity_rows(response: solver.Response) -> list[tuple[str, str]]:
         rows.append(("load multiplier α at the start", f"{values[0]:.6g}"))
         rows.append(("largest, last", f"{np.nanmax(values):.6g}, {values[-1]:.6g}"))
     elif state is not None and np.isfinite(state.load_multiplier):
-        limit = next((limit for limit in response.limits if limit.forces is state.forces), None)
+        limit = next((limit for limit, told in limit_states(response) if told is state), None)
         rows.append(("load multiplier α", f"{state.load_multiplier:.6g}"))
         if limit is not None:
             rows.append(("static, kinematic value", f"{limit.bounds[0]:.7g}, {limit.bounds[1]:.7g}"))

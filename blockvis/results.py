@@ -9,7 +9,6 @@ import os
 import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from .capacity import CAPACITY_TABLES, capacity_summary, stored_limits, stored_p
 from .loading import with_moving_load
 from .record import RECORD, Record, read_record, versions
 from .series import POSITION, parameter_word
+from .stored_increments import StoredIncrement, StoredIncrements, packed_increment
 from .stored_values import checked_arrays, packed, unpacked
 
 __all__ = ["ResultsExist", "ResultsFolder", "open_results", "refuse_results", "stored_case", "summary_of", "write"]
@@ -130,7 +130,8 @@ class ResultsFolder:
     ) -> None:
         self.parameter = parameter
         self.path, self.assembly, self.record = Path(path), assembly, record or Record(versions=versions())
-        self.increments: list[solver.Increment] = []
+        self.increments: list[StoredIncrement] = []
+        self._files = StoredIncrements(self.path)
         refuse_results(self.path, overwrite)
         (self.path / "increments").mkdir(parents=True, exist_ok=True)
         self._release = _held(self, self.path)
@@ -158,13 +159,14 @@ class ResultsFolder:
         results.record = read_record(results.path)
         results.assembly = _stored_assembly(results.path)
         results._release = _held(results, results.path)
+        results._files = StoredIncrements(results.path)
         results.increments, checkpoint, count = [], None, 0
         stored = results.path / CHECKPOINT
         if stored.is_file():
             try:
                 checkpoint, extra = unpacked(stored.read_bytes(), solver.Checkpoint)
                 count = int(extra["increments"])
-                results.increments = [_stored_increment(results.path, k) for k in range(count)]
+                results.increments = [results._files.opened(k) for k in range(count)]
             except (ValueError, KeyError, OSError) as error:
                 raise ValueError(f"'{results.path}' cannot go on ({error}); run the case again with --force") from None
         (results.path / "summary.json").unlink(missing_ok=True)
@@ -176,16 +178,19 @@ class ResultsFolder:
         return results, checkpoint
 
     def add(self, increment: solver.Increment) -> None:
-        """Writes one increment: its VTU files, its row, PVD files that list everything so far, and where to go on."""
+        """Writes one increment: its VTU files, its row, PVD files that list everything so far, and where to go on.
+
+        Of what is written the folder keeps the numbers; see :mod:`blockvis.stored_increments`.
+        """
         from .datasets import block_dataset, contact_dataset
         from .vtkxml import write_vtu
 
         number = len(self.increments)
-        self.increments.append(replace(increment, checkpoint=None))
         folder = self.path / "increments"
         write_vtu(block_dataset(self.assembly, increment), folder / f"blocks_{number:05d}.vtu")
         write_vtu(contact_dataset(self.assembly, increment), folder / f"contacts_{number:05d}.vtu")
-        _written(folder / f"state_{number:05d}.npz", _packed(_increment_arrays(increment)))
+        _written(self._files.file(number), packed_increment(increment))
+        self.increments.append(self._files.told(number, increment))
         self._add_row(number, increment)
         self._write_lists()
         if increment.checkpoint is not None:
@@ -265,12 +270,21 @@ def write(response: solver.Response, folder: str | Path, *, overwrite: bool = Fa
     Raises
     ------
     ResultsExist
+    ValueError
+        If the response is read from that very folder.
     """
+    for increment in response.increments:
+        if isinstance(increment, StoredIncrement) and increment.folder and _is_same(increment.folder, Path(folder)):
+            raise ValueError(f"the response is read from '{folder}' itself; write it to another folder")
     results = ResultsFolder(folder, response.assembly, overwrite=overwrite, parameter=parameter_word(response))
     for increment in response.increments:
         results.add(increment)
     results.finish(response, sum(i.seconds for i in response.increments))
     return results.path
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    return one.resolve() == other.resolve()
 
 
 def summary_of(response: solver.Response, *, seconds: float, record: Record) -> dict[str, Any]:
@@ -364,40 +378,6 @@ def _assembly_arrays(assembly: solver.Assembly) -> dict[str, Any]:
     }
 
 
-_CONTACT_ARRAYS = ("vertex", "edge", "corner", "block_a", "block_b", "points", "frames", "gaps", "along")
-_ARRAYS = ("forces", "displacements", "friction", "velocity", "support_forces")
-_NUMBERS = ("settlement", "phase", "load_multiplier", "reaction", "programs", "seconds")
-_CERTIFICATE = (
-    "equilibrium_residual",
-    "largest_penetration",
-    "duality_gap",
-    "complementarity",
-    "kinematic_violation",
-)
-
-
-def _increment_arrays(increment: solver.Increment) -> dict[str, Any]:
-    arrays: dict[str, Any] = {name: getattr(increment.contacts, name) for name in _CONTACT_ARRAYS}
-    arrays.update({name: getattr(increment, name) for name in (*_ARRAYS, *_NUMBERS)})
-    arrays.update({name: getattr(increment.certificate, name) for name in _CERTIFICATE})
-    arrays.update(
-        positions=increment.pose.positions, rotations=increment.pose.rotations, status=np.array(str(increment.status))
-    )
-    return arrays
-
-
-def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
-    fields: dict[str, Any] = {name: arrays[name] for name in _ARRAYS}
-    fields.update({name: arrays[name].item() for name in _NUMBERS})
-    return solver.Increment(
-        pose=solver.Pose(arrays["positions"], arrays["rotations"]),
-        contacts=solver.Contacts(**{name: arrays[name] for name in _CONTACT_ARRAYS}),
-        certificate=solver.Certificate(**{name: arrays[name].item() for name in _CERTIFICATE}),
-        status=solver.Status(str(arrays["status"])),
-        **fields,
-    )
-
-
 def _stored_assembly(folder: Path) -> solver.Assembly:
     if not (folder / "assembly.npz").is_file():
         raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
@@ -415,19 +395,6 @@ def _stored_assembly(folder: Path) -> solver.Assembly:
         )
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise ValueError(f"'{folder / 'assembly.npz'}' cannot be read ({error}); run the case again") from None
-
-
-def _stored_increment(folder: Path, number: int) -> solver.Increment:
-    path = folder / "increments" / f"state_{number:05d}.npz"
-    try:
-        arrays = checked_arrays(path)
-        n, k = len(arrays["rotations"]), len(arrays["gaps"])
-        for name, shape in (("positions", (n, 2)), ("velocity", (n, 3)), ("points", (k, 2)), ("forces", (k, 2))):
-            if arrays[name].shape != shape:
-                raise ValueError(f"{name} has shape {arrays[name].shape}, not {shape}")
-        return _increment_of(arrays)
-    except (ValueError, KeyError, TypeError, IndexError, FileNotFoundError) as error:
-        raise ValueError(f"'{path}' cannot be read ({error}); run the case again") from None
 
 
 def stored_case(folder: str | Path) -> str:
@@ -449,7 +416,8 @@ def open_results(folder: str | Path) -> solver.Response:
     Returns
     -------
     solver.Response
-        Without the settlements' limits and the loads unless the case can be read back from the summary.
+        Whose increments read their arrays from the folder when they are asked for; the settlements' limits and
+        the loads are known only where the case can be read back from the summary.
 
     Raises
     ------
@@ -460,7 +428,8 @@ def open_results(folder: str | Path) -> solver.Response:
 
     folder = Path(folder)
     assembly = _stored_assembly(folder)
-    increments = [_stored_increment(folder, k) for k in range(len(list((folder / "increments").glob("state_*.npz"))))]
+    files = StoredIncrements(folder)
+    increments = [files.opened(k) for k in range(len(files))]
     summary = {}
     if (folder / "summary.json").is_file():
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

@@ -31,6 +31,7 @@ class Run:
     Attributes
     ----------
     response : solver.Response
+        Whose increments read their arrays from the folder when they are asked for.
     folder : Path
     summary : dict
         What summary.json holds.
@@ -148,6 +149,8 @@ def _followed(case: Case, results: ResultsFolder, plan: Plan) -> Run:
                 ending = stop.value
                 break
             results.add(increment)
+            if len(plan.limits) == len(results.increments):
+                plan.told(results.increments[-1])
             if len(results.increments) == 1:
                 _note_settled(results.assembly, increment)
             progress.increment(increment)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,14 +72,26 @@ def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float
     return solver.Pose(start + magnification * (pose.positions - start), magnification * pose.rotations)
 
 
-def framed(assembly: solver.Assembly, poses: list[solver.Pose], margin: float = 0.04, supports: float = 0.13) -> Frame:
+class _Box:
+    """Bounds of points that come bit by bit."""
+
+    def __init__(self) -> None:
+        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
+
+    def hold(self, points: np.ndarray) -> None:
+        self.low, self.high = np.minimum(self.low, points.min(axis=0)), np.maximum(self.high, points.max(axis=0))
+
+
+def framed(
+    assembly: solver.Assembly, poses: Iterable[solver.Pose], margin: float = 0.04, supports: float = 0.13
+) -> Frame:
     """The frame in which every free block stays over all poses.
 
     Parameters
     ----------
     assembly : solver.Assembly
-    poses : list of solver.Pose
-        As drawn, magnified if they are.
+    poses : iterable of solver.Pose
+        As drawn, magnified if they are; gone through once.
     margin : float
         Empty border, as a fraction of the larger dimension.
     supports : float
@@ -86,13 +99,15 @@ def framed(assembly: solver.Assembly, poses: list[solver.Pose], margin: float = 
         supports of any extent.
     """
     free = assembly.free[assembly.block_of_vertex]
-    corners = [solver.moved_vertices(assembly, pose) for pose in poses]
-    inner = np.concatenate([c[free] for c in corners]) if free.any() else np.concatenate(corners)
-    low, high = inner.min(axis=0), inner.max(axis=0)
+    inner, outer = _Box(), _Box()
+    for pose in poses:
+        corners = solver.moved_vertices(assembly, pose)
+        inner.hold(corners[free] if free.any() else corners)
+        outer.hold(corners[~free] if (~free).any() else corners)
+    low, high = inner.low, inner.high
     size = float((high - low).max())
-    outer = np.concatenate([c[~free] for c in corners]) if (~free).any() else inner
-    low = np.minimum(low, np.maximum(outer.min(axis=0), low - supports * size))
-    high = np.maximum(high, np.minimum(outer.max(axis=0), high + supports * size))
+    low = np.minimum(low, np.maximum(outer.low, low - supports * size))
+    high = np.maximum(high, np.minimum(outer.high, high + supports * size))
     return Frame(low - margin * size, high + margin * size)
 
 

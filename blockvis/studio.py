@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 import shapely
@@ -33,6 +34,9 @@ WIDE_CRACK = 0.2
 
 #: Up to this many parts of a mechanism are tinted one by one.
 MOST_PARTS = 16
+
+#: The forces of this many increments tell what is usual.
+FORCES_OF = 100
 
 #: Length of the longest arrow of the live load, as a fraction of the picture.
 LIVE_LENGTH = 0.11
@@ -73,6 +77,32 @@ class Look:
                 raise ValueError(f"{name} is '{getattr(self, name)}'; choose from {', '.join(allowed)}")
 
 
+@dataclass
+class _Seen:
+    """What all pictures of some increments have to agree on.
+
+    Attributes
+    ----------
+    sampled : frozenset of int
+        Numbers of the increments whose forces tell what is usual.
+    largest : float [m]
+        Displacement of any free block.
+    cracks, sliding, hinges : bool
+        Whether any is marked anywhere.
+    largest_force : float [N]
+    forces : list of arrays [N]
+        Sizes, of the increments sampled.
+    """
+
+    sampled: frozenset[int]
+    largest: float = 0.0
+    cracks: bool = False
+    sliding: bool = False
+    hinges: bool = False
+    largest_force: float = 0.0
+    forces: list[np.ndarray] = field(default_factory=list)
+
+
 class Studio:
     """A scene and its sheet, set up for some increments of one response."""
 
@@ -92,13 +122,13 @@ class Studio:
         self.response, self.look, self.increments = response, look, increments
         assembly = self.assembly = response.assembly
         self.joints = marks.drawn_joints(assembly)
-        poses = [magnified(assembly, i.pose, look.magnification) for i in increments]
-        self.largest = max(_largest_displacement(assembly, i) for i in increments)
+        self._seen = _Seen(sampled=_sampled([k for k, i in enumerate(increments) if matters(i, response)]))
+        frame = framed(assembly, chain([solver.Pose.initial(assembly)], self._surveyed(), extra))
+        self.largest = self._seen.largest
         bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
         beside = round(0.36 * size[0]) if curve else 0
         self.sheet = Sheet(size, bar, beside)
         self.panel = CurvePanel(response, _size_of(self.sheet.beside), self.sheet.text) if curve else None
-        frame = framed(assembly, [solver.Pose.initial(assembly), *poses, *extra])
         self.live = _live_loads(response, increments, float(frame.size.max()))
         self.live_largest = max((load.largest for load in self.live.values()), default=0.0)
         #: Length of the live load's arrows per force [m/N].
@@ -112,7 +142,6 @@ class Studio:
         self.scene = Scene(assembly, frame, self.sheet.inside_size, fill, supersampling=4 if fine else 2)
         self.force_scale, self.force_shown = self._force_scale()
         self._show_start()
-        self._marked: dict[int, tuple[bool, bool, bool]] = {}
         self._keys: list[Key] | None = None
 
     def __enter__(self) -> Studio:
@@ -120,6 +149,26 @@ class Studio:
 
     def __exit__(self, *_: object) -> None:
         self.scene.close()
+
+    def _surveyed(self) -> Iterator[solver.Pose]:
+        """The poses as shown, one after another; notes what else all pictures have to agree on.
+
+        Increments may come from files: each is looked at once, and nothing of its size is kept.
+        """
+        seen, look = self._seen, self.look
+        for number, increment in enumerate(self.increments):
+            seen.largest = max(seen.largest, _largest_displacement(self.assembly, increment))
+            if look.joints:
+                found = marks.marks_of(self.assembly, self.joints, increment, increment.pose)
+                seen.cracks |= len(found.cracks) > 0
+                seen.sliding |= len(found.sliding) > 0
+                seen.hinges |= len(self._hinges(found)) > 0
+            if look.forces != "none" and matters(increment, self.response):
+                sizes = np.hypot(*_joint_forces(increment, look.forces)[1].T)
+                seen.largest_force = max(seen.largest_force, float(sizes.max(initial=0.0)))
+                if number in seen.sampled:
+                    seen.forces.append(sizes)
+            yield magnified(self.assembly, increment.pose, look.magnification)
 
     def picture(
         self, increment: solver.Increment, pose: solver.Pose | None = None, s: float | None = None, note: str = ""
@@ -197,10 +246,10 @@ class Studio:
         if self._keys is None:
             keys = []
             if self.look.joints:
-                open_, sliding, hinges = (any(k) for k in zip(*(self._kinds(i) for i in self.increments), strict=True))
-                keys += [Key("area", "open joint", palette.OPEN)] if open_ else []
-                keys += [Key("line", "sliding joint", palette.SLIDING)] if sliding else []
-                keys += [Key("dot", "hinge", palette.HINGE)] if hinges else []
+                seen = self._seen
+                keys += [Key("area", "open joint", palette.OPEN)] if seen.cracks else []
+                keys += [Key("line", "sliding joint", palette.SLIDING)] if seen.sliding else []
+                keys += [Key("dot", "hinge", palette.HINGE)] if seen.hinges else []
             if self.force_shown > 0:
                 text = ("compression " if self.look.forces == "thrust" else "contact force ") + force_text(
                     self.force_shown
@@ -216,10 +265,6 @@ class Studio:
                 keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT))
             self._keys = keys
         return self._keys
-
-    def _kinds(self, increment: solver.Increment) -> tuple[bool, bool, bool]:
-        found = marks.marks_of(self.assembly, self.joints, increment, increment.pose)
-        return len(found.cracks) > 0, len(found.sliding) > 0, len(self._hinges(found)) > 0
 
     def _hinges(self, found: marks.Marks) -> np.ndarray:
         """Hinges worth a dot: in a wall of many blocks nearly every brick turns a little about some corner."""
@@ -279,14 +324,11 @@ class Studio:
 
     def _force_scale(self) -> tuple[float, float]:
         """Length per force [m/N] and the force of the legend [N]; 0 where none is drawn."""
-        if self.look.forces == "none":
-            return 0.0, 0.0
-        path = [i for i in self.increments if matters(i, self.response)]
-        sizes = [np.hypot(*_joint_forces(i, self.look.forces)[1].T) for i in path]
-        every = np.concatenate([np.zeros(0), *sizes])
-        largest = float(every.max(initial=0.0))
+        largest = self._seen.largest_force
         if largest == 0.0:
             return 0.0, 0.0
+        every = np.concatenate(self._seen.forces)
+        every = every if every.max(initial=0.0) > 0.0 else np.full(1, largest)
         # What most joints carry is a block long: one corner that carries everything shall not make the rest vanish.
         usual = float(np.quantile(every[every > marks.SMALLEST_RESULTANT * largest], 0.9))
         extent = float(self.scene.frame.size.max())
@@ -313,13 +355,13 @@ class Studio:
 
     def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose) -> None:
         """The live load times its multiplier, arrows to scale that end where it acts."""
-        load = self.live[id(increment.forces)]
         if self.live_largest == 0.0:
             return
+        load = self.live[_place(increment)]
         swinging = self.response.analysis == "limit load" and self.response.collapse is None
         if increment.status == solver.Status.FALLING and not swinging:
             load = LiveLoad.none()
-        tips = marks.carried(load.points, load.blocks, load.pose, shown) if len(load.points) else load.points
+        tips = load.carried(shown)
         self._arrows("live", tips - load.forces * self.live_scale, tips, 0.55, palette.LIVE)
 
     def _draw_settlement_arrow(self, increment: solver.Increment, shown: solver.Pose) -> None:
@@ -367,16 +409,30 @@ class Studio:
 
 def _live_loads(
     response: solver.Response, increments: tuple[solver.Increment, ...], extent: float
-) -> dict[int, LiveLoad]:
-    """The live load of each increment by its forces, which frames of a swinging mechanism share with their state."""
-    found: dict[int, LiveLoad] = {}
+) -> dict[tuple[int, float], LiveLoad]:
+    """The live load of each increment by its place; frames of a swinging mechanism have that of their limit state."""
+    found: dict[tuple[int, float], LiveLoad] = {}
+    if response.analysis == "settlement":
+        return found
+    states = {_place(state): state for state in response.path}
     for increment in increments:
-        if id(increment.forces) not in found:
-            found[id(increment.forces)] = live_load_of(response, increment, extent)
+        place = _place(increment)
+        if place not in found:
+            found[place] = live_load_of(response, states.get(place, increment), extent)
     if parameter_word(response) == POSITION and len(found) > 1:
         # From place to place the limit differs a hundredfold; what shall be seen is where the load is.
         found = {key: replace(load, forces=load.forces / (load.largest or 1.0)) for key, load in found.items()}
     return found
+
+
+def _place(increment: solver.Increment) -> tuple[int, float]:
+    return increment.phase, increment.settlement
+
+
+def _sampled(numbers: list[int]) -> frozenset[int]:
+    """As many of the numbers as are enough to tell a usual force, evenly chosen."""
+    chosen = np.linspace(0, len(numbers) - 1, min(len(numbers), FORCES_OF)).round().astype(int)
+    return frozenset(numbers[k] for k in chosen)
 
 
 def _arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: float) -> tuple[np.ndarray, np.ndarray]:

@@ -103,31 +103,36 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
         controls=controls,
     )
     started = time.perf_counter()
-    path: list[solver.Increment] = []
+    # Of the path a study keeps the ends.
+    first = last = falling = None
+    n_path = n_programs = 0
     while True:
         try:
             increment = next(steps)
         except StopIteration as stop:
             ending: solver.Ending = stop.value
             break
-        path.append(increment)
+        if increment.status is solver.Status.FALLING:
+            falling = increment
+        else:
+            first, last = first or increment, increment
+            n_path, n_programs = n_path + 1, n_programs + increment.programs
         if seconds is not None and time.perf_counter() - started > seconds:
             raise _OutOfTime(f"took longer than {seconds:g} s, at a settlement of {increment.settlement:.6g}")
-    falling = path.pop() if path and path[-1].status is solver.Status.FALLING else None
     before = [0.0, *np.cumsum([s.limit for s in case.settlements])]
     found: dict[str, Any] = {
         "status": str(ending.stop),
         "message": ending.message if ending.collapse is None else "",
         "unit": case.settlements[-1].unit,
-        "last_settlement": float(path[-1].settlement + before[path[-1].phase]) if path else 0.0,
-        "initial_reaction": float(path[0].reaction) if path else None,
+        "last_settlement": float(last.settlement + before[last.phase]) if last else 0.0,
+        "initial_reaction": float(first.reaction) if first else None,
         "collapse_reaction": None,
         "total_weight": solver.total_weight(assembly),
-        "increments": len(path),
-        "programs": sum(i.programs for i in path),
+        "increments": n_path,
+        "programs": n_programs,
     }
-    if ending.collapse is not None:
-        offset = before[path[-1].phase]
+    if ending.collapse is not None and last is not None:
+        offset = before[last.phase]
         low, high = (float(offset + s) for s in ending.collapse.bracket)
         found |= {"collapse_displacement": (low + high) / 2.0, "bracket_low": low, "bracket_high": high}
         found["last_settlement"] = low
