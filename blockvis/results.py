@@ -312,6 +312,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record) -> 
     return {
         "status": str(response.stop),
         "message": response.message,
+        "notes": list(response.notes),
         "collapse_displacement": collapse.displacement if collapse else None,
         "collapse_bracket": list(collapse.bracket) if collapse else None,
         "settlement_unit": response.settlements[-1].unit if response.settlements else "m",

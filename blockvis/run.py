@@ -153,6 +153,8 @@ def _followed(case: Case, results: ResultsFolder, plan: Plan) -> Run:
                 plan.told(results.increments[-1])
             if len(results.increments) == 1:
                 _note_settled(results.assembly, increment)
+            for note in increment.notes:
+                warnings.warn(note, stacklevel=2)
             progress.increment(increment)
     except KeyboardInterrupt:
         plan.steps.close()

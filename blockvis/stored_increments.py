@@ -38,7 +38,7 @@ _CERTIFICATE = (
 )
 
 #: What is kept of an increment, and what is read.
-_KEPT = (*_NUMBERS, "certificate", "status")
+_KEPT = (*_NUMBERS, "certificate", "status", "notes")
 _READ = ("pose", "contacts", *_ARRAYS)
 
 
@@ -173,6 +173,7 @@ def packed_increment(increment: solver.Increment) -> bytes:
     arrays.update(
         positions=increment.pose.positions, rotations=increment.pose.rotations, status=np.array(str(increment.status))
     )
+    arrays["notes"] = np.array(increment.notes, dtype=str)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
@@ -186,6 +187,7 @@ def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
         contacts=solver.Contacts(**{name: arrays[name] for name in _CONTACT_ARRAYS}),
         certificate=solver.Certificate(**{name: arrays[name].item() for name in _CERTIFICATE}),
         status=solver.Status(str(arrays["status"])),
+        notes=tuple(map(str, arrays.get("notes", ()))),
         **fields,
     )
 

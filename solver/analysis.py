@@ -11,7 +11,7 @@ import numpy as np
 from .assembly import Assembly, check_blocks
 from .checkpoint import Checkpoint, Place
 from .contact import InterfaceLaw, Interfaces
-from .correction import Falls, NotConverged, at_rest, corrected, solve_again
+from .correction import FARTHEST_FALL, Falls, NotConverged, at_rest, corrected, solve_again
 from .kinematics import Pose, moved, moved_vertices
 from .loads import Loads, Settlement, checked_loads
 from .local_origin import at_origin, told_from, without_origin
@@ -20,6 +20,7 @@ from .mechanism import mechanism_of
 from .polygons import overlap_depths
 from .program import Locked, Model, Solved, point_velocities, solve_program
 from .response import Collapse, Increment, Response, Status
+from .snap import jump_words, snapped
 
 __all__ = ["Controls", "Ending", "check_settlement", "settle", "settlement_increments"]
 
@@ -39,6 +40,12 @@ PLACES = 16
 #: the forces are read again before any has closed; the second in large models, whose corrections leave as much open.
 #: At the start of the first phase nothing is left open.
 CLOSING_WORK, CLOSING_WORK_LARGE, CLOSING_WORK_AT_START = 1e-3, 1e-2, 1e-6
+
+#: Snaps of light pieces in one phase after which the structure is said to fall apart.
+SNAPS = 100
+
+#: Movement to the equilibrium of a place, in block sizes, that looks like a fall.
+JUMP = 0.02
 
 #: Step by which a reaction is read off at the last equilibrium, in block sizes.
 PROBE = 1e-6
@@ -259,9 +266,13 @@ class _Path:
         self.tolerance = float(phase.tolerance or phase.increment / 100.0)
         self.probe = PROBE * model.length / _lever(model.assembly, phase, start)
         self.step = phase.increment
+        self.fallen, self.snaps = np.zeros(model.assembly.n_blocks), 0
+        self.notes: tuple[str, ...] = ()
         if resume is not None:
             self.here, self.left, self.step = resume.here, list(resume.left), resume.step
             self.first_without, self.told = resume.first_without, resume.told
+            self.snaps, self.notes = resume.snaps, resume.notes
+            self.fallen = self.fallen if resume.fallen is None else resume.fallen
 
     def _checkpoint(self) -> Checkpoint:
         return Checkpoint(
@@ -272,16 +283,21 @@ class _Path:
             step=self.step,
             first_without=self.first_without,
             told=self.told,
+            fallen=self.fallen,
+            snaps=self.snaps,
+            notes=self.notes,
         )
 
     def follow(self) -> Generator[Increment, None, Ending]:
         """Yields the increments of the phase, each when it is left behind; returns how the phase ended."""
         phase, step = self.phase, self.step
+        locked: tuple[float, Locked] | None = None
         while True:
             here = self.here
             # The last place is looked at like any other: as if the path went on.
             at_limit = here.s >= phase.limit * (1.0 - 1e-12)
             step = (here.step or phase.increment) if at_limit else self._shortened(step)
+            predictor = None
             try:
                 predictor = self._predict(here, step)
                 changed = predictor.falling or self._mechanism_changed(predictor, step)
@@ -296,10 +312,16 @@ class _Path:
                     if here.s > self.told and not predictor.falling:
                         last = self._left(predictor, step)
                         self.told = here.s
-                        yield last
+                        yield self._noted(last)
                     break
                 if predictor.falling:
                     if step <= self.tolerance:
+                        if here.step > self.tolerance and self._read(here.s, here.pose).falling:
+                            # This place holds nothing itself: the last that does is further back than the tolerance.
+                            raise _NotHere(predictor)
+                        if (yield from self._goes_on(here.s, predictor)):
+                            step = self.step
+                            continue
                         return (yield from self._collapse(here.s + step, predictor))
                     step /= 2.0
                     continue
@@ -316,26 +338,37 @@ class _Path:
                 self.first_without = min(self.first_without, here.s)
                 step = self._go_back()
                 if self.first_without - self.here.s <= self.tolerance * (1.0 + 1e-9):
+                    if (yield from self._goes_on(here.s, fall.solved)):
+                        step = self.step
+                        continue
                     return (yield from self._collapse(self.first_without, fall.solved))
                 continue
             except Falls as fall:
                 self.first_without = min(self.first_without, here.s + step)
                 if self.first_without - here.s <= self.tolerance * (1.0 + 1e-9):
+                    if (yield from self._goes_on(here.s + step, fall.solved)):
+                        step = self.step
+                        continue
                     return (yield from self._collapse(self.first_without, fall.solved))
                 step /= 2.0
                 continue
             except (Locked, NotConverged, SolveError) as error:
                 if at_limit:
                     break
+                if predictor is None and isinstance(error, Locked) and step <= self.tolerance:
+                    locked = here.s, error
                 step /= 2.0
                 if step < self.tolerance / 64.0:
                     yield from self._tell_last()
+                    if locked is not None and locked[0] == here.s and isinstance(error, SolveError):
+                        # Proved by a step within the tolerance; in much smaller ones the proof drowns in rounding.
+                        error = locked[1]
                     stop = Status.LOCKED if isinstance(error, Locked) else Status.SOLVER_FAILED
                     return Ending(stop, f"at a settlement of {here.s:.6g} {phase.unit}: {error}")
                 continue
             if here.s + step >= self.first_without:
                 self.first_without = np.inf
-            found = self._left(predictor, step) if here.s > self.told else None
+            found = self._noted(self._left(predictor, step)) if here.s > self.told else None
             self.told = max(self.told, here.s)
             self.left = [*self.left[1 - PLACES :], here]
             self.here = Place(here.s + step, pose, step, predictor.motion / step, proved)
@@ -360,11 +393,21 @@ class _Path:
 
     def _prove(self) -> None:
         """Makes sure that this place is an equilibrium, moving on to the nearest one where a hinge has to jump."""
+        here, nudge = self.here, self._nudge(self.here.s)
         try:
-            pose = at_rest(self.model, self.here.pose, self.controls.correctors, self._nudge(self.here.s))
+            pose = at_rest(self.model, here.pose, self.controls.correctors, nudge)
         except Falls as fall:
             raise _NotHere(fall.solved) from None
-        self.here = replace(self.here, pose=pose, proved=True)
+        motion = np.column_stack([pose.positions - here.pose.positions, pose.rotations - here.pose.rotations])
+        if _largest_movement(self.model, motion) > JUMP * self.model.length:
+            # A light piece has fallen, at a stride: its way is followed in small steps where it is one to be followed.
+            snap = snapped(self.model, here.pose, motion, self.controls.correctors, nudge)
+            if snap is not None:
+                pose = snap.pose
+                self._note(here.s, snap.words(self.model.assembly))
+            else:
+                self._note(here.s, jump_words(self.model, here.pose, pose))
+        self.here = replace(here, pose=pose, proved=True)
 
     def _mechanism_changed(self, predictor: Solved, step: float) -> bool:
         """Whether the blocks move otherwise than in the step that led here: hinges jumped, joints opened or closed."""
@@ -418,14 +461,54 @@ class _Path:
         if self.here.s > self.told:
             self.told = self.here.s
             try:
-                yield self._increment(self._read(self.here.s, self.here.pose), self.probe)
-            except Locked:
-                # No finite force belongs to this state: its pose is told, with the forces of the supports at rest.
-                yield self._increment(solve_program(self.model, self.here.pose), self.probe)
+                last = self._increment(self._read(self.here.s, self.here.pose), self.probe)
+            except (Locked, SolveError):
+                # No finite force belongs to this state, or none was found: its pose is told, with the forces of the
+                # supports at rest.
+                last = self._increment(solve_program(self.model, self.here.pose), self.probe)
+            yield self._noted(last)
 
     def _increment(self, solved: Solved, step: float) -> Increment:
         rate = self.phase.rate(self.model.assembly, self.start, self.here.s)
         return _increment(self.model, solved, rate, step, self.here.s, self.number, Status.EQUILIBRIUM)
+
+    def _note(self, s: float, words: str) -> None:
+        self.notes = (*self.notes, f"at a settlement of {s:.6g} {self.phase.unit} {words}")
+
+    def _noted(self, increment: Increment) -> Increment:
+        """The increment with what is to be told with it."""
+        notes, self.notes = self.notes, ()
+        return replace(increment, notes=notes)
+
+    def _goes_on(self, s: float, falling: Solved) -> Generator[Increment, None, bool]:
+        """Lets a light piece that falls fall, the supports at s; tells whether it was caught, and the path goes on."""
+        # What falls off for good once it tips may yet be caught where it stood last.
+        for at, pose in ((s, falling.pose), (self.here.s, self.here.pose)):
+            if self.snaps == SNAPS:
+                return False
+            snap = snapped(self.model, pose, falling.motion, self.controls.correctors, self._nudge(at))
+            if snap is None:
+                continue
+            fallen = self.fallen.copy()
+            fallen[snap.blocks] += snap.fall
+            if fallen.max() > FARTHEST_FALL * self.model.length:
+                continue
+            if at > self.here.s and self.here.s > self.told:
+                reading = self._read(self.here.s, self.here.pose)
+                if not reading.falling:
+                    self.told = self.here.s
+                    yield replace(self._noted(self._increment(reading, self.probe)), checkpoint=self._checkpoint())
+            if at > self.here.s:
+                self.left = [*self.left[1 - PLACES :], self.here]
+            self.here = Place(at, snap.pose, proved=True)
+            self.first_without, self.step = np.inf, self.finest
+            self.fallen, self.snaps = fallen, self.snaps + 1
+            self.notes = (
+                *self.notes,
+                f"at a settlement of {at:.6g} {self.phase.unit} {snap.words(self.model.assembly)}",
+            )
+            return True
+        return False
 
     def _collapse(self, first_without: float, falling: Solved) -> Generator[Increment, None, Ending]:
         reading = self._read(self.here.s, self.here.pose)
@@ -435,7 +518,7 @@ class _Path:
             reading = self._read(self.here.s, self.here.pose)
         last = self._increment(reading, self.probe)
         if self.here.s > self.told:
-            yield last
+            yield self._noted(last)
         falls = _falling_frame(self.model, falling, first_without, self.number)
         collapse = Collapse(
             displacement=(self.here.s + first_without) / 2.0,

@@ -57,6 +57,12 @@ class Checkpoint:
         Smallest settlement known to have no equilibrium; infinite where none is known.
     told : float [m or rad]
         Settlement of the last increment.
+    fallen : (n_blocks,) array [m], optional
+        How far each block has fallen in snaps of this phase.
+    snaps : int
+        Of this phase.
+    notes : tuple of str
+        For the next increment to tell.
     """
 
     phase: int
@@ -66,3 +72,6 @@ class Checkpoint:
     step: float
     first_without: float
     told: float
+    fallen: np.ndarray | None = None
+    snaps: int = 0
+    notes: tuple[str, ...] = ()

@@ -46,6 +46,10 @@ AT_LIMIT = 1e-9
 #: give way to them.
 ROUNDING = 1e-10
 
+#: Where a program has no solution, penetration and drift below this, in units of the program, are left as they are:
+#: blocks wedged against each other cannot give way, and drawings and corrections are off by as much.
+LEFT_WEDGED = 1e-7
+
 
 class Locked(Exception):
     """Blocks of infinite strength are wedged between the supports: forces grow without limit."""
@@ -228,12 +232,10 @@ def solve_program(
     model.tally.programs += 1
     friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
     matrix = equilibrium_matrix(contacts, pose, model.length)
-    distance = matrix.T @ (support_motion / model.lengths).ravel()
-    distance[0::2] += _beyond_rounding(contacts.gaps / model.length)
-    if drift is not None:
-        distance[1::2] += _beyond_rounding(drift / model.length)
+    given = matrix.T @ (support_motion / model.lengths).ravel()
     if allowance is not None:
-        distance[0::2] += allowance / model.length
+        given[0::2] += allowance / model.length
+    distance = given + _distances(model, contacts, drift, ROUNDING)
     rays = cone_rays(friction)
     balance = sp.csc_array(sp.csr_array(matrix)[np.repeat(assembly.free, 3)] @ rays)
     rows = balance.shape[0]
@@ -253,7 +255,14 @@ def solve_program(
         upper=-external + tolerance,
     )
     try:
-        solution = solve_lp(program)
+        try:
+            solution = solve_lp(program)
+        except (Unbounded, SolveError):
+            left = given + _distances(model, contacts, drift, LEFT_WEDGED)
+            if (left == distance).all():
+                raise
+            distance, cost[0] = left, rays.T @ left
+            solution = solve_lp(replace(program, cost=np.concatenate(cost)))
     except Unbounded as ray:
         forces = (rays @ ray.x[: 2 * len(contacts)]).reshape(-1, 2)
         squeezed = np.unique(contacts.block_a[forces[:, 0] > 1e-6 * forces[:, 0].max(initial=0.0)])
@@ -333,9 +342,8 @@ def closing_program(
     columns = np.repeat(across, 2)
     columns[1::2] &= sticking
     rays = cone_rays(np.where(sticking, friction, 0.0))[:, columns]
-    distance = np.zeros(2 * len(contacts))
-    distance[0::2] = _beyond_rounding(contacts.gaps / model.length)
-    distance[1::2] = np.where(sticking, _beyond_rounding(drift / model.length), 0.0)
+    drift = np.where(sticking, drift, 0.0)
+    distance = _distances(model, contacts, drift, ROUNDING)
     weights = np.where(same[:, None], before.forces[place], 0.0) / model.force
     weights[:, 1] = np.where(sticking, weights[:, 1], 0.0)
     by_body = sp.csr_array(parts.motions.T @ matrix)
@@ -349,8 +357,16 @@ def closing_program(
         lower=load - resistance,
         upper=load + resistance,
     )
+    routes = None if bodies is None else INTERIOR_ROUTES
     try:
-        solution = solve_lp(program, None if bodies is None else INTERIOR_ROUTES)
+        try:
+            solution = solve_lp(program, routes)
+        except (Unbounded, SolveError):
+            left = _distances(model, contacts, drift, LEFT_WEDGED)
+            if (left == distance).all():
+                raise
+            cost = np.concatenate([rays.T @ left, program.cost[-2 * rows :]])
+            solution = solve_lp(replace(program, cost=cost), routes)
     except Unbounded:
         # A corner that has gone in too deep, wedged between blocks that cannot give way: a smaller step may not.
         raise SolveError("gaps that an increment has left cannot be closed: blocks are wedged") from None
@@ -381,8 +397,14 @@ def matched_contacts(assembly: Assembly, contacts: Contacts, before: Contacts) -
     return place, known[place] == keys
 
 
-def _beyond_rounding(values: np.ndarray) -> np.ndarray:
-    return np.where(np.abs(values) < ROUNDING, 0.0, values)
+def _distances(model: Model, contacts: Contacts, drift: np.ndarray | None, left: float) -> np.ndarray:
+    """(2 n_contacts,) array: gaps and drift in units of the program, without rounding and what is to be left."""
+    distances = np.zeros(2 * len(contacts))
+    gaps = contacts.gaps / model.length
+    distances[0::2] = np.where((gaps > -left) & (gaps < ROUNDING), 0.0, gaps)
+    if drift is not None:
+        distances[1::2] = np.where(np.abs(drift / model.length) < left, 0.0, drift / model.length)
+    return distances
 
 
 def _certificate(

@@ -108,6 +108,8 @@ class Increment:
         Linear programs solved for this increment.
     seconds : float
         Time spent on this increment.
+    notes : tuple of str
+        What happened on the way to it that forces and poses do not tell: blocks that fell and were caught.
     checkpoint : Checkpoint, optional
         Where the path stands after this increment, while a loop runs; a :class:`Response` keeps none.
     """
@@ -127,6 +129,7 @@ class Increment:
     status: Status
     programs: int
     seconds: float
+    notes: tuple[str, ...] = ()
     checkpoint: Checkpoint | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -231,6 +234,11 @@ class Response:
     def path(self) -> tuple[Increment, ...]:
         """The increments in equilibrium."""
         return tuple(i for i in self.increments if i.status == Status.EQUILIBRIUM)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the increments tell in words, in their order."""
+        return tuple(note for increment in self.increments for note in increment.notes)
 
     @property
     def settlement(self) -> np.ndarray:
