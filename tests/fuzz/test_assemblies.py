@@ -19,6 +19,23 @@ def test_three_blocks_at_a_corner():
     assert tried("voronoi", 1049).wrong == []
 
 
+def test_a_sliver_that_tips_does_not_end_the_run():
+    """Here 0.07 % of the weight once passed for the collapse of the whole."""
+    finding = tried("cuts", 100320)
+    assert finding.wrong == []
+    assert finding.outcome == "limit reached"
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"), [("arch", 100004), ("cuts", 100127), ("courses", 100125), ("courses", 100231)]
+)
+def test_blocks_wedged_by_rounding_are_no_failure(kind, seed):
+    """Here HiGHS found programs unbounded by less than their ray proves."""
+    finding = tried(kind, seed)
+    assert finding.wrong == []
+    assert finding.outcome in ("limit reached", "locked")
+
+
 def test_a_trial_is_made_from_its_kind_and_seed_alone():
     one, other = trial("voronoi", 7), trial("voronoi", 7)
     assert one.assembly.vertices.tobytes() == other.assembly.vertices.tobytes()
