@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from .mechanism import swung
 from .series import POSITION
 from .stored_increments import StoredLimit
 
-__all__ = ["Plan", "parameter_of", "planned"]
+__all__ = ["LimitNumbers", "Plan", "SeriesCheckpoint", "checkpoint_kind", "parameter_of", "planned"]
 
 #: Frames in which the mechanism of a limit load is swung, and how far its fastest block gets, in extents of the
 #: structure.
@@ -64,9 +64,7 @@ class Plan:
         increment : solver.Increment
             As it is kept.
         """
-        last = self.limits[-1]
-        numbers = ("multiplier", "bounds", "status", "flow", "live_force", "programs")
-        self.limits[-1] = StoredLimit.of(increment, **{name: getattr(last, name) for name in numbers})
+        self.limits[-1] = LimitNumbers.of(self.limits[-1]).told_by(increment)
 
     def response(self, increments: Sequence[solver.Increment], ending: solver.Ending) -> solver.Response:
         """The increments so far and how they ended."""
@@ -92,25 +90,88 @@ def parameter_of(case: Case) -> str:
     return POSITION if case.analysis == "limit load" and (moving or not case.settlements) else "settlement"
 
 
-def planned(case: Case, assembly: solver.Assembly, resume: solver.Checkpoint | None = None) -> Plan:
+@dataclass(frozen=True)
+class LimitNumbers:
+    """What a limit load is beside the arrays of the increment that tells it; as of :class:`solver.LimitLoad`."""
+
+    multiplier: float
+    bounds: tuple[float, float]
+    status: solver.LimitStatus
+    flow: str
+    live_force: float
+    programs: int
+
+    @classmethod
+    def of(cls, limit: solver.LimitLoad) -> LimitNumbers:
+        """Those of a limit load."""
+        return cls(**{field.name: getattr(limit, field.name) for field in fields(cls)})
+
+    def told_by(self, state: solver.Increment) -> StoredLimit:
+        """The limit load again, with the arrays of an increment."""
+        return StoredLimit.of(state, **{field.name: getattr(self, field.name) for field in fields(self)})
+
+
+@dataclass(frozen=True)
+class SeriesCheckpoint:
+    """Where limit loads go on from, after one of them, to the same bits.
+
+    Attributes
+    ----------
+    limits : tuple of LimitNumbers
+        Found so far, in the order of the increments that tell them.
+    settlement : solver.Checkpoint, optional
+        Where the settlement stands along which they are asked for.
+    pose : solver.Pose, optional
+        Where the settlement ended that comes before the places of a load.
+    """
+
+    limits: tuple[LimitNumbers, ...]
+    settlement: solver.Checkpoint | None = None
+    pose: solver.Pose | None = None
+
+
+AnyCheckpoint = solver.Checkpoint | solver.PushoverCheckpoint | SeriesCheckpoint
+
+
+def checkpoint_kind(case: Case) -> type[AnyCheckpoint]:
+    """The kind of checkpoint that the analysis of a case goes on from."""
+    kinds: dict[str, type[AnyCheckpoint]] = {
+        "settlement": solver.Checkpoint,
+        "pushover": solver.PushoverCheckpoint,
+        "limit load": SeriesCheckpoint,
+    }
+    return kinds[case.analysis]
+
+
+def planned(
+    case: Case,
+    assembly: solver.Assembly,
+    resume: AnyCheckpoint | None = None,
+    told: Sequence[solver.Increment] = (),
+) -> Plan:
     """The analysis of a case, its input checked.
 
     Parameters
     ----------
     case : Case
     assembly : solver.Assembly
-    resume : solver.Checkpoint, optional
-        Where a settlement goes on from; limit loads and pushovers keep none and start again.
+    resume : solver.Checkpoint, solver.PushoverCheckpoint or SeriesCheckpoint, optional
+        Where it goes on from; of the :func:`checkpoint_kind` of the case.
+    told : sequence of solver.Increment
+        What was found up to there.
 
     Raises
     ------
     ValueError
         For input that cannot be analysed. Limit loads and pushovers solve their first increment for that.
     """
+    if not isinstance(resume, checkpoint_kind(case) | None):
+        raise ValueError(f"a {case.analysis} cannot go on from a {type(resume).__name__}")
     interfaces, loads = case_interfaces(case), case_loads(case, assembly)
     if case.settlements:
         solver.check_settlement(assembly, case.settlements, case.controls)
     if case.analysis == "settlement":
+        assert not isinstance(resume, solver.PushoverCheckpoint | SeriesCheckpoint)
         steps = solver.settlement_increments(
             assembly,
             case.settlements,
@@ -122,13 +183,20 @@ def planned(case: Case, assembly: solver.Assembly, resume: solver.Checkpoint | N
         return Plan(case.analysis, assembly, interfaces, loads, case.settlements, steps)
     if case.analysis == "pushover":
         control = _checked_control(case, assembly)
-        steps = _pushover(case, control, assembly, interfaces, loads)
+        assert not isinstance(resume, solver.Checkpoint | SeriesCheckpoint)
+        steps = _pushover(case, control, assembly, interfaces, loads, resume)
         over: tuple[solver.Settlement, ...] = (control,)  # type: ignore[assignment]  # stands in for a settlement
         return Plan(case.analysis, assembly, interfaces, loads, over, _started(steps))
     places, live = moving_loads(case.loads, assembly, case.source)
     # A load that moves is kept where it is told about: at the first place until the lowest is known.
     plan = Plan(case.analysis, assembly, interfaces, loads, () if len(places) else case.settlements, iter(()))  # type: ignore[arg-type]
-    plan.steps = _started(_limit_loads(case, plan, places, live))
+    assert not isinstance(resume, solver.Checkpoint | solver.PushoverCheckpoint)
+    if resume is not None:
+        plan.limits = [limit.told_by(state) for limit, state in zip(resume.limits, told, strict=True)]
+    if len(places):
+        plan.steps = _started(_over_places(case, plan, places, live, resume, told))
+    else:
+        plan.steps = _started(_along_settlement(case, plan, resume, told))
     return plan
 
 
@@ -164,13 +232,19 @@ def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDis
     return control
 
 
-def _settled(case: Case, assembly: solver.Assembly, interfaces: solver.Interfaces, loads: solver.Loads) -> Steps:
+def _settled(
+    case: Case,
+    assembly: solver.Assembly,
+    interfaces: solver.Interfaces,
+    loads: solver.Loads,
+    resume: solver.Checkpoint | None = None,
+) -> Steps:
     """The settlements of a case, told under the dead load alone; nothing where there are none."""
     if not case.settlements:
         return solver.Ending(solver.Status.LIMIT_REACHED)
     return (
         yield from solver.settlement_increments(
-            assembly, case.settlements, interfaces=interfaces, loads=loads, controls=case.controls
+            assembly, case.settlements, interfaces=interfaces, loads=loads, controls=case.controls, resume=resume
         )
     )
 
@@ -181,13 +255,16 @@ def _pushover(
     assembly: solver.Assembly,
     interfaces: solver.Interfaces,
     loads: solver.Loads,
+    resume: solver.PushoverCheckpoint | None,
 ) -> Steps:
     pose, steps = None, _settled(case, assembly, interfaces, loads)
-    while True:
+    # A pushover that has begun has its settlement behind it.
+    before = solver.Ending(solver.Status.LIMIT_REACHED)
+    while resume is None:
         try:
             increment = next(steps)
         except StopIteration as stop:
-            before: solver.Ending = stop.value
+            before = stop.value
             break
         if increment.status == solver.Status.FALLING:
             yield replace(increment, settlement=0.0, phase=0)
@@ -197,7 +274,7 @@ def _pushover(
     try:
         return (
             yield from solver.pushover_increments(
-                assembly, control, loads=loads, interfaces=interfaces, controls=case.controls, pose=pose
+                assembly, control, loads=loads, interfaces=interfaces, controls=case.controls, pose=pose, resume=resume
             )
         )
     except ValueError as error:
@@ -211,12 +288,16 @@ def _not_reached(before: solver.Ending, what: str) -> solver.Ending:
     return solver.Ending(before.stop, f"during the settlement: {before.message}")
 
 
-def _limit_loads(case: Case, plan: Plan, places: np.ndarray, live: Callable[[int], np.ndarray]) -> Steps:
-    """Limit states: at each wanted settlement, or at the end of the settlements for each place of a moving load."""
-    assembly, standing = plan.assembly, plan.loads
-    pose, steps = None, _settled(case, assembly, plan.interfaces, standing)
-    # Of all states the one whose mechanism is shown: the lowest of several places, else the last.
-    chosen, shown, least = 0, None, np.inf
+def _along_settlement(
+    case: Case, plan: Plan, resume: SeriesCheckpoint | None, told: Sequence[solver.Increment]
+) -> Steps:
+    """Limit states at each wanted settlement, or as drawn where there is none; then the last one's mechanism."""
+    shown = told[-1] if told else None
+    if not case.settlements and shown is None:
+        shown = _limit_state(case, plan, plan.loads, None, None, 0)
+        yield replace(shown, checkpoint=_checkpoint(plan))
+    before = None if resume is None else resume.settlement
+    steps = _settled(case, plan.assembly, plan.interfaces, plan.loads, before)
     programs = 0
     while True:
         try:
@@ -225,38 +306,72 @@ def _limit_loads(case: Case, plan: Plan, places: np.ndarray, live: Callable[[int
             ending: solver.Ending = stop.value
             break
         programs += increment.programs
-        pose = increment.pose
         if increment.status == solver.Status.FALLING:
             yield increment
-        elif len(places) == 0 and _wanted(case, increment):
+        elif _wanted(case, increment):
             # In equilibrium under the dead load: the settlement has proved it.
-            state = _limit_state(case, plan, standing, pose, increment, programs)
+            state = _limit_state(case, plan, plan.loads, increment.pose, increment, programs)
             shown, programs = replace(state, status=solver.Status.EQUILIBRIUM), 0
-            yield shown
+            reached = increment.checkpoint
+            yield replace(shown, checkpoint=None if reached is None else _checkpoint(plan, settlement=reached))
     if ending.stop is not solver.Status.LIMIT_REACHED:
         if ending.stop is solver.Status.COLLAPSED and shown is not None:
             return replace(ending, message=f"the settlement alone brings it down: {ending.message}")
         return _not_reached(ending, "it carries no live load")
-    if not case.settlements and len(places) == 0:
-        shown = _limit_state(case, plan, standing, None, None, 0)
-        yield shown
+    assert shown is not None
+    yield from _swinging(plan.assembly, shown)
+    return _limit_ending(plan.limits[-1])
+
+
+def _over_places(
+    case: Case,
+    plan: Plan,
+    places: np.ndarray,
+    live: Callable[[int], np.ndarray],
+    resume: SeriesCheckpoint | None,
+    told: Sequence[solver.Increment],
+) -> Steps:
+    """Limit states for each place of a moving load at the end of the settlements; then the mechanism of the lowest."""
+    standing, programs = plan.loads, 0
+    pose = None if resume is None else resume.pose
+    steps = _settled(case, plan.assembly, plan.interfaces, standing)
+    while resume is None:
+        try:
+            increment = next(steps)
+        except StopIteration as stop:
+            if stop.value.stop is not solver.Status.LIMIT_REACHED:
+                return _not_reached(stop.value, "it carries no live load")
+            break
+        programs += increment.programs
+        pose = increment.pose
+        if increment.status == solver.Status.FALLING:
+            yield increment
+    chosen, shown, least = 0, None, np.inf
     for number, x in enumerate(places):
-        loads = replace(standing, live=standing.live + live(number))
-        state = replace(_limit_state(case, plan, loads, pose, None, programs), settlement=float(x))
-        programs = 0
+        if number < len(told):
+            state = told[number]
+        elif plan.limits and plan.limits[-1].status is solver.LimitStatus.NO_EQUILIBRIUM:
+            # Nor is there one with the load elsewhere.
+            break
+        else:
+            loads = replace(standing, live=standing.live + live(number))
+            state = replace(_limit_state(case, plan, loads, pose, None, programs), settlement=float(x))
+            programs = 0
         multiplier = float(np.nan_to_num(state.load_multiplier, nan=-np.inf, posinf=np.inf))
         if shown is None or multiplier < least:
             chosen, shown, least = number, state, multiplier
-        yield state
-        if plan.limits[-1].status is solver.LimitStatus.NO_EQUILIBRIUM:
-            break
-    if len(places):
-        plan.loads = replace(standing, live=standing.live + live(chosen))
-    else:
-        chosen = len(plan.limits) - 1
+        if number >= len(told):
+            yield replace(state, checkpoint=_checkpoint(plan, pose=pose))
+    plan.loads = replace(standing, live=standing.live + live(chosen))
     assert shown is not None
-    yield from _swinging(assembly, shown)
+    yield from _swinging(plan.assembly, shown)
     return _limit_ending(plan.limits[chosen])
+
+
+def _checkpoint(
+    plan: Plan, *, settlement: solver.Checkpoint | None = None, pose: solver.Pose | None = None
+) -> SeriesCheckpoint:
+    return SeriesCheckpoint(tuple(map(LimitNumbers.of, plan.limits)), settlement, pose)
 
 
 def _wanted(case: Case, increment: solver.Increment) -> bool:
@@ -337,4 +452,5 @@ def _swinging(assembly: solver.Assembly, state: solver.Increment) -> Iterator[so
             status=solver.Status.FALLING,
             programs=0,
             seconds=0.0,
+            checkpoint=None,
         )

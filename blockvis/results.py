@@ -11,7 +11,7 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -58,6 +58,9 @@ _PICTURES = (
     *("report.html", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
     *(f"collapse{suffix}" for suffix in (".mp4", ".gif", ".webp")),
 )
+
+
+C = TypeVar("C")
 
 
 class ResultsExist(ValueError):
@@ -144,10 +147,16 @@ class ResultsFolder:
         self._start_table()
 
     @classmethod
-    def reopened(
-        cls, path: str | Path, parameter: str = "settlement"
-    ) -> tuple[ResultsFolder, solver.Checkpoint | None]:
+    def reopened(cls, path: str | Path, parameter: str, kind: type[C]) -> tuple[ResultsFolder, C | None]:
         """The folder of a run that was stopped, as it was after its last checkpoint, and that checkpoint.
+
+        Parameters
+        ----------
+        path : str or Path
+        parameter : str
+            As of the folder.
+        kind : type
+            Of the checkpoint.
 
         Raises
         ------
@@ -164,7 +173,7 @@ class ResultsFolder:
         stored = results.path / CHECKPOINT
         if stored.is_file():
             try:
-                checkpoint, extra = unpacked(stored.read_bytes(), solver.Checkpoint)
+                checkpoint, extra = unpacked(stored.read_bytes(), kind)
                 count = int(extra["increments"])
                 results.increments = [results._files.opened(k) for k in range(count)]
             except (ValueError, KeyError, OSError) as error:

@@ -12,7 +12,7 @@ import numpy as np
 
 import solver
 
-from .analyses import Plan, parameter_of, planned
+from .analyses import Plan, checkpoint_kind, parameter_of, planned
 from .case import Case, case_assembly, parse_case, read_case
 from .progress import Progress
 from .record import read_record, record_of
@@ -103,7 +103,8 @@ def resume_run(folder: str | Path) -> Run:
 
     Notes
     -----
-    A settlement goes on from its last equilibrium; what has no checkpoint starts again. Files of the case that have
+    A settlement and a pushover go on from their last equilibrium, limit loads behind the last that was found; a
+    settlement that comes before them and had not ended starts again. Files of the case that have
     changed are named in a warning, and not read again. Of a run that has finished, what is not drawn yet is drawn.
     """
     folder = Path(folder)
@@ -120,8 +121,8 @@ def resume_run(folder: str | Path) -> Run:
         return Run(response, folder, finished, missing, had_finished=True)
     for note in record.changes():
         warnings.warn(note, stacklevel=2)
-    results, checkpoint = ResultsFolder.reopened(folder, parameter_of(case))
-    return _followed(case, results, planned(case, results.assembly, checkpoint))
+    results, checkpoint = ResultsFolder.reopened(folder, parameter_of(case), checkpoint_kind(case))
+    return _followed(case, results, planned(case, results.assembly, checkpoint, tuple(results.increments)))
 
 
 def _finished(folder: Path) -> dict[str, Any] | None:

@@ -14,7 +14,7 @@ This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 
 from .analysis import Controls, Ending, check_settlement, settle, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly
-from .checkpoint import Checkpoint
+from .checkpoint import Checkpoint, PushoverCheckpoint
 from .contact import Contacts, InterfaceLaw, Interfaces, JointScatter, find_contacts, measure_contacts
 from .equilibrium import block_forces
 from .kinematics import Pose, moved_vertices
@@ -52,6 +52,7 @@ __all__ = [
     "Loads",
     "Mechanism",
     "Pose",
+    "PushoverCheckpoint",
     "Response",
     "Settlement",
     "SolveError",

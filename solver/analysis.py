@@ -188,7 +188,7 @@ def settlement_increments(
     controls = controls or Controls()
     check_settlement(assembly, phases, controls)
     interfaces.refuse_strength("a settlement")
-    if resume is not None and (resume.phase >= len(phases) or len(resume.here.pose.rotations) != assembly.n_blocks):
+    if resume is not None and (resume.phase > len(phases) or len(resume.here.pose.rotations) != assembly.n_blocks):
         raise ValueError(
             f"the checkpoint is of phase {resume.phase + 1} with {len(resume.here.pose.rotations)} blocks; there are "
             f"{len(phases)} phases and {assembly.n_blocks} blocks: it belongs to another run"
@@ -228,6 +228,7 @@ def _increments(
     except (Locked, SolveError, NotConverged) as error:
         return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
     first = 0 if resume is None else resume.phase
+    ending = _reached(phases[-1])
     for number, phase in enumerate(phases[first:], start=first):
         path = _Path(model, phase, number, pose, controls, resume if number == first else None)
         try:
@@ -239,6 +240,10 @@ def _increments(
             return ending
         pose = path.here.pose
     return ending
+
+
+def _reached(phase: Settlement) -> Ending:
+    return Ending(Status.LIMIT_REACHED, f"the settlement reached its limit of {phase.limit:g} {phase.unit}")
 
 
 class _Path:
@@ -269,7 +274,7 @@ class _Path:
         self.fallen, self.snaps = np.zeros(model.assembly.n_blocks), 0
         self.notes: tuple[str, ...] = ()
         if resume is not None:
-            self.here, self.left, self.step = resume.here, list(resume.left), resume.step
+            self.here, self.left, self.step = resume.here, list(resume.left), min(resume.step, phase.increment)
             self.first_without, self.told = resume.first_without, resume.told
             self.snaps, self.notes = resume.snaps, resume.notes
             self.fallen = self.fallen if resume.fallen is None else resume.fallen
@@ -287,6 +292,10 @@ class _Path:
             snaps=self.snaps,
             notes=self.notes,
         )
+
+    def _next_phase(self) -> Checkpoint:
+        pose = self.here.pose
+        return Checkpoint(self.number + 1, pose, Place(0.0, pose), (), np.inf, np.inf, -np.inf)
 
     def follow(self) -> Generator[Increment, None, Ending]:
         """Yields the increments of the phase, each when it is left behind; returns how the phase ended."""
@@ -312,7 +321,7 @@ class _Path:
                     if here.s > self.told and not predictor.falling:
                         last = self._left(predictor, step)
                         self.told = here.s
-                        yield self._noted(last)
+                        yield replace(self._noted(last), checkpoint=self._next_phase())
                     break
                 if predictor.falling:
                     if step <= self.tolerance:
@@ -376,7 +385,7 @@ class _Path:
             if found is not None:
                 yield replace(found, checkpoint=self._checkpoint())
         yield from self._tell_last()
-        return Ending(Status.LIMIT_REACHED, f"the settlement reached its limit of {phase.limit:g} {phase.unit}")
+        return _reached(phase)
 
     def _shortened(self, step: float) -> float:
         """The step, not past the limit, and half-way to where equilibrium is known to be lost."""

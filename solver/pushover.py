@@ -9,6 +9,7 @@ import numpy as np
 
 from .analysis import Controls, Ending, drained, timed
 from .assembly import Assembly, check_blocks
+from .checkpoint import PushoverCheckpoint, PushoverPlace
 from .contact import InterfaceLaw, Interfaces
 from .correction import GEOMETRY_TOLERANCE, Falls, NotConverged, at_rest, corrected, solve_again
 from .kinematics import Pose, moved, rotation_matrices
@@ -204,16 +205,31 @@ def pushover_increments(
     interfaces: Interfaces,
     controls: Controls | None = None,
     pose: Pose | None = None,
+    resume: PushoverCheckpoint | None = None,
 ) -> Generator[Increment, None, Ending]:
-    """The increment loop of :func:`pushover` as a generator: yields each Increment, returns the Ending."""
+    """The increment loop of :func:`pushover` as a generator: yields each Increment, returns the Ending.
+
+    Parameters are those of :func:`pushover`.
+
+    Parameters
+    ----------
+    resume : PushoverCheckpoint, optional
+        Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
+        for bit as if the loop had not been interrupted. ``pose`` is not looked at then.
+    """
     controls = controls or Controls()
     check_blocks(assembly, controls.overlap_tolerance)
     interfaces.refuse_strength("a pushover")
     loads = checked_live(assembly, loads)
     if not assembly.free[assembly.index(control.block)]:
         raise ValueError(f"control block '{control.block}' is a support; name a free block")
+    if resume is not None and len(resume.here.pose.rotations) != assembly.n_blocks:
+        raise ValueError(
+            f"the checkpoint has {len(resume.here.pose.rotations)} blocks, the assembly {assembly.n_blocks}: it "
+            "belongs to another run"
+        )
     model = _model(assembly, control, interfaces, loads, controls)
-    return (yield from timed(_increments(model, control, controls, pose)))
+    return (yield from timed(_increments(model, control, controls, pose, resume)))
 
 
 def _model(
@@ -229,8 +245,14 @@ def _model(
 
 
 def _increments(
-    model: Model, control: ControlDisplacement, controls: Controls, start: Pose | None
+    model: Model,
+    control: ControlDisplacement,
+    controls: Controls,
+    start: Pose | None,
+    resume: PushoverCheckpoint | None,
 ) -> Generator[Increment, None, Ending]:
+    if resume is not None:
+        return (yield from _Path(model, control, controls, resume.start, resume).follow())
     still = replace(model, live=None)
     try:
         # Gaps and overlaps within the accuracy of the drawing are closed; a pose that is given stays as it is, since
@@ -244,18 +266,6 @@ def _increments(
     return (yield from _Path(model, control, controls, pose).follow())
 
 
-@dataclass(frozen=True)
-class _Place:
-    """An equilibrium on the path, how it was reached, and the multiplier there once it has been read."""
-
-    d: float
-    pose: Pose
-    step: float = 0.0
-    velocity: np.ndarray | None = None
-    multiplier: float = np.nan
-    proved: bool = False
-
-
 class _Lost(Exception):
     """The control displacement does not grow with the mechanism."""
 
@@ -263,23 +273,38 @@ class _Lost(Exception):
 class _Path:
     """The equilibrium path. A place is told when it is left, and left only if it was reached finely enough."""
 
-    def __init__(self, model: Model, control: ControlDisplacement, controls: Controls, start: Pose) -> None:
+    def __init__(
+        self,
+        model: Model,
+        control: ControlDisplacement,
+        controls: Controls,
+        start: Pose,
+        resume: PushoverCheckpoint | None = None,
+    ) -> None:
         assert control.tolerance is not None
         self.model, self.control, self.controls, self.start = model, control, controls, start
         self.offset = control.displacement(model.assembly, start)
-        self.here = _Place(0.0, start)
-        self.before: _Place | None = None
+        self.here = PushoverPlace(0.0, start)
+        self.before: PushoverPlace | None = None
         self.first_without = np.inf
         self.told = -np.inf
         self.silent = 0
         self.finest = control.increment / max(controls.event_refinement, 1)
         self.tolerance = float(control.tolerance)
         self.work = 0.0
+        self.step = control.increment
+        #: Told already: the program that is solved there again is not counted again.
+        self.resumed = resume is not None
+        if resume is not None:
+            self.here, self.before, self.step = resume.here, resume.before, resume.step
+            self.first_without, self.work, self.told = resume.first_without, resume.work, resume.here.d
 
     def follow(self) -> Generator[Increment, None, Ending]:
         """Yields the increments, each when it is left behind; returns how the path ended."""
-        step = self.control.increment
+        step = self.step
         while True:
+            # What is told here has to be worked out again from this very state when it goes on from there.
+            state = PushoverCheckpoint(self.start, self.here, self.before, step, self.first_without, self.work)
             at_limit = self.here.d >= self.control.limit * (1.0 - 1e-12)
             step = self.control.increment if at_limit else self._shortened(step)
             try:
@@ -288,8 +313,12 @@ class _Path:
                 self.here = replace(self.here, multiplier=reading.multiplier)
                 verdict, fall = self._judged(predictor, reading)
                 if verdict == "leave":
+                    if self.resumed:
+                        self.model.tally.take()
+                        self.resumed = False
                     if self.here.d > self.told:
-                        yield _increment(self.model, reading, self.here.d, self._length(reading), Status.EQUILIBRIUM)
+                        left = _increment(self.model, reading, self.here.d, self._length(reading), Status.EQUILIBRIUM)
+                        yield replace(left, checkpoint=state)
                         self.told, self.silent = self.here.d, 0
                     self.silent += 1
                     if self.silent > LONGEST_RETREAT:
@@ -380,7 +409,7 @@ class _Path:
     def _go_on(self, predictor: Solved, step: float) -> None:
         pose = self._moved_on(predictor, self.here.d + step)
         self.before = self.here
-        self.here = _Place(self._displacement(pose), pose, step, predictor.motion / step)
+        self.here = PushoverPlace(self._displacement(pose), pose, step, predictor.motion / step)
 
     def _shortened(self, step: float) -> float:
         """The step, not past the limit nor to where capacity is known to be lost."""
@@ -389,7 +418,7 @@ class _Path:
             step = rest / 2.0
         return min(step, max(self.control.limit - self.here.d, self.tolerance))
 
-    def _toward_zero(self, before: _Place, here: _Place) -> float:
+    def _toward_zero(self, before: PushoverPlace, here: PushoverPlace) -> float:
         """Step from the place before to just short of where a straight line puts zero capacity, or just past it."""
         rest = here.d - before.d
         if not before.multiplier > 0.0 or here.multiplier > 0.0:
@@ -399,7 +428,7 @@ class _Path:
         ahead = expected - aside if expected > 2.0 * aside else expected + aside
         return float(np.clip(ahead, 0.01 * rest, 0.99 * rest))
 
-    def _predict(self, place: _Place, step: float) -> Solved:
+    def _predict(self, place: PushoverPlace, step: float) -> Solved:
         """The program whose motion moves the control point by one step."""
         if self.work == 0.0:
             self.work = self._first_work()
@@ -494,7 +523,9 @@ class _Path:
             solved = solve_program(self.model, self.here.pose)
             yield _increment(self.model, solved, self.here.d, 1.0, Status.EQUILIBRIUM)
 
-    def _collapse(self, last: _Place, lost: _Place, fall: Solved | None) -> Generator[Increment, None, Ending]:
+    def _collapse(
+        self, last: PushoverPlace, lost: PushoverPlace, fall: Solved | None
+    ) -> Generator[Increment, None, Ending]:
         """Tells the last equilibrium and the fall: with the live load's work held where no multiplier balances."""
         if last.d > self.told:
             reading = self._read(self._predict(last, self.tolerance))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .assembly import Assembly
-from .checkpoint import Checkpoint
 from .contact import Contacts, Interfaces
 from .kinematics import Pose
 from .loads import Loads, Settlement
@@ -110,8 +109,9 @@ class Increment:
         Time spent on this increment.
     notes : tuple of str
         What happened on the way to it that forces and poses do not tell: blocks that fell and were caught.
-    checkpoint : Checkpoint, optional
-        Where the path stands after this increment, while a loop runs; a :class:`Response` keeps none.
+    checkpoint : optional
+        Where the loop that yields the increment goes on after it: :class:`Checkpoint` of a settlement,
+        :class:`PushoverCheckpoint` of a pushover. A :class:`Response` keeps none.
     """
 
     settlement: float
@@ -130,7 +130,7 @@ class Increment:
     programs: int
     seconds: float
     notes: tuple[str, ...] = ()
-    checkpoint: Checkpoint | None = field(default=None, repr=False, compare=False)
+    checkpoint: Any = field(default=None, repr=False, compare=False)
 
     @property
     def states(self) -> np.ndarray:

@@ -46,6 +46,33 @@ animation = false
 """
 
 
+#: Analyses of an arch whose right springer spreads first, or as it spreads; each ends in a collapse.
+ARCH = """
+[geometry]
+layout = "arch"
+[material]
+friction_coefficient = 0.7
+[[settlement]]
+direction = [1.0, 0.0]
+increment = 0.02
+limit = 0.02
+[[settlement]]
+direction = [1.0, 0.0]
+increment = 0.01
+limit = 0.03
+[output]
+animation = false
+"""
+SIDEWAYS = '[[loads]]\nkind = "live"\nweight_fraction = [1.0, 0.0]\n'
+OTHERS = {
+    "pushover": SIDEWAYS + '[analysis]\nkind = "pushover"\nfalling_frames = 2\n'
+    '[control]\nblock = "voussoir 4"\nincrement = 0.03\n',
+    "limit load": SIDEWAYS + '[analysis]\nkind = "limit load"\ncapacity_at = [0.0, 0.015, 0.03]\n',
+    "load that moves": '[analysis]\nkind = "limit load"\n[[loads]]\nkind = "live"\nforce = [0.0, -1000.0]\n'
+    "positions = [-0.8, 0.8, 5]\n",
+}
+
+
 def _command(folder, *arguments, code=""):
     """The command line in a process of its own; ``code`` runs before it."""
     script = f"{code}\nimport sys; from blockvis.cli import main; sys.exit(main({[str(a) for a in arguments]!r}))"
@@ -62,6 +89,18 @@ def _killed_at(number):
         "def lethal(*names):\n"
         f"    if next(count) == {number}: os.kill(os.getpid(), signal.SIGKILL)\n"
         "    replace(*names)\n"
+        "os.replace = lethal"
+    )
+
+
+def _killed_writing(name):
+    """Code that has the process killed, by the real signal, before it puts a file of this name in its place."""
+    return (
+        "import os, signal\n"
+        "replace = os.replace\n"
+        "def lethal(partial, target):\n"
+        f"    if os.path.basename(target) == {name!r}: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "    replace(partial, target)\n"
         "os.replace = lethal"
     )
 
@@ -133,6 +172,43 @@ def test_killed_run_goes_on(whole, tmp_path, moments):
     else:
         assert main(["run", "--resume", str(out)]) == 0
     _same_result(whole / "out", out)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
+@pytest.mark.parametrize(
+    ("kind", "moment", "kept"),
+    [
+        ("pushover", "state_00002.npz", 2),
+        ("limit load", "blocks_00002.vtu", 2),
+        ("limit load", "contacts_00010.vtu", 3),
+        ("load that moves", "state_00003.npz", 3),
+        ("load that moves", "summary.json", 5),
+    ],
+)
+def test_killed_limit_loads_and_pushovers_go_on(tmp_path, monkeypatch, kind, moment, kept):
+    case = tmp_path / "case.toml"
+    case.write_text(ARCH + OTHERS[kind], encoding="utf-8")
+    monkeypatch.setattr("blockvis.run.draw_results", lambda *_, **__: ())
+    assert main(["run", str(case), "-o", str(tmp_path / "whole")]) == 0
+    process = _command(tmp_path, "run", case, "-o", tmp_path / "out", code=_killed_writing(moment))
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == -signal.SIGKILL, said
+    _readable(tmp_path / "out")
+    before = [file.stat().st_mtime_ns for file in sorted((tmp_path / "out" / "increments").glob("state_*"))][:kept]
+    assert len(before) == kept
+    found = []
+    for name in ("limit_load", "settlement_increments"):
+        function = getattr(solver, name)
+        monkeypatch.setattr(
+            solver, name, lambda *a, name=name, function=function, **k: found.append(name) or function(*a, **k)
+        )
+    assert main(["run", "--resume", str(tmp_path / "out")]) == 0
+    _same_result(tmp_path / "whole", tmp_path / "out")
+    # What had been found was neither solved nor written again.
+    after = [file.stat().st_mtime_ns for file in sorted((tmp_path / "out" / "increments").glob("state_*"))][:kept]
+    assert after == before
+    limits = {"pushover": 0, "limit load": 3 - kept, "load that moves": 5 - kept}[kind]
+    assert found == ["settlement_increments"] * (kind == "limit load") + ["limit_load"] * limits
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
@@ -238,6 +314,8 @@ def _equal(one, other):
         return len(one) == len(other) and all(map(_equal, one, other))
     if isinstance(one, np.ndarray):
         return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
+    if isinstance(one, float) and np.isnan(one):
+        return isinstance(other, float) and np.isnan(other)
     return type(one) is type(other) and one == other
 
 
@@ -274,6 +352,50 @@ def test_every_checkpoint_leads_to_the_same_end():
                 "checkpoint",
             ):
                 assert _equal(getattr(one, name), getattr(other, name)), (k, name)
+
+
+def test_every_checkpoint_of_a_pushover_leads_to_the_same_end():
+    arch = layouts.arch(voussoirs=13)
+    live = solver.weight_fraction(arch, (1.0, 0.0), np.flatnonzero(arch.free))
+    control = solver.ControlDisplacement("voussoir 4", increment=0.03, limit=0.6)
+    setting = {
+        "interfaces": solver.Interfaces(solver.InterfaceLaw(0.45)),
+        "loads": solver.Loads(solver.self_weight(arch).dead, live),
+        "controls": solver.Controls(falling_frames=2),
+    }
+    told = list(solver.pushover_increments(arch, control, **setting))
+    kept = [k for k, increment in enumerate(told) if increment.checkpoint is not None]
+    assert len(kept) > 5
+    for k in kept:
+        checkpoint, _ = unpacked(packed(told[k].checkpoint), solver.PushoverCheckpoint)
+        assert _equal(checkpoint, told[k].checkpoint)
+        again = list(solver.pushover_increments(arch, control, resume=checkpoint, **setting))
+        assert len(again) == len(told) - k - 1
+        for one, other in zip(again, told[k + 1 :], strict=True):
+            for name in ("settlement", "load_multiplier", "pose", "forces", "velocity", "programs", "checkpoint"):
+                assert _equal(getattr(one, name), getattr(other, name)), (k, name)
+    other = layouts.arch(voussoirs=12)
+    setting["loads"] = solver.Loads(solver.self_weight(other).dead, solver.weight_fraction(other, (1.0, 0.0), [3]))
+    with pytest.raises(ValueError, match=r"has 15 blocks, the assembly 14: it belongs to another run"):
+        next(solver.pushover_increments(other, control, resume=checkpoint, **setting))
+
+
+def test_checkpoint_behind_the_last_increment_has_nothing_left_to_do():
+    arch = layouts.arch()
+    phases = [solver.Settlement(direction=(1, 0), increment=0.01, limit=limit) for limit in (0.02, 0.01)]
+    setting = {"interfaces": solver.Interfaces(), "loads": solver.self_weight(arch)}
+    told = list(solver.settlement_increments(arch, phases, **setting))
+    ends = [k for k, i in enumerate(told) if i.checkpoint.told == -np.inf]
+    assert [(told[k].phase, told[k].checkpoint.phase) for k in ends] == [(0, 1), (1, 2)]
+    assert ends[-1] == len(told) - 1
+    steps = solver.settlement_increments(arch, phases, resume=told[-1].checkpoint, **setting)
+    with pytest.raises(StopIteration) as end:
+        next(steps)
+    assert end.value.value.stop is solver.Status.LIMIT_REACHED
+    assert end.value.value.message == "the settlement reached its limit of 0.01 m"
+    first = next(solver.settlement_increments(arch, phases, resume=told[ends[0]].checkpoint, **setting))
+    assert _equal(first.pose, told[ends[0] + 1].pose)
+    assert first.programs == told[ends[0] + 1].programs
 
 
 def test_checkpoint_of_another_run_is_refused():
