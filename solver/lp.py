@@ -1,4 +1,4 @@
-"""Linear programs: stated, solved by HiGHS, and checked. The only module that imports highspy."""
+"""Linear programs: stated, solved by HiGHS or our own method, and checked. The only module that imports highspy."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import highspy
 import numpy as np
 import scipy.sparse as sp
+
+from .interior import NoProgress, interior_point
 
 __all__ = ["LPSolution", "LinearProgram", "SolveError", "Unbounded", "solve_lp"]
 
@@ -34,7 +36,7 @@ SIMPLEX_ROWS, CROSSOVER_ROWS = 250, 1500
 
 
 class SolveError(RuntimeError):
-    """No route through HiGHS gave a solution that passes its check. Not a statement about the structure."""
+    """No route gave a solution that passes its check. Not a statement about the structure."""
 
 
 class Unbounded(Exception):
@@ -84,7 +86,7 @@ class LPSolution:
     dual_violation : float
         Largest negative reduced cost.
     route : str
-        How HiGHS found it.
+        How it was found.
     iterations : int
     seconds : float
     """
@@ -118,6 +120,9 @@ INTERIOR: dict[str, object] = {
     "hipo_system": "normaleq",
 }
 
+#: Our own way, for programs whose rows form a band.
+BAND = "band"
+
 #: Ways through HiGHS: (name, options). Each is judged by our own check, so the order is a matter of speed only.
 ROUTES: dict[str, dict[str, object]] = {
     "simplex": {"solver": "simplex"},
@@ -130,7 +135,7 @@ ROUTES: dict[str, dict[str, object]] = {
 }
 
 #: The order for large programs, and for small ones that need no vertex.
-INTERIOR_ROUTES = ("hipo", "hipo without presolve", "ipx", "ipx with crossover", "simplex")
+INTERIOR_ROUTES = (BAND, "hipo", "hipo without presolve", "ipx", "ipx with crossover", "simplex")
 
 
 def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> LPSolution:
@@ -140,7 +145,7 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> L
     ----------
     program : LinearProgram
     routes : tuple of str, optional
-        Names out of ``ROUTES``, in the order to try; chosen by size by default.
+        ``BAND`` or names out of ``ROUTES``, in the order to try; chosen by size by default.
 
     Raises
     ------
@@ -159,7 +164,7 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> L
             routes = INTERIOR_ROUTES
     outcomes = []
     for route in routes:
-        solution, status = _run(program, route)
+        solution, status = _in_band(program) if route == BAND else _run(program, route)
         if solution is not None and solution.accepted:
             return solution
         if solution is not None:
@@ -171,6 +176,15 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> L
         f"no solution of the linear program with {program.matrix.shape[0]} rows and {program.matrix.shape[1]} "
         f"columns passed its check ({'; '.join(outcomes)})"
     )
+
+
+def _in_band(program: LinearProgram) -> tuple[LPSolution | None, str]:
+    started = time.perf_counter()
+    try:
+        x, y, iterations = interior_point(program.cost, program.matrix, program.lower, program.upper)
+    except NoProgress as reason:
+        return None, str(reason)
+    return _checked(program, x, y, BAND, iterations, time.perf_counter() - started), "solved"
 
 
 def _run(program: LinearProgram, route: str) -> tuple[LPSolution | None, str]:

@@ -1,0 +1,154 @@
+"""The interior point method for bands: the optimum that scipy finds, at every size, or a reason why not."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+from structures import wall
+
+import solver
+from solver import lp
+from solver.interior import NoProgress, interior_point
+from solver.threads import one_thread
+
+
+def chain(seed, blocks, degenerate=False):
+    """A program like a wall's: columns that join neighbours, slack of either sign in every row, a small tolerance."""
+    random = np.random.default_rng(seed)
+    rows, columns = 3 * blocks, 12 * blocks
+    first = random.integers(0, blocks - 1, columns)
+    row = 3 * first[:, None] + np.arange(6)
+    values = random.standard_normal((columns, 6))
+    if degenerate:
+        # Contact points twice over.
+        row, values = np.vstack([row, row]), np.vstack([values, values])
+        columns *= 2
+    joints = sp.csc_array((values.ravel(), row.ravel(), np.arange(0, 6 * columns + 1, 6)), shape=(rows, columns))
+    carried = random.uniform(0.0, 1.0, columns) * (random.uniform(size=columns) < 0.3)
+    middle = joints @ carried + np.where(random.uniform(size=rows) < 0.1, 1.0, 0.0)
+    cost = random.uniform(0.0, 0.1, columns) * (random.uniform(size=columns) < 0.7)
+    matrix = sp.csc_array(sp.hstack([joints, sp.eye_array(rows), -sp.eye_array(rows)]))
+    return lp.LinearProgram(np.concatenate([cost, np.ones(2 * rows)]), matrix, middle - 1e-6, middle + 1e-6)
+
+
+def solved(program):
+    x, y, iterations = interior_point(program.cost, program.matrix, program.lower, program.upper)
+    return lp._checked(program, x, y, lp.BAND, iterations, 0.0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.integers(2, 40), st.booleans())
+def test_finds_the_optimum_that_scipy_finds(seed, blocks, degenerate):
+    program = chain(seed, blocks, degenerate)
+    found = solved(program)
+    assert found.accepted
+    both = sp.vstack([program.matrix, -program.matrix])
+    known = linprog(program.cost, A_ub=both, b_ub=np.concatenate([program.upper, -program.lower]), method="highs-ds")
+    assert found.objective == pytest.approx(known.fun, abs=2e-7 * (1 + abs(known.fun)))
+
+
+def programs_of(monkeypatch, assembly, **settlement):
+    """The programs of a run, with the solutions it went on with."""
+    kept, solve_lp = [], solver.program.solve_lp
+
+    def keeping(program, routes=None):
+        kept.append((program, solve_lp(program, routes)))
+        return kept[-1][1]
+
+    monkeypatch.setattr(solver.program, "solve_lp", keeping)
+    solver.settle(assembly, solver.Settlement(**settlement), friction_coefficient=0.6)
+    return kept
+
+
+def test_walls_take_it_and_it_agrees_with_highs(monkeypatch):
+    """Every program of a wall of 520 bricks, those over its macro-blocks included, is solved in half the iterations."""
+    kept = programs_of(monkeypatch, wall(30, 17), direction=(0.0, -1.0), increment=2e-3, limit=4e-3)
+    assert len(kept) > 4
+    assert {solution.route for _, solution in kept} == {lp.BAND}
+    assert min(program.matrix.shape[0] for program, _ in kept) < 1000
+    for program, solution in kept[1:]:
+        known = lp.solve_lp(program, ("hipo",))
+        assert solution.objective == pytest.approx(known.objective, abs=1e-7 * (1 + abs(known.objective)))
+        assert solution.iterations < 0.8 * known.iterations
+
+
+def refusal(**change):
+    program = chain(1, 10)
+    given = {name: getattr(program, name) for name in ("cost", "matrix", "lower", "upper")}
+    with pytest.raises(NoProgress) as refused:
+        interior_point(**given | {name: new(program) for name, new in change.items()})
+    return str(refused.value)
+
+
+def test_refuses_what_it_was_not_made_for():
+    assert "equation" in refusal(upper=lambda program: program.lower)
+    assert "bound" in refusal(lower=lambda program: np.full(30, -np.inf))
+    assert "slack" in refusal(matrix=lambda program: program.matrix[:, :-1], cost=lambda program: program.cost[:-1])
+
+
+def test_refuses_a_load_on_every_block_before_it_fills_the_memory():
+    """A column with an entry in each of 30,000 rows would make 900 million entries of the normal equations."""
+    rows = 30_000
+    unit = sp.eye_array(rows)
+    matrix = sp.csc_array(sp.hstack([sp.csc_array(np.ones((rows, 1))), unit, -unit]))
+    with pytest.raises(NoProgress, match="30000 rows in a band 30000 wide"):
+        interior_point(np.ones(2 * rows + 1), matrix, np.zeros(rows), np.ones(rows))
+
+
+def test_an_objective_that_falls_without_limit_is_left_to_highs():
+    """Two columns against each other that cost less than nothing: no solution, a reason, and in time."""
+    program = chain(2, 10)
+    ray = sp.csc_array(([1.0, -1.0], [0, 0], [0, 1, 2]), shape=(30, 2))
+    program = lp.LinearProgram(
+        np.concatenate([[-1.0, -1.0], program.cost]),
+        sp.csc_array(sp.hstack([ray, program.matrix])),
+        program.lower,
+        program.upper,
+    )
+    with pytest.raises(NoProgress):
+        interior_point(program.cost, program.matrix, program.lower, program.upper)
+    with pytest.raises(lp.Unbounded):
+        lp.solve_lp(program, lp.INTERIOR_ROUTES)
+
+
+WHILE_LIMITED = """
+import hashlib, sys
+from solver.threads import _libraries, one_thread
+before = [get() for get, _ in _libraries()]
+with one_thread():
+    during = [get() for get, _ in _libraries()]
+try:
+    with one_thread():
+        raise KeyError
+except KeyError:
+    pass
+after = [get() for get, _ in _libraries()]
+print(before == after, during)
+"""
+
+
+def test_threads_are_limited_and_given_back():
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("NUM_THREADS")}
+    told = subprocess.run(
+        [sys.executable, "-c", WHILE_LIMITED],
+        env=environment | {"OPENBLAS_NUM_THREADS": "2"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert told.stdout.split() == ["True", "[1,", "1]"]
+
+
+def test_same_bits_with_any_number_of_threads():
+    program = chain(5, 200)
+    first = solved(program)
+    with one_thread():
+        second = solved(program)
+    assert first.x.tobytes() == second.x.tobytes()
+    assert first.row_dual.tobytes() == second.row_dual.tobytes()
