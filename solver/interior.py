@@ -164,9 +164,10 @@ class _Method:
         )
 
     def optimal(self, residuals: tuple[np.ndarray, np.ndarray, np.ndarray]) -> bool:
-        primal, dual = self.point.primal, self.point.dual
+        primal = self.point.primal
         objective = float(self.cost @ primal[self.x])
-        bound = float(dual[self.below] @ self.lower - dual[self.above] @ self.upper)
+        row_dual = self.point.row_dual
+        bound = float(np.maximum(row_dual, 0.0) @ self.lower + np.minimum(row_dual, 0.0) @ self.upper)
         gap = abs(objective - bound) / (1.0 + abs(objective))
         return max(gap, *(float(np.abs(part).max(initial=0.0)) for part in residuals)) < TOLERANCE
 
@@ -195,7 +196,8 @@ class _Method:
             if longer[0] < lengths[0] + WORTHWHILE and longer[1] < lengths[1] + WORTHWHILE:
                 break
             step, lengths = corrected, longer
-        by_primal, by_dual = (length if length == 1.0 else TO_BOUNDARY * length for length in lengths)
+        by_primal = TO_BOUNDARY * _longest(primal, step.primal, 1.0 / TO_BOUNDARY)
+        by_dual = TO_BOUNDARY * _longest(dual, step.dual, 1.0 / TO_BOUNDARY)
         self.point = _Point(
             primal + by_primal * step.primal, dual + by_dual * step.dual, self.point.row_dual + by_dual * step.row_dual
         )
@@ -246,10 +248,10 @@ class _Method:
         return corrected, (by_primal[p], by_dual[d])
 
 
-def _longest(values: np.ndarray, change: np.ndarray) -> float:
-    """Largest part of a change, up to the whole, that leaves positive values so."""
+def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float:
+    """Largest multiple of a change, up to ``most``, that leaves no positive value negative."""
     fastest = float((change / values).min())
-    return min(1.0, -1.0 / fastest) if fastest < 0.0 else 1.0
+    return min(most, -1.0 / fastest) if fastest < 0.0 else most
 
 
 def interior_point(
