@@ -43,8 +43,8 @@ FILMS = (".mp4", ".gif", ".webp")
 #: More increments or frames than this are a slip of the pen.
 MOST_STEPS = 1_000_000
 
-#: A block lighter than this part of the whole is not held in balance: twice what an equilibrium leaves open.
-LIGHTEST = 2e-9
+#: A block lighter than this part of the whole may drown in what rounding leaves of the forces on the others.
+LIGHTEST = 1e-14
 
 #: Blocks that are all smaller than this [m] are a drawing in another unit.
 SMALLEST_BLOCKS = 2e-3
@@ -558,8 +558,8 @@ def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
     if len(light):
         shown = ", ".join(f"'{assembly.names[i]}'" for i in light[:6].tolist()) + (" ..." if len(light) > 6 else "")
         warnings.warn(
-            f"{source}: {len(light)} blocks weigh less than {LIGHTEST:g} of the whole ({shown}), which the solver does "
-            "not see: they may stay in the air; remove them or check their size and density",
+            f"{source}: {len(light)} blocks weigh less than {LIGHTEST:g} of the whole ({shown}), less than rounding "
+            "leaves: they may stay in the air; remove them or check their size and density",
             stacklevel=3,
         )
     largest = float(np.sqrt(assembly.areas[assembly.free].max(initial=0.0)))

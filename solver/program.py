@@ -50,6 +50,11 @@ ROUNDING = 1e-10
 #: blocks wedged against each other cannot give way, and drawings and corrections are off by as much.
 LEFT_WEDGED = 1e-7
 
+#: A block whose weight times size is below this part of the whole is seen badly, or not at all, among the others, whose
+#: balance may be off by BALANCE_TOLERANCE. Its rows are written in its own weight and size, and balance to the second
+#: number; where it carries more, to ROUNDED_OFF of what it carries, which is what is left of double precision.
+LIGHTEST, LIGHT_BALANCE, ROUNDED_OFF = 2e-8, 1e-3, 1e-5
+
 
 class Locked(Exception):
     """Blocks of infinite strength are wedged between the supports: forces grow without limit."""
@@ -267,10 +272,19 @@ def solve_program(
         forces = (rays @ ray.x[: 2 * len(contacts)]).reshape(-1, 2)
         squeezed = np.unique(contacts.block_a[forces[:, 0] > 1e-6 * forces[:, 0].max(initial=0.0)])
         raise Locked(tuple(assembly.names[i] for i in squeezed)) from None
-    motion = support_motion.copy()
-    motion[assembly.free] = -solution.row_dual.reshape(-1, 3) * model.lengths
+    falls = np.full(rows, FALLING_FRACTION * model.total_load)
+    light = _light_blocks(model)
+    if light.any():
+        solution, falls = _with_light_blocks(
+            model, replace(program, cost=np.concatenate(cost)), solution, light, balance, falls
+        )
     multipliers = solution.x[: 2 * len(contacts)]
-    unbalanced = solution.x[2 * len(contacts) : 2 * (len(contacts) + rows)]
+    unbalanced = solution.x[2 * len(contacts) : 2 * (len(contacts) + rows)].reshape(2, -1)
+    # What is out of balance moves by the whole trust region; of the lightest blocks the duals no longer say so.
+    fall = (unbalanced > falls) & np.repeat(light, 3)
+    dual = np.where(fall.any(axis=0), (fall[0] * 1.0 - fall[1]) * model.trust / model.length, solution.row_dual)
+    motion = support_motion.copy()
+    motion[assembly.free] = -dual.reshape(-1, 3) * model.lengths
     level = float(solution.x[-2] - solution.x[-1]) if live_size > 0.0 else 0.0
     scaled_forces = rays @ multipliers
     resultant = (matrix @ scaled_forces).reshape(-1, 3)
@@ -294,7 +308,7 @@ def solve_program(
         slip=relative[1::2] * model.length,
         sliding=sliding,
         sticking=(forces[:, 0] > 0.0) & ~(used_up & (sliding > 0.0)),
-        falling=float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * model.total_load,
+        falling=bool((unbalanced > falls).any()),
         certificate=certificate,
         support_forces=on_supports * model.force * np.array([1.0, 1.0, model.length]),
         multiplier=level / live_size if live_size > 0.0 else 0.0,
@@ -395,6 +409,71 @@ def matched_contacts(assembly: Assembly, contacts: Contacts, before: Contacts) -
     order = np.argsort(known, kind="stable")
     place = order[np.minimum(np.searchsorted(known[order], keys), len(known) - 1)]
     return place, known[place] == keys
+
+
+def _light_blocks(model: Model) -> np.ndarray:
+    """(n_free,) bool array: the free blocks that are too light to be seen among the others."""
+    weight, size = _weights_and_sizes(model)
+    return (weight > 0.0) & (weight * size < LIGHTEST * model.total_load)
+
+
+def _weights_and_sizes(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """(n_free,) arrays in units of the program: load of each free block, and its size, at most 1."""
+    free = model.assembly.free
+    weight = np.abs(model.scaled_load[free, :2]).max(axis=1, initial=0.0)
+    return weight, np.minimum(np.sqrt(model.assembly.areas[free]) / model.length, 1.0)
+
+
+def _with_light_blocks(
+    model: Model,
+    program: LinearProgram,
+    solution: LPSolution,
+    light: np.ndarray,
+    balance: sp.csc_array,
+    falls: np.ndarray,
+) -> tuple[LPSolution, np.ndarray]:
+    """The solution in which light blocks are in balance, too, or fall; and from which unbalanced force on, per row.
+
+    Parameters
+    ----------
+    model : Model
+    program : LinearProgram
+    solution : LPSolution
+        As far as the others are concerned.
+    light : (n_free,) bool array
+    balance : (rows, n) sparse array
+        The columns of the contact points.
+    falls : (rows,) array
+        Unbalanced force that counts as falling where all blocks weigh enough.
+
+    Notes
+    -----
+    Rows of light blocks are divided by their weight, rows of moments by weight times size, and their unbalanced forces
+    are counted in it. In double precision a block that carries far more than its weight cannot be in balance to a part
+    of that weight; then what it carries is the unit. Where even that has no solution, the given one stands.
+    """
+    rows, n = balance.shape
+    weight, size = _weights_and_sizes(model)
+    carried = (abs(balance) @ solution.x[:n]).reshape(-1, 3).max(axis=1)
+    unit = np.where(light, np.minimum(np.maximum(weight, ROUNDED_OFF * carried), 1.0), 1.0)
+    own = np.repeat(unit, 3)
+    own[2::3] *= np.where(light, size, 1.0)
+    factor = np.ones(program.matrix.shape[1])
+    factor[n : n + 2 * rows] = np.tile(own, 2)
+    middle, half = (program.lower + program.upper) / 2.0, (program.upper - program.lower) / 2.0
+    half = np.where(np.repeat(light, 3), np.minimum(half, LIGHT_BALANCE * own), half)
+    scaled = LinearProgram(
+        cost=program.cost * factor,
+        matrix=sp.csc_array(sp.diags_array(1.0 / own) @ program.matrix @ sp.diags_array(factor)),
+        lower=(middle - half) / own,
+        upper=(middle + half) / own,
+    )
+    try:
+        found = solve_lp(scaled)
+    except (Unbounded, SolveError):
+        return solution, falls
+    falls = np.where(np.repeat(light, 3), np.minimum(falls, 5.0 * half), falls)
+    return replace(found, x=found.x * factor, row_dual=found.row_dual / own), falls
 
 
 def _distances(model: Model, contacts: Contacts, drift: np.ndarray | None, left: float) -> np.ndarray:

@@ -98,7 +98,7 @@ def test_blocks_of_a_millimetre_and_of_a_hundred_metres_in_one_stack():
 
 @pytest.mark.parametrize(
     ("scale", "density", "words"),
-    [(1.0, 1e-8, "'crumb'"), (1e-3, 1.0, r"under \[geometry\] unit")],
+    [(1.0, 1e-13, "'crumb'"), (1e-3, 1.0, r"under \[geometry\] unit")],
 )
 def test_numbers_beyond_what_is_solved_are_named(tmp_path, scale, density, words):
     blocks = [
@@ -112,6 +112,32 @@ def test_numbers_beyond_what_is_solved_are_named(tmp_path, scale, density, words
     (tmp_path / "case.toml").write_text('[geometry]\nfile = "a.json"\n[settlement]\ndirection = [0, -1]\n')
     with pytest.warns(UserWarning, match=words):
         case_assembly(read_case(tmp_path / "case.toml"))
+
+
+CRUMB = np.array([[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]])
+
+
+@pytest.mark.parametrize("share", [1e-6, 1e-8, 1e-10, 1e-12, 1e-14])
+@pytest.mark.parametrize(
+    ("place", "stands"), [((0.2, 1.1), True), ((0.96, 1.1), False), ((1.5, 2.0), False), (None, True)]
+)
+def test_a_crumb_stands_or_falls_whatever_its_share_of_the_weight(share, place, stands):
+    """On a block, over its edge by more than half its width, in the air; two more carry the block, of its weight."""
+    block, ground = [[0, 0.1], [1, 0.1], [1, 1.1], [0, 1.1]], [[0, -1], [1, -1], [1, 0], [0, 0]]
+    crumbs = [CRUMB, CRUMB + np.array([0.9, 0.0])] + ([] if place is None else [CRUMB + place])
+    assembly = solver.Assembly.from_outlines(
+        [block, ground, *crumbs],
+        roles=["free", "moving"] + ["free"] * len(crumbs),
+        density=[2000.0, 2000.0] + [2000.0 * share * 100] * len(crumbs),
+    )
+    sink = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.02)
+    response = solver.settle(assembly, sink, friction_coefficient=0.6, controls=solver.Controls(falling_frames=1))
+    if stands:
+        assert response.stop is solver.Status.LIMIT_REACHED
+        np.testing.assert_allclose(response.path[-1].pose.displacements(assembly)[2:, 1], -0.02, atol=1e-9)
+    else:
+        assert response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM
+        assert "1 of 4 blocks fall ('block 4')" in response.message
 
 
 def test_weights_far_apart_leave_the_collapse_alone(ordinary):
