@@ -16,6 +16,7 @@ import solver
 
 from .series import POSITION, governing, parameter_word, path_values
 from .stored_increments import StoredLimit
+from .whole_files import write_whole
 
 __all__ = [
     "CAPACITY_TABLES",
@@ -54,7 +55,7 @@ def write_capacity(response: solver.Response, folder: Path) -> None:
     name = CAPACITY_TABLES[0] if word == POSITION else CAPACITY_TABLES[1]
     if word == POSITION and len(response.limits) < 2:
         return
-    (folder / name).write_text(rows.getvalue(), encoding="utf-8")
+    write_whole(folder / name, rows.getvalue())
 
 
 def capacity_summary(response: solver.Response) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from .series import (
     reads_multipliers,
     value_label,
 )
+from .whole_files import whole_file
 
 __all__ = ["CurvePanel", "Event", "draw_curve", "events_of"]
 
@@ -81,13 +82,11 @@ def draw_curve(
     path = Path(path)
     if path.suffix.lower() not in CURVE_SUFFIXES:
         raise ValueError(f"'{path.name}' is no curve that blockvis draws; end its name in {', '.join(CURVE_SUFFIXES)}")
-    path.parent.mkdir(parents=True, exist_ok=True)
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.add_subplot()
     _draw(axes, response, events=True)
-    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
-    figure.savefig(partial, dpi=200)
-    os.replace(partial, path)
+    with whole_file(path) as partial:
+        figure.savefig(partial, dpi=200)
     return path
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from PIL import Image
 
+from .whole_files import whole_file
+
 __all__ = ["FILM_SUFFIXES", "write_film"]
 
 FILM_SUFFIXES = (".mp4", ".gif", ".webp")
@@ -44,16 +46,11 @@ def write_film(
         )
     if size[0] % 2 or size[1] % 2:
         raise ValueError(f"an animation of {size[0]} × {size[1]} pixels cannot be encoded; both must be even")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.stem}.partial{suffix}")
-    try:
+    with whole_file(path) as partial:
         if suffix == ".mp4":
             _write_mp4(frames, partial, size, fps)
         else:
             _write_pillow(frames, partial, fps)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
     return path
 
 

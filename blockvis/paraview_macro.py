@@ -7,6 +7,7 @@ from pathlib import Path
 from string import Template
 
 from . import palette
+from .whole_files import write_whole
 
 __all__ = ["write_paraview_macro"]
 
@@ -120,7 +121,6 @@ def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
     pathlib.Path
     """
     path = Path(folder) / "paraview_colours.py"
-    path.parent.mkdir(parents=True, exist_ok=True)
     ramp = []
     for k, (r, g, b) in enumerate(palette.RAMP):
         ramp += [k / (len(palette.RAMP) - 1), r / 255.0, g / 255.0, b / 255.0]
@@ -133,10 +133,7 @@ def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
         hinge=_fractions(palette.HINGE),
         force=_fractions(palette.FORCE),
     )
-    partial = path.with_name(f".{path.name}.partial")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
-    return path
+    return write_whole(path, text)
 
 
 def _fractions(colour: tuple[int, int, int]) -> str:

@@ -16,6 +16,7 @@ from .opengl import RenderingUnavailable, rendering_available
 from .scene import framed
 from .series import governing
 from .studio import MOST_PARTS, Look, Studio
+from .whole_files import whole_file
 
 __all__ = ["Look", "RenderingUnavailable", "animate", "draw_mechanism", "draw_still", "rendering_available"]
 
@@ -192,9 +193,6 @@ def _check_response(response: solver.Response) -> None:
 
 
 def _save(picture: Image.Image, path: str | os.PathLike[str]) -> Path:
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
-    picture.save(partial)
-    os.replace(partial, path)
-    return path
+    with whole_file(path) as partial:
+        picture.save(partial)
+    return Path(path)

@@ -37,6 +37,7 @@ from .series import (
     value_label,
 )
 from .sheet import force_text
+from .whole_files import write_whole
 
 __all__ = ["report_html", "write_report"]
 
@@ -72,12 +73,7 @@ def write_report(
     -------
     pathlib.Path
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.partial")
-    partial.write_text(report_html(response, case_text, title=title), encoding="utf-8")
-    os.replace(partial, path)
-    return path
+    return write_whole(path, report_html(response, case_text, title=title))
 
 
 def report_html(response: solver.Response, case_text: str = "", *, title: str = "") -> str:

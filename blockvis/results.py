@@ -23,6 +23,7 @@ from .record import RECORD, Record, read_record, versions
 from .series import POSITION, parameter_word
 from .stored_increments import StoredIncrement, StoredIncrements, packed_increment
 from .stored_values import checked_arrays, packed, unpacked
+from .whole_files import PARTIAL, make_folder, write_whole
 
 __all__ = ["ResultsExist", "ResultsFolder", "open_results", "refuse_results", "stored_case", "summary_of", "write"]
 
@@ -65,21 +66,6 @@ C = TypeVar("C")
 
 class ResultsExist(ValueError):
     """The results folder holds a run already."""
-
-
-def _written(path: Path, content: str | bytes) -> None:
-    """Writes a whole file or nothing: a reader never sees half of it, a killed run leaves the one before."""
-    data = content.encode() if isinstance(content, str) else content
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        with open(partial, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(partial, path)
-    except OSError:
-        partial.unlink(missing_ok=True)
-        raise
 
 
 def refuse_results(path: str | Path, overwrite: bool = False) -> None:
@@ -136,14 +122,14 @@ class ResultsFolder:
         self.increments: list[StoredIncrement] = []
         self._files = StoredIncrements(self.path)
         refuse_results(self.path, overwrite)
-        (self.path / "increments").mkdir(parents=True, exist_ok=True)
+        make_folder(self.path / "increments")
         self._release = _held(self, self.path)
         # What lists others goes first, so that nothing ever points to a file that is gone.
         for name in (*_LISTS, *_PICTURES, *_STARTED):
             (self.path / name).unlink(missing_ok=True)
         self._remove_from(0)
-        _written(self.path / "assembly.npz", _packed(_assembly_arrays(assembly)))
-        _written(self.path / RECORD, self.record.text())
+        write_whole(self.path / "assembly.npz", _packed(_assembly_arrays(assembly)))
+        write_whole(self.path / RECORD, self.record.text())
         self._start_table()
 
     @classmethod
@@ -196,21 +182,21 @@ class ResultsFolder:
 
         number = len(self.increments)
         folder = self.path / "increments"
-        write_vtu(block_dataset(self.assembly, increment), folder / f"blocks_{number:05d}.vtu")
-        write_vtu(contact_dataset(self.assembly, increment), folder / f"contacts_{number:05d}.vtu")
-        _written(self._files.file(number), packed_increment(increment))
+        write_vtu(block_dataset(self.assembly, increment), folder / f"blocks_{number:05d}.vtu", last=False)
+        write_vtu(contact_dataset(self.assembly, increment), folder / f"contacts_{number:05d}.vtu", last=False)
+        write_whole(self._files.file(number), packed_increment(increment))
         self.increments.append(self._files.told(number, increment))
         self._add_row(number, increment)
         self._write_lists()
         if increment.checkpoint is not None:
-            _written(self.path / CHECKPOINT, packed(increment.checkpoint, increments=number + 1))
+            write_whole(self.path / CHECKPOINT, packed(increment.checkpoint, increments=number + 1))
 
     def finish(self, response: solver.Response, seconds: float) -> dict[str, Any]:
         """Writes and returns the summary."""
         self._write_lists()
         write_capacity(response, self.path)
         summary = summary_of(response, seconds=seconds, record=self.record)
-        _written(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
+        write_whole(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
         return summary
 
@@ -229,11 +215,11 @@ class ResultsFolder:
         from .datasets import output_times
         from .vtkxml import write_pvd
 
-        _written(self.path / "response.csv", self._rows.getvalue())
+        write_whole(self.path / "response.csv", self._rows.getvalue(), last=False)
         times = output_times(self.increments)
         for kind in ("blocks", "contacts"):
             entries = [(t, f"increments/{kind}_{i:05d}.vtu") for i, t in enumerate(times)]
-            write_pvd(self.path / f"{kind}.pvd", entries)
+            write_pvd(self.path / f"{kind}.pvd", entries, last=False)
 
     def _remove_from(self, count: int) -> None:
         """Removes the files of increments from a number on, and what was being written when a run was killed."""
@@ -242,7 +228,7 @@ class ResultsFolder:
             number = old.stem.rpartition("_")[2]
             if not old.name.startswith(".") and number.isdigit() and int(number) >= count:
                 old.unlink()
-        for half in (*self.path.glob(".*.part*"), *folder.glob(".*.part*")):
+        for half in (*self.path.glob(PARTIAL), *folder.glob(PARTIAL)):
             half.unlink()
 
 

@@ -17,6 +17,7 @@ from .case import Case, case_assembly, parse_case, read_case
 from .progress import Progress
 from .record import read_record, record_of
 from .results import ResultsFolder, open_results, refuse_results
+from .whole_files import PARTIAL
 
 __all__ = ["Run", "draw_results", "resume_run", "run_case"]
 
@@ -188,7 +189,7 @@ def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
 
 def _given_up(folder: Path, error: OSError) -> OSError:
     """Takes away half a file when the disk is full or gone in the middle of a run; what to say and do about it."""
-    for half in folder.rglob(".*.part*"):
+    for half in folder.rglob(PARTIAL):
         half.unlink(missing_ok=True)
     return OSError(
         f"could not write to '{folder}': {_reason(error)}; what is there stays as it is: make room and go on with "

@@ -10,10 +10,12 @@ from xml.sax.saxutils import quoteattr
 import pyvista as pv
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
+from .whole_files import write_whole
+
 __all__ = ["write_pvd", "write_vtu"]
 
 
-def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str]) -> Path:
+def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True) -> Path:
     """Writes a dataset as VTU, whole or not at all.
 
     Parameters
@@ -21,6 +23,8 @@ def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str]) -> Pat
     dataset : pyvista.UnstructuredGrid
     path : path
         Its folder is made where it does not exist.
+    last : bool
+        As of :func:`blockvis.whole_files.whole_file`.
 
     Returns
     -------
@@ -31,8 +35,6 @@ def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str]) -> Pat
     Inline binary with zlib and 64-bit headers: what ParaView from 5.11 on, pyvista and meshio all read. Appended
     raw data, VTK's default, fails in ParaView 5.11 above some 10 kB.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(dataset)
     # Into memory first: on a full disk VTK's writer ends the process.
@@ -42,22 +44,12 @@ def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str]) -> Pat
     writer.SetHeaderTypeToUInt64()
     if writer.Write() != 1:
         raise OSError(f"VTK could not write {path}")
-    return _written(path, writer.GetOutputString())
+    return write_whole(path, writer.GetOutputString(), last=last)
 
 
-def _written(path: Path, text: str) -> Path:
-    """Writes a text whole or not at all, under a name beside the target, so that replacing stays on one file system."""
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
-    except OSError:
-        partial.unlink(missing_ok=True)
-        raise
-    return path
-
-
-def write_pvd(path: str | os.PathLike[str], entries: Iterable[tuple[float, str | os.PathLike[str]]]) -> Path:
+def write_pvd(
+    path: str | os.PathLike[str], entries: Iterable[tuple[float, str | os.PathLike[str]]], *, last: bool = True
+) -> Path:
     """Writes the list of files of a time series, whole or not at all.
 
     Parameters
@@ -65,13 +57,13 @@ def write_pvd(path: str | os.PathLike[str], entries: Iterable[tuple[float, str |
     path : path
     entries : iterable of (time, file)
         Files as given, relative to the folder of ``path``.
+    last : bool
+        As of :func:`blockvis.whole_files.whole_file`.
 
     Returns
     -------
     pathlib.Path
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     lines = [
         '<?xml version="1.0"?>',
         '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
@@ -83,4 +75,4 @@ def write_pvd(path: str | os.PathLike[str], entries: Iterable[tuple[float, str |
         "  </Collection>",
         "</VTKFile>",
     ]
-    return _written(path, "\n".join(lines) + "\n")
+    return write_whole(path, "\n".join(lines) + "\n", last=last)

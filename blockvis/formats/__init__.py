@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from blockvis.whole_files import whole_file
+
 if TYPE_CHECKING:
     from blockvis.drawing import Drawing
 
@@ -103,8 +105,10 @@ def read(path: Path, reading: Reading) -> Drawing:
 
 
 def write(drawing: Drawing, path: Path) -> None:
-    """Writes a file through the module that its suffix names."""
-    importlib.import_module(f".{_format(path, 'write').module}", __name__).write(drawing, path)
+    """Writes a file, whole or not at all, through the module that its suffix names."""
+    module = importlib.import_module(f".{_format(path, 'write').module}", __name__)
+    with whole_file(path) as partial:
+        module.write(drawing, partial)
 
 
 def _format(path: Path, verb: str) -> Format:

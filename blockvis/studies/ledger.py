@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import solver
+from blockvis.whole_files import flush, make_folder, whole_file, write_whole
 
 from .plan import RESERVED, Study
 from .single import FAILED
@@ -86,8 +87,8 @@ class Ledger:
                 self._clear()
         elif self.folder.is_dir() and any(self.folder.iterdir()):
             raise StudyExists(f"'{self.folder}' holds something that is no study; choose another folder with -o")
-        (self.folder / "mechanisms").mkdir(parents=True, exist_ok=True)
-        _write(
+        make_folder(self.folder / "mechanisms")
+        write_whole(
             record,
             _json(
                 {
@@ -122,12 +123,15 @@ class Ledger:
                 self._add_shape(row, shape)
         lines = "".join(json.dumps(row, ensure_ascii=False) + "\n" for row, _ in finished)
         with open(self.folder / RUNS, "ab") as stream:
-            if stream.tell() and not self._whole:
+            begun = stream.tell() > 0
+            if begun and not self._whole:
                 stream.write(b"\n")
             self._whole = True
             stream.write(lines.encode())
             stream.flush()
             os.fsync(stream.fileno())
+        if not begun:
+            flush(self.folder)
         self.rows |= {row["run"]: row for row, _ in finished}
 
     def _add_shape(self, row: Mapping[str, Any], shape: bytes) -> None:
@@ -139,7 +143,7 @@ class Ledger:
             self._first[file] = row["run"]
             with np.load(_buffer(shape)) as stored:
                 arrays = {name: stored[name] for name in stored.files}
-            _write(file, _packed({**arrays, "run": np.array(row["run"])}))
+            write_whole(file, _packed({**arrays, "run": np.array(row["run"])}))
 
     def shape_file(self, mechanism_class: str) -> Path:
         """Where the picture of a class is kept."""
@@ -169,15 +173,14 @@ class Ledger:
         """Writes table.csv and table.parquet, each whole or not at all, and returns the table."""
         table = self.table()
         for name, save in (("table.csv", table.to_csv), ("table.parquet", table.to_parquet)):
-            partial = self.folder / f".{name}.part"
-            save(partial, index=False)
-            os.replace(partial, self.folder / name)
+            with whole_file(self.folder / name) as partial:
+                save(partial, index=False)
         return table
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
         """Writes summary.json."""
         finished = {"finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
-        _write(self.folder / "summary.json", _json({**summary, **finished}))
+        write_whole(self.folder / "summary.json", _json({**summary, **finished}))
 
     def _stored(self) -> dict[int, dict[str, Any]]:
         """The rows that are there; a line that some accident has broken counts as a run that was never made."""
@@ -239,13 +242,3 @@ def _read(file: Path) -> Any:
         return json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-
-
-def _write(file: Path, data: bytes) -> None:
-    """Whole or not at all, also when the machine goes down."""
-    partial = file.with_name(f".{file.name}.part")
-    with open(partial, "wb") as stream:
-        stream.write(data)
-        stream.flush()
-        os.fsync(stream.fileno())
-    os.replace(partial, file)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from blockvis import palette
+from blockvis.whole_files import whole_file
 
 from .fragility import Fragility, fragility_of
 from .ledger import NO_RESULT, Ledger
@@ -323,7 +323,6 @@ def _plain_frame(axes: Axes) -> None:
 
 def _saved(figure: Figure, path: str | Path) -> Path:
     path = Path(path)
-    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
-    figure.savefig(partial, dpi=150)
-    os.replace(partial, path)
+    with whole_file(path) as partial:
+        figure.savefig(partial, dpi=150)
     return path
