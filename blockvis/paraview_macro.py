@@ -99,7 +99,7 @@ forces.ScaleFactor = 0.1 * (high - low) / largest if largest > 0 else 1.0
 forces.GlyphMode = "All Points"
 RenameSource("contact forces", forces)
 arrows = Show(forces, view)
-ColorBy(arrows, None)
+arrows.ColorArrayName = ["POINTS", ""]
 arrows.AmbientColor = arrows.DiffuseColor = [$force]
 arrows.Ambient, arrows.Diffuse = 1.0, 0.0
 
