@@ -237,8 +237,8 @@ class _Method:
         """The step with as much of a correction as makes it longest (Colombo & Gondzio 2008)."""
         primal, dual = self.point.primal, self.point.dual
         weights = max(lengths[0] * lengths[1], 0.05) * (1.0 - WEIGHTS) + WEIGHTS
-        by_primal = [_longest(primal, step.primal + weight * correction.primal) for weight in weights]
-        by_dual = [_longest(dual, step.dual + weight * correction.dual) for weight in weights]
+        by_primal = _lengths(step.primal / primal, correction.primal / primal, weights)
+        by_dual = _lengths(step.dual / dual, correction.dual / dual, weights)
         p, d = int(np.argmax(by_primal)), int(np.argmax(by_dual))
         corrected = _Point(
             step.primal + weights[p] * correction.primal,
@@ -252,6 +252,11 @@ def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float
     """Largest multiple of a change, up to ``most``, that leaves no positive value negative."""
     fastest = float((change / values).min())
     return min(most, -1.0 / fastest) if fastest < 0.0 else most
+
+
+def _lengths(rates: np.ndarray, corrections: np.ndarray, weights: np.ndarray) -> list[float]:
+    """The longest steps, up to 1, at relative changes corrected with each of the weights."""
+    return [1.0 / max(1.0, -float((rates + weight * corrections).min())) for weight in weights]
 
 
 def interior_point(
