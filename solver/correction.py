@@ -244,8 +244,12 @@ def _closed_up(model: Model, pose: Pose, solved: Solved, deepest: float) -> tupl
     movement = _size(model, solved.motion)
     reaction = abs(float((solved.support_forces * solved.motion).sum()))
     work = WORK_LEFT * max(reaction, LEAST_REACTION * model.total_load * model.force * movement)
+    contacts = _contacts_after(model, pose, solved)
     for attempt in range(MACRO_CLOSINGS + 1):
-        contacts = _contacts_after(model, pose, solved)
+        if attempt > 0:
+            # A closing moves blocks by a gap: the points are the same, and are measured in a tenth of the time.
+            vertices = moved_vertices(model.assembly, pose)
+            contacts = measure_contacts(model.assembly, vertices, contacts.vertex, contacts.edge, contacts.corner)
         carrying, _ = _carrying_and_sticking(model.assembly, contacts, solved)
         place, _ = matched_contacts(model.assembly, contacts, solved.contacts)
         normal = np.where(carrying, solved.forces[place, 0], 0.0)
