@@ -244,29 +244,33 @@ def _closed_up(model: Model, pose: Pose, solved: Solved, deepest: float) -> tupl
     movement = _size(model, solved.motion)
     reaction = abs(float((solved.support_forces * solved.motion).sum()))
     work = WORK_LEFT * max(reaction, LEAST_REACTION * model.total_load * model.force * movement)
-    contacts = _contacts_after(model, pose, solved)
-    for attempt in range(MACRO_CLOSINGS + 1):
-        if attempt > 0:
-            # A closing moves blocks by a gap: the points are the same, and are measured in a tenth of the time.
-            vertices = moved_vertices(model.assembly, pose)
-            contacts = measure_contacts(model.assembly, vertices, contacts.vertex, contacts.edge, contacts.corner)
+    contacts, found, closings = _contacts_after(model, pose, solved), True, 0
+    while True:
         carrying, _ = _carrying_and_sticking(model.assembly, contacts, solved)
         place, _ = matched_contacts(model.assembly, contacts, solved.contacts)
         normal = np.where(carrying, solved.forces[place, 0], 0.0)
         gap, depth = float(np.abs(contacts.gaps[carrying]).max(initial=0.0)), -float(contacts.gaps.min(initial=0.0))
-        acceptable = gap <= GAP_LEFT_LARGE * movement and depth <= deepest
-        if acceptable and (normal @ np.abs(contacts.gaps) <= work or attempt == MACRO_CLOSINGS):
-            return pose, solved, True
-        if attempt == MACRO_CLOSINGS:
-            break
+        last = closings == MACRO_CLOSINGS
+        enough = (
+            gap <= GAP_LEFT_LARGE * movement and depth <= deepest and (last or normal @ np.abs(contacts.gaps) <= work)
+        )
+        if found and (enough or last):
+            return pose, solved, enough
+        if enough or last:
+            # Corners may have come to an edge that they were not in front of.
+            contacts, found = _contacts_after(model, pose, solved), True
+            continue
         drift, _ = _carried(model.assembly, contacts, solved)
         try:
             solved = closing_program(model, pose, contacts, drift, solved, bodies)
         except SolveError:
             # A macro-block would have to come apart.
-            break
+            return pose, solved, False
         pose = _moved_freely(model, pose, solved)
-    return pose, solved, False
+        # A closing moves blocks by a gap: the points are the same, and are measured in a tenth of the time.
+        vertices = moved_vertices(model.assembly, pose)
+        contacts = measure_contacts(model.assembly, vertices, contacts.vertex, contacts.edge, contacts.corner)
+        found, closings = False, closings + 1
 
 
 def _macro_blocks(model: Model, solved: Solved) -> MacroBlocks:
