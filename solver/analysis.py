@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .assembly import Assembly, check_blocks
-from .checkpoint import Checkpoint, Place
+from .checkpoint import Checkpoint, Note, Place
 from .contact import InterfaceLaw, Interfaces
 from .correction import FARTHEST_FALL, Falls, NotConverged, at_rest, corrected, solve_again
 from .kinematics import Pose, moved, moved_vertices
@@ -272,7 +272,7 @@ class _Path:
         self.probe = PROBE * model.length / _lever(model.assembly, phase, start)
         self.step = phase.increment
         self.fallen, self.snaps = np.zeros(model.assembly.n_blocks), 0
-        self.notes: tuple[str, ...] = ()
+        self.notes: tuple[Note, ...] = ()
         if resume is not None:
             self.here, self.left, self.step = resume.here, list(resume.left), min(resume.step, phase.increment)
             self.first_without, self.told = resume.first_without, resume.told
@@ -398,6 +398,7 @@ class _Path:
         """Returns to the place before; gives the step to try from there."""
         step = self.here.step
         self.here = self.left.pop()
+        self._forget_beyond()
         return step / 2.0
 
     def _prove(self) -> None:
@@ -482,40 +483,43 @@ class _Path:
         return _increment(self.model, solved, rate, step, self.here.s, self.number, Status.EQUILIBRIUM)
 
     def _note(self, s: float, words: str) -> None:
-        self.notes = (*self.notes, f"at a settlement of {s:.6g} {self.phase.unit} {words}")
+        self.notes = (*self.notes, Note(s, f"at a settlement of {s:.6g} {self.phase.unit} {words}"))
+
+    def _forget_beyond(self) -> None:
+        """Drops the notes on places that the path has gone back from."""
+        self.notes = tuple(note for note in self.notes if note.s <= self.here.s)
 
     def _noted(self, increment: Increment) -> Increment:
         """The increment with what is to be told with it."""
         notes, self.notes = self.notes, ()
-        return replace(increment, notes=notes)
+        return replace(increment, notes=tuple(note.words for note in notes))
 
     def _goes_on(self, s: float, falling: Solved) -> Generator[Increment, None, bool]:
         """Lets a light piece that falls fall, the supports at s; tells whether it was caught, and the path goes on."""
-        # What falls off for good once it tips may yet be caught where it stood last.
-        for at, pose in ((s, falling.pose), (self.here.s, self.here.pose)):
-            if self.snaps == SNAPS:
-                return False
+        # What falls off for good once it has tipped may yet be caught from where it was before: corrections may have
+        # left it standing on nothing for several places.
+        places = [*self.left, self.here]
+        tries = [(s, falling.pose, places)] + [
+            (places[k].s, places[k].pose, places[:k]) for k in range(len(places))[::-1]
+        ]
+        for at, pose, before in tries:
             snap = snapped(self.model, pose, falling.motion, self.controls.correctors, self._nudge(at))
             if snap is None:
                 continue
             fallen = self.fallen.copy()
             fallen[snap.blocks] += snap.fall
-            if fallen.max() > FARTHEST_FALL * self.model.length:
+            if self.snaps == SNAPS or fallen.max() > FARTHEST_FALL * self.model.length:
                 continue
-            if at > self.here.s and self.here.s > self.told:
+            if at > self.here.s > self.told:
                 reading = self._read(self.here.s, self.here.pose)
                 if not reading.falling:
                     self.told = self.here.s
                     yield replace(self._noted(self._increment(reading, self.probe)), checkpoint=self._checkpoint())
-            if at > self.here.s:
-                self.left = [*self.left[1 - PLACES :], self.here]
-            self.here = Place(at, snap.pose, proved=True)
+            self.here, self.left = Place(at, snap.pose, proved=True), before[-PLACES:]
+            self._forget_beyond()
             self.first_without, self.step = np.inf, self.finest
             self.fallen, self.snaps = fallen, self.snaps + 1
-            self.notes = (
-                *self.notes,
-                f"at a settlement of {at:.6g} {self.phase.unit} {snap.words(self.model.assembly)}",
-            )
+            self._note(at, snap.words(self.model.assembly))
             return True
         return False
 

@@ -35,6 +35,14 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Note:
+    """What happened at a place of the path: settlement s [m or rad], and words."""
+
+    s: float
+    words: str
+
+
+@dataclass(frozen=True)
 class Checkpoint:
     """Everything a settlement remembers between two increments: given back, it goes on bit for bit.
 
@@ -61,7 +69,7 @@ class Checkpoint:
         How far each block has fallen in snaps of this phase.
     snaps : int
         Of this phase.
-    notes : tuple of str
+    notes : tuple of Note
         For the next increment to tell.
     """
 
@@ -74,7 +82,7 @@ class Checkpoint:
     told: float
     fallen: np.ndarray | None = None
     snaps: int = 0
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
 
 @dataclass(frozen=True)

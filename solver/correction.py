@@ -29,9 +29,6 @@ STILL = 1e-5
 #: Step of a descent, and the farthest that blocks may fall in one, in block sizes.
 DESCENT_STEP, FARTHEST_FALL = 0.1, 0.5
 
-#: A descent goes one way where it leads this part of its length away.
-ONE_WAY = 0.5
-
 #: Contact points below this fraction of the largest normal force do not decide whether a geometry is exact.
 CARRYING_FRACTION = 1e-6
 
@@ -157,23 +154,15 @@ def at_rest(model: Model, pose: Pose, correctors: int, nudge: np.ndarray | None 
 def _descended(model: Model, start: Pose, deepest: float) -> Pose:
     """Follows the blocks downhill by small steps until they rest, or have moved by more than a block size.
 
-    Friction at the edge of its cone may keep a pose in a small cycle; that is rest, too. Where friction lets blocks
-    creep through an open gap, no further in a step than a part of the gap, all steps go the same way; that is none.
+    Friction at the edge of its cone may keep a pose in a small cycle; that is rest, too.
     """
     slow = replace(model, trust=model.length * DESCENT_STEP)
     solved, pose = solve_program(slow, start), start
-    way = np.zeros((model.assembly.n_blocks, 3))
-    travelled = 0.0
     for _ in range(round(2.0 / DESCENT_STEP)):
         if not solved.falling and _size(model, solved.motion) <= STILL * model.length:
             break
         pose = moved(pose, solved.motion)
-        way, travelled = way + solved.motion, travelled + _size(model, solved.motion)
         solved = solve_again(slow, pose, solved)
-    else:
-        if not solved.falling and _size(model, way) > ONE_WAY * travelled:
-            # Within what counts as rest no gap that is open can close and hold anything.
-            solved = solve_program(replace(model, trust=model.length * STILL), pose)
     if solved.falling or np.abs(pose.positions - start.positions).max() > FARTHEST_FALL * model.length:
         raise Falls(solved)
     return _without_penetration(model, pose, solved, deepest)
