@@ -130,6 +130,11 @@ class Assembly:
             materials=materials,
         )
 
+    def __repr__(self) -> str:
+        """One line: how many blocks, and what they are."""
+        kinds = ", ".join(f"{int((self.roles == role).sum())} {role}" for role in ROLES)
+        return f"<Assembly of {self.n_blocks} blocks: {kinds}>"
+
     @property
     def n_blocks(self) -> int:
         """Number of blocks, supports included."""

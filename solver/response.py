@@ -132,6 +132,13 @@ class Increment:
     notes: tuple[str, ...] = ()
     checkpoint: Any = field(default=None, repr=False, compare=False)
 
+    def __repr__(self) -> str:
+        """One line; the arrays of a wall fill screens."""
+        return (
+            f"<Increment {self.status} at {self.settlement:g}, reaction {self.reaction:.6g}, "
+            f"load multiplier {self.load_multiplier:.6g}>"
+        )
+
     @property
     def states(self) -> np.ndarray:
         """(n_contacts,) uint8 array of :class:`ContactState`.
@@ -229,6 +236,10 @@ class Response:
     collapse: Collapse | None = field(default=None)
     analysis: str = "settlement"
     limits: tuple[LimitLoad, ...] = ()
+
+    def __repr__(self) -> str:
+        """One line: what was analysed, and how it ended."""
+        return f"<Response of {self.assembly.n_blocks} blocks: {self.analysis}, {len(self.increments)} increments, {self.stop}>"
 
     @property
     def path(self) -> tuple[Increment, ...]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import shapely
+from structures import arch_response
 
 import solver
 
@@ -115,3 +116,13 @@ def test_refused(what):
     outlines, given, message = REFUSED[what]
     with pytest.raises(ValueError, match=message):
         solver.Assembly.from_outlines(outlines, **given)
+
+
+def test_results_show_themselves_in_one_line():
+    """A wall of a thousand blocks at a prompt or in a notebook: no screens of numbers."""
+    response = arch_response()
+    assert repr(response.assembly) == "<Assembly of 14 blocks: 12 free, 1 fixed, 1 moving>"
+    assert repr(response).startswith("<Response of 14 blocks: settlement, ")
+    assert repr(response).endswith("increments, collapsed>")
+    assert repr(response.path[0]).startswith("<Increment equilibrium at 0, reaction ")
+    assert max(len(repr(shown)) for shown in (response, response.assembly, response.path[0])) < 120
