@@ -239,7 +239,8 @@ class Response:
 
     def __repr__(self) -> str:
         """One line: what was analysed, and how it ended."""
-        return f"<Response of {self.assembly.n_blocks} blocks: {self.analysis}, {len(self.increments)} increments, {self.stop}>"
+        blocks, increments = self.assembly.n_blocks, len(self.increments)
+        return f"<Response of {blocks} blocks: {self.analysis}, {increments} increments, {self.stop}>"
 
     @property
     def path(self) -> tuple[Increment, ...]:
