@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import fnmatch
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -40,6 +41,10 @@ MOST_CORNERS = 2000
 
 class MissingFile(FileNotFoundError, ValueError):
     """There is no file of that name."""
+
+
+#: Halves of characters, as they come from escaped JSON and from bytes that are no text.
+_HALVES = re.compile("[\ud800-\udfff]")
 
 
 @dataclass(frozen=True)
@@ -88,6 +93,14 @@ class Drawing:
         for what in ("names", "groups", "roles", "materials"):
             if len(getattr(self, what)) != n:
                 raise ValueError(f"{n} outlines but {len(getattr(self, what))} {what}; give one per block")
+        # A file in another encoding than it says leaves halves of characters, which no other file can hold.
+        note = "characters that are none in the file's encoding are shown as \ufffd"
+        for what in ("names", "groups", "roles", "materials"):
+            words = getattr(self, what)
+            whole = tuple(_HALVES.sub("\ufffd", word) for word in words)
+            if whole != tuple(words) and note not in self.notes:
+                object.__setattr__(self, "notes", (*self.notes, note))
+            object.__setattr__(self, what, whole)
 
     @property
     def n_blocks(self) -> int:

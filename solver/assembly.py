@@ -97,6 +97,8 @@ class Assembly:
         for what, given in (("names", len(names)), ("roles", len(roles_array)), ("materials", len(materials))):
             if given != n:
                 raise ValueError(f"{n} outlines but {given} {what}; give one per block")
+        _refuse_half_characters(names, "name")
+        _refuse_half_characters(materials, "material")
         if roles is not None:
             for name, role in zip(names, roles, strict=True):
                 if role not in ROLES:
@@ -277,6 +279,17 @@ def _checked_ring(outline: ArrayLike, name: str) -> np.ndarray:
         )
     repeated = np.flatnonzero((ring == np.roll(ring, -1, axis=0)).all(axis=1))
     return np.delete(ring, repeated, axis=0) if len(ring) - len(repeated) >= 3 else ring
+
+
+def _refuse_half_characters(words: Sequence[str], what: str) -> None:
+    for i, word in enumerate(words):
+        try:
+            word.encode()
+        except UnicodeEncodeError as error:
+            raise ValueError(
+                f"block {i}: its {what} {word!r} holds half of a character at place {error.start}, which no file can "
+                "hold; give whole characters"
+            ) from None
 
 
 def _unique_names(names: list[str]) -> tuple[str, ...]:

@@ -126,3 +126,11 @@ def test_results_show_themselves_in_one_line():
     assert repr(response).endswith("increments, collapsed>")
     assert repr(response.path[0]).startswith("<Increment equilibrium at 0, reaction ")
     assert max(len(repr(shown)) for shown in (response, response.assembly, response.path[0])) < 120
+
+
+def test_halves_of_characters_are_refused():
+    square = [[0, 0], [1, 0], [1, 1], [0, 1]]
+    with pytest.raises(ValueError, match=r"block 1: its name 'a\\ud800' holds half of a character at place 1"):
+        solver.Assembly.from_outlines([square, [[x + 1, y] for x, y in square]], names=["b", "a\ud800"])
+    with pytest.raises(ValueError, match=r"block 0: its material '\\udfff' holds half of a character at place 0"):
+        solver.Assembly.from_outlines([square], materials=["\udfff"])

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import blockvis
 import solver
 from blockvis.drawing import Drawing, assemble, drawing_of, read, read_drawing, save_layout
 
@@ -129,3 +130,23 @@ def test_missing_and_empty_files(tmp_path):
     (tmp_path / "arch.xyz").write_text("x")
     with pytest.raises(ValueError, match=r"cannot read '.xyz'; use one of .*\.dxf"):
         read(tmp_path / "arch.xyz")
+
+
+def test_halves_of_characters_are_replaced_and_noted(tmp_path):
+    """A name that no file can hold ended the process in VTK."""
+    blocks = [
+        {"name": "a\ud800b", "material": "m\udfff", "outline": [[0, 0], [1, 0], [1, 1], [0, 1]]},
+        {"name": "c\u0000d \U0001f9f1", "outline": [[0, 1], [1, 1], [1, 2], [0, 2]]},
+    ]
+    path = tmp_path / "halves.json"
+    path.write_text(json.dumps({"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}))
+    drawing = read_drawing(path)
+    assert drawing.names == ("a\ufffdb", "c\u0000d \U0001f9f1")
+    assert drawing.materials == ("m\ufffd", "")
+    assert [note for note in drawing.notes if "encoding" in note] == [
+        "characters that are none in the file's encoding are shown as \ufffd"
+    ]
+    assembly = assemble(drawing, roles={"a*": "moving"})
+    spread = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.01)
+    folder = blockvis.write(solver.settle(assembly, spread), tmp_path / "out")
+    assert blockvis.open_results(folder).assembly.names == drawing.names
