@@ -10,7 +10,7 @@ import numpy as np
 import solver
 from blockvis.outlines import without_collinear
 
-from .dimensions import above_zero, whole
+from .dimensions import MOST_VOUSSOIRS, above_zero, whole
 
 __all__ = [
     "arch",
@@ -61,7 +61,7 @@ def arch(
     """
     if not 0.0 < embrace <= 180.0:
         raise ValueError(f"embrace is {embrace:g} degrees; give an angle above 0 and up to 180")
-    voussoirs = whole("voussoirs", voussoirs, 2)
+    voussoirs = whole("voussoirs", voussoirs, 2, MOST_VOUSSOIRS)
     if not 0.0 < thickness_ratio < 2.0:
         raise ValueError(f"thickness_ratio is {thickness_ratio:g}; give thickness / radius between 0 and 2")
     half = math.radians(embrace) / 2.0
@@ -145,7 +145,7 @@ def pointed_arch(
     14
     """
     span, rise, thickness = above_zero("span", span), above_zero("rise", rise), above_zero("thickness", thickness)
-    n = whole("voussoirs", voussoirs, 2)
+    n = whole("voussoirs", voussoirs, 2, MOST_VOUSSOIRS)
     if rise < span / 2.0:
         raise ValueError(
             f"rise is {rise:g} m for a span of {span:g} m; a pointed arch rises at least {span / 2.0:g} m: "
@@ -210,7 +210,7 @@ def basket_handle_arch(
     17
     """
     span, rise, thickness = above_zero("span", span), above_zero("rise", rise), above_zero("thickness", thickness)
-    n = whole("voussoirs", voussoirs, 2)
+    n = whole("voussoirs", voussoirs, 2, MOST_VOUSSOIRS)
     apart = (span - 2.0 * rise) / (math.sqrt(3.0) - 1.0)
     haunch = span / 2.0 - apart / 2.0
     if apart < 0.0 or haunch <= 0.0:
@@ -269,7 +269,7 @@ def segmental_joints(span: float, rise: float, thickness: float, voussoirs: int)
     angles : (voussoirs + 1,) array [rad]
     """
     span, rise, thickness = above_zero("span", span), above_zero("rise", rise), above_zero("thickness", thickness)
-    n = whole("voussoirs", voussoirs, 2)
+    n = whole("voussoirs", voussoirs, 2, MOST_VOUSSOIRS)
     if rise > span / 2.0 * (1.0 + 1e-12):
         raise ValueError(
             f"rise is {rise:g} m for a span of {span:g} m; a segmental arch rises at most {span / 2.0:g} m: "

@@ -6,10 +6,14 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-__all__ = ["MOST_BLOCKS", "above_zero", "at_least_zero", "choice", "finite", "pair", "whole"]
+__all__ = ["MOST_BLOCKS", "MOST_VOUSSOIRS", "above_zero", "at_least_zero", "choice", "finite", "pair", "whole"]
 
 #: Blocks in a layout, or along a side of it: beyond anything that could be solved.
 MOST_BLOCKS = 100_000
+
+#: Voussoirs are radial, and the boxes around thin ones overlap by the hundred: memory grows with their number squared,
+#: 1.9 GB at 5,000.
+MOST_VOUSSOIRS = 2_000
 
 
 def finite(name: str, value: Any, unit: str = "m") -> float:
@@ -39,13 +43,15 @@ def at_least_zero(name: str, value: Any, unit: str = "m") -> float:
     return number
 
 
-def whole(name: str, value: Any, least: int) -> int:
-    """The value as an int; raises ``ValueError`` unless it is a whole number of at least ``least``."""
+def whole(name: str, value: Any, least: int, most: int = MOST_BLOCKS) -> int:
+    """The value as an int; raises ``ValueError`` unless it is a whole number from ``least`` to ``most``."""
     number = finite(name, value, "")
     if number != int(number) or number < least:
         raise ValueError(f"{name} is {number:g}; give a whole number of at least {least}")
-    if number > MOST_BLOCKS:
-        raise ValueError(f"{name} is {number:g}; a layout has at most {MOST_BLOCKS} blocks")
+    if number > most:
+        raise ValueError(
+            f"{name} is {number:g}; a layout has at most {most} {'blocks' if most == MOST_BLOCKS else name}"
+        )
     return int(number)
 
 
