@@ -49,9 +49,8 @@ def whole(name: str, value: Any, least: int, most: int = MOST_BLOCKS) -> int:
     if number != int(number) or number < least:
         raise ValueError(f"{name} is {number:g}; give a whole number of at least {least}")
     if number > most:
-        raise ValueError(
-            f"{name} is {number:g}; a layout has at most {most} {'blocks' if most == MOST_BLOCKS else name}"
-        )
+        where = "layout" if most == MOST_BLOCKS else "ring"
+        raise ValueError(f"{name} is {number:g}; a {where} has at most {most} blocks")
     return int(number)
 
 
