@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 import solver
 
 from .marks import carried
+from .series import POSITION, parameter_word
+from .sheet import force_text
 
-__all__ = ["LiveLoad", "live_load_of"]
+__all__ = ["LiveLoad", "LiveLoads", "live_load_of"]
 
 #: Loads below this fraction of the largest are rounding.
 ROUNDING = 1e-5
+
+#: Length of the longest arrow, as a fraction of the picture.
+LENGTH = 0.11
 
 #: More arrows than this are drawn as resultants, a grid cell each, of this fraction of the picture.
 MOST_ARROWS, CELL = 24, 0.12
@@ -89,6 +95,68 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     if len(blocks) > MOST_ARROWS:
         return _gathered(points, forces, blocks, pose, CELL * extent)
     return LiveLoad(points, forces, blocks, _of(blocks, pose))
+
+
+class LiveLoads:
+    """The live loads of some increments as arrows to one scale, which end where the loads act.
+
+    Parameters
+    ----------
+    response : solver.Response
+    increments : iterable of solver.Increment
+        Gone through once.
+    extent : float [m]
+        Of the picture.
+    """
+
+    def __init__(self, response: solver.Response, increments: Iterable[solver.Increment], extent: float) -> None:
+        self._swinging = response.analysis == "limit load" and response.collapse is None
+        self._loads: dict[tuple[int, float], LiveLoad] = {}
+        if response.analysis != "settlement":
+            # Frames of a swinging mechanism have the load of their limit state.
+            states = {_place(state): state for state in response.path}
+            for increment in increments:
+                place = _place(increment)
+                if place not in self._loads:
+                    self._loads[place] = live_load_of(response, states.get(place, increment), extent)
+        self._places = parameter_word(response) == POSITION and len(self._loads) > 1
+        if self._places:
+            # From place to place the limit differs a hundredfold; what shall be seen is where the load is.
+            for place, load in self._loads.items():
+                self._loads[place] = replace(load, forces=load.forces / (load.largest or 1.0))
+        self.largest = max((load.largest for load in self._loads.values()), default=0.0)
+        self._scale = LENGTH * extent / (self.largest or 1.0)
+
+    @property
+    def words(self) -> str:
+        """For the legend."""
+        scale = " (not to scale)" if self._places else f", longest arrow {force_text(self.largest)}"
+        return f"live load · α{scale}"
+
+    @property
+    def tails(self) -> np.ndarray:
+        """(n, 2) array [m]: where the arrows of all increments begin, at their poses."""
+        tails = [load.points - load.forces * self._scale for load in self._loads.values()]
+        return np.concatenate([np.zeros((0, 2)), *tails])
+
+    def arrows(self, increment: solver.Increment, pose: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
+        """Tails and tips (n, 2) [m] of one of the increments, its blocks at a pose; none in a fall.
+
+        Parameters
+        ----------
+        increment : solver.Increment
+        pose : solver.Pose
+        """
+        nothing = np.zeros((0, 2))
+        if self.largest == 0.0 or (increment.status == solver.Status.FALLING and not self._swinging):
+            return nothing, nothing
+        load = self._loads[_place(increment)]
+        tips = load.carried(pose)
+        return tips - load.forces * self._scale, tips
+
+
+def _place(increment: solver.Increment) -> tuple[int, float]:
+    return increment.phase, increment.settlement
 
 
 def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.ndarray) -> np.ndarray:

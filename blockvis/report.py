@@ -20,6 +20,7 @@ import solver
 
 from . import marks, palette
 from .capacity import limit_states
+from .live_load import LiveLoads
 from .scene import Frame, framed
 from .series import (
     MOST_OVER_LOWEST,
@@ -106,13 +107,16 @@ def _model(response: solver.Response) -> dict[str, Any]:
     assembly = response.assembly
     shown = _thinned(response.increments, assembly.n_blocks)
     frame, largest = _surveyed(assembly, shown)
+    live = LiveLoads(response, shown, float(frame.size.max()))
+    frame = frame.holding(live.tails)
     # Coordinates far from the origin (UTM) would waste the digits.
     origin = np.round(frame.low, 3)
     unit = FINENESS * float(frame.size.max())
     tables = _Tables(assembly, shown, origin, unit, largest)
     force_length = tables.force_length(assembly.block_size, float(frame.size.max()))
     shown_force = marks.rounded_length(largest)
-    packed = _packed_geometry(assembly, origin, unit) | tables.packed()
+    packed = _packed_geometry(assembly, origin, unit) | tables.packed() | _packed_live(live, shown, origin, unit)
+    arrows = [["area", live.words, palette.hexadecimal(palette.LIVE)]] if live.largest > 0.0 else []
     materials = list(assembly.materials)
     roles = {role: number for number, role in enumerate(solver.ROLES)}
     fills = palette.block_colours(assembly.materials, assembly.free)
@@ -132,6 +136,7 @@ def _model(response: solver.Response) -> dict[str, Any]:
             name: palette.hexadecimal(getattr(palette, name.upper()))
             for name in (
                 "ink", "outline", "support", "hatch", "open", "sliding", "force", "hinge", "settlement", "warning",
+                "live",
             )
         },
         "frames": _frames(response, shown),
@@ -145,6 +150,7 @@ def _model(response: solver.Response) -> dict[str, Any]:
             ["dot", "hinge", palette.hexadecimal(palette.HINGE)],
             ["dot", "sliding", palette.hexadecimal(palette.SLIDING)],
             ["area", "resultant of a joint", palette.hexadecimal(palette.FORCE)],
+            *arrows,
         ],
         "packed": packed,
     }  # fmt: skip
@@ -258,6 +264,20 @@ class _Tables:
             "mark_place": _packed(np.concatenate(self.mark_places), found[-1]),
             "mark_kind": _packed(np.concatenate(self.mark_kinds), found[-1]),
         }
+
+
+def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
+    """Arrows of the live load, frame after frame; no more than their first numbers where there are none."""
+    found = [
+        live.arrows(increment, increment.pose) if live.largest > 0.0 else (np.zeros((0, 2)),) * 2 for increment in shown
+    ]
+    first = np.cumsum([0, *(len(tips) for _, tips in found)]).tolist()
+    tails, tips = (np.concatenate([np.zeros((0, 2)), *ends]) for ends in zip(*found, strict=True))
+    return {
+        "live_first": _packed(first, len(first)),
+        "live_tail": _packed(_rounded(tails - origin, unit), first[-1]),
+        "live_tip": _packed(_rounded(tips - origin, unit), first[-1]),
+    }
 
 
 def _empty(columns: int) -> list[np.ndarray]:

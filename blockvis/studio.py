@@ -15,7 +15,7 @@ import solver
 from . import marks, palette
 from .curves import CurvePanel
 from .fills import cut_into_triangles
-from .live_load import LiveLoad, live_load_of
+from .live_load import LiveLoads
 from .mechanism import part_outlines
 from .scene import Scene, framed, magnified
 from .series import POSITION, badge_of, governing, matters, parameter_word, reads_multipliers, state_text
@@ -37,9 +37,6 @@ MOST_PARTS = 16
 
 #: The forces of this many increments tell what is usual.
 FORCES_OF = 100
-
-#: Length of the longest arrow of the live load, as a fraction of the picture.
-LIVE_LENGTH = 0.11
 
 #: Single pictures up to this size [pixels] are drawn at four times their size, so that flat slopes show no steps.
 FINE_UP_TO = 2600
@@ -129,12 +126,8 @@ class Studio:
         beside = round(0.36 * size[0]) if curve else 0
         self.sheet = Sheet(size, bar, beside)
         self.panel = CurvePanel(response, _size_of(self.sheet.beside), self.sheet.text) if curve else None
-        self.live = _live_loads(response, increments, float(frame.size.max()))
-        self.live_largest = max((load.largest for load in self.live.values()), default=0.0)
-        #: Length of the live load's arrows per force [m/N].
-        self.live_scale = LIVE_LENGTH * float(frame.size.max()) / (self.live_largest or 1.0)
-        tails = [load.points - load.forces * self.live_scale for load in self.live.values()]
-        frame = frame.holding(np.concatenate([np.zeros((0, 2)), *tails]))
+        self.live = LiveLoads(response, increments, float(frame.size.max()))
+        frame = frame.holding(self.live.tails)
         fill = palette.block_colours(assembly.materials, assembly.free)
         self.fill = fill
         self.tints: np.ndarray | None = None
@@ -256,11 +249,8 @@ class Studio:
                 )
                 length = self.force_shown * self.force_scale / self.scene.pixel
                 keys.append(Key("bar", text, palette.FORCE, length))
-            if self.live_largest > 0.0:
-                scale = f", longest arrow {force_text(self.live_largest)}"
-                if parameter_word(self.response) == POSITION and len(self.live) > 1:
-                    scale = " (not to scale)"
-                keys.append(Key("line", f"live load · α{scale}", palette.LIVE))
+            if self.live.largest > 0.0:
+                keys.append(Key("line", self.live.words, palette.LIVE))
             if any(layer.startswith("motion") for layer in self.scene.layers):
                 keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT))
             self._keys = keys
@@ -355,14 +345,8 @@ class Studio:
 
     def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose) -> None:
         """The live load times its multiplier, arrows to scale that end where it acts."""
-        if self.live_largest == 0.0:
-            return
-        load = self.live[_place(increment)]
-        swinging = self.response.analysis == "limit load" and self.response.collapse is None
-        if increment.status == solver.Status.FALLING and not swinging:
-            load = LiveLoad.none()
-        tips = load.carried(shown)
-        self._arrows("live", tips - load.forces * self.live_scale, tips, 0.55, palette.LIVE)
+        if self.live.largest > 0.0:
+            self._arrows("live", *self.live.arrows(increment, shown), 0.55, palette.LIVE)
 
     def _draw_settlement_arrow(self, increment: solver.Increment, shown: solver.Pose) -> None:
         assembly, scene = self.assembly, self.scene
@@ -405,28 +389,6 @@ class Studio:
             shafts, heads = _arrow_shapes(tails, tips, thick, grown * weight * scene.size[1] / 360.0 * scene.pixel)
             scene.polygons(f"{layer} {name}/shaft", shafts, colour)
             scene.polygons(f"{layer} {name}/head", heads, colour)
-
-
-def _live_loads(
-    response: solver.Response, increments: tuple[solver.Increment, ...], extent: float
-) -> dict[tuple[int, float], LiveLoad]:
-    """The live load of each increment by its place; frames of a swinging mechanism have that of their limit state."""
-    found: dict[tuple[int, float], LiveLoad] = {}
-    if response.analysis == "settlement":
-        return found
-    states = {_place(state): state for state in response.path}
-    for increment in increments:
-        place = _place(increment)
-        if place not in found:
-            found[place] = live_load_of(response, states.get(place, increment), extent)
-    if parameter_word(response) == POSITION and len(found) > 1:
-        # From place to place the limit differs a hundredfold; what shall be seen is where the load is.
-        found = {key: replace(load, forces=load.forces / (load.largest or 1.0)) for key, load in found.items()}
-    return found
-
-
-def _place(increment: solver.Increment) -> tuple[int, float]:
-    return increment.phase, increment.settlement
 
 
 def _sampled(numbers: list[int]) -> frozenset[int]:

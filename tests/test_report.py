@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from PIL import Image
 from structures import arch_response, parted, wall
+from test_capacity import ARCH, solved
 
 import solver
+from blockvis import palette
 from blockvis.notebook import show
 from blockvis.report import report_html, write_report
 from blockvis.scene import framed
@@ -89,6 +91,24 @@ def test_pictures_differ_between_frames(tmp_path):
     start, end, forces = pictures
     assert (np.abs(start - end).max(axis=2) > 40).sum() > 2000
     assert (np.abs(start - forces).max(axis=2) > 40).sum() > 200
+
+
+@browser
+def test_live_load_stands_where_it_acts_at_each_position(tmp_path):
+    response, _ = solved(ARCH, tmp_path)
+    page = write_report(response, tmp_path / "report.html")
+    columns = []
+    for k in (1, 3):
+        visited(page, tmp_path, f"--screenshot={tmp_path / str(k)}.png", anchor=f"#frame={k}")
+        # Without the legend.
+        picture = np.asarray(Image.open(tmp_path / f"{k}.png").convert("RGB")).astype(int)[:630]
+        columns.append(np.nonzero((np.abs(picture - np.array(palette.LIVE)) < 30).all(axis=2))[1])
+    assert min(map(len, columns)) > 80
+    assert columns[1].mean() - columns[0].mean() > 100
+    assert max(map(np.ptp, columns)) < 20
+    told = '["area","live load '
+    assert told in page.read_text(encoding="utf-8")
+    assert told not in report_html(arch_response())
 
 
 @browser

@@ -36,6 +36,7 @@
   const travel = scaled("travel", q), turn = scaled("turn", model.turn_unit);
   const joints = { blocks: raw.joint_blocks, ends: scaled("joint_ends", q), n: model.packed.joint_blocks.rows };
   const forces = { place: scaled("force_place", q), vector: scaled("force_vector", model.force_unit), first: raw.force_first };
+  const live = { tail: scaled("live_tail", q), tip: scaled("live_tip", q), first: raw.live_first };
   const marks = { place: scaled("mark_place", q), kind: raw.mark_kind, first: raw.mark_first };
 
   const state = { frame: 0, playing: false, clock: 0, magnify: 1, forces: false, view: null, hover: -1 };
@@ -154,6 +155,7 @@
     if (state.magnify === 1 && Math.abs(state.frame - near) < 0.5) {
       if (state.forces && !falling) drawForces(pen, near);
       drawMarks(pen, near);
+      drawLive(pen, near);
     }
     scaleBar(pen);
     words(near);
@@ -178,6 +180,20 @@
       pen.beginPath(); pen.arc(x, y, radius, 0, 2 * Math.PI);
       pen.fillStyle = sliding ? model.colours.sliding : model.colours.hinge;
       pen.strokeStyle = "#fff"; pen.lineWidth = 1.5; pen.stroke(); pen.fill();
+    }
+  }
+
+  function drawLive(pen, k) {
+    pen.strokeStyle = pen.fillStyle = model.colours.live; pen.lineWidth = 2.5; pen.lineCap = "butt";
+    for (let i = live.first[k]; i < live.first[k + 1]; i++) {
+      const [x0, y0, x1, y1] = [px(live.tail[2 * i]), py(live.tail[2 * i + 1]), px(live.tip[2 * i]), py(live.tip[2 * i + 1])];
+      const length = Math.hypot(x1 - x0, y1 - y0), ux = (x1 - x0) / length, uy = (y1 - y0) / length, head = Math.min(9, 0.6 * length);
+      if (length < 2) continue;
+      pen.beginPath(); pen.moveTo(x0, y0); pen.lineTo(x1 - head * ux, y1 - head * uy); pen.stroke();
+      pen.beginPath(); pen.moveTo(x1, y1);
+      pen.lineTo(x1 - head * ux - 0.5 * head * uy, y1 - head * uy + 0.5 * head * ux);
+      pen.lineTo(x1 - head * ux + 0.5 * head * uy, y1 - head * uy - 0.5 * head * ux);
+      pen.closePath(); pen.fill();
     }
   }
 
