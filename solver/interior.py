@@ -45,7 +45,7 @@ CORRECTIONS, LONGER, SPREAD, WORTHWHILE = 2, 0.3, 0.05, 0.01
 WEIGHTS = np.linspace(1.0, 0.0, 7)
 
 #: Refinements of a solution, until its residual is below this or this part of what it is to remove.
-REFINEMENTS, RESIDUAL, RESIDUAL_PART = 2, 1e-10, 1e-2
+REFINEMENTS, RESIDUAL, RESIDUAL_PART = 2, 1e-9, 1e-2
 
 
 class NoProgress(Exception):
@@ -64,15 +64,12 @@ class _Point:
 class _Band:
     """A D Aᵀ for a fixed A, its rows reordered so that what is not zero lies near the diagonal; and its factor."""
 
-    def __init__(self, matrix: sp.csc_array) -> None:
+    def __init__(self, matrix: sp.csc_array, along: np.ndarray | None) -> None:
         self.rows = rows = matrix.shape[0]
         counts = np.diff(matrix.indptr)
         # Each column is as wide as it has entries, at least: a load on every block fills the matrix.
         self._refuse_wide(int(counts.max(initial=0)))
-        pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape[::-1])
-        self.order = reverse_cuthill_mckee(sp.csr_matrix(pattern.T @ pattern), symmetric_mode=True)
-        place = np.empty(rows, dtype=np.int64)
-        place[self.order] = np.arange(rows)
+        self.order, place = _narrowest(matrix, along)
         row, column, weight, entry = [], [], [], []
         for count in np.unique(counts[counts > 0]):
             members = np.flatnonzero(counts == count)
@@ -117,7 +114,14 @@ class _Band:
 class _Method:
     """The program with its rows as unknowns of their own: A x - w = 0, x ≥ 0, lower ≤ w ≤ upper."""
 
-    def __init__(self, cost: np.ndarray, matrix: sp.csc_array, lower: np.ndarray, upper: np.ndarray) -> None:
+    def __init__(
+        self,
+        cost: np.ndarray,
+        matrix: sp.csc_array,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        along: np.ndarray | None,
+    ) -> None:
         rows, columns = matrix.shape
         if not (np.isfinite(lower).all() and np.isfinite(upper).all() and (upper > lower).all()):
             raise NoProgress("a row is an equation or has no bound")
@@ -125,7 +129,7 @@ class _Method:
         self.matrix, self.transposed = sp.csr_array(matrix), sp.csr_array(matrix.T)
         self.x = slice(0, columns)
         self.below, self.above = slice(columns, columns + rows), slice(columns + rows, columns + 2 * rows)
-        self.band = _Band(sp.csc_array(sp.hstack([matrix, sp.eye_array(rows)])))
+        self.band = _Band(sp.csc_array(sp.hstack([matrix, sp.eye_array(rows)])), along)
         self.point = self._start(matrix)
         self.tried = 0
 
@@ -248,6 +252,25 @@ class _Method:
         return corrected, (by_primal[p], by_dual[d])
 
 
+def _narrowest(matrix: sp.csc_array, along: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """The order of the rows that makes the narrower band, and the place of each row in it."""
+    rows = matrix.shape[0]
+    pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape[::-1])
+    orders = [reverse_cuthill_mckee(sp.csr_matrix(pattern.T @ pattern), symmetric_mode=True)]
+    if along is not None:
+        orders.append(np.argsort(along, kind="stable"))
+    starts = matrix.indptr[:-1][np.diff(matrix.indptr) > 0]
+    found = []
+    for order in orders:
+        place = np.empty(rows, dtype=np.int64)
+        place[order] = np.arange(rows)
+        of_entries = place[matrix.indices]
+        widths = np.maximum.reduceat(of_entries, starts) - np.minimum.reduceat(of_entries, starts)
+        found.append((int(widths.max(initial=0)), order, place))
+    _, order, place = min(found, key=lambda one: one[0])
+    return order, place
+
+
 def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float:
     """Largest multiple of a change, up to ``most``, that leaves no positive value negative."""
     fastest = float((change / values).min())
@@ -260,7 +283,11 @@ def _lengths(rates: np.ndarray, corrections: np.ndarray, weights: np.ndarray) ->
 
 
 def interior_point(
-    cost: np.ndarray, matrix: sp.csc_array, lower: np.ndarray, upper: np.ndarray
+    cost: np.ndarray,
+    matrix: sp.csc_array,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    along: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Minimises cost · x subject to lower ≤ A x ≤ upper and x ≥ 0.
 
@@ -271,6 +298,9 @@ def interior_point(
         With a unit column of either sign for every row.
     lower, upper : (m,) arrays
         Finite, and different from each other.
+    along : (m,) array, optional
+        Where each row lies along the structure: an order of the rows to try beside that of Cuthill & McKee. Along the
+        longer side of a wall it makes a band two thirds as wide.
 
     Returns
     -------
@@ -287,14 +317,14 @@ def interior_point(
     Notes
     -----
     A primal-dual method: every iteration factorises A D Aᵀ, whose blocks of 3 × 3 are the blocks of the structure and
-    their neighbours, as a band in the order of Cuthill & McKee (1969). At 1,500 blocks that takes 5 ms. After Mehrotra
+    their neighbours, as a band in the order given or that of Cuthill & McKee (1969). After Mehrotra
     (1992), https://doi.org/10.1137/0802028, with Gondzio's (1996) correctors, https://doi.org/10.1007/BF00249643, their
     weights after Colombo & Gondzio (2008), https://doi.org/10.1007/s10589-007-9106-0, and a proximal term (Friedlander
     & Orban 2012, https://doi.org/10.1007/s12532-012-0035-2).
     """
     try:
         with one_thread():
-            return _solved(_Method(cost, matrix, lower, upper))
+            return _solved(_Method(cost, matrix, lower, upper, along))
     except NotLimited as error:
         raise NoProgress(str(error)) from None
 

@@ -62,12 +62,15 @@ class LinearProgram:
     cost : (n,) array
     matrix : (m, n) sparse array, by columns
     lower, upper : (m,) arrays
+    along : (m,) array, optional
+        Where the row's block lies along the structure; rows of neighbours are to have values near each other.
     """
 
     cost: np.ndarray
     matrix: sp.csc_array
     lower: np.ndarray
     upper: np.ndarray
+    along: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -181,7 +184,7 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> L
 def _in_band(program: LinearProgram) -> tuple[LPSolution | None, str]:
     started = time.perf_counter()
     try:
-        x, y, iterations = interior_point(program.cost, program.matrix, program.lower, program.upper)
+        x, y, iterations = interior_point(program.cost, program.matrix, program.lower, program.upper, program.along)
     except NoProgress as reason:
         return None, str(reason)
     return _checked(program, x, y, BAND, iterations, time.perf_counter() - started), "solved"

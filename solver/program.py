@@ -258,6 +258,7 @@ def solve_program(
         matrix=with_slack(*columns),
         lower=-external - tolerance,
         upper=-external + tolerance,
+        along=_along(free_blocks(assembly), pose),
     )
     try:
         try:
@@ -370,6 +371,7 @@ def closing_program(
         matrix=with_slack(balance),
         lower=load - resistance,
         upper=load + resistance,
+        along=_along(parts, pose),
     )
     routes = None if bodies is None else INTERIOR_ROUTES
     try:
@@ -401,6 +403,15 @@ def closing_program(
         sticking=sticking & (forces[:, 0] > 0.0),
         falling=False,
     )
+
+
+def _along(parts: MacroBlocks, pose: Pose) -> np.ndarray:
+    """(3 n_parts,) array [m]: where each part lies along the longer side of the structure, for each of its freedoms."""
+    moving = parts.part >= 0
+    part, places = parts.part[moving], pose.positions[moving]
+    axis = int(np.argmax(np.ptp(places, axis=0))) if len(places) else 0
+    mean = np.bincount(part, places[:, axis], parts.n_parts) / np.maximum(np.bincount(part, minlength=parts.n_parts), 1)
+    return np.repeat(mean, 3)
 
 
 def matched_contacts(assembly: Assembly, contacts: Contacts, before: Contacts) -> tuple[np.ndarray, np.ndarray]:
@@ -467,6 +478,7 @@ def _with_light_blocks(
         matrix=sp.csc_array(sp.diags_array(1.0 / own) @ program.matrix @ sp.diags_array(factor)),
         lower=(middle - half) / own,
         upper=(middle + half) / own,
+        along=program.along,
     )
     try:
         found = solve_lp(scaled)

@@ -14,7 +14,7 @@ from structures import wall
 
 import solver
 from solver import lp
-from solver.interior import NoProgress, interior_point
+from solver.interior import NoProgress, _Band, interior_point
 from solver.threads import one_thread
 
 
@@ -163,3 +163,17 @@ def test_same_bits_with_any_number_of_threads():
         second = solved(program)
     assert first.x.tobytes() == second.x.tobytes()
     assert first.row_dual.tobytes() == second.row_dual.tobytes()
+
+
+def test_an_order_of_the_rows_makes_no_difference_but_the_width():
+    """Rows in any order, told where they lie: the same optimum, in a band as narrow as in order."""
+    program = chain(7, 40)
+    order = np.random.default_rng(0).permutation(40)
+    rows = (3 * order[:, None] + np.arange(3)).ravel()
+    shuffled = lp.LinearProgram(
+        program.cost, sp.csc_array(program.matrix[rows]), program.lower[rows], program.upper[rows], np.repeat(order, 3)
+    )
+    first, second = solved(program), lp.solve_lp(shuffled, (lp.BAND,))
+    assert second.objective == pytest.approx(first.objective, abs=1e-7 * (1 + abs(first.objective)))
+    whole = sp.csc_array(sp.hstack([shuffled.matrix, sp.eye_array(120)]))
+    assert _Band(whole, shuffled.along).width == 6
