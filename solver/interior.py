@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from .threads import NotLimited, one_thread
 
-__all__ = ["NoProgress", "interior_point"]
+__all__ = ["Diverges", "NoProgress", "interior_point"]
 
 #: Violation of rows and reduced costs, absolute, and relative difference of the objectives at which a point is optimal.
 TOLERANCE = 1e-8
@@ -46,6 +46,28 @@ WEIGHTS = np.linspace(1.0, 0.0, 7)
 
 #: Refinements of a solution, until its residual is below this or this part of what it is to remove.
 REFINEMENTS, RESIDUAL, RESIDUAL_PART = 2, 1e-9, 1e-2
+
+
+#: Multipliers of this size, in units of the program, are looked at for a ray along which the objective falls for ever,
+#: at every so manieth iteration; passes that remove what is left of its balance, each with this on the diagonal.
+RAY_SIZE, RAY_EVERY, RAY_PASSES, RAY_DIAGONAL = 1e5, 5, 3, 1e-16
+
+#: Out of balance by less than this, a ray is shown to the caller.
+PROVES = 1e-9
+
+
+class Diverges(Exception):
+    """The multipliers grow along what looks like a ray.
+
+    Attributes
+    ----------
+    ray : (n,) array
+        A x near 0, x ≥ 0, cost · x < 0, its largest entry 1; for the caller to judge.
+    """
+
+    def __init__(self, ray: np.ndarray) -> None:
+        super().__init__("the multipliers grow without limit")
+        self.ray = ray
 
 
 class NoProgress(Exception):
@@ -207,6 +229,20 @@ class _Method:
         )
         self.tried = self.tried + 1 if min(by_primal, by_dual) < SHORT else 0
 
+    def refuse_ray(self) -> None:
+        """Raises ``Diverges`` where the multipliers point along a ray: their balance is mended, each by its size."""
+        x = self.point.primal[self.x]
+        size = float(x.max())
+        if size < RAY_SIZE or self.cost @ x > -size / RAY_SIZE:
+            return
+        x = x / size
+        weight = x**2
+        self.band.factorise(np.concatenate([weight, np.full(self.matrix.shape[0], RAY_DIAGONAL)]))
+        for _ in range(RAY_PASSES):
+            x = np.maximum(x - weight * (self.transposed @ self.band.solve(self.matrix @ x)), 0.0)
+        if np.abs(self.matrix @ x).max() < PROVES * x.max() and self.cost @ x < 0.0:
+            raise Diverges(x / x.max())
+
     def _direction(self, residuals: tuple[np.ndarray, ...], products: np.ndarray) -> _Point:
         """Newton's direction that removes the residuals and changes the products primal · dual by those given."""
         primal, dual = self.point.primal, self.point.dual
@@ -311,6 +347,8 @@ def interior_point(
 
     Raises
     ------
+    Diverges
+        If the multipliers grow along a ray.
     NoProgress
         If the rows do not form a narrow band, or the steps become too short.
 
@@ -335,6 +373,8 @@ def _solved(method: _Method) -> tuple[np.ndarray, np.ndarray, int]:
         if method.optimal(residuals):
             return method.point.primal[method.x], method.point.row_dual, iteration
         method.iterate(residuals)
+        if iteration % RAY_EVERY == 0:
+            method.refuse_ray()
         if method.tried >= SHORT_STEPS:
             raise NoProgress(f"the steps became too short after {iteration + 1} iterations")
     raise NoProgress(f"no solution after {ITERATIONS} iterations")

@@ -9,7 +9,7 @@ import highspy
 import numpy as np
 import scipy.sparse as sp
 
-from .interior import NoProgress, interior_point
+from .interior import Diverges, NoProgress, interior_point
 
 __all__ = ["LPSolution", "LinearProgram", "SolveError", "Unbounded", "solve_lp"]
 
@@ -185,6 +185,9 @@ def _in_band(program: LinearProgram) -> tuple[LPSolution | None, str]:
     started = time.perf_counter()
     try:
         x, y, iterations = interior_point(program.cost, program.matrix, program.lower, program.upper, program.along)
+    except Diverges as found:
+        _raise_if_proved(program, found.ray)
+        return None, str(found)
     except NoProgress as reason:
         return None, str(reason)
     return _checked(program, x, y, BAND, iterations, time.perf_counter() - started), "solved"
@@ -227,7 +230,9 @@ def _run(program: LinearProgram, route: str) -> tuple[LPSolution | None, str]:
     highs.run()
     status = highs.modelStatusToString(highs.getModelStatus())
     if highs.getModelStatus() == highspy.HighsModelStatus.kUnbounded:
-        _raise_if_proved(program, highs)
+        _, has_ray, ray = highs.getPrimalRay()
+        if has_ray:
+            _raise_if_proved(program, np.asarray(ray))
         return None, status
     found = highs.getSolution()
     if not (found.value_valid and found.dual_valid):
@@ -240,12 +245,9 @@ def _run(program: LinearProgram, route: str) -> tuple[LPSolution | None, str]:
     return _checked(program, x, y, route, int(iterations), time.perf_counter() - started), status
 
 
-def _raise_if_proved(program: LinearProgram, highs: highspy.Highs) -> None:
-    """Raises ``Unbounded`` where HiGHS' ray proves it; otherwise its word counts for nothing."""
-    _, has_ray, ray = highs.getPrimalRay()
-    if not has_ray:
-        return
-    x = np.maximum(np.asarray(ray), 0.0)
+def _raise_if_proved(program: LinearProgram, ray: np.ndarray) -> None:
+    """Raises ``Unbounded`` where a ray proves it; otherwise the word of whoever found it counts for nothing."""
+    x = np.maximum(ray, 0.0)
     size = float(np.abs(x).max(initial=0.0))
     if size == 0.0:
         return
