@@ -20,7 +20,7 @@ TOLERANCE = 1e-8
 ITERATIONS = 200
 
 #: So many steps in a row that are shorter than this lead nowhere.
-SHORT_STEPS, SHORT = 8, 1e-3
+SHORT_STEPS, SHORT = 20, 1e-3
 
 #: Largest number of operations of one factorisation, rows times the square of the band's width: beyond it an
 #: elimination by nested dissection is faster (a tenth of a second at 10,000 blocks, which need 4e9).
@@ -48,9 +48,10 @@ WEIGHTS = np.linspace(1.0, 0.0, 7)
 REFINEMENTS, RESIDUAL, RESIDUAL_PART = 2, 1e-9, 1e-2
 
 
-#: Multipliers of this size, in units of the program, are looked at for a ray along which the objective falls for ever,
-#: at every so manieth iteration; passes that remove what is left of its balance, each with this on the diagonal.
-RAY_SIZE, RAY_EVERY, RAY_PASSES, RAY_DIAGONAL = 1e5, 5, 3, 1e-16
+#: Multipliers of this size that cost less than nothing by this, in units of the program, are looked at for a ray along
+#: which the objective falls for ever, at every so manieth iteration; passes that remove what is left of its balance,
+#: with either number on the diagonal: the large one leaves something of it, with the small one it may be singular.
+RAY_SIZE, RAY_COST, RAY_EVERY, RAY_PASSES, RAY_DIAGONALS = 1e3, 1e-8, 5, 3, (1e-16, 1e-20)
 
 #: Out of balance by less than this, a ray is shown to the caller.
 PROVES = 1e-9
@@ -233,15 +234,20 @@ class _Method:
         """Raises ``Diverges`` where the multipliers point along a ray: their balance is mended, each by its size."""
         x = self.point.primal[self.x]
         size = float(x.max())
-        if size < RAY_SIZE or self.cost @ x > -size / RAY_SIZE:
+        if size < RAY_SIZE or self.cost @ x > -RAY_COST * size:
             return
-        x = x / size
-        weight = x**2
-        self.band.factorise(np.concatenate([weight, np.full(self.matrix.shape[0], RAY_DIAGONAL)]))
-        for _ in range(RAY_PASSES):
-            x = np.maximum(x - weight * (self.transposed @ self.band.solve(self.matrix @ x)), 0.0)
-        if np.abs(self.matrix @ x).max() < PROVES * x.max() and self.cost @ x < 0.0:
-            raise Diverges(x / x.max())
+        weight = (x / size) ** 2
+        for diagonal in RAY_DIAGONALS:
+            try:
+                self.band.factorise(np.concatenate([weight, np.full(self.matrix.shape[0], diagonal)]))
+            except NoProgress:
+                # Blocks that the ray leaves alone have nothing else on their diagonal.
+                return
+            ray = x / size
+            for _ in range(RAY_PASSES):
+                ray = np.maximum(ray - weight * (self.transposed @ self.band.solve(self.matrix @ ray)), 0.0)
+            if np.abs(self.matrix @ ray).max() < PROVES * ray.max() and self.cost @ ray < 0.0:
+                raise Diverges(ray / ray.max())
 
     def _direction(self, residuals: tuple[np.ndarray, ...], products: np.ndarray) -> _Point:
         """Newton's direction that removes the residuals and changes the products primal · dual by those given."""
