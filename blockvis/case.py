@@ -16,6 +16,7 @@ import numpy as np
 import solver
 
 from . import drawing, layouts
+from .formats import FORMATS
 from .imperfections import Imperfection, imperfect, joint_scatter, read_imperfection
 from .loading import LoadCase, loads_of, nearest_name
 
@@ -212,6 +213,11 @@ def read_case(path: str | Path) -> Case:
         near = difflib.get_close_matches(path.name, beside, n=3, cutoff=0.4) or beside[:3]
         hint = f"; beside it are {', '.join(near)}" if near else ""
         raise ValueError(f"there is no case file '{path}'{hint}")
+    if path.suffix.lower() in FORMATS:
+        raise ValueError(
+            f"'{path}' is a layout, not a case file; a case file names it, what settles and by how much: "
+            f'[geometry] file = "{path.name}" (see examples/); blockvis info shows what is in it'
+        )
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:

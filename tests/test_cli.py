@@ -85,6 +85,14 @@ def test_console_script_and_exit_code():
     assert "Traceback" not in done.stderr
 
 
+def test_a_layout_in_place_of_the_case_file_says_so(capsys):
+    layout = Path(__file__).parent.parent / "assets" / "semicircular_arch.msh"
+    assert main(["run", str(layout)]) == 2
+    said = capsys.readouterr().err
+    assert "is a layout, not a case file" in said
+    assert '[geometry] file = "semicircular_arch.msh"' in said
+
+
 def test_missing_layout_names_file_and_neighbours(case, capsys):
     _refused(_changed(case, "arch.msh", "arhc.msh"), capsys, "arhc.msh", "arch.msh")
 
