@@ -22,8 +22,8 @@ ITERATIONS = 200
 #: So many steps in a row that are shorter than this lead nowhere.
 SHORT_STEPS, SHORT = 20, 1e-3
 
-#: Largest number of operations of one factorisation, rows times the square of the band's width: beyond it an
-#: elimination by nested dissection is faster (a tenth of a second at 10,000 blocks, which need 4e9).
+#: Largest number of operations of one factorisation, rows times the square of the band's width; walls of 10,000 blocks
+#: need 2e9, a tenth of a second. They grow with the square of the blocks: larger programs are left to others.
 OPERATIONS = 1e10
 
 #: Weight of the proximal term. Without it the multipliers that carry force weigh 1e16 at the end, and the balance of
@@ -46,7 +46,6 @@ WEIGHTS = np.linspace(1.0, 0.0, 7)
 
 #: Refinements of a solution, until its residual is below this or this part of what it is to remove.
 REFINEMENTS, RESIDUAL, RESIDUAL_PART = 2, 1e-9, 1e-2
-
 
 #: Multipliers of this size that cost less than nothing by this, in units of the program, are looked at for a ray along
 #: which the objective falls for ever, at every so manieth iteration; passes that remove what is left of its balance,
@@ -367,9 +366,9 @@ def interior_point(
     & Orban 2012, https://doi.org/10.1007/s12532-012-0035-2).
     """
     try:
-        with one_thread():
+        with one_thread(), np.errstate(divide="raise", over="raise", invalid="raise"):
             return _solved(_Method(cost, matrix, lower, upper, along))
-    except NotLimited as error:
+    except (NotLimited, FloatingPointError) as error:
         raise NoProgress(str(error)) from None
 
 
