@@ -261,14 +261,9 @@ def solve_program(
         along=_along(free_blocks(assembly), pose),
     )
     try:
-        try:
-            solution = solve_lp(program)
-        except (Unbounded, SolveError):
-            left = given + _distances(model, contacts, drift, LEFT_WEDGED)
-            if (left == distance).all():
-                raise
-            distance, cost[0] = left, rays.T @ left
-            solution = solve_lp(replace(program, cost=np.concatenate(cost)))
+        program, solution, distance = _solved(
+            program, rays, distance, given + _distances(model, contacts, drift, LEFT_WEDGED)
+        )
     except Unbounded as ray:
         forces = (rays @ ray.x[: 2 * len(contacts)]).reshape(-1, 2)
         squeezed = np.unique(contacts.block_a[forces[:, 0] > 1e-6 * forces[:, 0].max(initial=0.0)])
@@ -276,9 +271,7 @@ def solve_program(
     falls = np.full(rows, FALLING_FRACTION * model.total_load)
     light = _light_blocks(model)
     if light.any():
-        solution, falls = _with_light_blocks(
-            model, replace(program, cost=np.concatenate(cost)), solution, light, balance, falls
-        )
+        solution, falls = _with_light_blocks(model, program, solution, light, balance, falls)
     multipliers = solution.x[: 2 * len(contacts)]
     unbalanced = solution.x[2 * len(contacts) : 2 * (len(contacts) + rows)].reshape(2, -1)
     # What is out of balance moves by the whole trust region; of the lightest blocks the duals no longer say so.
@@ -375,14 +368,7 @@ def closing_program(
     )
     routes = None if bodies is None else INTERIOR_ROUTES
     try:
-        try:
-            solution = solve_lp(program, routes)
-        except (Unbounded, SolveError):
-            left = _distances(model, contacts, drift, LEFT_WEDGED)
-            if (left == distance).all():
-                raise
-            cost = np.concatenate([rays.T @ left, program.cost[-2 * rows :]])
-            solution = solve_lp(replace(program, cost=cost), routes)
+        _, solution, _ = _solved(program, rays, distance, _distances(model, contacts, drift, LEFT_WEDGED), routes)
     except Unbounded:
         # A corner that has gone in too deep, wedged between blocks that cannot give way: a smaller step may not.
         raise SolveError("gaps that an increment has left cannot be closed: blocks are wedged") from None
@@ -420,6 +406,24 @@ def matched_contacts(assembly: Assembly, contacts: Contacts, before: Contacts) -
     order = np.argsort(known, kind="stable")
     place = order[np.minimum(np.searchsorted(known[order], keys), len(known) - 1)]
     return place, known[place] == keys
+
+
+def _solved(
+    program: LinearProgram,
+    rays: sp.csc_array,
+    distance: np.ndarray,
+    left: np.ndarray,
+    routes: tuple[str, ...] | None = None,
+) -> tuple[LinearProgram, LPSolution, np.ndarray]:
+    """The program, its solution and its distances; with those that leave small penetration alone where it has none."""
+    try:
+        return program, solve_lp(program, routes), distance
+    except (Unbounded, SolveError):
+        if (left == distance).all():
+            raise
+        cost = np.concatenate([rays.T @ left, program.cost[rays.shape[1] :]])
+        program = replace(program, cost=cost)
+        return program, solve_lp(program, routes), left
 
 
 def _light_blocks(model: Model) -> np.ndarray:
