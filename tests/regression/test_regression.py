@@ -19,12 +19,16 @@ EXACT = os.environ.get("BLOCKVIS_EXACT", "") not in ("", "0")
 TIGHT = 1e-9
 
 #: Where many joints slide, programs have more than one solution, and rounding chooses. Measured between the kernels:
-#: 1e-8, 9e-5 and 4e-3.
-LOOSER = {"wall_pushed": 1e-6, "wall_loaded": 1e-3, "panel_settlement_friction": 0.02}
+#: 1e-7, 9e-5, 4e-3 and 8e-3.
+LOOSER = {"wall_pushed": 1e-6, "wall_loaded": 1e-3, "panel_settlement_friction": 0.02, "facade": 0.03}
+
+#: Before anything has moved there is nothing to choose but where an interior solution stops: 1.5e-9 was measured.
+START = 1e-8
 
 #: Where it chooses another path, too. What is compared then is the start, before anything has moved.
 UNSETTLED = {
     "panel_with_opening": "between kernels the path differs by 6 % of the reaction and has 67 to 94 increments",
+    "wall_with_arch": "between kernels the collapse differs by 0.6 %, its reaction by 9 %",
     "wall_horizontal_after_settlement": "between kernels α differs by 13 %, and with Haswell the solver fails",
 }
 
@@ -87,7 +91,7 @@ def wrong_start(found, frozen):
         }
         for numbers in (found, frozen)
     ]
-    return wrong(*starts, TIGHT)
+    return wrong(*starts, START)
 
 
 def difference(found, frozen):
