@@ -12,8 +12,6 @@ import solver
 
 from .case import Case, case_interfaces, case_loads
 from .loading import moving_loads, nearest_name
-from .marks import carried
-from .mechanism import swung
 from .series import POSITION
 from .stored_increments import StoredLimit
 
@@ -443,8 +441,8 @@ def _swinging(assembly: solver.Assembly, state: solver.Increment) -> Iterator[so
     reach = SWING * float(np.ptp(corners[free[block]], axis=0).max())
     contacts = state.contacts
     for part in np.linspace(0.0, 1.0, SWINGING_FRAMES + 1)[1:]:
-        pose = swung(state.pose, state.velocity * (part * reach / fastest))
-        sides = [carried(contacts.points, k, state.pose, pose) for k in (contacts.block_a, contacts.block_b)]
+        pose = solver.swung(state.pose, state.velocity * (part * reach / fastest))
+        sides = [solver.carried(contacts.points, k, state.pose, pose) for k in (contacts.block_a, contacts.block_b)]
         yield replace(
             state,
             pose=pose,

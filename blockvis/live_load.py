@@ -9,7 +9,6 @@ import numpy as np
 
 import solver
 
-from .marks import carried
 from .series import POSITION, parameter_word
 from .sheet import force_text
 
@@ -56,7 +55,7 @@ class LiveLoad:
         if len(self.points) == 0:
             return self.points
         there = solver.Pose(pose.positions[self.blocks], pose.rotations[self.blocks])
-        return carried(self.points, np.arange(len(self.blocks)), self.pose, there)
+        return solver.carried(self.points, np.arange(len(self.blocks)), self.pose, there)
 
     @property
     def largest(self) -> float:

@@ -12,7 +12,6 @@ import solver
 __all__ = [
     "DrawnJoints",
     "Marks",
-    "carried",
     "drawn_joints",
     "marks_of",
     "resultants",
@@ -85,24 +84,6 @@ class Marks:
     pockets: tuple[np.ndarray, ...]
     sliding: np.ndarray
     hinges: np.ndarray
-
-
-def carried(points: np.ndarray, blocks: np.ndarray, before: solver.Pose, after: solver.Pose) -> np.ndarray:
-    """(n, 2) array [m]: where points that ride on blocks get to.
-
-    Parameters
-    ----------
-    points : (n, 2) array [m]
-        Where they are when the blocks are at ``before``.
-    blocks : (n,) int array
-        The block each rides on.
-    before, after : solver.Pose
-    """
-    arms = points - before.positions[blocks]
-    turn = after.rotations[blocks] - before.rotations[blocks]
-    c, s = np.cos(turn), np.sin(turn)
-    turned = np.stack([c * arms[:, 0] - s * arms[:, 1], s * arms[:, 0] + c * arms[:, 1]], axis=1)
-    return after.positions[blocks] + turned
 
 
 def drawn_joints(assembly: solver.Assembly) -> DrawnJoints:
@@ -212,7 +193,7 @@ def _middle(
     points: np.ndarray, block_a: np.ndarray, block_b: np.ndarray, before: solver.Pose, after: solver.Pose
 ) -> np.ndarray:
     """Points carried by both of their blocks, half-way: magnified, the two are no longer in the same place."""
-    return (carried(points, block_a, before, after) + carried(points, block_b, before, after)) / 2.0
+    return (solver.carried(points, block_a, before, after) + solver.carried(points, block_b, before, after)) / 2.0
 
 
 def _cracks(
@@ -222,8 +203,8 @@ def _cracks(
     drawn = solver.Pose.initial(assembly)
 
     def sides(at: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
-        on_a = np.stack([carried(joints.ends[:, k], joints.block_a, drawn, at) for k in (0, 1)], axis=1)
-        on_b = np.stack([carried(joints.ends[:, k], joints.block_b, drawn, at) for k in (0, 1)], axis=1)
+        on_a = np.stack([solver.carried(joints.ends[:, k], joints.block_a, drawn, at) for k in (0, 1)], axis=1)
+        on_b = np.stack([solver.carried(joints.ends[:, k], joints.block_b, drawn, at) for k in (0, 1)], axis=1)
         return on_a, on_b
 
     on_a, on_b = sides(pose)

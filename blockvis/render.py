@@ -11,7 +11,6 @@ from PIL import Image
 import solver
 
 from .film import write_film
-from .mechanism import swung, with_motion
 from .opengl import RenderingUnavailable, rendering_available
 from .scene import framed
 from .series import governing
@@ -96,7 +95,7 @@ def draw_mechanism(
     _check_response(response)
     last = governing(response) or response.increments[0]
     motion = last.velocity if response.collapse is None else response.collapse.mechanism
-    last = with_motion(last, motion)
+    last = solver.with_motion(last, motion)
     assembly = response.assembly
     speeds = _speeds(assembly, last.pose, motion)
     fastest = float(speeds.max(initial=0.0))
@@ -105,7 +104,7 @@ def draw_mechanism(
         fastest = _exceeded_by(0.01, speeds, assembly.areas) or fastest
         motion = motion * np.minimum(1.0, fastest / np.maximum(speeds, fastest))[:, None]
     reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
-    displaced = swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
+    displaced = solver.swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
     parts = solver.rigid_parts(assembly, last)
     with Studio(response, Look(forces="none"), size, (last,), extra=(displaced,)) as studio:
         if fastest > 0:

@@ -10,7 +10,7 @@ from PIL import Image
 
 import solver
 
-from . import marks, palette
+from . import palette
 from .fills import hatch_lines, triangles
 from .opengl import RenderingUnavailable, rendering_available
 
@@ -193,7 +193,7 @@ class Scene:
             self._layers["fill"].colour(vertex_colours)
         if "hatch" in self._layers:
             points, blocks = self._hatch
-            self._layers["hatch"].move(marks.carried(points, blocks, solver.Pose.initial(self.assembly), shown))
+            self._layers["hatch"].move(solver.carried(points, blocks, solver.Pose.initial(self.assembly), shown))
 
     def polygons(self, layer: str, corners: np.ndarray, colour: tuple[int, int, int]) -> None:
         """Fills convex polygons, (n, k, 2) [m], in one layer; they replace what it held."""

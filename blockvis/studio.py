@@ -231,7 +231,7 @@ class Studio:
         for k, blocks in enumerate(chosen):
             weight = assembly.areas[blocks] / assembly.areas[blocks].sum()
             tails[k] = weight @ pose.positions[blocks]
-            tips[k] = marks.carried(tails[[k]], blocks[:1], pose, displaced)[0]
+            tips[k] = solver.carried(tails[[k]], blocks[:1], pose, displaced)[0]
         self._arrows("motion", tails, tips, 0.6)
 
     def keys(self) -> list[Key]:
@@ -301,7 +301,7 @@ class Studio:
         size = np.hypot(*forces.T)
         kept = size > marks.SMALLEST_RESULTANT * size.max(initial=0.0)
         points, forces, blocks, size = points[kept], forces[kept], blocks[kept], size[kept]
-        first, second = (marks.carried(points, blocks[:, k], increment.pose, shown) for k in (0, 1))
+        first, second = (solver.carried(points, blocks[:, k], increment.pose, shown) for k in (0, 1))
         points = (first + second) / 2.0
         unit = forces / size[:, None]
         half = unit * (0.5 * self.force_scale * size)[:, None]
@@ -339,7 +339,7 @@ class Studio:
         lines = []
         for block, other in ((joints.block_a, joints.block_b), (joints.block_b, joints.block_a)):
             on = ~free[block] & free[other]
-            ends = [marks.carried(joints.ends[on, k], block[on], drawn, shown) for k in (0, 1)]
+            ends = [solver.carried(joints.ends[on, k], block[on], drawn, shown) for k in (0, 1)]
             lines.append(np.stack(ends, axis=1))
         self.scene.lines("ground", np.concatenate(lines), palette.INK, max(1.2, self.scene.size[1] / 320.0))
 
@@ -443,7 +443,7 @@ def _contacts_at(increment: solver.Increment, pose: solver.Pose) -> solver.Conta
     """The increment's contact points carried to a pose nearby."""
     contacts = increment.contacts
     first, second = (
-        marks.carried(contacts.points, block, increment.pose, pose) for block in (contacts.block_a, contacts.block_b)
+        solver.carried(contacts.points, block, increment.pose, pose) for block in (contacts.block_a, contacts.block_b)
     )
     return replace(contacts, points=(first + second) / 2.0)
 

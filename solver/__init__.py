@@ -17,11 +17,11 @@ from .assembly import FIXED, FREE, MOVING, ROLES, Assembly
 from .checkpoint import Checkpoint, PushoverCheckpoint
 from .contact import Contacts, InterfaceLaw, Interfaces, JointScatter, find_contacts, measure_contacts
 from .equilibrium import block_forces
-from .kinematics import Pose, moved_vertices
+from .kinematics import Pose, carried, moved_vertices, swung
 from .limit import Envelope, LimitLoad, LimitStatus, limit_load, limit_load_envelope
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
 from .lp import SolveError
-from .mechanism import Mechanism, mechanism_of, rigid_parts
+from .mechanism import Mechanism, mechanism_of, rigid_parts, with_motion
 from .polygons import overlap_depths
 from .pushover import ControlDisplacement, pushover, pushover_increments
 from .response import Certificate, Collapse, ContactState, Increment, Response, Status, total_weight
@@ -58,6 +58,7 @@ __all__ = [
     "SolveError",
     "Status",
     "block_forces",
+    "carried",
     "check_settlement",
     "edge_pressure",
     "find_contacts",
@@ -76,6 +77,8 @@ __all__ = [
     "settle",
     "settlement_increments",
     "surface_pressure",
+    "swung",
     "total_weight",
     "weight_fraction",
+    "with_motion",
 ]

@@ -12,13 +12,13 @@ from .assembly import Assembly, check_blocks
 from .checkpoint import Checkpoint, Note, Place
 from .contact import InterfaceLaw, Interfaces
 from .correction import FARTHEST_FALL, Falls, NotConverged, at_rest, corrected, solve_again
-from .kinematics import Pose, moved, moved_vertices
+from .kinematics import Pose, moved, moved_vertices, point_velocities
 from .loads import Loads, Settlement, checked_loads
 from .local_origin import at_origin, told_from, without_origin
 from .lp import SolveError
 from .mechanism import mechanism_of
 from .polygons import overlap_depths
-from .program import Locked, Model, Solved, point_velocities, solve_program
+from .program import Locked, Model, Solved, solve_program
 from .response import Collapse, Increment, Response, Status
 from .snap import jump_words, snapped
 

@@ -12,10 +12,10 @@ import scipy.sparse as sp
 from .assembly import Assembly, check_blocks
 from .contact import Contacts, InterfaceLaw, Interfaces, find_contacts
 from .equilibrium import equilibrium_matrix
-from .kinematics import Pose, moved_vertices
+from .kinematics import Pose, moved_vertices, point_velocities
 from .loads import Loads, checked_loads
 from .lp import LinearProgram, Unbounded, solve_lp
-from .program import FALLING_FRACTION, point_velocities
+from .program import FALLING_FRACTION
 from .response import Certificate, Increment, Status
 from .strength import Admissible, point_strength
 

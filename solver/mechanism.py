@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .assembly import Assembly
+from .kinematics import point_velocities
 from .macroblocks import moving_together
 from .response import ContactState, Increment
 
-__all__ = ["Mechanism", "mechanism_of", "rigid_parts"]
+__all__ = ["Mechanism", "mechanism_of", "rigid_parts", "with_motion"]
 
 #: Blocks belong together where their contact points move apart by less than this fraction of the fastest block.
 TOGETHER = 1e-3
@@ -119,3 +120,18 @@ def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
         return np.stack([found // n, found % n], axis=1)
 
     return Mechanism(parts=parts, motions=motions, hinges=pairs(turns), sliding=pairs(slides), names=assembly.names)
+
+
+def with_motion(increment: Increment, motion: np.ndarray) -> Increment:
+    """The increment with its hinges and sliding joints those of another motion.
+
+    Parameters
+    ----------
+    increment : Increment
+    motion : (n_blocks, 3) array
+        Velocity of each centroid and angular velocity, in any scale.
+    """
+    contacts, pose = increment.contacts, increment.pose
+
+    a, b = (point_velocities(contacts.points, k, pose, motion) for k in (contacts.block_a, contacts.block_b))
+    return replace(increment, velocity=motion, displacements=np.einsum("kij,kj->ki", contacts.frames, a - b))

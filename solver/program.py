@@ -22,7 +22,6 @@ __all__ = [
     "Tally",
     "closing_program",
     "matched_contacts",
-    "point_velocities",
     "solve_program",
 ]
 
@@ -522,22 +521,3 @@ def _certificate(
         complementarity=float(np.abs(multipliers @ room)) / (1.0 + abs(solution.objective)),
         kinematic_violation=float(np.maximum(-room, 0.0).max(initial=0.0)),
     )
-
-
-def point_velocities(points: np.ndarray, block: np.ndarray, pose: Pose, velocity: np.ndarray) -> np.ndarray:
-    """Velocity of points that move with blocks.
-
-    Parameters
-    ----------
-    points : (n, 2) array [m]
-    block : (n,) int array
-    pose : Pose
-    velocity : (n_blocks, 3) array
-        Of the centroids, and angular.
-
-    Returns
-    -------
-    (n, 2) array
-    """
-    arm = points - pose.positions[block]
-    return velocity[block, :2] + velocity[block, 2:] * np.stack([-arm[:, 1], arm[:, 0]], axis=1)

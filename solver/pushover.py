@@ -12,12 +12,12 @@ from .assembly import Assembly, check_blocks
 from .checkpoint import PushoverCheckpoint, PushoverPlace
 from .contact import InterfaceLaw, Interfaces
 from .correction import GEOMETRY_TOLERANCE, Falls, NotConverged, at_rest, corrected, solve_again
-from .kinematics import Pose, moved, rotation_matrices
+from .kinematics import Pose, moved, point_velocities, rotation_matrices
 from .limit import checked_live
 from .loads import Loads
 from .lp import SolveError
 from .mechanism import mechanism_of
-from .program import Locked, Model, Solved, point_velocities, solve_program
+from .program import Locked, Model, Solved, solve_program
 from .response import Collapse, Increment, Response, Status
 
 __all__ = ["ControlDisplacement", "pushover", "pushover_increments"]

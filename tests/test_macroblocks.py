@@ -4,9 +4,8 @@ import pytest
 import solver
 from blockvis import layouts
 from solver.contact import find_contacts
-from solver.kinematics import Pose, moved_vertices
+from solver.kinematics import Pose, moved_vertices, point_velocities
 from solver.macroblocks import free_blocks, macro_blocks, moving_together
-from solver.program import point_velocities
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from structures import BENT, arch_response, parted, wall
 import solver
 from blockvis import marks
 from blockvis.fills import cut_into_triangles, hatch_lines, triangles
-from blockvis.mechanism import part_outlines, swung, with_motion
+from blockvis.mechanism import part_outlines
 
 
 def stacked(shift=(0.0, 0.0), turn=0.0):
@@ -130,7 +130,7 @@ def test_arch_spreads_on_three_hinges_and_falls_on_five():
     last, joints = response.path[-1], marks.drawn_joints(response.assembly)
     spreading = marks.marks_of(response.assembly, joints, last, last.pose)
     assert len(spreading.hinges) == 3
-    falling = with_motion(last, response.collapse.mechanism)
+    falling = solver.with_motion(last, response.collapse.mechanism)
     assert len(marks.marks_of(response.assembly, joints, falling, last.pose).hinges) == 5
     parts = solver.rigid_parts(response.assembly, falling)
     assert sorted(np.bincount(parts[parts >= 0]).tolist()) == [2, 2, 4, 4]
@@ -139,9 +139,9 @@ def test_arch_spreads_on_three_hinges_and_falls_on_five():
 
 def test_parts_swing_as_one_body():
     response = arch_response()
-    falling = with_motion(response.path[-1], response.collapse.mechanism)
+    falling = solver.with_motion(response.path[-1], response.collapse.mechanism)
     parts = solver.rigid_parts(response.assembly, falling)
-    displaced = swung(falling.pose, 0.1 * response.collapse.mechanism)
+    displaced = solver.swung(falling.pose, 0.1 * response.collapse.mechanism)
     outlines = part_outlines(response.assembly, solver.moved_vertices(response.assembly, displaced), parts)
     length = np.hypot(*(outlines[:, 1] - outlines[:, 0]).T).sum()
     before = part_outlines(response.assembly, solver.moved_vertices(response.assembly, falling.pose), parts)
@@ -187,5 +187,5 @@ def test_carried_there_and_back(turn, x, y):
     before = solver.Pose(np.array([[1.0, 2.0]]), np.array([0.3]))
     after = solver.Pose(np.array([[x, y]]), np.array([turn]))
     point = np.array([[0.7, -0.4]])
-    there = marks.carried(point, np.array([0]), before, after)
-    np.testing.assert_allclose(marks.carried(there, np.array([0]), after, before), point, atol=1e-9)
+    there = solver.carried(point, np.array([0]), before, after)
+    np.testing.assert_allclose(solver.carried(there, np.array([0]), after, before), point, atol=1e-9)

@@ -14,7 +14,6 @@ import numpy as np
 
 import solver
 from blockvis.case import Case, case_assembly, case_interfaces, case_loads, case_of
-from blockvis.mechanism import swung
 
 from .plan import run_values
 
@@ -197,9 +196,9 @@ def _shape(assembly: solver.Assembly, falling: solver.Increment, mechanism: solv
     free = assembly.free[assembly.block_of_vertex]
     at_rest = solver.moved_vertices(assembly, falling.pose)
     size = float(np.ptp(at_rest[free], axis=0).max())
-    step = solver.moved_vertices(assembly, swung(falling.pose, falling.velocity * 1e-6)) - at_rest
+    step = solver.moved_vertices(assembly, solver.swung(falling.pose, falling.velocity * 1e-6)) - at_rest
     fastest = float(np.hypot(*step[free].T).max()) / 1e-6
-    moved = swung(falling.pose, falling.velocity * (SWING * size / fastest if fastest > 0.0 else 0.0))
+    moved = solver.swung(falling.pose, falling.velocity * (SWING * size / fastest if fastest > 0.0 else 0.0))
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
