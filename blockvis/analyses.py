@@ -15,8 +15,6 @@ from .loading import moving_loads, nearest_name
 from .series import POSITION
 from .stored_increments import StoredLimit
 
-__all__ = ["LimitNumbers", "Plan", "SeriesCheckpoint", "checkpoint_kind", "parameter_of", "planned"]
-
 #: Frames in which the mechanism of a limit load is swung, and how far its fastest block gets, in extents of the
 #: structure.
 SWINGING_FRAMES, SWING = 30, 0.05

@@ -18,15 +18,6 @@ from .series import POSITION, governing, parameter_word, path_values
 from .stored_increments import StoredLimit
 from .whole_files import write_whole
 
-__all__ = [
-    "CAPACITY_TABLES",
-    "capacity_summary",
-    "limit_states",
-    "stored_limits",
-    "stored_parameters",
-    "write_capacity",
-]
-
 #: Limit loads over the positions of a load that moves, and over the settlement.
 CAPACITY_TABLES = ("envelope.csv", "capacity.csv")
 

@@ -20,19 +20,6 @@ from .formats import FORMATS
 from .imperfections import Imperfection, imperfect, joint_scatter, read_imperfection
 from .loading import LoadCase, loads_of, nearest_name
 
-__all__ = [
-    "ANALYSES",
-    "FLOWS",
-    "Case",
-    "LoadCase",
-    "case_assembly",
-    "case_interfaces",
-    "case_loads",
-    "case_of",
-    "parse_case",
-    "read_case",
-]
-
 ANALYSES = ("settlement", "limit load", "pushover")
 
 #: How sliding joints of a limit load behave.

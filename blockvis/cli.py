@@ -16,8 +16,6 @@ import solver
 
 from .layouts import LAYOUTS
 
-__all__ = ["entry", "main"]
-
 #: Exit codes: bad input, a solver failure, everything written but the pictures, Ctrl-C.
 BAD_INPUT, SOLVER_FAILED, NO_PICTURES, INTERRUPTED = 2, 3, 4, 130
 
@@ -216,7 +214,8 @@ def _layout(options: argparse.Namespace) -> int:
 
 def _render(options: argparse.Namespace) -> int:
     from .curves import draw_curve
-    from .render import animate, draw_mechanism, draw_still, rendering_available
+    from .opengl import rendering_available
+    from .render import animate, draw_mechanism, draw_still
     from .report import write_report
     from .results import open_results, stored_case
 

@@ -32,8 +32,6 @@ from .series import (
 )
 from .whole_files import whole_file
 
-__all__ = ["CurvePanel", "Event", "draw_curve", "events_of"]
-
 #: Suffixes of the files that draw_curve writes.
 CURVE_SUFFIXES = (".png", ".svg", ".pdf")
 

@@ -12,8 +12,6 @@ from .facing import CLOSED, Edges, Facing
 from .outlines import without_collinear
 from .shared_lines import Line, moved_outlines, normal_form
 
-__all__ = ["LONGEST_MITRE", "cut_along", "parted", "welded"]
-
 #: Corners closer than this fraction of the joint thickness become one where blocks were cut along each other.
 WELD = 0.2
 

@@ -11,8 +11,6 @@ from vtkmodules.vtkCommonCore import vtkStringArray
 
 import solver
 
-__all__ = ["block_dataset", "contact_dataset", "output_times"]
-
 #: Numbers of the roles in the cell array ``role``; their names are in the field array ``role_names``.
 ROLE_NUMBERS = {role: number for number, role in enumerate(solver.ROLES)}
 

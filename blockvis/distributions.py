@@ -12,8 +12,6 @@ from scipy import special
 
 from .layouts.names import nearest, refuse_unknown
 
-__all__ = ["KINDS", "Distribution", "read_distribution"]
-
 #: The numbers each distribution needs, by its name; "normal" and "lognormal" may be cut off by lower and upper.
 KINDS: dict[str, tuple[str, ...]] = {
     "uniform": ("lower", "upper"),

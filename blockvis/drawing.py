@@ -20,20 +20,8 @@ from .outlines import without_collinear
 from .repair import duplicates, mended
 from .units import chosen_unit, metres_per
 
-__all__ = [
-    "Drawing",
-    "MissingFile",
-    "assemble",
-    "drawing_of",
-    "read",
-    "read_drawing",
-    "save_layout",
-    "write_drawing",
-]
-
 #: Coordinates beyond this [m] belong to no building on Earth; double precision leaves less than 0.1 mm there.
 LARGEST_COORDINATE = 1e8
-
 
 #: Corners of one block: more make checks quadratic in them expensive and are never meant.
 MOST_CORNERS = 2000

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["CLOSED", "Edges", "Facing", "edges_of", "facing_edges", "proposed_thickness"]
-
 #: Edges face each other when their outward normals point at each other within acos(0.8) = 37 degrees.
 FACING = -0.8
 

@@ -9,8 +9,6 @@ import shapely
 
 import solver
 
-__all__ = ["cut_into_triangles", "hatch_lines", "triangles"]
-
 
 def triangles(assembly: solver.Assembly) -> np.ndarray:
     """(n_triangles, 4) array of VTK cells over the vertices of the assembly; bent outlines included.

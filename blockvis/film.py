@@ -10,8 +10,6 @@ from PIL import Image
 
 from .whole_files import whole_file
 
-__all__ = ["FILM_SUFFIXES", "write_film"]
-
 FILM_SUFFIXES = (".mp4", ".gif", ".webp")
 
 #: Quality of x264 (0 lossless, 51 worst): line drawings show ringing from about 22 on.

@@ -20,8 +20,6 @@ import solver
 from .drawing import Drawing, assemble, read_drawing, write_drawing
 from .formats.pyvista_files import dataset_of, drawing_of_dataset
 
-__all__ = ["READS", "WRITES", "BlockvisAccessor"]
-
 
 def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:
     """A layout as a dataset of one polygon per block; options are those of ``blockvis.drawing.read_drawing``."""

@@ -18,8 +18,6 @@ import solver
 from .distributions import Distribution, read_distribution
 from .layouts.names import nearest
 
-__all__ = ["IMPERFECTIONS", "Imperfection", "imperfect", "joint_scatter", "moved_corners", "read_imperfection"]
-
 #: What each kind scatters, and the numbers of its distribution that may be left out.
 IMPERFECTIONS: dict[str, dict[str, float]] = {
     "vertices": {"mean": 0.0},

@@ -14,8 +14,6 @@ from .drawing import Drawing, read_drawing
 from .facing import Facing, proposed_thickness
 from .repair import CARELESS, ROUNDING, block_widths, duplicates, overlaps
 
-__all__ = ["Inspection", "draw_inspection", "inspect"]
-
 #: Classes of joint thickness in the report.
 CLASSES = 8
 

@@ -18,8 +18,6 @@ from .cutting import LONGEST_MITRE, cut_along, parted
 from .facing import CLOSED, edges_of, facing_edges
 from .shared_lines import common_lines, moved_outlines
 
-__all__ = ["Closing", "close_joints"]
-
 
 @dataclass(frozen=True)
 class Closing:

@@ -12,8 +12,6 @@ import solver
 from .series import POSITION, parameter_word
 from .sheet import force_text
 
-__all__ = ["LiveLoad", "LiveLoads", "live_load_of"]
-
 #: Loads below this fraction of the largest are rounding.
 ROUNDING = 1e-5
 

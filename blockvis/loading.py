@@ -12,8 +12,6 @@ import numpy as np
 
 import solver
 
-__all__ = ["LoadCase", "loads_of", "moving_loads", "nearest_name", "with_moving_load"]
-
 
 @dataclass(frozen=True)
 class LoadCase:

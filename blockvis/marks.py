@@ -9,16 +9,6 @@ import shapely
 
 import solver
 
-__all__ = [
-    "DrawnJoints",
-    "Marks",
-    "drawn_joints",
-    "marks_of",
-    "resultants",
-    "rounded_length",
-    "slipping",
-]
-
 #: A joint is shown open from this fraction of the block size on; on an ordinary brick it is a tenth of a millimetre.
 SMALLEST_OPENING = 1e-3
 

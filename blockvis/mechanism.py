@@ -7,8 +7,6 @@ import shapely
 
 import solver
 
-__all__ = ["part_outlines"]
-
 
 def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndarray) -> np.ndarray:
     """(n, 2, 2) array [m]: edges of the outline around each part, its blocks merged.

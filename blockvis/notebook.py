@@ -9,8 +9,6 @@ import solver
 
 from .report import report_html
 
-__all__ = ["Player", "show"]
-
 
 @dataclass(frozen=True)
 class Player:

@@ -8,8 +8,6 @@ import subprocess
 import sys
 from functools import cache
 
-__all__ = ["RenderingUnavailable", "rendering_available"]
-
 _PROBE = """
 from vtkmodules.vtkRenderingCore import vtkRenderWindow, vtkRenderer
 import vtkmodules.vtkRenderingOpenGL2

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-__all__ = ["arc_points", "flattened", "outlines_of_cells", "ring_area", "without_collinear"]
-
 #: A point this close to the chord of its neighbours, as a fraction of the size of the block, lies on it:
 #: single precision files (VTK, STL) leave 6e-8 of the coordinate.
 COLLINEAR = 1e-6

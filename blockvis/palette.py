@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["block_colours", "displacement_colours", "hexadecimal", "part_colours"]
-
 PAPER = (255, 255, 255)
 INK = (38, 38, 38)
 FAINT = (120, 120, 120)

@@ -9,8 +9,6 @@ from string import Template
 from . import palette
 from .whole_files import write_whole
 
-__all__ = ["write_paraview_macro"]
-
 _SCRIPT = Template('''\
 """Opens these results in ParaView: View > Python Shell > Run Script, or paraview --script=paraview_colours.py
 

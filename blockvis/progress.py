@@ -8,8 +8,6 @@ from typing import TextIO
 
 import solver
 
-__all__ = ["Progress", "StudyProgress"]
-
 #: Seconds between two redrawings of the bar.
 REDRAW = 0.1
 

@@ -11,8 +11,6 @@ from pathlib import Path
 
 from .case import Case, parse_case
 
-__all__ = ["RECORD", "Record", "read_record", "record_of", "versions"]
-
 #: Name of the file in the results folder.
 RECORD = "run.json"
 

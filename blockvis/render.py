@@ -11,13 +11,10 @@ from PIL import Image
 import solver
 
 from .film import write_film
-from .opengl import RenderingUnavailable, rendering_available
 from .scene import framed
 from .series import governing
 from .studio import MOST_PARTS, Look, Studio
 from .whole_files import whole_file
-
-__all__ = ["Look", "RenderingUnavailable", "animate", "draw_mechanism", "draw_still", "rendering_available"]
 
 STILL_SIZE = (1920, 1080)
 FILM_SIZE = (1280, 720)

@@ -11,8 +11,6 @@ import solver
 from .facing import proposed_thickness
 from .joints import Closing, close_joints
 
-__all__ = ["block_widths", "duplicates", "mended", "overlaps"]
-
 #: Two outlines closer than this fraction of the size of a block, corner by corner, are one block drawn twice.
 SAME = 1e-6
 

@@ -40,8 +40,6 @@ from .series import (
 from .sheet import force_text
 from .whole_files import write_whole
 
-__all__ = ["report_html", "write_report"]
-
 #: Increments beyond this many are thinned out evenly; the page stays below 2 MB for a thousand blocks. Of more than
 #: four thousand blocks fewer are shown, so that poses times blocks stay what a browser can hold.
 MOST_FRAMES, MOST_POSES, FEWEST_FRAMES = 160, 640_000, 24

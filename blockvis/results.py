@@ -25,8 +25,6 @@ from .stored_increments import StoredIncrement, StoredIncrements, packed_increme
 from .stored_values import checked_arrays, packed, unpacked
 from .whole_files import PARTIAL, make_folder, write_whole
 
-__all__ = ["ResultsExist", "ResultsFolder", "open_results", "refuse_results", "stored_case", "summary_of", "write"]
-
 #: Columns of response.csv.
 COLUMNS = (
     "increment",
@@ -48,7 +46,6 @@ COLUMNS = (
     "seconds",
 )
 
-
 #: Where a run can go on from, beside the increments it belongs to.
 CHECKPOINT = "checkpoint.npz"
 
@@ -59,7 +56,6 @@ _PICTURES = (
     *("report.html", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
     *(f"collapse{suffix}" for suffix in (".mp4", ".gif", ".webp")),
 )
-
 
 C = TypeVar("C")
 

@@ -19,8 +19,6 @@ from .record import read_record, record_of
 from .results import ResultsFolder, open_results, refuse_results
 from .whole_files import PARTIAL
 
-__all__ = ["Run", "draw_results", "resume_run", "run_case"]
-
 #: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
 AS_DRAWN = 0.02
 
@@ -225,8 +223,9 @@ def draw_results(
         What could not be drawn, and why; empty where all is there.
     """
     from .curves import draw_curve
+    from .opengl import RenderingUnavailable, rendering_available
     from .paraview_macro import write_paraview_macro
-    from .render import RenderingUnavailable, animate, draw_mechanism, rendering_available
+    from .render import animate, draw_mechanism
     from .report import write_report
 
     if not response.increments:

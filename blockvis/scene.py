@@ -14,8 +14,6 @@ from . import palette
 from .fills import hatch_lines, triangles
 from .opengl import RenderingUnavailable, rendering_available
 
-__all__ = ["Frame", "Scene", "framed", "magnified"]
-
 #: Depths of the layers, back to front.
 DEPTHS = {
     name: k / 170.0

@@ -8,24 +8,6 @@ import solver
 
 from .sheet import force_text
 
-__all__ = [
-    "MOST_OVER_LOWEST",
-    "POSITION",
-    "badge_of",
-    "force_unit",
-    "governing",
-    "matters",
-    "parameter_label",
-    "parameter_text",
-    "parameter_unit",
-    "parameter_word",
-    "path_parameters",
-    "path_values",
-    "reads_multipliers",
-    "state_text",
-    "value_label",
-]
-
 #: Multipliers above this many times the lowest of an envelope are not shown: over a support a load may grow nearly
 #: without limit.
 MOST_OVER_LOWEST = 8.0

@@ -8,8 +8,6 @@ import numpy as np
 
 from .facing import Edges, Facing
 
-__all__ = ["Line", "common_lines", "moved_outlines", "normal_form"]
-
 #: One line serves several stretches of a joint where it leaves their midlines by no more than this fraction of the
 #: gap: far enough from a half, at which an edge would have to move backwards or all the way.
 SHARED_LINE = 0.3

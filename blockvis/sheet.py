@@ -13,8 +13,6 @@ from PIL import Image, ImageDraw, ImageFont
 from . import palette
 from .marks import rounded_length
 
-__all__ = ["ColourBar", "Key", "Sheet", "force_text", "length_text"]
-
 #: Height of the text as a fraction of the height of the picture, and its least size in pixels.
 TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 36.0, 12
 

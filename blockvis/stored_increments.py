@@ -20,8 +20,6 @@ import solver
 
 from .stored_values import checked_arrays
 
-__all__ = ["StoredIncrement", "StoredIncrements", "StoredLimit", "packed_increment"]
-
 #: Bytes of arrays that are kept of the increments read last, and how many of them are kept whatever their size: frames
 #: of a film lie between two.
 CACHED, AT_LEAST = 8 << 20, 2

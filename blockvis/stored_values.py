@@ -15,8 +15,6 @@ from typing import IO, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-__all__ = ["checked_arrays", "packed", "unpacked"]
-
 T = TypeVar("T")
 
 #: An .npz file of a run never comes near this many bytes unpacked; a bomb does.

@@ -21,8 +21,6 @@ from .scene import Scene, framed, magnified
 from .series import POSITION, badge_of, governing, matters, parameter_word, reads_multipliers, state_text
 from .sheet import ColourBar, Key, Sheet, force_text
 
-__all__ = ["Look", "Studio"]
-
 #: Resultants and hinges of more blocks than this hide what they stand on.
 FEW_BLOCKS = 300
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["PLAUSIBLE_SIZE", "UNITS", "chosen_unit", "metres_per"]
-
 #: Metres per unit.
 UNITS = {
     "m": 1.0,

@@ -12,8 +12,6 @@ from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 from .whole_files import write_whole
 
-__all__ = ["write_pvd", "write_vtu"]
-
 
 def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True) -> Path:
     """Writes a dataset as VTU, whole or not at all.

@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["PARTIAL", "flush", "make_folder", "whole_file", "write_whole"]
-
 #: Pattern of the names under which files are written before they are put in their place; what a process that was
 #: killed has left of it may be removed.
 PARTIAL = ".*.part*"

@@ -1,14 +1,15 @@
-"""Pose: where the blocks are; moved corners and points; the exact rigid update."""
+"""Kinematics: where the blocks are, how points ride on them, which of them move together."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from .assembly import Assembly
-
-__all__ = ["Pose", "carried", "moved", "moved_vertices", "point_velocities", "rotation_matrices", "swung"]
+from .geometry.contacts import Contacts
 
 
 @dataclass(frozen=True)
@@ -115,3 +116,31 @@ def point_velocities(points: np.ndarray, block: np.ndarray, pose: Pose, velocity
     """
     arm = points - pose.positions[block]
     return velocity[block, :2] + velocity[block, 2:] * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+
+
+def moving_together(
+    n_blocks: int, contacts: Contacts, apart: np.ndarray, turned: np.ndarray, together: float
+) -> np.ndarray:
+    """(n_blocks,) int array: number of the group of each block.
+
+    Parameters
+    ----------
+    n_blocks : int
+    contacts : Contacts
+    apart : (n_contacts,) array [m]
+        Relative movement of each contact point.
+    turned : (n_blocks,) array [m]
+        Rotation of each block times a length.
+    together : float [m]
+        Two blocks belong together where all their contact points move apart by less than this, and their rotations too:
+        a single point cannot tell that blocks turn about it.
+    """
+    low = np.minimum(contacts.block_a, contacts.block_b)
+    high = np.maximum(contacts.block_a, contacts.block_b)
+    pair, which = np.unique(low.astype(np.int64) * n_blocks + high, return_inverse=True)
+    most = np.zeros(len(pair))
+    np.maximum.at(most, which.ravel(), apart)
+    a, b = pair // n_blocks, pair % n_blocks
+    stay = (most < together) & (np.abs(turned[a] - turned[b]) < together)
+    links = sp.coo_array((np.ones(np.count_nonzero(stay)), (a[stay], b[stay])), shape=(n_blocks, n_blocks))
+    return connected_components(links, directed=False)[1]

@@ -11,6 +11,7 @@ from scipy.optimize import linprog
 import solver
 from blockvis import layouts
 from solver.equilibrium import block_forces
+from solver.lp.highs import run_highs
 
 NO_FALL = solver.Controls(falling_frames=0)
 DOWN = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.02)
@@ -445,15 +446,15 @@ def test_increments_are_told_as_they_are_found():
 
 def test_solver_failure_is_not_collapse(monkeypatch):
     """HiGHS that gives nothing from some program on is told as such, with what was found before."""
-    from solver import lp
+    from solver.lp import solve
 
-    run, calls = lp._run, []
+    run, calls = run_highs, []
 
     def breaks(program, route):
         calls.append(route)
         return run(program, route) if len(calls) <= 4 else (None, "kSolveError")
 
-    monkeypatch.setattr(lp, "_run", breaks)
+    monkeypatch.setattr(solve, "run_highs", breaks)
     spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
     response = solver.settle(layouts.arch(), spread, friction_coefficient=2.0)
     assert response.stop is solver.Status.SOLVER_FAILED

@@ -15,7 +15,7 @@ from blockvis.case import case_assembly, parse_case
 from blockvis.cli import _in_words, main
 from blockvis.render import draw_still
 from blockvis.series import governing, parameter_label, state_text, value_label
-from solver.analysis import drained
+from solver.analysis.settlement import drained
 
 COLUMN = """
 [geometry]

@@ -13,9 +13,11 @@ from scipy.optimize import linprog
 from structures import wall
 
 import solver
-from solver import lp
-from solver.interior import Diverges, NoProgress, _Band, interior_point
-from solver.threads import one_thread
+from solver.lp import problem
+from solver.lp.band import Diverges, NoProgress, _Band, interior_point
+from solver.lp.solve import BAND, solve_lp
+from solver.lp.threads import one_thread
+from solver.program import increment, light_blocks
 
 
 def chain(seed, blocks, degenerate=False):
@@ -34,12 +36,12 @@ def chain(seed, blocks, degenerate=False):
     middle = joints @ carried + np.where(random.uniform(size=rows) < 0.1, 1.0, 0.0)
     cost = random.uniform(0.0, 0.1, columns) * (random.uniform(size=columns) < 0.7)
     matrix = sp.csc_array(sp.hstack([joints, sp.eye_array(rows), -sp.eye_array(rows)]))
-    return lp.LinearProgram(np.concatenate([cost, np.ones(2 * rows)]), matrix, middle - 1e-6, middle + 1e-6)
+    return problem.LinearProgram(np.concatenate([cost, np.ones(2 * rows)]), matrix, middle - 1e-6, middle + 1e-6)
 
 
 def solved(program):
     x, y, iterations = interior_point(program.cost, program.matrix, program.lower, program.upper)
-    return lp._checked(program, x, y, lp.BAND, iterations, 0.0)
+    return problem.checked(program, x, y, BAND, iterations, 0.0)
 
 
 @settings(max_examples=25, deadline=None)
@@ -66,13 +68,14 @@ def test_hardly_ever_gives_up():
 
 def programs_of(monkeypatch, assembly, **settlement):
     """The programs of a run, with the solutions it went on with."""
-    kept, solve_lp = [], solver.program.solve_lp
+    kept = []
 
     def keeping(program, routes=None):
         kept.append((program, solve_lp(program, routes)))
         return kept[-1][1]
 
-    monkeypatch.setattr(solver.program, "solve_lp", keeping)
+    for module in (increment, light_blocks):
+        monkeypatch.setattr(module, "solve_lp", keeping)
     solver.settle(assembly, solver.Settlement(**settlement), friction_coefficient=0.6)
     return kept
 
@@ -81,10 +84,10 @@ def test_walls_take_it_and_it_agrees_with_highs(monkeypatch):
     """Every program of a wall of 520 bricks, those over its macro-blocks included, is solved in half the iterations."""
     kept = programs_of(monkeypatch, wall(30, 17), direction=(0.0, -1.0), increment=2e-3, limit=4e-3)
     assert len(kept) > 4
-    assert {solution.route for _, solution in kept} == {lp.BAND}
+    assert {solution.route for _, solution in kept} == {BAND}
     assert min(program.matrix.shape[0] for program, _ in kept) < 1000
     for program, solution in kept[1:]:
-        known = lp.solve_lp(program, ("hipo",))
+        known = solve_lp(program, ("hipo",))
         assert solution.objective == pytest.approx(known.objective, abs=1e-7 * (1 + abs(known.objective)))
         assert solution.iterations < 0.8 * known.iterations
 
@@ -116,7 +119,7 @@ def test_an_objective_that_falls_without_limit_is_proved_by_its_ray():
     """Two columns against each other that cost less than nothing."""
     program = chain(2, 10)
     ray = sp.csc_array(([1.0, -1.0], [0, 0], [0, 1, 2]), shape=(30, 2))
-    program = lp.LinearProgram(
+    program = problem.LinearProgram(
         np.concatenate([[-1.0, -1.0], program.cost]),
         sp.csc_array(sp.hstack([ray, program.matrix])),
         program.lower,
@@ -125,8 +128,8 @@ def test_an_objective_that_falls_without_limit_is_proved_by_its_ray():
     with pytest.raises(Diverges) as found:
         interior_point(program.cost, program.matrix, program.lower, program.upper)
     assert found.value.ray.max() == 1.0
-    with pytest.raises(lp.Unbounded) as proved:
-        lp.solve_lp(program, (lp.BAND,))
+    with pytest.raises(problem.Unbounded) as proved:
+        solve_lp(program, (BAND,))
     assert np.abs(program.matrix @ proved.value.x).max() < 1e-9
     assert program.cost @ proved.value.x < -0.1
     assert (proved.value.x >= 0.0).all()
@@ -134,8 +137,8 @@ def test_an_objective_that_falls_without_limit_is_proved_by_its_ray():
 
 def test_a_ray_that_does_not_prove_it_counts_for_nothing():
     program = chain(2, 10)
-    lp._raise_if_proved(program, np.ones(program.matrix.shape[1]))
-    lp._raise_if_proved(program, np.zeros(program.matrix.shape[1]))
+    problem.raise_if_proved(program, np.ones(program.matrix.shape[1]))
+    problem.raise_if_proved(program, np.zeros(program.matrix.shape[1]))
 
 
 def test_a_wall_squeezed_between_its_supports_is_locked():
@@ -154,7 +157,7 @@ def test_a_wall_squeezed_between_its_supports_is_locked():
 
 WHILE_LIMITED = """
 import hashlib, sys
-from solver.threads import _libraries, one_thread
+from solver.lp.threads import _libraries, one_thread
 before = [get() for get, _ in _libraries()]
 with one_thread():
     during = [get() for get, _ in _libraries()]
@@ -194,10 +197,10 @@ def test_an_order_of_the_rows_makes_no_difference_but_the_width():
     program = chain(7, 40)
     order = np.random.default_rng(0).permutation(40)
     rows = (3 * order[:, None] + np.arange(3)).ravel()
-    shuffled = lp.LinearProgram(
+    shuffled = problem.LinearProgram(
         program.cost, sp.csc_array(program.matrix[rows]), program.lower[rows], program.upper[rows], np.repeat(order, 3)
     )
-    first, second = solved(program), lp.solve_lp(shuffled, (lp.BAND,))
+    first, second = solved(program), solve_lp(shuffled, (BAND,))
     assert second.objective == pytest.approx(first.objective, abs=1e-7 * (1 + abs(first.objective)))
     whole = sp.csc_array(sp.hstack([shuffled.matrix, sp.eye_array(120)]))
     assert _Band(whole, shuffled.along).width == 6

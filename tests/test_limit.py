@@ -5,7 +5,8 @@ import pytest
 
 import solver
 from blockvis import layouts
-from solver.limit import LimitStatus, limit_load, limit_load_envelope
+from solver.analysis.limit_load import limit_load, limit_load_envelope
+from solver.results.limit import LimitStatus
 from solver.surface_loads import edge_pressure, load_on_top, surface_pressure
 
 GROUND = [[-2, -1], [3, -1], [3, 0], [-2, 0]]

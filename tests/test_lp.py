@@ -7,8 +7,10 @@ import pytest
 import scipy.sparse as sp
 from scipy.optimize import linprog
 
-from solver import lp
-from solver.lp import LinearProgram, SolveError, Unbounded, solve_lp
+from solver.lp import problem, solve
+from solver.lp.highs import ROUTES, run_highs
+from solver.lp.problem import LinearProgram, SolveError, Unbounded
+from solver.lp.solve import solve_lp
 
 
 def random_program(seed, rows=12, columns=30, equalities=6):
@@ -37,7 +39,7 @@ def test_random_programs_have_the_optimum_that_scipy_finds(seed):
     assert solution.objective == pytest.approx(scipy_optimum(program), abs=1e-7)
 
 
-@pytest.mark.parametrize("route", lp.ROUTES)
+@pytest.mark.parametrize("route", ROUTES)
 def test_every_route_finds_it(route):
     program = random_program(99, rows=30, columns=80, equalities=20)
     solution = solve_lp(program, (route,))
@@ -66,15 +68,15 @@ def test_a_wrong_solution_does_not_pass_the_check(field, error):
     right = solve_lp(program)
     x, y = right.x.copy(), right.row_dual.copy()
     (x if field == "x" else y)[np.argmax(np.abs(x if field == "x" else y))] += error
-    assert lp._checked(program, right.x, right.row_dual, "as found", 0, 0.0).accepted
-    assert not lp._checked(program, x, y, "made up", 0, 0.0).accepted
+    assert problem.checked(program, right.x, right.row_dual, "as found", 0, 0.0).accepted
+    assert not problem.checked(program, x, y, "made up", 0, 0.0).accepted
 
 
 def test_a_feasible_point_that_is_not_the_optimum_does_not_pass():
     program = random_program(2)
     right, worse = solve_lp(program), solve_lp(replace(program, cost=np.ones(30)))
-    assert lp._checked(program, worse.x, right.row_dual, "made up", 0, 0.0).primal_violation < 1e-7
-    assert not lp._checked(program, worse.x, right.row_dual, "made up", 0, 0.0).accepted
+    assert problem.checked(program, worse.x, right.row_dual, "made up", 0, 0.0).primal_violation < 1e-7
+    assert not problem.checked(program, worse.x, right.row_dual, "made up", 0, 0.0).accepted
 
 
 def test_unbounded_program_is_proved_by_a_ray():
@@ -110,13 +112,13 @@ def wrong(program, route, solution):
 
 
 def test_another_route_is_taken_where_the_first_gives_nothing(monkeypatch):
-    run, taken = lp._run, []
+    run, taken = run_highs, []
 
     def fails_first(program, route):
         taken.append(route)
         return (None, "kSolveError") if len(taken) == 1 else run(program, route)
 
-    monkeypatch.setattr(lp, "_run", fails_first)
+    monkeypatch.setattr(solve, "run_highs", fails_first)
     program = random_program(3)
     solution = solve_lp(program)
     assert len(taken) == 2
@@ -125,19 +127,19 @@ def test_another_route_is_taken_where_the_first_gives_nothing(monkeypatch):
 
 
 def test_another_route_is_taken_where_the_first_calls_a_wrong_solution_optimal(monkeypatch):
-    run = lp._run
+    run = run_highs
 
     def lies_first(program, route):
         solution, status = run(program, route)
         return wrong(program, route, solution) if route == "simplex" else (solution, status)
 
-    monkeypatch.setattr(lp, "_run", lies_first)
+    monkeypatch.setattr(solve, "run_highs", lies_first)
     assert solve_lp(random_program(3)).route == "simplex without presolve"
 
 
 def test_no_route_left_is_an_error_with_the_measures(monkeypatch):
-    run = lp._run
-    monkeypatch.setattr(lp, "_run", lambda program, route: wrong(program, route, run(program, route)[0]))
+    run = run_highs
+    monkeypatch.setattr(solve, "run_highs", lambda program, route: wrong(program, route, run(program, route)[0]))
     with pytest.raises(SolveError, match=r"simplex: Optimal, violation 1\.0e-01"):
         solve_lp(random_program(3))
 

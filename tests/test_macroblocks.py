@@ -3,9 +3,9 @@ import pytest
 
 import solver
 from blockvis import layouts
-from solver.contact import find_contacts
-from solver.kinematics import Pose, moved_vertices, point_velocities
-from solver.macroblocks import free_blocks, macro_blocks, moving_together
+from solver.geometry.planar_contacts import find_contacts
+from solver.kinematics import Pose, moved_vertices, moving_together, point_velocities
+from solver.program.macroblocks import free_blocks, macro_blocks
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_a_large_wall_closes_up_like_a_small_one(wall, monkeypatch):
     """The reaction hangs on gaps being closed: left as they are it is 20 % off."""
     sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.004, limit=0.016)
     exact = solver.settle(wall, sinks, friction_coefficient=0.6)
-    monkeypatch.setattr("solver.program.CROSSOVER_ROWS", 10)
+    monkeypatch.setattr("solver.program.model.CROSSOVER_ROWS", 10)
     large = solver.settle(wall, sinks, friction_coefficient=0.6)
     assert large.stop is solver.Status.LIMIT_REACHED
     here = np.interp(exact.settlement, large.settlement, large.reaction)

@@ -14,11 +14,11 @@ from blockvis import stored_increments
 from blockvis.case import parse_case
 from blockvis.curves import draw_curve
 from blockvis.film import write_film
-from blockvis.render import Look, rendering_available
+from blockvis.opengl import rendering_available
 from blockvis.report import report_html
 from blockvis.results import ResultsFolder
 from blockvis.stored_increments import AT_LEAST, StoredIncrements
-from blockvis.studio import Studio
+from blockvis.studio import Look, Studio
 
 ARCH = """
 [geometry]

@@ -6,8 +6,8 @@ import pytest
 
 import solver
 from blockvis import layouts
-from solver.limit import limit_load
-from solver.pushover import ControlDisplacement, pushover
+from solver.analysis.limit_load import limit_load
+from solver.analysis.pushover import ControlDisplacement, pushover
 
 
 def block():

@@ -10,7 +10,8 @@ from structures import BENT, arch_response, parted, wall
 
 import solver
 from blockvis import opengl, palette
-from blockvis.render import animate, draw_mechanism, draw_still, rendering_available
+from blockvis.opengl import rendering_available
+from blockvis.render import animate, draw_mechanism, draw_still
 from blockvis.scene import Frame, Scene, framed, magnified
 from blockvis.studio import Look, Studio
 

@@ -8,7 +8,7 @@ import pytest
 import blockvis
 import solver
 from blockvis import layouts
-from solver.analysis import settlement_increments
+from solver.analysis.settlement import settlement_increments
 
 WIDTH, HEIGHT, SLOT = 0.1, 0.2, 0.02
 

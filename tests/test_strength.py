@@ -9,7 +9,7 @@ import solver
 from blockvis import layouts
 from blockvis.case import parse_case
 from blockvis.cli import main
-from solver.strength import contact_areas
+from solver.program.strength import contact_areas
 
 WIDTH, HEIGHT, THICKNESS = 0.8, 0.5, 0.3
 AREA = WIDTH * THICKNESS

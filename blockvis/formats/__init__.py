@@ -16,6 +16,9 @@ from blockvis.whole_files import whole_file
 if TYPE_CHECKING:
     from blockvis.drawing import Drawing
 
+if TYPE_CHECKING:
+    from blockvis.drawing import Drawing
+
 __all__ = ["FORMATS", "Format", "Reading", "read", "write"]
 
 

@@ -11,10 +11,9 @@ import numpy as np
 
 import solver
 from blockvis.drawing import Drawing
-from blockvis.formats.layout_json import with_rows
 from blockvis.outlines import flattened, outlines_of_cells
 
-__all__ = ["components", "drawing_of_cells", "merged", "row_of"]
+from .layout_json import with_rows
 
 #: Names of the cell array that numbers the blocks, in order of preference.
 BLOCK_ARRAYS = ("block_id", "BlockId", "block", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags")

@@ -14,12 +14,11 @@ import numpy as np
 
 from blockvis.drawing import Drawing
 from blockvis.formats import Reading
-from blockvis.formats.layout_json import rows_of, with_rows
-from blockvis.formats.loose_lines import Line, faces_of_lines
 from blockvis.outlines import arc_points
 from blockvis.units import metres_per
 
-__all__ = ["read", "write"]
+from .layout_json import rows_of, with_rows
+from .loose_lines import Line, faces_of_lines
 
 #: Units by the header variable $INSUNITS.
 UNIT_CODES = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 14: "dm"}

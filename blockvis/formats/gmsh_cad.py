@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from blockvis.drawing import Drawing
-from blockvis.formats import Reading, gmsh_mesh
-from blockvis.formats.gmsh_process import NO_LIBRARY
-from blockvis.formats.solids import Body, drawing_of_bodies
+from blockvis.formats import Reading
 
-__all__ = ["read"]
+from . import gmsh_mesh
+from .gmsh_process import NO_LIBRARY
+from .solids import Body, drawing_of_bodies
 
 #: A geometry script that needs longer is taken for one that does not end.
 LONGEST_SECONDS = 120

@@ -15,10 +15,9 @@ import numpy as np
 
 from blockvis.drawing import Drawing
 from blockvis.formats import Reading
-from blockvis.formats.triangles import cells_of_ring
 from blockvis.outlines import flattened, outlines_of_cells
 
-__all__ = ["read", "write"]
+from .triangles import cells_of_ring
 
 #: Points around a surface element, by gmsh's element type: corners with the points of curved sides between them.
 RINGS = {
@@ -329,7 +328,7 @@ def _with_table(drawing: Drawing, table: dict[str, dict[str, object]], tags: np.
     rows = [table.get(str(tag)) for tag in tags]
     if not all(isinstance(row, dict) for row in rows):
         return drawing
-    from blockvis.formats.layout_json import with_rows
+    from .layout_json import with_rows
 
     return with_rows(drawing, rows)
 
@@ -340,7 +339,7 @@ def write(drawing: Drawing, path: Path) -> None:
     A block without a group is put into one named after its role, its material, or "blocks". A section of our own,
     which other programs skip, keeps names, roles, materials, density and thickness.
     """
-    from blockvis.formats.layout_json import rows_of
+    from .layout_json import rows_of
 
     groups = [
         group or (role if role in ("fixed", "moving") else "") or material or "blocks"

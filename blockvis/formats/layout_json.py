@@ -20,8 +20,6 @@ import solver
 from blockvis.drawing import Drawing
 from blockvis.formats import Reading
 
-__all__ = ["read", "rows_of", "with_rows", "write"]
-
 FORMAT = "blockvis layout"
 
 

@@ -12,9 +12,8 @@ import numpy as np
 
 from blockvis.drawing import Drawing
 from blockvis.formats import Reading
-from blockvis.formats.cells import drawing_of_cells
 
-__all__ = ["read"]
+from .cells import drawing_of_cells
 
 #: Points around a surface cell, by meshio's name; None: all of them in order.
 RINGS: dict[str, tuple[int, ...] | None] = {

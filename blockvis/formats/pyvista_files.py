@@ -15,14 +15,13 @@ import numpy as np
 
 from blockvis.drawing import Drawing
 from blockvis.formats import Reading
-from blockvis.formats.cells import drawing_of_cells, merged, row_of
-from blockvis.formats.layout_json import rows_of
-from blockvis.formats.vtk_arrays import largest_number
+
+from .cells import drawing_of_cells, merged, row_of
+from .layout_json import rows_of
+from .vtk_arrays import largest_number
 
 if TYPE_CHECKING:
     import pyvista
-
-__all__ = ["dataset_of", "drawing_of_dataset", "read", "write"]
 
 #: Points around a surface cell, by VTK's cell type; None: all of them in order.
 RINGS: dict[int, tuple[int, ...] | None] = {
@@ -273,7 +272,7 @@ def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
 
 
 def _drawing_of_solids(grid: Any, path: Path | str) -> Drawing:
-    from blockvis.formats.solids import Body, drawing_of_bodies
+    from .solids import Body, drawing_of_bodies
 
     rows: list[dict[str, Any]] = []
     bodies = []

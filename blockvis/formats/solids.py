@@ -12,12 +12,11 @@ import numpy as np
 
 from blockvis.drawing import Drawing
 from blockvis.formats import Reading
-from blockvis.formats.cells import components, drawing_of_cells, merged
-from blockvis.formats.layout_json import rows_of, with_rows
-from blockvis.formats.triangles import triangles_of_ring
 from blockvis.outlines import FLAT, outlines_of_cells
 
-__all__ = ["Body", "drawing_of_bodies", "read", "write"]
+from .cells import components, drawing_of_cells, merged
+from .layout_json import rows_of, with_rows
+from .triangles import triangles_of_ring
 
 #: Points closer than this fraction of the drawing are one: single precision leaves 6e-8 of a coordinate.
 SAME_POINT = 2e-6

@@ -21,11 +21,10 @@ import numpy as np
 import solver
 from blockvis.drawing import Drawing
 from blockvis.formats import Reading
-from blockvis.formats.layout_json import rows_of, with_rows
 from blockvis.outlines import LARGEST_CHORD
 from blockvis.units import UNITS, metres_per
 
-__all__ = ["read", "write"]
+from .layout_json import rows_of, with_rows
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")

@@ -12,16 +12,6 @@ from blockvis.outlines import without_collinear
 
 from .dimensions import MOST_VOUSSOIRS, above_zero, whole
 
-__all__ = [
-    "arch",
-    "basket_handle_arch",
-    "pointed_arch",
-    "radial_joints",
-    "segmental_arch",
-    "segmental_joints",
-    "voussoir_outlines",
-]
-
 
 def arch(
     *,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["BONDS", "SHORTEST_BRICK", "head_joints"]
-
 BONDS = ("running", "stack", "english")
 
 #: A brick cut shorter than this fraction of its length is joined to its neighbour: shorter than the closer (a quarter)

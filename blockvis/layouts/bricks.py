@@ -13,8 +13,6 @@ from blockvis.outlines import without_collinear
 
 from .bonds import SHORTEST_BRICK, head_joints
 
-__all__ = ["LOWEST_BRICK", "Bond", "Brick", "brick_outline", "cut_bricks", "lay_bricks"]
-
 #: All corners lie on a grid of this fraction of the brick height, so that cuts leave no splinters of rounding errors.
 GRID = 1e-10
 

@@ -13,8 +13,6 @@ from .frames import arch_on_piers, buttressed_arch, column, portal
 from .names import nearest, refuse_unknown
 from .walls import facade, panel, wall
 
-__all__ = ["LAYOUTS", "build", "parameters_of"]
-
 #: Every layout by its name.
 LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
     "arch": arch,

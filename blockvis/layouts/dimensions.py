@@ -6,8 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-__all__ = ["MOST_BLOCKS", "MOST_VOUSSOIRS", "above_zero", "at_least_zero", "choice", "finite", "pair", "whole"]
-
 #: Blocks in a layout, or along a side of it: beyond anything that could be solved.
 MOST_BLOCKS = 100_000
 

@@ -12,8 +12,6 @@ from blockvis.outlines import without_collinear
 from .arches import segmental_joints, voussoir_outlines
 from .dimensions import above_zero, whole
 
-__all__ = ["arch_on_piers", "buttressed_arch", "column", "portal"]
-
 MIRROR = np.array([-1.0, 1.0])
 
 

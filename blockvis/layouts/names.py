@@ -5,8 +5,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Sequence
 
-__all__ = ["nearest", "refuse_unknown"]
-
 
 def nearest(word: str, known: Sequence[str]) -> str:
     """A hint at the known word most like this one; empty where none is."""

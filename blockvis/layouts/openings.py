@@ -13,8 +13,6 @@ from .arches import segmental_joints, voussoir_outlines
 from .dimensions import above_zero, at_least_zero, choice, finite, whole
 from .names import refuse_unknown
 
-__all__ = ["HEADS", "Opening", "checked_opening", "head_outlines", "opening_ring"]
-
 HEADS = ("lintel", "flat arch", "segmental arch", "round arch", "none")
 
 

@@ -17,8 +17,6 @@ from .bricks import LOWEST_BRICK, Bond, brick_outline, cut_bricks, lay_bricks
 from .dimensions import MOST_BLOCKS, above_zero, choice, finite, pair, whole
 from .openings import Opening, checked_opening, head_joints_of, head_outlines, opening_ring
 
-__all__ = ["facade", "panel", "wall"]
-
 #: An edge of an opening this near a joint, as a fraction of their spacing, was meant to be on it.
 ROUNDING = 1e-6
 

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from distributed import Client, Future
 
-__all__ = ["carry_out", "local_cluster", "run_study", "study"]
-
 #: Runs given to the scheduler at a time: enough for a thousand workers, little for its memory.
 WINDOW = 2000
 
@@ -299,7 +297,6 @@ def _record(ledger: Ledger, bar: StudyProgress, rows: Sequence[tuple[dict[str, A
 
 #: Why a run that no worker survives has no result.
 KILLED = "every worker that took this run died, perhaps out of memory; make it alone with --keep to see why"
-
 
 _Finished = tuple[int, dict[str, Any] | None, bytes]
 

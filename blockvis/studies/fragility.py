@@ -16,8 +16,6 @@ from .ledger import NO_RESULT
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Fragility", "fragility", "fragility_of", "observations", "wilson"]
-
 #: Status of runs that stood as far as they were followed.
 STOOD = (str(solver.Status.LIMIT_REACHED), str(solver.Status.LOCKED))
 

@@ -22,8 +22,6 @@ from .single import FAILED
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Ledger", "StudyExists", "finished_runs", "has_failed"]
-
 #: The file of the rows, one JSON object per line.
 RUNS = "runs.jsonl"
 

@@ -8,8 +8,6 @@ from typing import Any
 
 from blockvis.layouts.names import nearest
 
-__all__ = ["parse_path", "put"]
-
 _STEP = re.compile(r'\.?(?:([A-Za-z0-9_-]+)|"([^"]*)"|\[(\d+)\])')
 
 

@@ -23,8 +23,6 @@ from .summary import classes_of, curve_name, independent_rows
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["draw_fragility", "draw_mechanisms", "draw_scatter", "draw_sensitivity", "draw_study"]
-
 #: Classes with a colour of their own in the scatter, and classes drawn.
 COLOURED, DRAWN = 6, 12
 

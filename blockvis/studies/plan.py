@@ -21,8 +21,6 @@ from blockvis.layouts.names import nearest, refuse_unknown
 from .paths import parse_path, put
 from .sampling import METHODS, Design, designed
 
-__all__ = ["RESERVED", "Parameter", "Study", "read_study", "run_values"]
-
 #: Columns of the table that are no parameters.
 RESERVED = (
     "run", "status", "collapse_displacement", "bracket_low", "bracket_high", "last_settlement", "unit",
@@ -32,7 +30,6 @@ RESERVED = (
 
 #: Most runs of one study: rows are files in one folder, and their table is made in memory.
 MOST_RUNS = 1_000_000
-
 
 #: So many runs are checked as cases before anything starts, which takes a few seconds; of a larger study, a later one
 #: that is no case is recorded as failed.

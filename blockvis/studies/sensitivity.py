@@ -13,8 +13,6 @@ from .plan import Parameter, Study
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["IMPERFECTIONS", "Swing", "first_order", "outcome", "swings"]
-
 #: What the exchange of all imperfections together is called.
 IMPERFECTIONS = "imperfections"
 

@@ -17,8 +17,6 @@ from blockvis.case import Case, case_assembly, case_interfaces, case_loads, case
 
 from .plan import run_values
 
-__all__ = ["FAILED", "failed_row", "mechanism_class", "run_once"]
-
 #: Status of a run that gave no result, besides "solver failed".
 FAILED = "failed"
 

@@ -18,8 +18,6 @@ from .sensitivity import first_order, swings
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["classes_of", "curve_name", "in_words", "independent_rows", "stored_summary", "summary_of"]
-
 #: Mechanisms that are told one by one.
 MOST_TOLD = 6
 

@@ -11,8 +11,6 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from .threads import NotLimited, one_thread
 
-__all__ = ["Diverges", "NoProgress", "interior_point"]
-
 #: Violation of rows and reduced costs, absolute, and relative difference of the objectives at which a point is optimal.
 TOLERANCE = 1e-8
 

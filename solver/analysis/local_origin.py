@@ -8,12 +8,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from .assembly import Assembly
-from .kinematics import Pose
-from .loads import Settlement
-from .response import Increment
-
-__all__ = ["at_origin", "told_from", "without_origin"]
+from solver.assembly import Assembly
+from solver.kinematics import Pose
+from solver.loads import Settlement
+from solver.results.increment import Increment
 
 Ended = TypeVar("Ended")
 

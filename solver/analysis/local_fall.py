@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .assembly import FIXED, FREE, Assembly
-from .contact import measure_contacts
-from .correction import FARTHEST_FALL, STILL, Falls, NotConverged, at_rest, solve_again
-from .kinematics import Pose, moved, moved_vertices
-from .lp import SolveError
-from .program import Locked, Model, Solved, solve_program
-
-__all__ = ["Snap", "jump_words", "snapped"]
+from solver.assembly import FIXED, FREE, Assembly
+from solver.geometry.planar_contacts import measure_contacts
+from solver.kinematics import Pose, moved, moved_vertices
+from solver.lp.problem import SolveError
+from solver.program.correction import FARTHEST_FALL, STILL, Falls, NotConverged, at_rest, solve_again
+from solver.program.increment import Locked, Solved, solve_program
+from solver.program.model import Model
 
 #: Largest weight of what may snap, as a fraction of that of the free blocks. Falling by half a block size at most, it
 #: strikes the rest with an energy that would lift all of it by 5e-3 block sizes at most: a knock that statics may pass

@@ -7,20 +7,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .analysis import Controls, Ending, drained, timed
-from .assembly import Assembly, check_blocks
-from .checkpoint import PushoverCheckpoint, PushoverPlace
-from .contact import InterfaceLaw, Interfaces
-from .correction import GEOMETRY_TOLERANCE, Falls, NotConverged, at_rest, corrected, solve_again
-from .kinematics import Pose, moved, point_velocities, rotation_matrices
-from .limit import checked_live
-from .loads import Loads
-from .lp import SolveError
-from .mechanism import mechanism_of
-from .program import Locked, Model, Solved, solve_program
-from .response import Collapse, Increment, Response, Status
+from solver.assembly import Assembly, check_blocks
+from solver.interfaces import InterfaceLaw, Interfaces
+from solver.kinematics import Pose, moved, point_velocities, rotation_matrices
+from solver.loads import Loads
+from solver.lp.problem import SolveError
+from solver.program.closing import GEOMETRY_TOLERANCE
+from solver.program.correction import Falls, NotConverged, at_rest, corrected, solve_again
+from solver.program.increment import Locked, Solved, solve_program
+from solver.program.model import Model
+from solver.results.increment import Increment, Status
+from solver.results.mechanism import mechanism_of
+from solver.results.response import Collapse, Response
 
-__all__ = ["ControlDisplacement", "pushover", "pushover_increments"]
+from .checkpoint import PushoverCheckpoint, PushoverPlace
+from .limit_load import checked_live
+from .settlement import Controls, Ending, drained, timed
 
 #: The mechanism has changed within an increment when its velocities, weighted by mass and taken as a unit vector,
 #: differ by this much. With 0.05 the curve of a wall of 33 bricks that rocks depended on the increment by 0.2 %, with

@@ -12,8 +12,6 @@ from functools import cache
 import numpy as np
 from scipy.linalg import lapack
 
-__all__ = ["NotLimited", "one_thread"]
-
 #: Names of the functions in the builds of OpenBLAS that the wheels of scipy and numpy come with, and in others.
 NAMES = ("scipy_openblas_{}_num_threads", "scipy_openblas_{}_num_threads64_", "openblas_{}_num_threads")
 

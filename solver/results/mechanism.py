@@ -6,12 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .assembly import Assembly
-from .kinematics import point_velocities
-from .macroblocks import moving_together
-from .response import ContactState, Increment
+from solver.assembly import Assembly
+from solver.kinematics import moving_together, point_velocities
 
-__all__ = ["Mechanism", "mechanism_of", "rigid_parts", "with_motion"]
+from .increment import ContactState, Increment
 
 #: Blocks belong together where their contact points move apart by less than this fraction of the fastest block.
 TOGETHER = 1e-3

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
-from .assembly import Assembly
-from .contact import Contacts
-from .kinematics import Pose
-
-__all__ = ["MacroBlocks", "free_blocks", "macro_blocks", "moving_together"]
+from solver.assembly import Assembly
+from solver.geometry.contacts import Contacts
+from solver.kinematics import Pose, moving_together
 
 
 @dataclass(frozen=True)
@@ -92,31 +89,3 @@ def macro_blocks(
     values = np.stack([one, one, turn, -arm[:, 1] * turn, arm[:, 0] * turn], axis=1)
     entries = (values.ravel(), (rows.ravel(), columns.ravel()))
     return MacroBlocks(part, sp.csr_array(entries, shape=(3 * n, 3 * count)))
-
-
-def moving_together(
-    n_blocks: int, contacts: Contacts, apart: np.ndarray, turned: np.ndarray, together: float
-) -> np.ndarray:
-    """(n_blocks,) int array: number of the group of each block.
-
-    Parameters
-    ----------
-    n_blocks : int
-    contacts : Contacts
-    apart : (n_contacts,) array [m]
-        Relative movement of each contact point.
-    turned : (n_blocks,) array [m]
-        Rotation of each block times a length.
-    together : float [m]
-        Two blocks belong together where all their contact points move apart by less than this, and their rotations too:
-        a single point cannot tell that blocks turn about it.
-    """
-    low = np.minimum(contacts.block_a, contacts.block_b)
-    high = np.maximum(contacts.block_a, contacts.block_b)
-    pair, which = np.unique(low.astype(np.int64) * n_blocks + high, return_inverse=True)
-    most = np.zeros(len(pair))
-    np.maximum.at(most, which.ravel(), apart)
-    a, b = pair // n_blocks, pair % n_blocks
-    stay = (most < together) & (np.abs(turned[a] - turned[b]) < together)
-    links = sp.coo_array((np.ones(np.count_nonzero(stay)), (a[stay], b[stay])), shape=(n_blocks, n_blocks))
-    return connected_components(links, directed=False)[1]

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .assembly import Assembly
-from .contact import Contacts, Interfaces
-from .equilibrium import cone_rays
-from .program import matched_contacts
-
-__all__ = ["Admissible", "contact_areas", "point_strength"]
+from solver.assembly import Assembly
+from solver.equilibrium import cone_rays
+from solver.geometry.contacts import Contacts, matched_contacts
+from solver.interfaces import Interfaces
 
 #: Contact points of two blocks belong to one face while their normals differ by less than this sine.
 ONE_FACE = 0.5

@@ -8,21 +8,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .assembly import Assembly, check_blocks
-from .checkpoint import Checkpoint, Note, Place
-from .contact import InterfaceLaw, Interfaces
-from .correction import FARTHEST_FALL, Falls, NotConverged, at_rest, corrected, solve_again
-from .kinematics import Pose, moved, moved_vertices, point_velocities
-from .loads import Loads, Settlement, checked_loads
-from .local_origin import at_origin, told_from, without_origin
-from .lp import SolveError
-from .mechanism import mechanism_of
-from .polygons import overlap_depths
-from .program import Locked, Model, Solved, solve_program
-from .response import Collapse, Increment, Response, Status
-from .snap import jump_words, snapped
+from solver.assembly import Assembly, check_blocks
+from solver.geometry.polygons import overlap_depths
+from solver.interfaces import InterfaceLaw, Interfaces
+from solver.kinematics import Pose, moved, moved_vertices, point_velocities
+from solver.loads import Loads, Settlement, checked_loads
+from solver.lp.problem import SolveError
+from solver.program.correction import FARTHEST_FALL, Falls, NotConverged, at_rest, corrected, solve_again
+from solver.program.increment import Locked, Solved, solve_program
+from solver.program.model import Model
+from solver.results.increment import Increment, Status
+from solver.results.mechanism import mechanism_of
+from solver.results.response import Collapse, Response
 
-__all__ = ["Controls", "Ending", "check_settlement", "settle", "settlement_increments"]
+from .checkpoint import Checkpoint, Note, Place
+from .local_fall import jump_words, snapped
+from .local_origin import at_origin, told_from, without_origin
 
 #: The mechanism has changed within an increment when the velocities before and after differ by this much of their
 #: size, weighted by mass, times the root of the number of blocks (in a wall a few bricks always change their ways),

@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .kinematics import Pose
-
-__all__ = ["Checkpoint", "Place", "PushoverCheckpoint", "PushoverPlace"]
+from solver.kinematics import Pose
 
 
 @dataclass(frozen=True)
