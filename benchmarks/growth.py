@@ -25,7 +25,7 @@ import scipy
 
 import blockvis
 import solver
-from blockvis import layouts
+from blockvis import generators
 from solver.program import closing, increment, light_blocks
 
 SIZES = (100, 300, 1000, 1500, 3000, 10000)
@@ -38,7 +38,7 @@ def wall_of(blocks: int) -> solver.Assembly:
     courses = max(4, round(math.sqrt(0.6 * blocks)))
     bricks = max(4, 2 * round(blocks / courses / 2))
     width = bricks * BRICK[0]
-    return layouts.build(
+    return generators.build(
         "wall",
         {
             "bricks": bricks,

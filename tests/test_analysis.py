@@ -9,7 +9,7 @@ import shapely
 from scipy.optimize import linprog
 
 import solver
-from blockvis import layouts
+from blockvis import generators
 from solver.equilibrium import block_forces
 from solver.lp.highs import run_highs
 
@@ -219,7 +219,7 @@ def test_limit_reached():
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-5])
 def test_bracket_is_as_narrow_as_asked(tolerance):
     settlement = solver.Settlement(direction=(1, 0), increment=0.02, limit=1, tolerance=tolerance)
-    response = solver.settle(layouts.arch(), settlement, friction_coefficient=2.0, controls=NO_FALL)
+    response = solver.settle(generators.arch(), settlement, friction_coefficient=2.0, controls=NO_FALL)
     low, high = response.collapse.bracket
     assert 0 < high - low <= tolerance * (1 + 1e-9)
     # Table A of the reference values.
@@ -246,7 +246,7 @@ def test_rotation_about_a_point_moves_the_support_on_the_arc():
 
 def test_several_phases():
     """20 mm down, then spreading from there until it collapses."""
-    arch = layouts.arch()
+    arch = generators.arch()
     phases = [DOWN, solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)]
     response = solver.settle(arch, phases, friction_coefficient=2.0, controls=NO_FALL)
     assert response.stop is solver.Status.COLLAPSED
@@ -271,7 +271,7 @@ def test_several_phases():
 
 
 def test_direction_and_rotation_together():
-    arch = layouts.arch()
+    arch = generators.arch()
     springer = arch.index("right springer")
     settlement = solver.Settlement(direction=(0, -1), rotation_centre=(1, 0), rotation=0.3, increment=0.02, limit=0.1)
     response = solver.settle(arch, settlement, friction_coefficient=2.0, controls=NO_FALL)
@@ -293,7 +293,7 @@ def test_direction_and_rotation_together():
 @cache
 def arch_response():
     spread = solver.Settlement(direction=(1, 0), increment=0.01, limit=0.5)
-    return solver.settle(layouts.arch(), spread, friction_coefficient=2.0)
+    return solver.settle(generators.arch(), spread, friction_coefficient=2.0)
 
 
 @cache
@@ -306,7 +306,7 @@ def wall_response():
 def sliding_response():
     """An arch of so little friction that it slides."""
     spread = solver.Settlement(direction=(1, 0), increment=0.01, limit=0.5)
-    return solver.settle(layouts.arch(thickness_ratio=0.3), spread, friction_coefficient=0.35)
+    return solver.settle(generators.arch(thickness_ratio=0.3), spread, friction_coefficient=0.35)
 
 
 RESPONSES = {"arch": arch_response, "wall": wall_response, "sliding arch": sliding_response}
@@ -425,7 +425,7 @@ def test_mechanism_at_collapse():
 def test_same_input_twice_gives_the_same_arrays():
     spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
     first, second = (
-        solver.settle(layouts.arch(), spread, friction_coefficient=0.6, controls=solver.Controls(falling_frames=5))
+        solver.settle(generators.arch(), spread, friction_coefficient=0.6, controls=solver.Controls(falling_frames=5))
         for _ in range(2)
     )
     assert first.collapse.bracket == second.collapse.bracket
@@ -456,7 +456,7 @@ def test_solver_failure_is_not_collapse(monkeypatch):
 
     monkeypatch.setattr(solve, "run_highs", breaks)
     spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
-    response = solver.settle(layouts.arch(), spread, friction_coefficient=2.0)
+    response = solver.settle(generators.arch(), spread, friction_coefficient=2.0)
     assert response.stop is solver.Status.SOLVER_FAILED
     assert "kSolveError" in response.message
     assert response.collapse is None

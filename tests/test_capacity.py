@@ -9,12 +9,14 @@ import pytest
 
 import blockvis
 import solver
-from blockvis.analyses import planned
-from blockvis.capacity import capacity_summary
-from blockvis.case import case_assembly, parse_case
+from blockvis.cases.build import case_assembly
+from blockvis.cases.case import parse_case
 from blockvis.cli import _in_words, main
-from blockvis.render import draw_still
-from blockvis.series import governing, parameter_label, state_text, value_label
+from blockvis.pictures.captions import parameter_label, state_text, value_label
+from blockvis.pictures.render import draw_still
+from blockvis.results.quantities import governing
+from blockvis.results.tables import capacity_summary
+from blockvis.runs.plan import planned
 from solver.analysis.settlement import drained
 
 COLUMN = """
@@ -137,7 +139,7 @@ def test_live_load_is_drawn_where_it_acts_at_each_position(tmp_path):
     """The arrow stands over the place of the load, whichever position is drawn."""
     from PIL import Image
 
-    from blockvis import palette
+    from blockvis.pictures import palette
 
     folder, _ = ran(ARCH, tmp_path)
     response = blockvis.open_results(folder)

@@ -8,9 +8,9 @@ import pytest
 from PIL import Image
 from structures import arch_response, parted, wall
 
-from blockvis import palette
-from blockvis.curves import CurvePanel, draw_curve, events_of
-from blockvis.series import parameter_text
+from blockvis.pictures import palette
+from blockvis.pictures.captions import parameter_text
+from blockvis.pictures.curves import CurvePanel, draw_curve, events_of
 
 
 def test_png_has_a_curve_and_the_collapse(tmp_path):

@@ -8,8 +8,8 @@ import pyvista as pv
 from structures import BENT, arch_response, parted, wall
 
 import solver
-from blockvis.datasets import block_dataset, contact_dataset, output_times
-from blockvis.vtkxml import write_pvd, write_vtu
+from blockvis.results.datasets import block_dataset, contact_dataset, output_times
+from blockvis.vtk_files import write_pvd, write_vtu
 
 
 def test_every_block_is_one_polygon_bent_ones_too():

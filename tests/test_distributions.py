@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.stats as st
 
-from blockvis.distributions import read_distribution
+from blockvis.cases.distributions import read_distribution
 
 P = np.array([1e-6, 0.01, 0.2, 0.5, 0.77, 0.999])
 SIGMA = np.sqrt(np.log1p(0.25))

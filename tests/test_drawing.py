@@ -7,13 +7,15 @@ import pytest
 
 import blockvis
 import solver
-from blockvis.drawing import Drawing, assemble, drawing_of, read, read_drawing, save_layout
+from blockvis.formats.read import read, read_layout, save_layout
+from blockvis.layout.assemble import assemble
+from blockvis.layout.layout import Layout, layout_of
 
 UNIT = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
 
 
 def row(n, **more):
-    return Drawing(
+    return Layout(
         outlines=tuple(UNIT + np.array([k, 0]) for k in range(n)),
         names=tuple(f"brick {k + 1}" for k in range(n)),
         **more,
@@ -54,7 +56,7 @@ def test_supports_are_added_and_checked():
 
 def test_duplicates_are_dropped_with_one_warning_that_names_them():
     drawing = row(3)
-    twice = Drawing(outlines=(*drawing.outlines, drawing.outlines[1][[2, 1, 0, 3]]), names=(*drawing.names, "again"))
+    twice = Layout(outlines=(*drawing.outlines, drawing.outlines[1][[2, 1, 0, 3]]), names=(*drawing.names, "again"))
     with pytest.warns(UserWarning, match="1 of 4 blocks are drawn twice and were dropped: 'again' = 'brick 2'") as seen:
         assembly = assemble(twice)
     assert len(seen) == 1
@@ -63,7 +65,7 @@ def test_duplicates_are_dropped_with_one_warning_that_names_them():
 
 def test_small_overlaps_are_resolved_and_large_ones_name_both_blocks():
     def pair(depth):
-        return Drawing(outlines=(UNIT, UNIT + np.array([1 - depth, 0])), names=("left", "right"))
+        return Layout(outlines=(UNIT, UNIT + np.array([1 - depth, 0])), names=("left", "right"))
 
     closed = assemble(pair(0.01))
     assert closed.outline(0)[:, 0].max() == pytest.approx(0.995, abs=1e-12)
@@ -97,7 +99,7 @@ def test_a_deformed_pose_is_written(tmp_path):
     save_layout(assembly, tmp_path / "moved.json", pose=pose)
     moved = read(tmp_path / "moved.json")
     assert np.allclose(moved.centroids, assembly.centroids + np.array([0, -0.25]))
-    assert (drawing_of(assembly).outlines[1] == assembly.outline(1)).all()
+    assert (layout_of(assembly).outlines[1] == assembly.outline(1)).all()
 
 
 def test_units(tmp_path):
@@ -106,11 +108,11 @@ def test_units(tmp_path):
     path.write_text(json.dumps({"unit": "mm", "blocks": blocks}))
     assert read(path).areas[0] == pytest.approx(0.0625)
     assert read(path, unit="cm").areas[0] == pytest.approx(6.25)
-    assert "it was read in cm because that was asked for" in read_drawing(path, unit="cm").notes[0]
+    assert "it was read in cm because that was asked for" in read_layout(path, unit="cm").notes[0]
     path.write_text(json.dumps({"blocks": [{"outline": UNIT.tolist()}]}))
-    assert read_drawing(path).notes == ("the file does not say its unit; m was assumed",)
+    assert read_layout(path).notes == ("the file does not say its unit; m was assumed",)
     path.write_text(json.dumps({"unit": "in", "blocks": [{"outline": (UNIT * 0.2).tolist()}]}))
-    clash = read_drawing(path)
+    clash = read_layout(path)
     assert clash.unit == "m"
     assert "unit clash: the file says its unit is in" in clash.notes[0]
     with pytest.warns(UserWarning, match="unit clash: the file says its unit is in"):
@@ -140,7 +142,7 @@ def test_halves_of_characters_are_replaced_and_noted(tmp_path):
     ]
     path = tmp_path / "halves.json"
     path.write_text(json.dumps({"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}))
-    drawing = read_drawing(path)
+    drawing = read_layout(path)
     assert drawing.names == ("a\ufffdb", "c\u0000d \U0001f9f1")
     assert drawing.materials == ("m\ufffd", "")
     assert [note for note in drawing.notes if "encoding" in note] == [

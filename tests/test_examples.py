@@ -8,8 +8,9 @@ import pytest
 
 import blockvis
 import solver
-from blockvis import layouts
-from blockvis.case import case_assembly, case_interfaces, read_case
+from blockvis import generators
+from blockvis.cases.build import case_assembly, case_interfaces
+from blockvis.cases.case import read_case
 
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.toml"))
 LONG = {"facade"}
@@ -76,7 +77,7 @@ def key_sinks(assembly, pose, arch):
 def test_a_small_facade_with_the_friction_of_the_large_one_loses_its_key():
     """One window over the edge of the settling ground: the jambs part, and the key slips out between the haunches."""
     case = read_case(EXAMPLES[0].parent / "facade.toml")
-    assembly = layouts.facade(
+    assembly = generators.facade(
         bricks=12,
         courses=16,
         storeys=1,

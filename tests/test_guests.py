@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from blockvis import guests
-from blockvis.drawing import read
+from blockvis import pyvista_plugin
+from blockvis.formats.read import read
 
 
 def polygons(outlines):
@@ -18,11 +18,11 @@ def polygons(outlines):
 def test_layouts_through_pyvista(tmp_path):
     mesh = polygons([np.array([[0, 0], [2, 0], [2, 1], [0, 1.0]]), np.array([[2, 0], [3, 0], [2, 1.0]])])
     mesh.cell_data["name"] = ["left", "right"]
-    for suffix in guests.WRITES:
+    for suffix in pyvista_plugin.WRITES:
         mesh.save(tmp_path / f"a{suffix}")
         assert read(tmp_path / f"a{suffix}").names == ("left", "right")
-    assert ".dxf" in guests.READS
-    for suffix in set(guests.READS) & set(guests.WRITES):
+    assert ".dxf" in pyvista_plugin.READS
+    for suffix in set(pyvista_plugin.READS) & set(pyvista_plugin.WRITES):
         again = pv.read(tmp_path / f"a{suffix}")
         assert again.n_cells == 2
         assert list(again.cell_data["name"]) == ["left", "right"]

@@ -5,18 +5,19 @@ import pytest
 import shapely
 
 import solver
-from blockvis import layouts
-from blockvis.case import case_assembly, case_interfaces, parse_case
-from blockvis.imperfections import Imperfection, imperfect, moved_corners, read_imperfection
+from blockvis import generators
+from blockvis.cases.build import case_assembly, case_interfaces
+from blockvis.cases.case import parse_case
+from blockvis.cases.imperfections import Imperfection, imperfect, moved_corners, read_imperfection
 
 WINDOW = {"x": 1.0, "y": 0.6, "width": 1.0, "height": 0.6, "head": "segmental arch", "voussoirs": 9}
 
 STRUCTURES = {
-    "arch": (layouts.arch, {}, 0.005),
-    "running bond": (layouts.panel, {"nb": 20, "nc": 6}, 0.02),
-    "english bond": (layouts.wall, {"bond": "english", "settling": [1.0, 2.0]}, 0.002),
-    "cut bricks round an arch": (layouts.wall, {"openings": [WINDOW], "settling": [1.5, 3.0]}, 0.003),
-    "battered buttresses": (layouts.buttressed_arch, {}, 0.01),
+    "arch": (generators.arch, {}, 0.005),
+    "running bond": (generators.panel, {"nb": 20, "nc": 6}, 0.02),
+    "english bond": (generators.wall, {"bond": "english", "settling": [1.0, 2.0]}, 0.002),
+    "cut bricks round an arch": (generators.wall, {"openings": [WINDOW], "settling": [1.5, 3.0]}, 0.003),
+    "battered buttresses": (generators.buttressed_arch, {}, 0.01),
 }
 
 
@@ -52,7 +53,7 @@ def test_joints_stay_closed_and_nothing_overlaps(name):
 
 
 def test_a_whole_wall_covers_the_same_ground_without_a_gap():
-    drawn = layouts.panel(nb=6, nc=5)
+    drawn = generators.panel(nb=6, nc=5)
     moved = imperfect(drawn, [_vertices(0.03)])
     blocks = [shapely.Polygon(moved.outline(i)).buffer(1e-9) for i in range(moved.n_blocks)]
     union = shapely.unary_union(blocks)
@@ -61,7 +62,7 @@ def test_a_whole_wall_covers_the_same_ground_without_a_gap():
 
 
 def test_outer_corners_of_supports_stay():
-    drawn = layouts.arch()
+    drawn = generators.arch()
     moved = imperfect(drawn, [_vertices(0.01)])
     for block in np.flatnonzero(~drawn.free).tolist():
         np.testing.assert_allclose(moved.outline(block), drawn.outline(block), atol=1e-15)
@@ -69,11 +70,11 @@ def test_outer_corners_of_supports_stay():
 
 def test_too_large_displacements_are_refused():
     with pytest.raises(ValueError, match=r"by more than a quarter of what lies beside them.*smaller"):
-        moved_corners(layouts.arch(), _vertices(0.5))
+        moved_corners(generators.arch(), _vertices(0.5))
 
 
 def test_the_seed_decides():
-    drawn = layouts.arch()
+    drawn = generators.arch()
     first, again, other = (moved_corners(drawn, _vertices(0.005, seed)).vertices for seed in (4, 4, 5))
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 1e-4

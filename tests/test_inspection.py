@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis.drawing import save_layout
-from blockvis.inspection import draw_inspection, inspect
+from blockvis.formats.read import inspect, save_layout
+from blockvis.pictures.inspection import draw_inspection
 
 FACADE = Path(__file__).resolve().parents[2] / "shared" / "data" / "facade" / "facade.dxf"
 
@@ -54,7 +54,7 @@ def test_picture(layout, tmp_path):
 @pytest.mark.skipif(not FACADE.exists(), reason="third-party drawing, not part of the project")
 def test_facade():
     found = inspect(FACADE)
-    assert found.drawing.n_blocks == 1568
+    assert found.layout.n_blocks == 1568
     assert len(found.twins) == 6
     assert found.unit_clash.startswith("unit clash: the file says its unit is in")
     assert found.high - found.low == pytest.approx([5.97, 5.615])

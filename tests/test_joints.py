@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import solver
-from blockvis.drawing import assemble, read_drawing
-from blockvis.facing import facing_edges, proposed_thickness
-from blockvis.joints import close_joints
+from blockvis.formats.read import read_layout
+from blockvis.layout.assemble import assemble
+from blockvis.layout.joints.close import close_joints
+from blockvis.layout.joints.facing_edges import facing_edges, proposed_thickness
 
 FACADE = Path(__file__).resolve().parents[2] / "shared" / "data" / "facade" / "facade.dxf"
 needs_facade = pytest.mark.skipif(not FACADE.exists(), reason="third-party drawing, not part of the project")
@@ -169,7 +170,7 @@ def test_proposed_thickness_is_the_widest_joint():
 
 @needs_facade
 def test_the_facade_closes_without_overlap_and_its_openings_stay():
-    drawing = read_drawing(FACADE, unit="m")
+    drawing = read_layout(FACADE, unit="m")
     supports = [
         {"name": "ground left", "role": "fixed", "outline": [[-1, -0.5], [4, -0.5], [4, 0], [-1, 0]]},
         {"name": "ground right", "role": "moving", "outline": [[4, -0.5], [7, -0.5], [7, 0], [4, 0]]},

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import solver
-from blockvis import layouts
+from blockvis import generators
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 
@@ -21,7 +21,7 @@ SMALL = {"facade": {"bricks": 14, "courses": 24, "storeys": 1, "windows": 1}}
 
 
 def _small(name: str) -> solver.Assembly:
-    return layouts.build(name, SMALL.get(name))
+    return generators.build(name, SMALL.get(name))
 
 
 def _shapes(assembly: solver.Assembly) -> list[shapely.Polygon]:
@@ -37,7 +37,7 @@ def _block(assembly: solver.Assembly, name: str) -> np.ndarray:
     return assembly.outline(assembly.index(name))
 
 
-@pytest.mark.parametrize("name", layouts.LAYOUTS)
+@pytest.mark.parametrize("name", generators.LAYOUTS)
 def test_no_block_overlaps_another_and_all_hang_together(name):
     assembly = _small(name)
     _assert_no_overlap(assembly)
@@ -47,7 +47,7 @@ def test_no_block_overlaps_another_and_all_hang_together(name):
     assert whole.area == pytest.approx(sum(shape.area for shape in shapes), rel=1e-8)
 
 
-@pytest.mark.parametrize("name", layouts.LAYOUTS)
+@pytest.mark.parametrize("name", generators.LAYOUTS)
 def test_every_layout_has_named_blocks_a_material_and_a_ground(name):
     assembly = _small(name)
     assert (assembly.roles != "free").any()
@@ -57,9 +57,9 @@ def test_every_layout_has_named_blocks_a_material_and_a_ground(name):
     assert not any(label.startswith("block ") for label in assembly.names) or name == "column"
 
 
-@pytest.mark.parametrize("name", layouts.LAYOUTS)
+@pytest.mark.parametrize("name", generators.LAYOUTS)
 def test_every_layout_stands(name):
-    assembly = layouts.build("wall", {"settling": [1.5, 3.0]}) if name == "wall" else _small(name)
+    assembly = generators.build("wall", {"settling": [1.5, 3.0]}) if name == "wall" else _small(name)
     down = solver.Settlement(direction=(0, -1), increment=1e-7, limit=1e-7)
     response = solver.settle(assembly, down, friction_coefficient=0.6)
     assert response.stop == solver.Status.LIMIT_REACHED, response.message
@@ -68,7 +68,7 @@ def test_every_layout_stands(name):
 
 
 def test_the_circular_arch_is_what_the_reference_values_are_for():
-    arch = layouts.arch(embrace=120.0, thickness_ratio=0.1, voussoirs=12)
+    arch = generators.arch(embrace=120.0, thickness_ratio=0.1, voussoirs=12)
     radii = np.hypot(*np.array([_block(arch, f"voussoir {i}") for i in range(1, 13)]).reshape(-1, 2).T)
     assert np.unique(np.round(radii, 12)).tolist() == [0.95, 1.05]
     angles = np.degrees(np.arctan2(*_block(arch, "voussoir 1").T[::-1]))
@@ -90,7 +90,7 @@ def test_the_circular_arch_is_what_the_reference_values_are_for():
     ],
 )
 def test_arches_have_the_span_rise_thickness_and_voussoirs_asked_for(name, parameters):
-    arch = layouts.build(name, parameters)
+    arch = generators.build(name, parameters)
     n, span, rise = parameters["voussoirs"], parameters["span"], parameters["rise"]
     stones = [_block(arch, f"voussoir {i}") for i in range(1, n + 1)]
     corners = np.concatenate(stones)
@@ -109,7 +109,7 @@ def test_arches_have_the_span_rise_thickness_and_voussoirs_asked_for(name, param
 
 def test_a_basket_handle_arch_turns_without_a_kink():
     n = 30
-    arch = layouts.basket_handle_arch(span=3.0, rise=1.0, thickness=0.3, voussoirs=n)
+    arch = generators.basket_handle_arch(span=3.0, rise=1.0, thickness=0.3, voussoirs=n)
     stones = [shapely.Polygon(_block(arch, f"voussoir {i}")) for i in range(1, n + 1)]
     joints = [shapely.shared_paths(a.boundary, b.boundary) for a, b in pairwise(stones)]
     leans = []
@@ -126,14 +126,14 @@ def test_a_basket_handle_arch_turns_without_a_kink():
 def test_wall_of_each_bond_has_the_bricks_of_that_bond():
     counts = {"stack": 4 * 6, "running": 2 * 6 + 2 * 7, "english": 2 * 6 + 2 * (12 + 1)}
     for bond, expected in counts.items():
-        wall = layouts.wall(bricks=6, courses=4, bond=bond)
+        wall = generators.wall(bricks=6, courses=4, bond=bond)
         assert int(wall.free.sum()) == expected, bond
     assert wall.roles.tolist().count("fixed") == 1
 
 
 @pytest.mark.parametrize(("bond", "lap"), [("running", 0.5), ("english", 0.25)])
 def test_head_joints_of_neighbouring_courses_keep_their_lap(bond, lap):
-    wall = layouts.wall(bricks=6, courses=4, brick_length=1.0, brick_height=0.3, bond=bond)
+    wall = generators.wall(bricks=6, courses=4, brick_length=1.0, brick_height=0.3, bond=bond)
     joints = [
         {
             round(float(x), 9)
@@ -149,7 +149,7 @@ def test_head_joints_of_neighbouring_courses_keep_their_lap(bond, lap):
 
 
 def test_panel_of_the_reference_values_holds_the_reaction_at_onset():
-    panel = layouts.panel(nb=3, nc=4, x_s=3.0)
+    panel = generators.panel(nb=3, nc=4, x_s=3.0)
     assert int(panel.free.sum()) == 3 + 4 + 3 + 4
     response = solver.settle(
         panel, solver.Settlement(direction=(0, -1), increment=1e-4, limit=1e-4), friction_coefficient=0.6
@@ -168,7 +168,7 @@ def test_panel_of_the_reference_values_holds_the_reaction_at_onset():
     ],
 )
 def test_ground_is_split_where_it_settles(settling, expected):
-    wall = layouts.wall(bricks=12, courses=2, settling=settling)
+    wall = generators.wall(bricks=12, courses=2, settling=settling)
     found = {name: str(role) for name, role in zip(wall.names, wall.roles, strict=True) if role != "free"}
     assert found == expected
     if len(expected) == 2:
@@ -177,7 +177,7 @@ def test_ground_is_split_where_it_settles(settling, expected):
 
 def test_sill_and_jambs_are_straight_and_a_lintel_bears_on_both_sides():
     window = {"x": 0.8, "y": 0.53, "width": 0.9, "height": 0.61, "head": "lintel", "bearing": 0.2, "depth": 0.2}
-    wall = layouts.wall(bricks=10, courses=16, openings=[window])
+    wall = generators.wall(bricks=10, courses=16, openings=[window])
     assert shapely.union_all(_shapes(wall), grid_size=1e-9).interiors[0].bounds == pytest.approx((0.8, 0.53, 1.7, 1.14))
     lintel = _block(wall, "lintel 1")
     assert lintel.min(axis=0) == pytest.approx([0.6, 1.14])
@@ -185,7 +185,7 @@ def test_sill_and_jambs_are_straight_and_a_lintel_bears_on_both_sides():
 
 
 def test_openings_to_the_top_and_to_the_ground_need_no_head():
-    wall = layouts.wall(
+    wall = generators.wall(
         bricks=12, courses=10, openings=[{"x": 0.5, "y": 0.5, "width": 0.5, "height": 0.5},
                                          {"x": 1.5, "y": 0.0, "width": 0.5, "height": 0.5, "head": "none"}]
     )  # fmt: skip
@@ -235,7 +235,7 @@ def _open_area(wall: solver.Assembly, number: int, opening: dict) -> float:
 @given(walls())
 def test_bricks_fill_any_wall_around_its_openings_without_overlap(sample):
     parameters, length, height = sample
-    wall = layouts.build("wall", parameters)
+    wall = generators.build("wall", parameters)
     _assert_no_overlap(wall)
     shapes = _shapes(wall)
     assert len(set(wall.names)) == wall.n_blocks
@@ -251,7 +251,7 @@ def test_bricks_fill_any_wall_around_its_openings_without_overlap(sample):
 
 
 def test_facade_has_about_1500_bricks_in_regular_courses():
-    facade = layouts.facade()
+    facade = generators.facade()
     bricks = [i for i, kind in enumerate(facade.materials) if kind == "brick"]
     assert 1400 <= len(bricks) <= 1600
     assert {name.split("-")[0] for name in facade.names if name.startswith("voussoir")} == {
@@ -267,7 +267,7 @@ def test_facade_has_about_1500_bricks_in_regular_courses():
 
 
 def test_facade_arches_rise_by_the_courses_asked_for():
-    facade = layouts.facade(**SMALL["facade"], voussoirs=3, rise_courses=1.5)
+    facade = generators.facade(**SMALL["facade"], voussoirs=3, rise_courses=1.5)
     key = _block(facade, "voussoir 1-2")
     # Of three equal voussoirs the key's intrados is a chord about the crown, below it by its sagitta.
     radius = (1.0**2 + 0.1875**2) / (2 * 0.1875)
@@ -276,8 +276,8 @@ def test_facade_arches_rise_by_the_courses_asked_for():
 
 
 def test_layouts_are_found_by_name_however_it_is_written():
-    assert layouts.build("Basket_handle arch", {"voussoirs": 7.0}).n_blocks == 9
-    assert layouts.build("façade", SMALL["facade"]).n_blocks == layouts.facade(**SMALL["facade"]).n_blocks
+    assert generators.build("Basket_handle arch", {"voussoirs": 7.0}).n_blocks == 9
+    assert generators.build("façade", SMALL["facade"]).n_blocks == generators.facade(**SMALL["facade"]).n_blocks
 
 
 WALL = {"bricks": 12, "courses": 12}
@@ -319,7 +319,7 @@ WALL = {"bricks": 12, "courses": 12}
 )
 def test_bad_parameters_are_named_with_their_value_and_a_remedy(name, parameters, message):
     with pytest.raises(ValueError, match=message):
-        layouts.build(name, parameters)
+        generators.build(name, parameters)
 
 
 @pytest.mark.parametrize(
@@ -343,13 +343,13 @@ def test_a_bad_opening_is_named_with_its_value_and_a_remedy(changes, message):
     opening = {"x": 1.0, "y": 0.1, "width": 0.5, "height": 0.3} | changes
     opening = {key: value for key, value in opening.items() if value is not None}
     with pytest.raises(ValueError, match=message):
-        layouts.wall(**WALL, openings=[opening])
+        generators.wall(**WALL, openings=[opening])
 
 
 def test_openings_that_overlap_with_their_heads_are_both_named():
     openings = [{"x": x, "y": 0.1, "width": 0.5, "height": 0.3} for x in (1.0, 1.6)]
     with pytest.raises(ValueError, match=r"opening 1 and opening 2 overlap by 0\.03 m², heads included; move them"):
-        layouts.wall(**WALL, openings=openings)
+        generators.wall(**WALL, openings=openings)
 
 
 def _generated() -> list[str]:
@@ -361,7 +361,7 @@ def _generated() -> list[str]:
 @pytest.mark.parametrize("file", _generated())
 def test_examples_of_layouts_build_and_their_loads_find_their_blocks(file):
     case = tomllib.loads((EXAMPLES / file).read_text(encoding="utf-8"))
-    assembly = layouts.build(case["geometry"]["layout"], case["geometry"].get("parameters"))
+    assembly = generators.build(case["geometry"]["layout"], case["geometry"].get("parameters"))
     assert assembly.moving.any() or "settlement" not in case
     _assert_no_overlap(assembly)
     for load in case.get("loads", ()):

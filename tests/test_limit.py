@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import layouts
+from blockvis import generators
 from solver.analysis.limit_load import limit_load, limit_load_envelope
 from solver.results.limit import LimitStatus
 from solver.surface_loads import edge_pressure, load_on_top, surface_pressure
@@ -141,7 +141,7 @@ def test_input_is_refused_with_a_remedy():
 
 
 def test_envelope_of_a_load_that_moves_over_an_arch():
-    arch = layouts.arch()
+    arch = generators.arch()
     dead = solver.self_weight(arch).dead
     x = np.linspace(-0.9, 0.9, 13)
     envelope = limit_load_envelope(

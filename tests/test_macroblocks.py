@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import layouts
+from blockvis import generators
 from solver.geometry.planar_contacts import find_contacts
 from solver.kinematics import Pose, moved_vertices, moving_together, point_velocities
 from solver.program.macroblocks import free_blocks, macro_blocks
@@ -10,7 +10,7 @@ from solver.program.macroblocks import free_blocks, macro_blocks
 
 @pytest.fixture
 def wall():
-    return layouts.build("wall", {"bricks": 10, "courses": 8, "settling": [1.25, 2.5]})
+    return generators.build("wall", {"bricks": 10, "courses": 8, "settling": [1.25, 2.5]})
 
 
 def rigid_motion(positions, shift, turn, about):

@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from structures import BENT, arch_response, parted, wall
 
 import solver
-from blockvis import marks
-from blockvis.fills import cut_into_triangles, hatch_lines, triangles
-from blockvis.mechanism import part_outlines
+from blockvis.numbers import rounded_length
+from blockvis.pictures import annotations as marks
+from blockvis.pictures.annotations import part_outlines
+from blockvis.pictures.hatching import cut_into_triangles, hatch_lines, triangles
 
 
 def stacked(shift=(0.0, 0.0), turn=0.0):
@@ -176,7 +177,7 @@ def test_hatch_stays_inside_the_support():
 
 @given(st.floats(1e-9, 1e9))
 def test_round_lengths_are_round_and_not_longer(length):
-    round_length = marks.rounded_length(length)
+    round_length = rounded_length(length)
     assert round_length <= length * (1 + 1e-6)
     assert round_length > 0.39 * length
     assert f"{round_length:.0e}"[0] in "125"

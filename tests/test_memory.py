@@ -10,15 +10,16 @@ import pytest
 
 import blockvis
 import solver
-from blockvis import stored_increments
-from blockvis.case import parse_case
-from blockvis.curves import draw_curve
-from blockvis.film import write_film
-from blockvis.opengl import rendering_available
-from blockvis.report import report_html
-from blockvis.results import ResultsFolder
-from blockvis.stored_increments import AT_LEAST, StoredIncrements
-from blockvis.studio import Look, Studio
+from blockvis import generators
+from blockvis.cases.case import parse_case
+from blockvis.pictures.curves import draw_curve
+from blockvis.pictures.drawer import Look, Studio
+from blockvis.pictures.opengl import rendering_available
+from blockvis.pictures.video import write_film
+from blockvis.report.page import report_html
+from blockvis.results import increments
+from blockvis.results.folder import ResultsFolder
+from blockvis.results.increments import AT_LEAST, StoredIncrements
 
 ARCH = """
 [geometry]
@@ -70,7 +71,7 @@ def ran(text, folder):
 @pytest.fixture(autouse=True, scope="module")
 def undrawn():
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("blockvis.run.draw_results", lambda *_, **__: ())
+        patched.setattr("blockvis.runs.run.draw_results", lambda *_, **__: ())
         yield
 
 
@@ -111,7 +112,7 @@ def test_results_are_read_one_at_a_time(use, folder, tmp_path, monkeypatch):
         most.append(sum(ref() is not None for ref in seen))
         return increment
 
-    monkeypatch.setattr(stored_increments, "CACHED", 0)
+    monkeypatch.setattr(increments, "CACHED", 0)
     monkeypatch.setattr(StoredIncrements, "_read", watched)
     response = blockvis.open_results(folder)
     n = len(response.increments)
@@ -144,7 +145,7 @@ def test_a_few_small_increments_are_read_once(folder, monkeypatch):
 
 
 def test_stored_increments_are_what_was_told(tmp_path):
-    assembly = blockvis.layouts.arch()
+    assembly = generators.arch()
     spread = solver.Settlement(direction=(1, 0), increment=0.04, limit=0.5)
     told = solver.settle(assembly, spread, controls=solver.Controls(falling_frames=2))
     stored = blockvis.open_results(blockvis.write(told, tmp_path / "out"))
@@ -170,7 +171,7 @@ def test_stored_increments_are_what_was_told(tmp_path):
 
 
 def test_results_that_change_below_the_reader_are_named(folder, tmp_path, monkeypatch):
-    monkeypatch.setattr(stored_increments, "CACHED", 0)
+    monkeypatch.setattr(increments, "CACHED", 0)
     shutil.copytree(folder, tmp_path / "out")
     response = blockvis.open_results(tmp_path / "out")
     files = sorted((tmp_path / "out" / "increments").glob("state_*.npz"))

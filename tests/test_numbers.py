@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import layouts
-from blockvis.case import case_assembly, read_case
+from blockvis import generators
+from blockvis.cases.build import case_assembly
+from blockvis.cases.case import read_case
 
 #: A national grid: coordinates of five thousand kilometres are rounded to a nanometre.
 GRID = np.array([5e5, 5e6])
 
 
 def _arch(scale=1.0, place=(0.0, 0.0), density=2000.0):
-    arch = layouts.arch(voussoirs=12, density=density)
+    arch = generators.arch(voussoirs=12, density=density)
     return replace(arch, vertices=arch.vertices * scale + np.asarray(place))
 
 

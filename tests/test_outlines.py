@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from blockvis.outlines import arc_points, flattened, outlines_of_cells, ring_area, without_collinear
+from blockvis.layout.outlines import arc_points, flattened, outlines_of_cells, ring_area, without_collinear
 
 SQUARES = np.array([[x, y] for y in range(4) for x in range(4)], dtype=float)
 

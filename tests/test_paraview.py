@@ -8,9 +8,9 @@ import subprocess
 import pytest
 from structures import arch_response
 
-from blockvis.datasets import block_dataset, contact_dataset, output_times
-from blockvis.paraview_macro import write_paraview_macro
-from blockvis.vtkxml import write_pvd, write_vtu
+from blockvis.pictures.paraview import write_paraview_macro
+from blockvis.results.datasets import block_dataset, contact_dataset, output_times
+from blockvis.vtk_files import write_pvd, write_vtu
 
 PVPYTHON, XVFB = shutil.which("pvpython"), shutil.which("xvfb-run")
 

@@ -10,7 +10,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import solver
-from blockvis import layouts
+from blockvis import generators
 
 few = settings(max_examples=4, deadline=None, derandomize=True, database=None, phases=[Phase.explicit, Phase.generate])
 
@@ -71,8 +71,8 @@ def _wall():
 
 
 CASES = {
-    "hinging arch": _case(layouts.arch(embrace=140, thickness_ratio=0.12, voussoirs=8), 2.0, (1, 0), 0.02, 0.5),
-    "sliding arch": _case(layouts.arch(thickness_ratio=0.3, voussoirs=7), 0.35, (1, 0), 0.02, 0.5),
+    "hinging arch": _case(generators.arch(embrace=140, thickness_ratio=0.12, voussoirs=8), 2.0, (1, 0), 0.02, 0.5),
+    "sliding arch": _case(generators.arch(thickness_ratio=0.3, voussoirs=7), 0.35, (1, 0), 0.02, 0.5),
     "sinking wall": _case(_wall(), 0.5, (0.0, -1.0), 0.05, 0.1),
 }
 

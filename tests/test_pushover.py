@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import layouts
+from blockvis import generators
 from solver.analysis.limit_load import limit_load
 from solver.analysis.pushover import ControlDisplacement, pushover
 
@@ -25,7 +25,7 @@ def sideways(assembly):
 
 @cache
 def arch(increment):
-    assembly = layouts.arch()
+    assembly = generators.arch()
     control = ControlDisplacement("voussoir 7", (1, 0), increment=increment, limit=0.5)
     controls = solver.Controls(falling_frames=5)
     return pushover(assembly, control, loads=sideways(assembly), friction_coefficient=2.0, controls=controls)

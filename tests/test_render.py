@@ -9,11 +9,12 @@ from PIL import Image
 from structures import BENT, arch_response, parted, wall
 
 import solver
-from blockvis import opengl, palette
-from blockvis.opengl import rendering_available
-from blockvis.render import animate, draw_mechanism, draw_still
-from blockvis.scene import Frame, Scene, framed, magnified
-from blockvis.studio import Look, Studio
+from blockvis.pictures import opengl, palette
+from blockvis.pictures.drawer import Look, Studio
+from blockvis.pictures.flat_scene import Scene, magnified
+from blockvis.pictures.frame import Frame, framed
+from blockvis.pictures.opengl import rendering_available
+from blockvis.pictures.render import animate, draw_mechanism, draw_still
 
 missing = rendering_available()
 drawing = pytest.mark.skipif(missing is not None, reason=str(missing))

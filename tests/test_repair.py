@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis.repair import duplicates, mended, overlaps
+from blockvis.layout.repair import duplicates, mended, overlaps
 
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
 

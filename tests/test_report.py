@@ -15,10 +15,10 @@ from structures import arch_response, parted, wall
 from test_capacity import ARCH, solved
 
 import solver
-from blockvis import palette
-from blockvis.notebook import show
-from blockvis.report import report_html, write_report
-from blockvis.scene import framed
+from blockvis.pictures import palette
+from blockvis.pictures.frame import framed
+from blockvis.report.notebook import show
+from blockvis.report.page import report_html, write_report
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 browser = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")

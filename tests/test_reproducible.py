@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from blockvis.case import parse_case
+from blockvis.cases.case import parse_case
 from blockvis.cli import main
 
 CASE = """

@@ -8,13 +8,15 @@ import pytest
 
 import blockvis
 import solver
-from blockvis import layouts
+from blockvis import generators
 
 
 @pytest.fixture(scope="module")
 def response():
     spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
-    return solver.settle(layouts.arch(), spread, friction_coefficient=0.6, controls=solver.Controls(falling_frames=3))
+    return solver.settle(
+        generators.arch(), spread, friction_coefficient=0.6, controls=solver.Controls(falling_frames=3)
+    )
 
 
 @pytest.fixture(scope="module")

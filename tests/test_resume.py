@@ -18,10 +18,10 @@ import pytest
 
 import blockvis
 import solver
-from blockvis import layouts
+from blockvis import generators
 from blockvis.cli import main
-from blockvis.results import ResultsExist, ResultsFolder
-from blockvis.stored_values import packed, unpacked
+from blockvis.results.folder import ResultsExist, ResultsFolder
+from blockvis.results.npz import packed, unpacked
 
 #: Two phases, and a hinge that jumps: the path goes back, halves its steps, proves places.
 CASE = """
@@ -188,7 +188,7 @@ def test_killed_run_goes_on(whole, tmp_path, moments):
 def test_killed_limit_loads_and_pushovers_go_on(tmp_path, monkeypatch, kind, moment, kept):
     case = tmp_path / "case.toml"
     case.write_text(ARCH + OTHERS[kind], encoding="utf-8")
-    monkeypatch.setattr("blockvis.run.draw_results", lambda *_, **__: ())
+    monkeypatch.setattr("blockvis.runs.run.draw_results", lambda *_, **__: ())
     assert main(["run", str(case), "-o", str(tmp_path / "whole")]) == 0
     process = _command(tmp_path, "run", case, "-o", tmp_path / "out", code=_killed_writing(moment))
     _, said = process.communicate(timeout=120)
@@ -296,7 +296,7 @@ def test_damaged_checkpoint_is_refused(whole, tmp_path, capsys):
 
 def test_two_runs_cannot_write_to_one_folder(whole, tmp_path):
     pytest.importorskip("fcntl", reason="the system has no file locks")
-    assembly = layouts.arch()
+    assembly = generators.arch()
     first = ResultsFolder(tmp_path / "out", assembly)
     for overwrite in (False, True):
         with pytest.raises(ResultsExist, match=r"results already|another run is writing"):
@@ -320,7 +320,7 @@ def _equal(one, other):
 
 
 def test_every_checkpoint_leads_to_the_same_end():
-    arch = layouts.arch(voussoirs=13)
+    arch = generators.arch(voussoirs=13)
     phases = (
         solver.Settlement(direction=(1, 0), increment=0.03, limit=0.06),
         solver.Settlement(direction=(0, -1), increment=0.04, limit=0.5),
@@ -355,7 +355,7 @@ def test_every_checkpoint_leads_to_the_same_end():
 
 
 def test_every_checkpoint_of_a_pushover_leads_to_the_same_end():
-    arch = layouts.arch(voussoirs=13)
+    arch = generators.arch(voussoirs=13)
     live = solver.weight_fraction(arch, (1.0, 0.0), np.flatnonzero(arch.free))
     control = solver.ControlDisplacement("voussoir 4", increment=0.03, limit=0.6)
     setting = {
@@ -374,14 +374,14 @@ def test_every_checkpoint_of_a_pushover_leads_to_the_same_end():
         for one, other in zip(again, told[k + 1 :], strict=True):
             for name in ("settlement", "load_multiplier", "pose", "forces", "velocity", "programs", "checkpoint"):
                 assert _equal(getattr(one, name), getattr(other, name)), (k, name)
-    other = layouts.arch(voussoirs=12)
+    other = generators.arch(voussoirs=12)
     setting["loads"] = solver.Loads(solver.self_weight(other).dead, solver.weight_fraction(other, (1.0, 0.0), [3]))
     with pytest.raises(ValueError, match=r"has 15 blocks, the assembly 14: it belongs to another run"):
         next(solver.pushover_increments(other, control, resume=checkpoint, **setting))
 
 
 def test_checkpoint_behind_the_last_increment_has_nothing_left_to_do():
-    arch = layouts.arch()
+    arch = generators.arch()
     phases = [solver.Settlement(direction=(1, 0), increment=0.01, limit=limit) for limit in (0.02, 0.01)]
     setting = {"interfaces": solver.Interfaces(), "loads": solver.self_weight(arch)}
     told = list(solver.settlement_increments(arch, phases, **setting))
@@ -399,7 +399,7 @@ def test_checkpoint_behind_the_last_increment_has_nothing_left_to_do():
 
 
 def test_checkpoint_of_another_run_is_refused():
-    arch, other = layouts.arch(voussoirs=13), layouts.arch(voussoirs=12)
+    arch, other = generators.arch(voussoirs=13), generators.arch(voussoirs=12)
     spread = solver.Settlement(direction=(1, 0), increment=0.03, limit=0.06)
     setting = {"interfaces": solver.Interfaces(), "controls": solver.Controls()}
     checkpoint = next(
@@ -413,7 +413,7 @@ def test_checkpoint_of_another_run_is_refused():
 
 
 def test_a_response_keeps_no_checkpoints():
-    arch = layouts.arch()
+    arch = generators.arch()
     spread = solver.Settlement(direction=(1, 0), increment=0.05, limit=0.1)
     assert all(i.checkpoint is None for i in solver.settle(arch, spread).increments)
 

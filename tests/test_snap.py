@@ -7,7 +7,7 @@ import pytest
 
 import blockvis
 import solver
-from blockvis import layouts
+from blockvis import generators
 from solver.analysis.settlement import settlement_increments
 
 WIDTH, HEIGHT, SLOT = 0.1, 0.2, 0.02
@@ -80,7 +80,7 @@ def test_much_of_the_weight_does_not_snap():
 
 def test_an_arch_collapses_though_its_fall_would_jam():
     """The mechanism of an arch is no light piece, and a pebble on a bench beside it changes nothing about it."""
-    arch = layouts.arch(radius=1.0, thickness_ratio=0.15, embrace=180.0, voussoirs=12)
+    arch = generators.arch(radius=1.0, thickness_ratio=0.15, embrace=180.0, voussoirs=12)
     spread = solver.Settlement(direction=(1.0, 0.0), increment=0.01, limit=0.2)
     response = solver.settle(arch, spread, friction_coefficient=2.0)
     assert response.collapse.displacement == pytest.approx(0.14104982, rel=1e-3)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import layouts
-from blockvis.case import parse_case
+from blockvis import generators
+from blockvis.cases.case import parse_case
 from blockvis.cli import main
 from solver.program.strength import contact_areas
 
@@ -87,7 +87,7 @@ def test_cohesion_does_not_hold_a_joint_together():
 
 def test_faces_are_shared_out_among_their_contact_points():
     """A brick on two: each interface has its own length, and the parts of all points make up the whole face."""
-    wall = layouts.build("wall", {"bricks": 4, "courses": 3, "depth": 0.2})
+    wall = generators.build("wall", {"bricks": 4, "courses": 3, "depth": 0.2})
     contacts = solver.find_contacts(wall, wall.vertices, 1e-6)
     areas = contact_areas(wall, contacts)
     for course, bearing in ((0, 4 * 0.25), (1, 4 * 0.25), (2, 4 * 0.25)):
@@ -102,7 +102,7 @@ def test_faces_are_shared_out_among_their_contact_points():
 
 
 def test_a_strong_joint_is_a_dry_joint():
-    wall = layouts.build("wall", {"bricks": 4, "courses": 5})
+    wall = generators.build("wall", {"bricks": 4, "courses": 5})
     live = solver.weight_fraction(wall, (1.0, 0.0), np.flatnonzero(wall.free))
 
     def multiplier(*law):

@@ -18,9 +18,9 @@ import blockvis
 from blockvis.cli import main
 from blockvis.studies import campaign
 from blockvis.studies.fragility import fragility_of
-from blockvis.studies.ledger import Ledger, finished_runs
-from blockvis.studies.plan import read_study
-from blockvis.studies.single import run_once
+from blockvis.studies.run_one import run_once
+from blockvis.studies.study_file import read_study
+from blockvis.studies.study_folder import Ledger, finished_runs
 
 #: A block 0.5 × 1 on a ground that tilts: it overturns at atan(0.5) or slides at atan(μ), whichever is first.
 TILT = {

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import blockvis
-from blockvis.case import case_of
+from blockvis.cases.case import case_of
 from blockvis.cli import main
 from blockvis.studies import campaign
-from blockvis.studies.paths import parse_path, put
-from blockvis.studies.plan import read_study
 from blockvis.studies.sampling import METHODS, designed
+from blockvis.studies.study_file import read_study
+from blockvis.studies.value_paths import parse_path, put
 
 CASE = """
 [geometry]

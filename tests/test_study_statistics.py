@@ -6,8 +6,8 @@ import pytest
 import scipy.stats as st
 
 from blockvis.studies.fragility import fragility, fragility_of, wilson
-from blockvis.studies.plan import read_study
 from blockvis.studies.sensitivity import IMPERFECTIONS, first_order, swings
+from blockvis.studies.study_file import read_study
 from blockvis.studies.summary import in_words, summary_of
 
 CASE = {"geometry": {"layout": "arch"}, "settlement": {"direction": [1, 0]}}

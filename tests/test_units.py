@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blockvis.units import chosen_unit, metres_per
+from blockvis.layout.units import chosen_unit, metres_per
 
 
 def test_names_of_units():

@@ -36,11 +36,6 @@ def test_solver_imports_nothing_but_its_own_and_three_libraries():
             assert name.startswith(".") or top in allowed or top in sys.stdlib_module_names, (path.name, name)
 
 
-def test_only_one_module_imports_highspy():
-    users = [p.name for p in (ROOT / "solver").rglob("*.py") if "highspy" in _imports(p)]
-    assert users == ["highs.py"]
-
-
 def test_solver_opens_no_file_and_prints_nothing():
     for path in (ROOT / "solver").rglob("*.py"):
         assert not re.search(r"(?<![\w.])(?:open|print)\(", path.read_text(encoding="utf-8")), path.name

@@ -9,10 +9,10 @@ import pytest
 
 import blockvis
 import solver
-from blockvis import layouts
-from blockvis.results import ResultsFolder
-from blockvis.vtkxml import write_pvd
-from blockvis.whole_files import PARTIAL, whole_file, write_whole
+from blockvis import generators
+from blockvis.atomic_files import PARTIAL, whole_file, write_whole
+from blockvis.results.folder import ResultsFolder
+from blockvis.vtk_files import write_pvd
 
 ROOT = Path(__file__).parents[1]
 
@@ -67,7 +67,7 @@ def test_what_fails_leaves_the_file_before(tmp_path):
 
 def test_a_layout_that_cannot_be_written_leaves_the_file_before(tmp_path, monkeypatch):
     target = tmp_path / "arch.svg"
-    blockvis.save_layout(layouts.arch(), target)
+    blockvis.save_layout(generators.arch(), target)
     before = target.read_bytes()
 
     def broken(drawing, path):
@@ -76,14 +76,14 @@ def test_a_layout_that_cannot_be_written_leaves_the_file_before(tmp_path, monkey
 
     monkeypatch.setattr("blockvis.formats.svg.write", broken)
     with pytest.raises(OSError, match="No space left"):
-        blockvis.save_layout(layouts.arch(voussoirs=5), target)
+        blockvis.save_layout(generators.arch(voussoirs=5), target)
     assert target.read_bytes() == before
     assert list(tmp_path.iterdir()) == [target]
 
 
 @on_linux
 def test_all_of_an_increment_is_on_the_disk_before_the_checkpoint_that_counts_it(tmp_path, done):
-    arch = layouts.arch()
+    arch = generators.arch()
     steps = solver.settlement_increments(
         arch,
         [solver.Settlement(direction=(1, 0), increment=0.02, limit=0.1)],
@@ -108,14 +108,14 @@ def test_all_of_an_increment_is_on_the_disk_before_the_checkpoint_that_counts_it
 def test_a_link_stays_a_link_and_a_pipe_is_written_to(tmp_path):
     target, link, pipe = tmp_path / "target.svg", tmp_path / "link.svg", tmp_path / "pipe.svg"
     link.symlink_to(target)
-    blockvis.save_layout(layouts.arch(), link)
+    blockvis.save_layout(generators.arch(), link)
     assert link.is_symlink()
     assert target.read_text(encoding="utf-8").startswith("<?xml")
     os.mkfifo(pipe)
     read = []
     reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()))
     reader.start()
-    blockvis.save_layout(layouts.arch(), pipe)
+    blockvis.save_layout(generators.arch(), pipe)
     reader.join(timeout=30)
     assert read == [target.read_bytes()]
     assert pipe.is_fifo()
@@ -133,14 +133,14 @@ def test_there_is_one_way_to_write_a_file():
         *(f"blockvis/formats/{name}.py" for name in ("gmsh_mesh", "layout_json", "solids", "svg")),
         # The case of one run of a study, which is made anew each time.
         "blockvis/studies/campaign.py",
-        "blockvis/whole_files.py",
+        "blockvis/atomic_files.py",
     }
     assert {name for name, calls in found.items() if calls} == allowed
 
 
 def test_a_list_of_files_is_flushed_with_what_follows(tmp_path, monkeypatch):
     flushed = []
-    monkeypatch.setattr("blockvis.whole_files.flush", flushed.append)
+    monkeypatch.setattr("blockvis.atomic_files.flush", flushed.append)
     write_pvd(tmp_path / "a.pvd", [(0.0, "a.vtu")], last=False)
     write_pvd(tmp_path / "b.pvd", [(0.0, "b.vtu")])
     assert flushed == [tmp_path / ".a.part.pvd", tmp_path / ".b.part.pvd", tmp_path]

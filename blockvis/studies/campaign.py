@@ -15,11 +15,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from blockvis.progress import StudyProgress
+from blockvis.runs.progress import StudyProgress
 
-from .ledger import Ledger, has_failed
-from .plan import Study, read_study
-from .single import failed_row, run_once
+from .run_one import failed_row, run_once
+from .study_file import Study, read_study
+from .study_folder import Ledger, has_failed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -144,8 +144,8 @@ def _keep(ledger: Ledger, run: int) -> None:
     """The whole results folder of a run, made again on this machine from a case file that stands for itself."""
     import tomli_w
 
-    from blockvis.case import parse_case
-    from blockvis.run import run_case
+    from blockvis.cases.case import parse_case
+    from blockvis.runs.run import run_case
 
     folder = ledger.folder / "results" / f"run_{run:06d}"
     if (folder / "summary.json").is_file():
@@ -224,7 +224,7 @@ def _deaf_plugin() -> Any:
 def _existing_cluster(address: str, plan: Study) -> Iterator[Client]:
     from distributed import Client
 
-    from blockvis.case import case_of
+    from blockvis.cases.case import case_of
 
     try:
         client = Client(address, timeout=ANSWER)

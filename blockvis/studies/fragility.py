@@ -11,7 +11,7 @@ from scipy.special import ndtri
 
 import solver
 
-from .ledger import NO_RESULT
+from .study_folder import NO_RESULT
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,13 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from blockvis import palette
-from blockvis.whole_files import whole_file
+from blockvis.atomic_files import whole_file
+from blockvis.pictures import palette
 
 from .fragility import Fragility, fragility_of
-from .ledger import NO_RESULT, Ledger
-from .plan import Study
 from .sensitivity import first_order, outcome, swings
+from .study_file import Study
+from .study_folder import NO_RESULT, Ledger
 from .summary import classes_of, curve_name, independent_rows
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .ledger import NO_RESULT
-from .plan import Parameter, Study
+from .study_file import Parameter, Study
+from .study_folder import NO_RESULT
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .fragility import fragility_of
-from .ledger import NO_RESULT
-from .plan import Study
 from .sensitivity import first_order, swings
+from .study_file import Study
+from .study_folder import NO_RESULT
 
 if TYPE_CHECKING:
     import pandas as pd

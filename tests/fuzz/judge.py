@@ -12,7 +12,7 @@ from oracle import GRAVITY, Touching, judged, moved_on, support_velocities, touc
 from rubble import Trial, trial
 
 import solver
-from blockvis.run import AS_DRAWN
+from blockvis.runs.run import AS_DRAWN
 
 #: Distance at which corners touch, in block sizes: above what the solver leaves open, below every real gap.
 NEAR = 1e-5

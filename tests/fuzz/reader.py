@@ -25,7 +25,8 @@ def main(memory: str, seconds: str, files: list[str]) -> None:
     # The libraries themselves map more than a gigabyte: they are loaded before the limit is set, and not counted.
     for library in ("meshio", "pyvista", "trimesh", "ezdxf", "shapely", "scipy.spatial", "blockvis.formats.solids"):
         import_module(library)
-    from blockvis.drawing import assemble, read_drawing
+    from blockvis.formats.read import read_layout
+    from blockvis.layout.assemble import assemble
 
     with open("/proc/self/statm", encoding="ascii") as file:
         mapped = int(file.read().split()[0]) * resource.getpagesize()
@@ -43,7 +44,7 @@ def main(memory: str, seconds: str, files: list[str]) -> None:
         started = time.process_time()
         signal.setitimer(signal.ITIMER_PROF, float(seconds))
         try:
-            found = read_drawing(Path(name))
+            found = read_layout(Path(name))
             said["message"] = f"{assemble(found).n_blocks} blocks"
         except (ValueError, OSError) as error:
             said |= {"outcome": "refused", "message": str(error)}

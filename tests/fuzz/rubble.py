@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import Voronoi
 
 import solver
-from blockvis import layouts
+from blockvis import generators
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ def stack(random: np.random.Generator) -> tuple[list[np.ndarray], float]:
 def arch(random: np.random.Generator) -> tuple[solver.Assembly, float]:
     """Arches of few or many voussoirs, thin and thick, flat and tall."""
     radius = float(random.uniform(0.5, 5.0))
-    built = layouts.arch(
+    built = generators.arch(
         radius=radius,
         thickness_ratio=float(random.uniform(0.05, 0.5)),
         embrace=float(random.uniform(50, 180)),
@@ -194,7 +194,7 @@ def layout(random: np.random.Generator) -> tuple[solver.Assembly, float]:
         bricks, length = int(random.integers(2, 7)), 0.4
         bond = str(random.choice(["running", "stack"]))
         half = round(bricks / 2) * length
-        built = layouts.build(
+        built = generators.build(
             "wall",
             {
                 "bricks": bricks,
@@ -206,11 +206,11 @@ def layout(random: np.random.Generator) -> tuple[solver.Assembly, float]:
             },
         )
     elif name == "portal":
-        built = layouts.build(
+        built = generators.build(
             "portal", {"column_blocks": int(random.integers(1, 7)), "lintel_height": float(random.uniform(0.05, 1.0))}
         )
     else:
-        built = layouts.build(
+        built = generators.build(
             "column", {"blocks": int(random.integers(1, 9)), "width": float(random.uniform(0.05, 2.0))}
         )
     return built, 1.0

@@ -10,9 +10,9 @@ from mutations import MEMORY, SECONDS, fixtures, mutated, read_all
 
 import blockvis
 import solver
-from blockvis import layouts
+from blockvis import generators
 from blockvis.cli import main
-from blockvis.stored_values import checked_arrays
+from blockvis.results.npz import checked_arrays
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are set the way Linux has them")
 
@@ -50,7 +50,7 @@ def test_changed_bytes_are_read_or_refused(tmp_path):
 @pytest.mark.parametrize("content", [npz_absurd, npz_bomb, lambda: b"", lambda: bytes(5000)])
 def test_hostile_results_are_refused(tmp_path, capsys, name, content):
     spread = solver.Settlement(direction=(1, 0), increment=0.05, limit=0.05)
-    folder = blockvis.write(solver.settle(layouts.arch(), spread), tmp_path / "out")
+    folder = blockvis.write(solver.settle(generators.arch(), spread), tmp_path / "out")
     (folder / name).write_bytes(content())
     assert main(["render", str(folder)]) == 2
     assert f"{Path(name).name}' cannot be read" in capsys.readouterr().err
