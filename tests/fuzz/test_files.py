@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hostile import FILES, npz_absurd, npz_bomb, written
-from mutations import MEMORY, SECONDS, fixtures, mutated, read_all
+from mutations import MEMORY, READER, SECONDS, fixtures, mutated, read_all
 
 import blockvis
 import solver
@@ -73,7 +73,7 @@ def test_the_limits_bind(tmp_path):
     assert MEMORY == 2 << 30
     (tmp_path / "a.py").write_text(
         "import sys; sys.argv = ['', str(64 << 20), '1']; sys.path.insert(0, sys.argv[0])\n"
-        f"sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        f"sys.path.insert(0, {str(READER.parent)!r})\n"
         "import reader\nreader.main(str(64 << 20), '1', [])\n"
         "try:\n    bytearray(256 << 20)\nexcept MemoryError:\n    print('bound')\n"
     )

@@ -14,7 +14,7 @@ from blockvis.atomic_files import PARTIAL, whole_file, write_whole
 from blockvis.results.folder import ResultsFolder
 from blockvis.vtk_files import write_pvd
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture

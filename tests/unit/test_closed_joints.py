@@ -15,7 +15,7 @@ from blockvis.layout.assemble import assemble
 from blockvis.layout.joints.close import close_joints
 from blockvis.layout.joints.facing_edges import facing_edges, proposed_thickness
 
-FACADE = Path(__file__).resolve().parents[2] / "shared" / "data" / "facade" / "facade.dxf"
+FACADE = Path(__file__).resolve().parents[3] / "shared" / "data" / "facade" / "facade.dxf"
 needs_facade = pytest.mark.skipif(not FACADE.exists(), reason="third-party drawing, not part of the project")
 
 

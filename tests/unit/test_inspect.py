@@ -10,7 +10,7 @@ import solver
 from blockvis.formats.read import inspect, save_layout
 from blockvis.pictures.inspection import draw_inspection
 
-FACADE = Path(__file__).resolve().parents[2] / "shared" / "data" / "facade" / "facade.dxf"
+FACADE = Path(__file__).resolve().parents[3] / "shared" / "data" / "facade" / "facade.dxf"
 
 
 @pytest.fixture

@@ -233,8 +233,9 @@ def test_a_run_that_kills_its_workers_is_recorded_and_the_others_are_made(arches
 def cluster(tmp_path):
     """A scheduler and two workers as a user starts them, without anybody who restarts what dies."""
     file = tmp_path / "scheduler.json"
-    tests = Path(__file__).parent
-    path = os.pathsep.join([str(tests.parent), str(tests), os.environ.get("PYTHONPATH", "")])
+    path = os.pathsep.join(
+        [str(Path(__file__).parents[2]), str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")]
+    )
     common = {
         "env": {**os.environ, "PYTHONPATH": path},
         "cwd": tmp_path,

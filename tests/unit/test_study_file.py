@@ -230,7 +230,7 @@ def test_an_unreachable_scheduler_is_one_message_and_nothing_started(study_file,
 
 @pytest.mark.parametrize(("name", "runs"), [("arch_friction", 256), ("panel_settlement_friction", 36)])
 def test_shipped_studies_are_studies(name, runs):
-    study = read_study(Path(__file__).parent.parent / "examples" / "studies" / f"{name}.toml")
+    study = read_study(Path(__file__).parents[2] / "examples" / "studies" / f"{name}.toml")
     assert study.n_runs == runs
 
 

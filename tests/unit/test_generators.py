@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import solver
 from blockvis import generators
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 #: The façade at a size at which a program takes a fraction of a second.
 SMALL = {"facade": {"bricks": 14, "courses": 24, "storeys": 1, "windows": 1}}

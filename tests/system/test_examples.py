@@ -12,7 +12,7 @@ from blockvis import generators
 from blockvis.cases.build import case_assembly, case_interfaces
 from blockvis.cases.case import read_case
 
-EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.toml"))
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))
 LONG = {"facade"}
 
 #: How each ends, and the first reaction over the weight of the free blocks, as measured; they guard against change.

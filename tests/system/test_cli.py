@@ -11,7 +11,7 @@ import pytest
 
 from blockvis.cli import main
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 CASE = (ROOT / "examples" / "semicircular_arch.toml").read_text(encoding="utf-8")
 
@@ -86,7 +86,7 @@ def test_console_script_and_exit_code():
 
 
 def test_a_layout_in_place_of_the_case_file_says_so(capsys):
-    layout = Path(__file__).parent.parent / "assets" / "semicircular_arch.msh"
+    layout = Path(__file__).parents[2] / "assets" / "semicircular_arch.msh"
     assert main(["run", str(layout)]) == 2
     said = capsys.readouterr().err
     assert "is a layout, not a case file" in said
