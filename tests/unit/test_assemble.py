@@ -1,4 +1,4 @@
-"""Drawing to assembly: roles, supports, duplicates, overlaps, units; and what is refused."""
+"""Layout to assembly: roles, supports, duplicates, overlaps, units; and what is refused."""
 
 import json
 
