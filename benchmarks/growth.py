@@ -25,10 +25,8 @@ import scipy
 
 import blockvis
 import solver
-import solver.contact
-import solver.correction
-import solver.program
-from blockvis import layouts
+from blockvis import generators
+from solver.program import closing, increment, light_blocks
 
 SIZES = (100, 300, 1000, 1500, 3000, 10000)
 BRICK = 0.25, 0.125  # m
@@ -40,7 +38,7 @@ def wall_of(blocks: int) -> solver.Assembly:
     courses = max(4, round(math.sqrt(0.6 * blocks)))
     bricks = max(4, 2 * round(blocks / courses / 2))
     width = bricks * BRICK[0]
-    return layouts.build(
+    return generators.build(
         "wall",
         {
             "bricks": bricks,
@@ -74,9 +72,10 @@ class Clock:
 def one_size(blocks: int, increments: int) -> dict[str, Any]:
     """Measures one wall."""
     clock = Clock()
-    solver.program.solve_lp = clock.timed("programs", solver.program.solve_lp)
-    for room in (solver.program, solver.correction):
-        room.find_contacts = clock.timed("contacts", room.find_contacts)
+    for module in (increment, light_blocks):
+        module.solve_lp = clock.timed("programs", module.solve_lp)
+    for module in (increment, closing):
+        module.find_contacts = clock.timed("contacts", module.find_contacts)
     assembly = wall_of(blocks)
     told = []
 

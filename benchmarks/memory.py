@@ -20,8 +20,8 @@ from typing import Any
 from growth import BRICK, INCREMENT, wall_of
 
 import blockvis
-from blockvis.case import parse_case
-from blockvis.results import ResultsFolder
+from blockvis.cases.case import parse_case
+from blockvis.results.folder import ResultsFolder
 
 CASE = """
 [geometry]

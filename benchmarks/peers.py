@@ -46,7 +46,7 @@ import numpy as np
 import physics_engines
 
 import solver
-from blockvis import layouts
+from blockvis import generators
 
 #: Spreading arch of 12 voussoirs: displacement of collapse over R, H/W at the start and at collapse.
 COLLAPSE, FIRST, LAST = 0.14104982, 0.1771150, 0.2420193
@@ -158,7 +158,7 @@ def engine_arch(name: str, response: solver.Response, time_step: float, speed: f
 
 def spreading_arch(engines: list[str], budget: float) -> None:
     """Spreads the supports of the arch with every tool."""
-    arch = layouts.arch(voussoirs=12, thickness_ratio=0.15)
+    arch = generators.arch(voussoirs=12, thickness_ratio=0.15)
     _, fine = (our_arch(arch, increment) for increment in (0.02, 0.01))
     our_forces(fine)
     for name in engines:
@@ -168,16 +168,16 @@ def spreading_arch(engines: list[str], budget: float) -> None:
 
 def equilibrium(tools: dict[str, Drive], quick: bool) -> None:
     """Asks every tool whether a structure carries its own weight."""
-    panel = layouts.panel
+    panel = generators.panel
     cases = [
-        ("arch, t/R 0.15", layouts.arch(), ARCH_FRICTION, True),
-        ("arch, t/R 0.10", layouts.arch(thickness_ratio=0.10), ARCH_FRICTION, False),
+        ("arch, t/R 0.15", generators.arch(), ARCH_FRICTION, True),
+        ("arch, t/R 0.10", generators.arch(thickness_ratio=0.10), ARCH_FRICTION, False),
         ("panel", panel(nb=5, nc=6), PANEL_FRICTION, True),
     ]
     if not quick:
         cases.append(("panel", panel(nb=8, nc=9), PANEL_FRICTION, True))
     for ask in tools.values():
-        ask(layouts.arch(), ARCH_FRICTION)  # what is imported and compiled once
+        ask(generators.arch(), ARCH_FRICTION)  # what is imported and compiled once
     for name, assembly, friction, stands in cases:
         for tool, ask in tools.items():
             verdict = ask(assembly, friction)
@@ -192,7 +192,7 @@ def equilibrium(tools: dict[str, Drive], quick: bool) -> None:
 
 def settling_panel(bricks: int, courses: int, engines: list[str], budget: float) -> None:
     """The base of a panel settles under its right half."""
-    assembly = layouts.panel(nb=bricks, nc=courses, x_s=0.1 * bricks, block_height=0.1)
+    assembly = generators.panel(nb=bricks, nc=courses, x_s=0.1 * bricks, block_height=0.1)
     case = f"panel, {int(assembly.free.sum())} blocks, {1e3 * SETTLED:g} mm"
     quantity = "reaction/W"
     controls = solver.Controls(falling_frames=0)

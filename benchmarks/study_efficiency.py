@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Any
 
 from blockvis.studies import campaign
 from blockvis.studies.campaign import carry_out, local_cluster
-from blockvis.studies.ledger import Ledger
-from blockvis.studies.plan import read_study
-from blockvis.studies.single import run_once
+from blockvis.studies.run_one import run_once
+from blockvis.studies.study_file import read_study
+from blockvis.studies.study_folder import Ledger
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -17,35 +17,35 @@ from typing import TYPE_CHECKING, Any
 import solver
 
 if TYPE_CHECKING:
-    from .case import Case as Case
-    from .case import read_case as read_case
-    from .drawing import read as read
-    from .drawing import save_layout as save_layout
-    from .render import animate as animate
-    from .results import open_results as open_results
-    from .results import write as write
-    from .run import run_case as run_case
+    from .cases.case import Case as Case
+    from .cases.case import read_case as read_case
+    from .formats.read import read as read
+    from .formats.read import save_layout as save_layout
+    from .pictures.render import animate as animate
+    from .results.folder import write as write
+    from .runs.reopen import open_results as open_results
+    from .runs.run import run_case as run_case
     from .studies.campaign import study as study
 
 #: Public names and where they live; loaded when first used, because VTK takes seconds to import.
 _HOMES = {
-    "Case": "case",
-    "animate": "render",
-    "draw_curve": "curves",
-    "draw_mechanism": "render",
-    "draw_still": "render",
-    "open_results": "results",
-    "read": "drawing",
-    "read_case": "case",
-    "inspect": "inspection",
-    "read_drawing": "drawing",
-    "run_case": "run",
-    "save_layout": "drawing",
-    "show": "notebook",
+    "Case": "cases.case",
+    "animate": "pictures.render",
+    "draw_curve": "pictures.curves",
+    "draw_mechanism": "pictures.render",
+    "draw_still": "pictures.render",
+    "inspect": "formats.read",
+    "open_results": "runs.reopen",
+    "read": "formats.read",
+    "read_case": "cases.case",
+    "read_layout": "formats.read",
+    "run_case": "runs.run",
+    "save_layout": "formats.read",
+    "show": "report.notebook",
     "study": "studies.campaign",
-    "write": "results",
-    "write_drawing": "drawing",
-    "write_report": "report",
+    "write": "results.folder",
+    "write_layout": "formats.read",
+    "write_report": "report.page",
 }
 
 __all__ = sorted(_HOMES)
@@ -53,7 +53,7 @@ __all__ = sorted(_HOMES)
 
 def _plot(response: solver.Response, **options: Any) -> Any:
     """The response as a player for notebooks; see :func:`blockvis.show`."""
-    from .notebook import show
+    from .report.notebook import show
 
     return show(response, **options)
 

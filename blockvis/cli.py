@@ -14,9 +14,7 @@ import numpy as np
 
 import solver
 
-from .layouts import LAYOUTS
-
-__all__ = ["entry", "main"]
+from .generators import LAYOUTS
 
 #: Exit codes: bad input, a solver failure, everything written but the pictures, Ctrl-C.
 BAD_INPUT, SOLVER_FAILED, NO_PICTURES, INTERRUPTED = 2, 3, 4, 130
@@ -116,8 +114,8 @@ def _add_sweep(verbs: Any) -> None:
 
 def _sweep(options: argparse.Namespace) -> int:
     from .studies.campaign import run_study
-    from .studies.ledger import finished_runs
-    from .studies.plan import read_study
+    from .studies.study_file import read_study
+    from .studies.study_folder import finished_runs
     from .studies.summary import in_words, stored_summary
 
     study = read_study(options.study)
@@ -153,7 +151,7 @@ def _run_numbers(text: str) -> tuple[int, ...]:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from .run import resume_run, run_case
+    from .runs.run import resume_run, run_case
 
     if options.resume is not None:
         if options.case is not None or options.output is not None or options.force:
@@ -178,7 +176,8 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _info(options: argparse.Namespace) -> int:
-    from .inspection import draw_inspection, inspect
+    from .formats.read import inspect
+    from .pictures.inspection import draw_inspection
 
     found = inspect(options.file, unit=options.unit)
     print(found)
@@ -188,24 +187,25 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _convert(options: argparse.Namespace) -> int:
-    from .drawing import assemble, read_drawing, save_layout, write_drawing
+    from .formats.read import read_layout, save_layout, write_layout
+    from .layout.assemble import assemble
 
     target = _new_file(options.target, options.force)
-    drawing = read_drawing(options.source, unit=options.unit)
-    for note in drawing.notes:
+    layout = read_layout(options.source, unit=options.unit)
+    for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)
     joint = options.joint_thickness
     if joint == "0":
-        write_drawing(drawing, target)
+        write_layout(layout, target)
     else:
-        save_layout(assemble(drawing, joint_thickness=joint if joint == "auto" else _number(joint)), target)
-    print(f"{drawing.n_blocks} blocks written to {target}")
+        save_layout(assemble(layout, joint_thickness=joint if joint == "auto" else _number(joint)), target)
+    print(f"{layout.n_blocks} blocks written to {target}")
     return 0
 
 
 def _layout(options: argparse.Namespace) -> int:
-    from .drawing import save_layout
-    from .layouts import build
+    from .formats.read import save_layout
+    from .generators import build
 
     target = _new_file(options.output, options.force)
     assembly = build(options.name, dict(_parameter(given) for given in options.parameters))
@@ -215,10 +215,12 @@ def _layout(options: argparse.Namespace) -> int:
 
 
 def _render(options: argparse.Namespace) -> int:
-    from .curves import draw_curve
-    from .render import animate, draw_mechanism, draw_still, rendering_available
-    from .report import write_report
-    from .results import open_results, stored_case
+    from .pictures.curves import draw_curve
+    from .pictures.opengl import rendering_available
+    from .pictures.render import animate, draw_mechanism, draw_still
+    from .report.page import write_report
+    from .results.folder import stored_case
+    from .runs.reopen import open_results
 
     folder = Path(options.results)
     response = open_results(folder)
@@ -359,8 +361,8 @@ def _pushover_in_words(response: solver.Response) -> list[str]:
 
 
 def _limit_in_words(response: solver.Response) -> list[str]:
-    from .capacity import capacity_summary
-    from .series import POSITION, governing, parameter_word
+    from .results.quantities import POSITION, governing, parameter_word
+    from .results.tables import capacity_summary
 
     path, state, said = response.path, governing(response), capacity_summary(response)
     if state is None or said["limit_load_multiplier"] is None:

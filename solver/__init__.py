@@ -12,19 +12,24 @@ Conventions, written once:
 This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 """
 
-from .analysis import Controls, Ending, check_settlement, settle, settlement_increments
+from .analysis.checkpoint import Checkpoint, PushoverCheckpoint
+from .analysis.limit_load import limit_load, limit_load_envelope
+from .analysis.pushover import ControlDisplacement, pushover, pushover_increments
+from .analysis.settlement import Controls, Ending, check_settlement, settle, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly
-from .checkpoint import Checkpoint, PushoverCheckpoint
-from .contact import Contacts, InterfaceLaw, Interfaces, JointScatter, find_contacts, measure_contacts
 from .equilibrium import block_forces
-from .kinematics import Pose, moved_vertices
-from .limit import Envelope, LimitLoad, LimitStatus, limit_load, limit_load_envelope
+from .geometry.contacts import Contacts
+from .geometry.planar_contacts import find_contacts, measure_contacts
+from .geometry.polygons import overlap_depths
+from .interfaces import InterfaceLaw, Interfaces, JointScatter
+from .kinematics import Pose, carried, moved_vertices, swung
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
-from .lp import SolveError
-from .mechanism import Mechanism, mechanism_of, rigid_parts
-from .polygons import overlap_depths
-from .pushover import ControlDisplacement, pushover, pushover_increments
-from .response import Certificate, Collapse, ContactState, Increment, Response, Status, total_weight
+from .lp.problem import SolveError
+from .results.certificate import Certificate
+from .results.increment import ContactState, Increment, Status
+from .results.limit import Envelope, LimitLoad, LimitStatus
+from .results.mechanism import Mechanism, mechanism_of, rigid_parts, with_motion
+from .results.response import Collapse, Response, total_weight
 from .surface_loads import edge_pressure, load_on_top, surface_pressure
 
 __all__ = [
@@ -58,6 +63,7 @@ __all__ = [
     "SolveError",
     "Status",
     "block_forces",
+    "carried",
     "check_settlement",
     "edge_pressure",
     "find_contacts",
@@ -76,6 +82,8 @@ __all__ = [
     "settle",
     "settlement_increments",
     "surface_pressure",
+    "swung",
     "total_weight",
     "weight_fraction",
+    "with_motion",
 ]

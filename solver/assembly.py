@@ -9,9 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .polygons import overlap_depths, polygon_integrals, self_crossings
-
-__all__ = ["FIXED", "FREE", "MOVING", "ROLES", "Assembly", "check_blocks"]
+from .geometry.polygons import overlap_depths, polygon_integrals, self_crossings
 
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from .contact import Contacts
+from .geometry.contacts import Contacts
 from .kinematics import Pose
-
-__all__ = ["block_forces", "compatibility_matrix", "cone_rays", "equilibrium_matrix", "with_slack"]
 
 
 def equilibrium_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc_array:

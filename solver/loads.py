@@ -10,8 +10,6 @@ import numpy as np
 from .assembly import Assembly
 from .kinematics import Pose, rotation_matrices
 
-__all__ = ["GRAVITY", "Loads", "Settlement", "point_load", "self_weight", "weight_fraction"]
-
 #: Acceleration of gravity [m/s²], as structural codes round it.
 GRAVITY = 9.81
 

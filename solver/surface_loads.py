@@ -9,8 +9,6 @@ import numpy as np
 from .assembly import Assembly
 from .loads import point_load
 
-__all__ = ["edge_pressure", "load_on_top", "surface_pressure"]
-
 #: Strips of the surface narrower than this fraction of its width are rounding of the drawing.
 NARROWEST = 1e-12
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 import solver
-from blockvis import layouts
+from blockvis import generators
 
 #: Bent outlines that VTK would fill wrongly: an L, a U, a comb.
 BENT = {
@@ -21,7 +21,7 @@ def arch_response() -> solver.Response:
     """A semicircular arch of 12 voussoirs whose right springer spreads until it collapses."""
     spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
     controls = solver.Controls(falling_frames=12)
-    return solver.settle(layouts.arch(), spread, friction_coefficient=0.6, controls=controls)
+    return solver.settle(generators.arch(), spread, friction_coefficient=0.6, controls=controls)
 
 
 def wall(columns: int, courses: int) -> solver.Assembly:

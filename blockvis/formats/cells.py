@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.drawing import Drawing
-from blockvis.formats.layout_json import with_rows
-from blockvis.outlines import flattened, outlines_of_cells
-
-__all__ = ["components", "drawing_of_cells", "merged", "row_of"]
+from blockvis.layout.block_table import with_rows
+from blockvis.layout.layout import Layout
+from blockvis.layout.outlines import flattened, outlines_of_cells
 
 #: Names of the cell array that numbers the blocks, in order of preference.
 BLOCK_ARRAYS = ("block_id", "BlockId", "block", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags")
@@ -32,9 +30,9 @@ def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
     return np.unique(piece[[ring[0] for ring in rings]], return_inverse=True)[1]
 
 
-def drawing_of_cells(
+def layout_of_cells(
     points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray], path: Path | str
-) -> Drawing:
+) -> Layout:
     """A drawing from surface cells.
 
     Parameters
@@ -73,8 +71,8 @@ def drawing_of_cells(
     outlines = outlines_of_cells(flat, rings, owner, names)
     first = np.unique(owner, return_index=True)[1]
     notes = tuple(text for text in (how, note) if text)
-    drawing = Drawing(outlines=tuple(outlines), names=tuple(names), unit="", notes=notes)
-    return with_rows(drawing, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
+    layout = Layout(outlines=tuple(outlines), names=tuple(names), unit="", notes=notes)
+    return with_rows(layout, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
 
 
 def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, Any]:
@@ -98,28 +96,28 @@ def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, An
     return row
 
 
-def merged(drawings: Sequence[Drawing], labels: Sequence[str], path: Path | str) -> Drawing:
+def merged(drawings: Sequence[Layout], labels: Sequence[str], path: Path | str) -> Layout:
     """Several drawings as one; a block that has no name of its own is named after its part of the file."""
     if not drawings:
         raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
     if len(drawings) == 1:
         return drawings[0]
     named = []
-    for drawing, label in zip(drawings, labels, strict=True):
-        plain = all(name.startswith("block ") for name in drawing.names)
-        own = (label,) if drawing.n_blocks == 1 else tuple(f"{label} {k + 1}" for k in range(drawing.n_blocks))
-        named.append(replace(drawing, names=own if plain and label else drawing.names))
+    for layout, label in zip(drawings, labels, strict=True):
+        plain = all(name.startswith("block ") for name in layout.names)
+        own = (label,) if layout.n_blocks == 1 else tuple(f"{label} {k + 1}" for k in range(layout.n_blocks))
+        named.append(replace(layout, names=own if plain and label else layout.names))
 
     def joined(key: str) -> tuple[Any, ...]:
-        return tuple(value for drawing in named for value in getattr(drawing, key))
+        return tuple(value for layout in named for value in getattr(layout, key))
 
     def numbers(key: str) -> np.ndarray | None:
-        if all(getattr(drawing, key) is None for drawing in named):
+        if all(getattr(layout, key) is None for layout in named):
             return None
         parts = (getattr(d, key) if getattr(d, key) is not None else np.full(d.n_blocks, np.nan) for d in named)
         return np.concatenate(list(parts))
 
-    return Drawing(
+    return Layout(
         outlines=joined("outlines"),
         names=joined("names"),
         groups=tuple(group or label for d, label in zip(named, labels, strict=True) for group in d.groups),

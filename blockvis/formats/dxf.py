@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.drawing import Drawing
-from blockvis.formats import Reading
-from blockvis.formats.layout_json import rows_of, with_rows
-from blockvis.formats.loose_lines import Line, faces_of_lines
-from blockvis.outlines import arc_points
-from blockvis.units import metres_per
+from blockvis.layout.block_table import rows_of, with_rows
+from blockvis.layout.layout import Layout
+from blockvis.layout.outlines import arc_points
+from blockvis.layout.units import metres_per
 
-__all__ = ["read", "write"]
+from .loose_lines import Line, faces_of_lines
+from .reading import Reading
 
 #: Units by the header variable $INSUNITS.
 UNIT_CODES = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 14: "dm"}
@@ -55,7 +54,7 @@ class _Found:
         self.rows.append(_own_data(entity))
 
 
-def read(path: Path, reading: Reading) -> Drawing:
+def read(path: Path, reading: Reading) -> Layout:
     """Reads a .dxf drawing; the header's $INSUNITS names its unit."""
     import ezdxf
     from ezdxf import recover
@@ -101,7 +100,7 @@ def read(path: Path, reading: Reading) -> Drawing:
         notes.append("skipped on layers that are off or frozen: " + _listed(found.hidden))
     if any(abs(ring[:, 2]).max() > 0 for ring in found.rings):
         notes.append("elevations were ignored: the drawing was read as seen from above")
-    drawing = Drawing(
+    layout = Layout(
         outlines=tuple(ring[:, :2] for ring in found.rings),
         names=tuple(found.names),
         unit=stated,
@@ -111,7 +110,7 @@ def read(path: Path, reading: Reading) -> Drawing:
         {"group": layer, **({"material": layer} if layer != "0" else {}), "name": name, **row}
         for layer, name, row in zip(found.layers, found.names, found.rows, strict=True)
     ]
-    return with_rows(drawing, rows)
+    return with_rows(layout, rows)
 
 
 def _flat(entities: Any, depth: int, path: Path, parent: str = "") -> Iterator[tuple[Any, str]]:
@@ -298,7 +297,7 @@ def _own_data(entity: Any) -> dict[str, Any]:
     return row if isinstance(row, dict) else {}
 
 
-def write(drawing: Drawing, path: Path) -> None:
+def write(layout: Layout, path: Path) -> None:
     """Writes .dxf R2000 in m: one closed LWPOLYLINE per block on the layer of its group, role or material."""
     import ezdxf
 
@@ -306,13 +305,13 @@ def write(drawing: Drawing, path: Path) -> None:
     document.header["$INSUNITS"] = 6
     document.appids.add(APPLICATION)
     space = document.modelspace()
-    for i, row in enumerate(rows_of(drawing)):
-        role = drawing.roles[i] if drawing.roles[i] in ("fixed", "moving") else ""
-        layer = drawing.groups[i] or role or drawing.materials[i] or "0"
+    for i, row in enumerate(rows_of(layout)):
+        role = layout.roles[i] if layout.roles[i] in ("fixed", "moving") else ""
+        layer = layout.groups[i] or role or layout.materials[i] or "0"
         layer = "".join("_" if c in '<>/\\":;?*|=`' or ord(c) < 32 else c for c in layer)[:255]
         if layer not in document.layers:
             document.layers.add(layer)
-        outline = space.add_lwpolyline(drawing.outlines[i].tolist(), close=True, dxfattribs={"layer": layer})
+        outline = space.add_lwpolyline(layout.outlines[i].tolist(), close=True, dxfattribs={"layer": layer})
         text = json.dumps(row)
         outline.set_xdata(APPLICATION, [(1000, text[k : k + 200]) for k in range(0, len(text), 200)])
     document.saveas(path)

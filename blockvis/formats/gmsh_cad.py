@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from blockvis.drawing import Drawing
-from blockvis.formats import Reading, gmsh_mesh
-from blockvis.formats.gmsh_process import NO_LIBRARY
-from blockvis.formats.solids import Body, drawing_of_bodies
+from blockvis.layout.layout import Layout
 
-__all__ = ["read"]
+from . import gmsh_mesh
+from .gmsh_process import NO_LIBRARY
+from .reading import Reading
+from .solids import Body, layout_of_bodies
 
 #: A geometry script that needs longer is taken for one that does not end.
 LONGEST_SECONDS = 120
@@ -31,7 +31,7 @@ _REACHES_OUT = re.compile(
 _PACKAGES = "libglu1-mesa libxcursor1 libxft2 libxinerama1 libxrender1 libxi6 libxfixes3"
 
 
-def read(path: Path, reading: Reading) -> Drawing:
+def read(path: Path, reading: Reading) -> Layout:
     """Reads a geometry file; .step and .brep come in m, a .geo does not say its unit."""
     script = path.suffix.lower().startswith(".geo")
     if script:
@@ -61,13 +61,13 @@ def read(path: Path, reading: Reading) -> Drawing:
             reason = " ".join(done.stderr.split())[-300:] or f"it ended with code {done.returncode}"
             raise ValueError(f"'{path}' cannot be read by gmsh: {reason}; repair it or give it as .msh")
         if done.stdout.strip().endswith("json"):
-            drawing = _drawing_of_volumes(json.loads(target.with_suffix(".json").read_text(encoding="utf-8")), path)
+            layout = _layout_of_volumes(json.loads(target.with_suffix(".json").read_text(encoding="utf-8")), path)
         else:
-            drawing = gmsh_mesh.read(target.with_suffix(".msh"), reading)
-    return replace(drawing, unit="" if script else "m")
+            layout = gmsh_mesh.read(target.with_suffix(".msh"), reading)
+    return replace(layout, unit="" if script else "m")
 
 
-def _drawing_of_volumes(found: list[dict[str, object]], path: Path) -> Drawing:
+def _layout_of_volumes(found: list[dict[str, object]], path: Path) -> Layout:
     bodies, rows = [], []
     for part in found:
         if int(str(part["groups"])) > 1:
@@ -80,4 +80,4 @@ def _drawing_of_volumes(found: list[dict[str, object]], path: Path) -> Drawing:
         if part["group"]:
             row |= {"group": str(part["group"]), "material": str(part["group"])}
         rows.append(row)
-    return drawing_of_bodies(bodies, path, rows)
+    return layout_of_bodies(bodies, path, rows)

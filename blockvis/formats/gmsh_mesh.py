@@ -13,12 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from blockvis.drawing import Drawing
-from blockvis.formats import Reading
-from blockvis.formats.triangles import cells_of_ring
-from blockvis.outlines import flattened, outlines_of_cells
+from blockvis.layout.layout import Layout
+from blockvis.layout.outlines import flattened, outlines_of_cells
 
-__all__ = ["read", "write"]
+from .reading import Reading
+from .triangles import cells_of_ring
 
 #: Points around a surface element, by gmsh's element type: corners with the points of curved sides between them.
 RINGS = {
@@ -102,7 +101,7 @@ class _Numbers:
         return int(text)
 
 
-def read(path: Path, reading: Reading) -> Drawing:
+def read(path: Path, reading: Reading) -> Layout:
     """Reads a .msh file; the file does not say its unit."""
     data = path.read_bytes()
     mesh, table = _sections(data, path)
@@ -125,7 +124,7 @@ def read(path: Path, reading: Reading) -> Drawing:
     if "" in groups:
         notes.append(f"{groups.count('')} of {len(tags)} surfaces are in no physical group")
     notes += [note] if note else []
-    drawing = Drawing(
+    layout = Layout(
         outlines=tuple(outlines),
         names=tuple(names),
         groups=tuple(groups),
@@ -133,7 +132,7 @@ def read(path: Path, reading: Reading) -> Drawing:
         unit="",
         notes=tuple(notes),
     )
-    return _with_table(drawing, table, tags)
+    return _with_table(layout, table, tags)
 
 
 def _surface_names(groups: list[str], tags: np.ndarray) -> list[str]:
@@ -324,32 +323,32 @@ def _add(mesh: _Mesh, numbers: _Numbers, dimension: int, kind: int, nodes: np.nd
     mesh.surfaces.append(tags)
 
 
-def _with_table(drawing: Drawing, table: dict[str, dict[str, object]], tags: np.ndarray) -> Drawing:
+def _with_table(layout: Layout, table: dict[str, dict[str, object]], tags: np.ndarray) -> Layout:
     """What our own writer kept of each block beside its group, where the file still has all of them."""
     rows = [table.get(str(tag)) for tag in tags]
     if not all(isinstance(row, dict) for row in rows):
-        return drawing
-    from blockvis.formats.layout_json import with_rows
+        return layout
+    from blockvis.layout.block_table import with_rows
 
-    return with_rows(drawing, rows)
+    return with_rows(layout, rows)
 
 
-def write(drawing: Drawing, path: Path) -> None:
+def write(layout: Layout, path: Path) -> None:
     """Writes .msh 4.1 ASCII: one surface per block, its corners as nodes, physical groups kept.
 
     A block without a group is put into one named after its role, its material, or "blocks". A section of our own,
     which other programs skip, keeps names, roles, materials, density and thickness.
     """
-    from blockvis.formats.layout_json import rows_of
+    from blockvis.layout.block_table import rows_of
 
     groups = [
         group or (role if role in ("fixed", "moving") else "") or material or "blocks"
-        for group, role, material in zip(drawing.groups, drawing.roles, drawing.materials, strict=True)
+        for group, role, material in zip(layout.groups, layout.roles, layout.materials, strict=True)
     ]
     number = {group: k + 1 for k, group in enumerate(dict.fromkeys(groups))}
     nodes, elements, entities = [], [], []
     n_nodes = n_elements = n_parts = 0
-    for i, ring in enumerate(drawing.outlines):
+    for i, ring in enumerate(layout.outlines):
         low, high = ring.min(axis=0), ring.max(axis=0)
         box = " ".join(repr(float(x)) for x in (*low, 0.0, *high, 0.0))
         entities.append(f"{i + 1} {box} 1 {number[groups[i]]} 0")
@@ -369,9 +368,9 @@ def write(drawing: Drawing, path: Path) -> None:
     lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat"]
     lines += ["$PhysicalNames", str(len(number))]
     lines += [f'2 {k} "{group.replace(chr(34), chr(39))}"' for group, k in number.items()]
-    lines += ["$EndPhysicalNames", "$Entities", f"0 0 {drawing.n_blocks} 0", *entities, "$EndEntities"]
-    lines += ["$Nodes", f"{drawing.n_blocks} {n_nodes} 1 {n_nodes}", *nodes, "$EndNodes"]
+    lines += ["$EndPhysicalNames", "$Entities", f"0 0 {layout.n_blocks} 0", *entities, "$EndEntities"]
+    lines += ["$Nodes", f"{layout.n_blocks} {n_nodes} 1 {n_nodes}", *nodes, "$EndNodes"]
     lines += ["$Elements", f"{n_parts} {n_elements} 1 {n_elements}", *elements, "$EndElements"]
-    table = {str(i + 1): row for i, row in enumerate(rows_of(drawing))}
+    table = {str(i + 1): row for i, row in enumerate(rows_of(layout))}
     lines += [f"${TABLE}", json.dumps(table), f"$End{TABLE}", ""]
     path.write_text("\n".join(lines), encoding="utf-8")

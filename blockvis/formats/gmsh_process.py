@@ -10,8 +10,6 @@ from __future__ import annotations
 import json
 import sys
 
-__all__ = ["main"]
-
 #: Exit code for a library that cannot be loaded.
 NO_LIBRARY = 3
 

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["Line", "faces_of_lines"]
-
 #: Ends closer than this fraction of the drawing meet.
 MEETS = 1e-6
 

@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.drawing import Drawing
-from blockvis.formats import Reading
-from blockvis.formats.cells import drawing_of_cells
+from blockvis.layout.layout import Layout
 
-__all__ = ["read"]
+from .cells import layout_of_cells
+from .reading import Reading
 
 #: Points around a surface cell, by meshio's name; None: all of them in order.
 RINGS: dict[str, tuple[int, ...] | None] = {
@@ -23,7 +22,7 @@ RINGS: dict[str, tuple[int, ...] | None] = {
 }  # fmt: skip
 
 
-def read(path: Path, reading: Reading) -> Drawing:
+def read(path: Path, reading: Reading) -> Layout:
     """Reads a mesh through meshio; it does not say its unit."""
     import meshio
 
@@ -60,7 +59,7 @@ def read(path: Path, reading: Reading) -> Drawing:
         data[key] = np.concatenate([np.asarray(arrays[k]) for k, _ in chosen]) if chosen else np.zeros(0)
     if "block_id" not in data:
         data.update(_sets(mesh, chosen))
-    return drawing_of_cells(np.asarray(mesh.points, dtype=float), rings, data, path)
+    return layout_of_cells(np.asarray(mesh.points, dtype=float), rings, data, path)
 
 
 class _Ending(io.StringIO):

@@ -13,16 +13,15 @@ from xml.sax.saxutils import unescape
 
 import numpy as np
 
-from blockvis.drawing import Drawing
-from blockvis.formats import Reading
-from blockvis.formats.cells import drawing_of_cells, merged, row_of
-from blockvis.formats.layout_json import rows_of
-from blockvis.formats.vtk_arrays import largest_number
+from blockvis.layout.block_table import rows_of
+from blockvis.layout.layout import Layout
+
+from .cells import layout_of_cells, merged, row_of
+from .reading import Reading
+from .vtk_arrays import largest_number
 
 if TYPE_CHECKING:
     import pyvista
-
-__all__ = ["dataset_of", "drawing_of_dataset", "read", "write"]
 
 #: Points around a surface cell, by VTK's cell type; None: all of them in order.
 RINGS: dict[int, tuple[int, ...] | None] = {
@@ -42,7 +41,7 @@ MOST_NUMBERS = 50_000_000
 DEEPEST = 64
 
 
-def read(path: Path, reading: Reading) -> Drawing:
+def read(path: Path, reading: Reading) -> Layout:
     """Reads a file of VTK; it does not say its unit."""
     import pyvista
     from vtkmodules.vtkCommonCore import vtkObject
@@ -63,7 +62,7 @@ def read(path: Path, reading: Reading) -> Drawing:
         raise ValueError(f"'{path}' cannot be read as {path.suffix} ({error}); export it again") from None
     finally:
         vtkObject.GlobalWarningDisplayOn()
-    return drawing_of_dataset(data, path)
+    return layout_of_dataset(data, path)
 
 
 def _check_counts(path: Path) -> None:
@@ -227,7 +226,7 @@ def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
             _check_parts(target, (*seen, path))
 
 
-def drawing_of_dataset(data: Any, path: Path | str = "dataset") -> Drawing:
+def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
     """The drawing of a pyvista dataset: a mesh, or a multiblock of meshes.
 
     Parameters
@@ -243,14 +242,14 @@ def drawing_of_dataset(data: Any, path: Path | str = "dataset") -> Drawing:
         for k, part in enumerate(data):
             if part is None or (isinstance(part, pyvista.DataSet) and part.n_cells == 0):
                 continue
-            parts.append(drawing_of_dataset(part, path))
+            parts.append(layout_of_dataset(part, path))
             name = data.get_block_name(k) or ""
             labels.append("" if re.fullmatch(r"Block-\d+", name) else name)
         return merged(parts, labels, path)
     grid = _as_cells(data, path)
     flat_types = np.asarray(grid.celltypes)
     if np.isin(flat_types, list(SOLID_CELLS)).any():
-        return _drawing_of_solids(grid, path)
+        return _layout_of_solids(grid, path)
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
     surface = np.flatnonzero(np.isin(flat_types, list(RINGS)))
     rings = []
@@ -259,7 +258,7 @@ def drawing_of_dataset(data: Any, path: Path | str = "dataset") -> Drawing:
         order = RINGS[int(flat_types[cell])]
         rings.append(nodes if order is None else nodes[list(order)])
     cell_data = {str(key): np.asarray(grid.cell_data[key])[surface] for key in grid.cell_data}
-    return drawing_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path)
+    return layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path)
 
 
 def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
@@ -272,8 +271,8 @@ def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
     return data.cast_to_unstructured_grid()
 
 
-def _drawing_of_solids(grid: Any, path: Path | str) -> Drawing:
-    from blockvis.formats.solids import Body, drawing_of_bodies
+def _layout_of_solids(grid: Any, path: Path | str) -> Layout:
+    from .solids import Body, layout_of_bodies
 
     rows: list[dict[str, Any]] = []
     bodies = []
@@ -287,21 +286,21 @@ def _drawing_of_solids(grid: Any, path: Path | str) -> Drawing:
         bodies.append(Body(f"block {value}", np.asarray(surface.points, dtype=float), faces))
         named = {key: np.asarray(grid.cell_data[key])[cells] for key in grid.cell_data}
         rows.append(row_of(named, 0, f"block {value}"))
-    return drawing_of_bodies(bodies, path, rows)
+    return layout_of_bodies(bodies, path, rows)
 
 
-def dataset_of(drawing: Drawing) -> pyvista.UnstructuredGrid:
+def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:
     """A dataset of one polygon cell per block, with the arrays that the reader understands."""
     import pyvista
 
-    counts = [len(ring) for ring in drawing.outlines]
+    counts = [len(ring) for ring in layout.outlines]
     starts = np.concatenate([[0], np.cumsum(counts)])
     cells = np.concatenate([[n, *range(s, s + n)] for n, s in zip(counts, starts[:-1], strict=True)])
-    flat = np.concatenate(drawing.outlines)
+    flat = np.concatenate(layout.outlines)
     points = np.column_stack([flat, np.zeros(len(flat))])
     grid = pyvista.UnstructuredGrid(cells, np.full(len(counts), 7, dtype=np.uint8), points)
     grid.cell_data["block_id"] = np.arange(len(counts), dtype=np.int32)
-    rows = rows_of(drawing)
+    rows = rows_of(layout)
     for key in ("name", "group", "role", "material"):
         words = [str(row.get(key, "")) for row in rows]
         if any(words):
@@ -324,15 +323,15 @@ def _add_words(attributes: Any, name: str, words: list[str]) -> None:
     attributes.AddArray(array)
 
 
-def write(drawing: Drawing, path: Path) -> None:
+def write(layout: Layout, path: Path) -> None:
     """Writes .vtu, .vtp or .vtk: a polygon cell per block, double precision, lengths in m."""
-    grid = dataset_of(drawing)
+    grid = dataset_of(layout)
     if path.suffix.lower() == ".vtp":
         surface = _surface(grid)
         surface.save(str(path))
     else:
         if path.suffix.lower() == ".vtu":
-            from blockvis.vtkxml import write_vtu
+            from blockvis.vtk_files import write_vtu
 
             write_vtu(grid, path)
             return

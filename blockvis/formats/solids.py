@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.drawing import Drawing
-from blockvis.formats import Reading
-from blockvis.formats.cells import components, drawing_of_cells, merged
-from blockvis.formats.layout_json import rows_of, with_rows
-from blockvis.formats.triangles import triangles_of_ring
-from blockvis.outlines import FLAT, outlines_of_cells
+from blockvis.layout.block_table import rows_of, with_rows
+from blockvis.layout.layout import Layout
+from blockvis.layout.outlines import FLAT, outlines_of_cells
 
-__all__ = ["Body", "drawing_of_bodies", "read", "write"]
+from .cells import components, layout_of_cells, merged
+from .reading import Reading
+from .triangles import triangles_of_ring
 
 #: Points closer than this fraction of the drawing are one: single precision leaves 6e-8 of a coordinate.
 SAME_POINT = 2e-6
@@ -35,7 +34,7 @@ class Body:
     faces: np.ndarray
 
 
-def read(path: Path, reading: Reading) -> Drawing:
+def read(path: Path, reading: Reading) -> Layout:
     """Reads bodies or a flat mesh; .glb is in metres, the other formats do not say their unit."""
     import trimesh
 
@@ -81,7 +80,7 @@ def read(path: Path, reading: Reading) -> Drawing:
         by_name = {row.get("name"): row for row in rows}
         rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
-    return replace(drawing_of_bodies(bodies, path, known), unit=unit)
+    return replace(layout_of_bodies(bodies, path, known), unit=unit)
 
 
 def _placed(scene: Any) -> list[tuple[str, Any]]:
@@ -151,7 +150,7 @@ def _bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path:
     return [Body(name if n == 1 else f"{name} {k + 1}", points, faces[piece == k]) for k in range(n)]
 
 
-def drawing_of_bodies(bodies: Sequence[Body], path: Path | str, rows: Sequence[dict[str, Any]] = ()) -> Drawing:
+def layout_of_bodies(bodies: Sequence[Body], path: Path | str, rows: Sequence[dict[str, Any]] = ()) -> Layout:
     """Outlines and thicknesses of prismatic bodies, cut by the plane of their common extrusion.
 
     Parameters
@@ -204,9 +203,9 @@ def drawing_of_bodies(bodies: Sequence[Body], path: Path | str, rows: Sequence[d
         depth.append(float(np.ptp(used[:, axis])))
     notes = [f"{len(bodies)} bodies were read as outlines in {'xyz'[first]}{'xyz'[second]}; their depth along "
              f"{'xyz'[axis]} is the thickness"]  # fmt: skip
-    drawing = Drawing(outlines=tuple(outlines), names=tuple(body.name for body in bodies), unit="", notes=tuple(notes))
-    drawing = with_rows(drawing, rows) if len(rows) == len(bodies) else drawing
-    return replace(drawing, thickness=np.array(depth))
+    layout = Layout(outlines=tuple(outlines), names=tuple(body.name for body in bodies), unit="", notes=tuple(notes))
+    layout = with_rows(layout, rows) if len(rows) == len(bodies) else layout
+    return replace(layout, thickness=np.array(depth))
 
 
 def _is_prism(body: Body, axis: int, size: float) -> bool:
@@ -224,10 +223,10 @@ def _is_prism(body: Body, axis: int, size: float) -> bool:
 
 def _flat(
     parts: list[tuple[str, np.ndarray, np.ndarray]], size: float, path: Path, rows: list[dict[str, Any]]
-) -> Drawing:
-    drawings = [drawing_of_cells(points, list(faces), {}, path) for _, points, faces in parts]
-    drawing = merged(drawings, [name for name, _, _ in parts], path)
-    return with_rows(drawing, rows) if len(rows) == drawing.n_blocks else drawing
+) -> Layout:
+    drawings = [layout_of_cells(points, list(faces), {}, path) for _, points, faces in parts]
+    layout = merged(drawings, [name for name, _, _ in parts], path)
+    return with_rows(layout, rows) if len(rows) == layout.n_blocks else layout
 
 
 def _object_names(path: Path) -> list[str]:
@@ -263,11 +262,11 @@ def _prism(ring: np.ndarray, thickness: float) -> tuple[np.ndarray, np.ndarray]:
     return points, np.concatenate([cap[:, ::-1], cap + n, sides])
 
 
-def write(drawing: Drawing, path: Path) -> None:
+def write(layout: Layout, path: Path) -> None:
     """Writes .stl, .obj or .ply as text: each block extruded along z by its thickness, 1 m where it has none."""
-    depth = np.ones(drawing.n_blocks) if drawing.thickness is None else np.nan_to_num(drawing.thickness, nan=1.0)
-    prisms = [_prism(ring, float(t)) for ring, t in zip(drawing.outlines, depth, strict=True)]
-    rows = rows_of(drawing)
+    depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
+    prisms = [_prism(ring, float(t)) for ring, t in zip(layout.outlines, depth, strict=True)]
+    rows = rows_of(layout)
     lines = {".stl": _stl_lines, ".obj": _obj_lines, ".ply": _ply_lines}[path.suffix.lower()](prisms, rows)
     path.write_text("\n".join([*lines, ""]), encoding="utf-8")
 

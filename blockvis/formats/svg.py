@@ -19,13 +19,12 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 import solver
-from blockvis.drawing import Drawing
-from blockvis.formats import Reading
-from blockvis.formats.layout_json import rows_of, with_rows
-from blockvis.outlines import LARGEST_CHORD
-from blockvis.units import UNITS, metres_per
+from blockvis.layout.block_table import rows_of, with_rows
+from blockvis.layout.layout import Layout
+from blockvis.layout.outlines import LARGEST_CHORD
+from blockvis.layout.units import UNITS, metres_per
 
-__all__ = ["read", "write"]
+from .reading import Reading
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
@@ -67,7 +66,7 @@ class _Where:
     depth: int = 0
 
 
-def read(path: Path, reading: Reading) -> Drawing:
+def read(path: Path, reading: Reading) -> Layout:
     """Reads a .svg drawing; width and height beside the viewBox name its unit."""
     text = path.read_bytes()
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -93,7 +92,7 @@ def read(path: Path, reading: Reading) -> Drawing:
         found.notes.append(f"{found.open_lines} lines without area were skipped")
     turned = tuple(ring * [1.0, -1.0] for ring in found.rings)
     names = tuple(row.get("name", f"block {k}") for k, row in enumerate(found.rows))
-    return with_rows(Drawing(outlines=turned, names=names, unit=stated, notes=tuple(found.notes)), found.rows)
+    return with_rows(Layout(outlines=turned, names=names, unit=stated, notes=tuple(found.notes)), found.rows)
 
 
 def _unit(root: ElementTree.Element) -> str:
@@ -381,9 +380,9 @@ _SHAPES: dict[str, Callable[[ElementTree.Element, _Where], list[tuple[np.ndarray
 }
 
 
-def write(drawing: Drawing, path: Path) -> None:
+def write(layout: Layout, path: Path) -> None:
     """Writes .svg in m: a layer per group, role or material, a path per block with its name as title."""
-    every = np.concatenate(drawing.outlines)
+    every = np.concatenate(layout.outlines)
     low, high = every.min(axis=0), every.max(axis=0)
     size = np.maximum(high - low, 1e-9)
     margin = 0.02 * float(size.max())
@@ -393,10 +392,10 @@ def write(drawing: Drawing, path: Path) -> None:
         f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="{_INKSCAPE[1:-1]}" viewBox="{box}" '
         'data-blockvis-unit="m">',
     ]
-    rows = rows_of(drawing)
+    rows = rows_of(layout)
     labels = [
         group or (role if role in ("fixed", "moving") else "") or material or "blocks"
-        for group, role, material in zip(drawing.groups, drawing.roles, drawing.materials, strict=True)
+        for group, role, material in zip(layout.groups, layout.roles, layout.materials, strict=True)
     ]
     # One group per run of equal labels keeps the order of the blocks.
     for i, row in enumerate(rows):
@@ -406,7 +405,7 @@ def write(drawing: Drawing, path: Path) -> None:
                 f'<g inkscape:groupmode="layer" inkscape:label={quoteattr(labels[i])} fill="#e0cfae" stroke="#333" '
                 f'stroke-width="{0.1 * margin:.4g}">'
             )
-        points = " L ".join(f"{float(x)!r},{-float(y)!r}" for x, y in drawing.outlines[i])
+        points = " L ".join(f"{float(x)!r},{-float(y)!r}" for x, y in layout.outlines[i])
         title = row["name"].replace("&", "&amp;").replace("<", "&lt;")
         lines.append(f'<path d="M {points} Z" data-blockvis={quoteattr(json.dumps(row))}><title>{title}</title></path>')
     path.write_text("\n".join([*lines, "</g>", "</svg>", ""]), encoding="utf-8")

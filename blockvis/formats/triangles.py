@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["cells_of_ring", "triangles_of_ring"]
-
 
 def cells_of_ring(ring: np.ndarray) -> list[tuple[int, ...]]:
     """Cells that cover a counter-clockwise ring: itself where it has three corners or four convex ones."""

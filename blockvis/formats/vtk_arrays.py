@@ -8,8 +8,6 @@ import zlib
 
 import numpy as np
 
-__all__ = ["largest_number"]
-
 _TYPES = {f"{sign}Int{bits}": f"{'u' if sign else 'i'}{bits // 8}" for sign in ("", "U") for bits in (8, 16, 32, 64)}
 
 

@@ -5,6 +5,6 @@ Dask, ``ledger`` keeps what is finished; ``fragility``, ``sensitivity`` and ``pi
 """
 
 from .campaign import study
-from .plan import Study, read_study
+from .study_file import Study, read_study
 
 __all__ = ["Study", "read_study", "study"]

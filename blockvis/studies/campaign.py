@@ -15,17 +15,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from blockvis.progress import StudyProgress
+from blockvis.runs.progress import StudyProgress
 
-from .ledger import Ledger, has_failed
-from .plan import Study, read_study
-from .single import failed_row, run_once
+from .run_one import failed_row, run_once
+from .study_file import Study, read_study
+from .study_folder import Ledger, has_failed
 
 if TYPE_CHECKING:
     import pandas as pd
     from distributed import Client, Future
-
-__all__ = ["carry_out", "local_cluster", "run_study", "study"]
 
 #: Runs given to the scheduler at a time: enough for a thousand workers, little for its memory.
 WINDOW = 2000
@@ -146,8 +144,8 @@ def _keep(ledger: Ledger, run: int) -> None:
     """The whole results folder of a run, made again on this machine from a case file that stands for itself."""
     import tomli_w
 
-    from blockvis.case import parse_case
-    from blockvis.run import run_case
+    from blockvis.cases.case import parse_case
+    from blockvis.runs.run import run_case
 
     folder = ledger.folder / "results" / f"run_{run:06d}"
     if (folder / "summary.json").is_file():
@@ -226,7 +224,7 @@ def _deaf_plugin() -> Any:
 def _existing_cluster(address: str, plan: Study) -> Iterator[Client]:
     from distributed import Client
 
-    from blockvis.case import case_of
+    from blockvis.cases.case import case_of
 
     try:
         client = Client(address, timeout=ANSWER)
@@ -299,7 +297,6 @@ def _record(ledger: Ledger, bar: StudyProgress, rows: Sequence[tuple[dict[str, A
 
 #: Why a run that no worker survives has no result.
 KILLED = "every worker that took this run died, perhaps out of memory; make it alone with --keep to see why"
-
 
 _Finished = tuple[int, dict[str, Any] | None, bytes]
 

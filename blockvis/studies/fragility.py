@@ -11,12 +11,10 @@ from scipy.special import ndtri
 
 import solver
 
-from .ledger import NO_RESULT
+from .study_folder import NO_RESULT
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["Fragility", "fragility", "fragility_of", "observations", "wilson"]
 
 #: Status of runs that stood as far as they were followed.
 STOOD = (str(solver.Status.LIMIT_REACHED), str(solver.Status.LOCKED))

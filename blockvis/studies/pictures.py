@@ -11,19 +11,17 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from blockvis import palette
-from blockvis.whole_files import whole_file
+from blockvis.atomic_files import whole_file
+from blockvis.pictures import palette
 
 from .fragility import Fragility, fragility_of
-from .ledger import NO_RESULT, Ledger
-from .plan import Study
 from .sensitivity import first_order, outcome, swings
+from .study_file import Study
+from .study_folder import NO_RESULT, Ledger
 from .summary import classes_of, curve_name, independent_rows
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["draw_fragility", "draw_mechanisms", "draw_scatter", "draw_sensitivity", "draw_study"]
 
 #: Classes with a colour of their own in the scatter, and classes drawn.
 COLOURED, DRAWN = 6, 12

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-__all__ = ["METHODS", "Design", "designed"]
-
 #: Ways to choose the runs; "saltelli" is for Sobol' indices of first order and total.
 METHODS = ("grid", "latin hypercube", "sobol", "random", "saltelli")
 

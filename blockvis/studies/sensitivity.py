@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .ledger import NO_RESULT
-from .plan import Parameter, Study
+from .study_file import Parameter, Study
+from .study_folder import NO_RESULT
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["IMPERFECTIONS", "Swing", "first_order", "outcome", "swings"]
 
 #: What the exchange of all imperfections together is called.
 IMPERFECTIONS = "imperfections"

@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .fragility import fragility_of
-from .ledger import NO_RESULT
-from .plan import Study
 from .sensitivity import first_order, swings
+from .study_file import Study
+from .study_folder import NO_RESULT
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["classes_of", "curve_name", "in_words", "independent_rows", "stored_summary", "summary_of"]
 
 #: Mechanisms that are told one by one.
 MOST_TOLD = 6

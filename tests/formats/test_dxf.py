@@ -6,7 +6,7 @@ import ezdxf
 import numpy as np
 import pytest
 
-from blockvis.drawing import read, read_drawing
+from blockvis.formats.read import read, read_layout
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
@@ -79,7 +79,7 @@ def test_loose_lines_enclose_blocks(tmp_path):
             space.add_line(a, b, dxfattribs={"layer": "stone"})
         space.add_line((5, 5), (6, 6))
 
-    drawing = read_drawing(saved(tmp_path, draw))
+    drawing = read_layout(saved(tmp_path, draw))
     assert drawing.groups == ("stone", "stone")
     assert any("2 blocks are faces between 6 loose lines" in note for note in drawing.notes)
     assert any("1 loose lines enclose nothing" in note for note in drawing.notes)
@@ -103,7 +103,7 @@ def test_hidden_layers_and_texts_are_skipped_with_a_note(tmp_path):
         space.add_lwpolyline([(x + 3, y) for x, y in SQUARE], close=True)
         space.add_text("section A-A")
 
-    drawing = read_drawing(saved(tmp_path, draw))
+    drawing = read_layout(saved(tmp_path, draw))
     assert drawing.n_blocks == 1
     assert "skipped: 1 TEXT" in drawing.notes
     assert "skipped on layers that are off or frozen: 1 on 'old'" in drawing.notes

@@ -2,7 +2,7 @@
 
 import pytest
 
-from blockvis.drawing import read_drawing
+from blockvis.formats.read import read_layout
 
 
 def _entity(kind, layer, *pairs):
@@ -26,6 +26,6 @@ def test_polylines_and_loose_lines_of_a_bare_r12_file(tmp_path):
     ]
     path = tmp_path / "bare.dxf"
     path.write_text(_file(_polyline("bricks", [(0, 0), (1, 0), (1, 1), (0, 1)]), *lines), encoding="ascii")
-    drawing = read_drawing(path, unit="m")
+    drawing = read_layout(path, unit="m")
     assert sorted(drawing.groups) == ["bricks", "loose"]
     assert sorted(outline[:, 0].min() for outline in drawing.outlines) == pytest.approx([0.0, 1.0])

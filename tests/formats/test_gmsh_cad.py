@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
-from blockvis.drawing import read, read_drawing
 from blockvis.formats import gmsh_cad
+from blockvis.formats.read import read, read_layout
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is an extra", exc_type=(ImportError, OSError))
 
@@ -28,7 +28,7 @@ def test_solids_of_a_step_file(tmp_path):
     gmsh.model.occ.synchronize()
     gmsh.write(str(tmp_path / "a.step"))
     gmsh.finalize()
-    drawing = read_drawing(tmp_path / "a.step")
+    drawing = read_layout(tmp_path / "a.step")
     assert drawing.n_blocks == 3
     # STEP names its unit, here mm; the bodies share their planes along z and along y, and z comes first.
     assert read(tmp_path / "a.step").areas == pytest.approx([0.3] * 3)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blockvis.drawing import read, read_drawing
+from blockvis.formats.read import read, read_layout
 
 ASSETS = Path(__file__).parents[2] / "assets"
 gmsh = pytest.importorskip("gmsh", reason="gmsh is an extra", exc_type=(ImportError, OSError))
@@ -39,7 +39,7 @@ def test_versions(model, tmp_path, version, binary, order):
     gmsh.option.setNumber("Mesh.Binary", binary)
     path = tmp_path / "a.msh"
     gmsh.write(str(path))
-    drawing = read_drawing(path)
+    drawing = read_layout(path)
     assert drawing.groups == ("stone", "stone", "fixed")
     assert drawing.names == ("stone 1", "stone 2", "fixed")
     assembly = read(path)
@@ -83,7 +83,7 @@ def test_no_surface_cells(model, tmp_path):
 
 
 def test_gmsh_reads_what_we_write(model, tmp_path):
-    from blockvis.drawing import save_layout
+    from blockvis.formats.read import save_layout
 
     arch = read(ASSETS / "semicircular_arch.msh", roles={"right springer": "moving", "left springer": "fixed"})
     save_layout(arch, tmp_path / "a.msh")

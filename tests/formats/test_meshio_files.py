@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 import pytest
 
-from blockvis.drawing import read, read_drawing
+from blockvis.formats.read import read, read_layout
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0], [0.5, 0.5, 0]], dtype=float)
 
@@ -24,7 +24,7 @@ def test_cell_sets_name_the_blocks(tmp_path):
     triangles = [[0, 1, 6], [1, 2, 6], [2, 3, 6], [3, 0, 6], [1, 4, 5], [1, 5, 2]]
     sets = {"left": [np.arange(4)], "right": [np.array([4, 5])]}
     meshio.write(tmp_path / "a.inp", meshio.Mesh(POINTS, [("triangle", triangles)], cell_sets=sets))
-    drawing = read_drawing(tmp_path / "a.inp")
+    drawing = read_layout(tmp_path / "a.inp")
     assert set(drawing.names) == {"left", "right"}
     assert sorted(len(ring) for ring in drawing.outlines) == [4, 4]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from blockvis.drawing import read, read_drawing
+from blockvis.formats.read import read, read_layout
 
 
 def quads(n=3):
@@ -16,7 +16,7 @@ def quads(n=3):
 @pytest.mark.parametrize("suffix", [".vtp", ".vtk"])
 def test_one_polygon_is_one_block_without_ids(tmp_path, suffix):
     quads().save(tmp_path / f"a{suffix}")
-    drawing = read_drawing(tmp_path / f"a{suffix}")
+    drawing = read_layout(tmp_path / f"a{suffix}")
     assert drawing.n_blocks == 3
     assert any("one per cell: no cell array 'block_id'" in note for note in drawing.notes)
 
@@ -60,8 +60,8 @@ def test_pvd_gives_its_first_time(tmp_path):
 
 def test_results_are_layouts_too(tmp_path):
     import solver
-    from blockvis.datasets import block_dataset
-    from blockvis.vtkxml import write_vtu
+    from blockvis.results.datasets import block_dataset
+    from blockvis.vtk_files import write_vtu
 
     wall = solver.Assembly.from_outlines(
         [[[0, 0], [1, 0], [1, 1], [0, 1]], [[1, 0], [2, 0], [2, 1], [1, 1]]],

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis.drawing import read, read_drawing, save_layout
 from blockvis.formats import FORMATS
+from blockvis.formats.read import read, read_layout, save_layout
 
 WRITTEN = sorted(suffix for suffix, known in FORMATS.items() if known.writes)
 #: What a file cannot say of a block.
@@ -60,7 +60,7 @@ def test_everything_comes_back(layout, suffix, tmp_path):
 def test_the_reader_says_what_it_assumed_of_the_unit(layout, suffix, tmp_path):
     path = tmp_path / f"layout{suffix}"
     save_layout(layout, path)
-    drawing = read_drawing(path)
+    drawing = read_layout(path)
     assert drawing.unit == "m"
     said = any("does not say its unit; m was assumed" in note for note in drawing.notes)
     assert said == (suffix not in (".json", ".dxf", ".svg"))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from blockvis.drawing import read, read_drawing
+from blockvis.formats.read import read, read_layout
 
 move = trimesh.transformations.translation_matrix
 
@@ -17,7 +17,7 @@ def bricks(n=3, gap=0.1):
 def test_separate_bodies_of_a_facade_that_stands_upright(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     trimesh.util.concatenate(bricks()).export(path)
-    drawing = read_drawing(path)
+    drawing = read_layout(path)
     assert drawing.n_blocks == 3
     assert drawing.thickness == pytest.approx([0.5] * 3, rel=1e-6)
     assert any("outlines in xz; their depth along y is the thickness" in note for note in drawing.notes)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blockvis.drawing import read, read_drawing
+from blockvis.formats.read import read, read_layout
 
 
 def saved(tmp_path, body, head='width="2000mm" height="1000mm" viewBox="0 0 2000 1000"'):
@@ -20,7 +20,7 @@ def test_shapes_layers_and_units(tmp_path):
         <g id="fixed"><polyline points="0,500 100,500 100,600 0,600 0,500"/></g>
         <circle cx="500" cy="800" r="100"/>""",
     )
-    drawing = read_drawing(path)
+    drawing = read_layout(path)
     assert drawing.unit == "mm"
     assert drawing.groups == ("stone", "stone", "fixed", "")
     assembly = read(path, chord_tolerance=1e-5)

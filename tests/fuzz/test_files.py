@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hostile import FILES, npz_absurd, npz_bomb, written
-from mutations import MEMORY, SECONDS, fixtures, mutated, read_all
+from mutations import MEMORY, READER, SECONDS, fixtures, mutated, read_all
 
 import blockvis
 import solver
-from blockvis import layouts
+from blockvis import generators
 from blockvis.cli import main
-from blockvis.stored_values import checked_arrays
+from blockvis.results.npz import checked_arrays
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are set the way Linux has them")
 
@@ -50,7 +50,7 @@ def test_changed_bytes_are_read_or_refused(tmp_path):
 @pytest.mark.parametrize("content", [npz_absurd, npz_bomb, lambda: b"", lambda: bytes(5000)])
 def test_hostile_results_are_refused(tmp_path, capsys, name, content):
     spread = solver.Settlement(direction=(1, 0), increment=0.05, limit=0.05)
-    folder = blockvis.write(solver.settle(layouts.arch(), spread), tmp_path / "out")
+    folder = blockvis.write(solver.settle(generators.arch(), spread), tmp_path / "out")
     (folder / name).write_bytes(content())
     assert main(["render", str(folder)]) == 2
     assert f"{Path(name).name}' cannot be read" in capsys.readouterr().err
@@ -73,7 +73,7 @@ def test_the_limits_bind(tmp_path):
     assert MEMORY == 2 << 30
     (tmp_path / "a.py").write_text(
         "import sys; sys.argv = ['', str(64 << 20), '1']; sys.path.insert(0, sys.argv[0])\n"
-        f"sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        f"sys.path.insert(0, {str(READER.parent)!r})\n"
         "import reader\nreader.main(str(64 << 20), '1', [])\n"
         "try:\n    bytearray(256 << 20)\nexcept MemoryError:\n    print('bound')\n"
     )

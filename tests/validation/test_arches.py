@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import layouts
+from blockvis import generators
 
 #: embrace [degrees], t/R, n, d_c/R, H/W at the start, H/W at collapse.
 SPREADING = [
@@ -29,7 +29,7 @@ SINKING = [
 
 
 def _settle(embrace, ratio, n, direction, increment=0.01):
-    arch = layouts.arch(embrace=embrace, thickness_ratio=ratio, voussoirs=n)
+    arch = generators.arch(embrace=embrace, thickness_ratio=ratio, voussoirs=n)
     settlement = solver.Settlement(direction=direction, increment=increment, limit=1.0, tolerance=increment / 1000)
     return solver.settle(arch, settlement, friction_coefficient=2.0, controls=solver.Controls(falling_frames=0))
 
@@ -92,7 +92,7 @@ def test_minimum_thickness_of_the_semicircle(n, thinnest):
     still = solver.Settlement(direction=(1, 0), increment=1e-4, limit=1e-4)
 
     def stands(ratio):
-        arch = layouts.arch(thickness_ratio=ratio, voussoirs=n)
+        arch = generators.arch(thickness_ratio=ratio, voussoirs=n)
         return solver.settle(arch, still, friction_coefficient=2.0).stop is not solver.Status.NO_INITIAL_EQUILIBRIUM
 
     assert stands(thinnest * 1.005)

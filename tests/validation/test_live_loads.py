@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import solver
-from solver.limit import LimitStatus, limit_load
-from solver.pushover import ControlDisplacement, pushover
+from solver.analysis.limit_load import limit_load
+from solver.analysis.pushover import ControlDisplacement, pushover
+from solver.results.limit import LimitStatus
 
 BRICK, HEIGHT = 0.4, 0.175
 A, B = [0.5, 1, 1, 1, 1, 0.5], [1, 1, 1, 1, 1]

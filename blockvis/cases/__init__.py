@@ -1,0 +1,1 @@
+"""Case files: read, checked, and built into assembly, interfaces and loads."""

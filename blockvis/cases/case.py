@@ -1,0 +1,413 @@
+"""Case: the TOML case file, read and checked."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis import generators
+from blockvis.formats import FORMATS
+
+from .imperfections import Imperfection, read_imperfection
+from .loads import LoadCase
+from .toml_table import Table, is_number, shortened
+
+ANALYSES = ("settlement", "limit load", "pushover")
+
+#: How sliding joints of a limit load behave.
+FLOWS = ("associative", "non-associative")
+
+#: Endings of animations.
+FILMS = (".mp4", ".gif", ".webp")
+
+#: More increments or frames than this are a slip of the pen.
+MOST_STEPS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Case:
+    """A checked case file. The keys are those of the file; see the README.
+
+    Attributes
+    ----------
+    source : Path
+        The case file; paths in it are relative to its folder.
+    text : str
+        The case file as it was read.
+    """
+
+    source: Path
+    text: str
+    file: Path | None = None
+    layout: str | None = None
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    unit: str | None = None
+    thickness: float | None = None
+    joint_thickness: float | str = 0.0
+    overlap_tolerance: float | None = None
+    roles: Mapping[str, str] = field(default_factory=dict)
+    supports: tuple[Mapping[str, Any], ...] = ()
+    density: float | None = None
+    densities: Mapping[str, float] = field(default_factory=dict)
+    friction_coefficient: float = 0.6
+    cohesion: float = 0.0
+    compressive_strength: float = math.inf
+    interfaces: Mapping[tuple[str, str], solver.InterfaceLaw] = field(default_factory=dict)
+    imperfections: tuple[Imperfection, ...] = ()
+    settlements: tuple[solver.Settlement, ...] = ()
+    loads: tuple[LoadCase, ...] = ()
+    analysis: str = "settlement"
+    flow: str = "associative"
+    capacity_at: tuple[float, ...] | None = None
+    displacement: float | None = None
+    control: solver.ControlDisplacement | None = None
+    controls: solver.Controls = field(default_factory=solver.Controls)
+    animation: str | None = "collapse.mp4"
+
+
+def read_case(path: str | Path) -> Case:
+    """Reads and checks a case file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    ValueError
+        Names the file, the key and the remedy: a missing file, broken TOML (with its line), an unknown key (with the
+        nearest valid one), a value of the wrong kind.
+    """
+    path = Path(path)
+    if not path.is_file():
+        beside = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
+        near = difflib.get_close_matches(path.name, beside, n=3, cutoff=0.4) or beside[:3]
+        hint = f"; beside it are {', '.join(near)}" if near else ""
+        raise ValueError(f"there is no case file '{path}'{hint}")
+    if path.suffix.lower() in FORMATS:
+        raise ValueError(
+            f"'{path}' is a layout, not a case file; a case file names it, what settles and by how much: "
+            f'[geometry] file = "{path.name}" (see examples/); blockvis info shows what is in it'
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: is not a text file ({error.reason} at byte {error.start})") from None
+    return parse_case(text, path)
+
+
+def parse_case(text: str, source: Path) -> Case:
+    """As :func:`read_case`, from the text of a case file; paths in it are relative to the folder of ``source``."""
+    try:
+        values = tomllib.loads(text)
+    except RecursionError:
+        raise ValueError(f"{source}: nests lists or tables without end; a case file has a handful of them") from None
+    except ValueError as error:
+        raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"') from None
+    return case_of(values, source, text)
+
+
+def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
+    """As :func:`parse_case`, from the values that TOML makes of a text."""
+    top = Table(values, "", source)
+    geometry = top.table("geometry")
+    file, layout = geometry.text("file"), geometry.text("layout")
+    parameters = geometry.table("parameters").values
+    if (file is None) == (layout is None):
+        problem = "is missing; name the layout file" if file is None else "and layout are both given; give one of them"
+        raise geometry.error("file", problem + f", or a layout: {', '.join(generators.LAYOUTS)}" * (file is None))
+    if file is not None and parameters:
+        raise geometry.error("parameters", "belong to a layout, not to a file")
+    joint = geometry.take("joint_thickness", 0.0)
+    if joint != "auto":
+        joint = geometry.number("joint_thickness", 0.0)
+        if joint < 0.0:
+            raise geometry.error("joint_thickness", f'is {joint:g}; give a thickness in m of at least 0, or "auto"')
+    roles = top.table("roles").values
+    for name, role in roles.items():
+        if role not in solver.ROLES:
+            raise ValueError(f'{source}: [roles] "{name}" is {shortened(role)}; a role is {", ".join(solver.ROLES)}')
+    material = top.table("material")
+    materials = top.table("materials")
+    densities = {}
+    for name in materials.values:
+        one = materials.table(name)
+        densities[name] = one.number("density", positive=True)
+        one.finish()
+    analysis = top.table("analysis")
+    output = top.table("output")
+    animation = output.take("animation", "collapse.mp4")
+    if animation is not False:
+        animation = output.text("animation", "collapse.mp4")
+        if not Path(animation).name == animation or "\\" in animation or not animation.lower().endswith(FILMS):
+            raise output.error(
+                "animation",
+                f"is {shortened(animation)}; give a name ending in {', '.join(FILMS)}, without a folder: it is written "
+                "into the results folder",
+            )
+    case = Case(
+        source=source,
+        text=text,
+        file=None if file is None else source.parent / file,
+        layout=layout,
+        parameters=dict(parameters),
+        unit=geometry.text("unit"),
+        thickness=geometry.number("thickness", positive=True),
+        joint_thickness=joint,
+        overlap_tolerance=geometry.number("overlap_tolerance", positive=True),
+        roles=dict(roles),
+        supports=tuple(_support(entry) for entry in top.tables("supports")),
+        density=material.number("density", positive=True),
+        densities=densities,
+        friction_coefficient=_friction(material),
+        **_strength(material),
+        interfaces=dict(_interface(entry) for entry in top.tables("interfaces")),
+        imperfections=_imperfections(top),
+        settlements=tuple(_settlement(entry) for entry in top.tables("settlement")),
+        loads=tuple(_load(entry) for entry in top.tables("loads")),
+        analysis=analysis.text("kind", "settlement", among=ANALYSES),
+        flow=analysis.text("flow", "associative", among=FLOWS),
+        capacity_at=analysis.numbers("capacity_at"),
+        displacement=_displacement(analysis),
+        control=_control(top.table("control")),
+        controls=_controls(analysis, geometry.number("overlap_tolerance", positive=True)),
+        animation=animation or None,
+    )
+    for table in (geometry, material, analysis, output, top):
+        table.finish()
+    return _fitting(case)
+
+
+def _fitting(case: Case) -> Case:
+    """The case, once its keys fit the analysis that it asks for."""
+    source, kind = case.source, case.analysis
+    live = any(load.kind == "live" for load in case.loads)
+    moving = [k + 1 for k, load in enumerate(case.loads) if load.positions]
+    if kind == "settlement" and not case.settlements:
+        raise ValueError(f"{source}: [settlement] is missing; say how the moving supports move, direction = [1, 0]")
+    if kind == "settlement" and live:
+        warnings.warn(
+            f'{source}: a settlement analysis leaves the live loads out; give loads that act during it kind = "dead"',
+            stacklevel=4,
+        )
+    if kind != "settlement" and not live:
+        raise ValueError(
+            f'{source}: [analysis] kind is "{kind}", but no load is live; add [[loads]] with kind = "live", for '
+            "instance weight_fraction = [1.0, 0.0]"
+        )
+    laws = [solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength)]
+    if not all(law.dry for law in [*laws, *case.interfaces.values()]) and (kind != "limit load" or case.settlements):
+        raise ValueError(
+            f"{source}: cohesion and compressive_strength are for limit loads without a settlement; what follows the "
+            "geometry follows dry joints"
+        )
+    if kind == "pushover" and case.control is None:
+        raise ValueError(
+            f'{source}: [control] is missing; a pushover needs the displacement that grows, block = "..." and '
+            "direction = [1, 0]"
+        )
+    if kind != "pushover" and case.control is not None:
+        raise ValueError(f'{source}: [control] belongs to [analysis] kind = "pushover", not "{kind}"')
+    if kind != "limit load" and case.flow != "associative":
+        raise ValueError(
+            f'{source}: [analysis] flow "{case.flow}" belongs to kind = "limit load"; a {kind} follows the geometry, '
+            "in which friction never dilates"
+        )
+    if case.displacement is not None and (kind != "limit load" or not case.settlements):
+        raise ValueError(
+            f"{source}: [analysis] displacement is that of a limit load after a settlement, in which open joints may "
+            "close"
+        )
+    if kind == "pushover" and moving:
+        raise ValueError(f'{source}: [loads {moving[0]}] positions belong to [analysis] kind = "limit load"')
+    if len(moving) > 1:
+        raise ValueError(f"{source}: [loads {moving[1]}] positions: only one load may move, and loads {moving[0]} does")
+    if case.capacity_at is None:
+        return case
+    if kind != "limit load" or not case.settlements or moving:
+        raise ValueError(
+            f'{source}: [analysis] capacity_at asks for limit loads (kind = "limit load") of loads that stand still, '
+            "along a [settlement]"
+        )
+    last = case.settlements[-1]
+    try:
+        stopping = replace(last, stops=case.capacity_at)
+    except ValueError as error:
+        raise ValueError(f"{source}: [analysis] capacity_at: {error}") from None
+    return replace(case, settlements=(*case.settlements[:-1], stopping))
+
+
+def _friction(table: Table, default: float | None = 0.6) -> float:
+    value = table.number("friction_coefficient", default)
+    if value is None:
+        raise table.error("friction_coefficient", "is missing")
+    if value < 0.0:
+        raise table.error("friction_coefficient", f"is {value:g}; it must be at least 0")
+    return float(value)
+
+
+def _support(table: Table) -> Mapping[str, Any]:
+    support = {
+        "name": table.text("name", "support"),
+        "role": table.text("role", solver.FIXED, among=(solver.FIXED, solver.MOVING)),
+        "outline": table.take("outline"),
+    }
+    if not isinstance(support["outline"], list) or len(support["outline"]) < 3:
+        raise table.error("outline", f"is {shortened(support['outline'])}; give at least three corners [[x, y], ...]")
+    for corner in support["outline"]:
+        if not isinstance(corner, (list, tuple)) or len(corner) != 2 or not all(map(is_number, corner)):
+            raise table.error("outline", f"has the corner {shortened(corner)}; give two numbers [x, y]")
+    material = table.text("material")
+    if material is not None:
+        support["material"] = material
+    table.finish()
+    return support
+
+
+def _strength(table: Table) -> dict[str, float]:
+    """Cohesion and compressive strength [Pa], where they are given."""
+    cohesion = table.number("cohesion", 0.0)
+    if cohesion < 0.0:
+        raise table.error("cohesion", f"is {cohesion:g}; give a stress in Pa of at least 0")
+    strength = table.number("compressive_strength", positive=True)
+    return {"cohesion": cohesion, "compressive_strength": math.inf if strength is None else strength}
+
+
+def _interface(table: Table) -> tuple[tuple[str, str], solver.InterfaceLaw]:
+    pair = table.take("materials")
+    if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(name, str) for name in pair)):
+        raise table.error("materials", f'is {pair!r}; name two materials ["stone", "brick"]')
+    law = solver.InterfaceLaw(_friction(table, None), **_strength(table))
+    table.finish()
+    return (pair[0], pair[1]), law
+
+
+def _imperfections(top: Table) -> tuple[Imperfection, ...]:
+    found: dict[str, Imperfection] = {}
+    for entry in top.tables("imperfections"):
+        one = read_imperfection(entry.values, f"{top.source}: [{entry.where}]")
+        if one.kind in found:
+            raise ValueError(f"{top.source}: [{entry.where}] kind '{one.kind}' is there twice; give one of each kind")
+        found[one.kind] = one
+    return tuple(found.values())
+
+
+def _settlement(table: Table) -> solver.Settlement:
+    blocks = table.take("blocks")
+    if blocks is not None:
+        blocks = tuple([blocks] if isinstance(blocks, str) else blocks if isinstance(blocks, (list, tuple)) else [None])
+        if not all(isinstance(name, str) for name in blocks):
+            raise table.error("blocks", f"is {shortened(table.values['blocks'])}; give names of supports in quotes")
+    keys = {
+        "direction": table.pair("direction"),
+        "rotation_centre": table.pair("rotation_centre"),
+        "rotation": table.number("rotation"),
+        "increment": table.number("increment", 0.01, positive=True),
+        "limit": table.number("limit", 1.0, positive=True),
+        "tolerance": table.number("tolerance", positive=True),
+    }
+    table.finish()
+    if keys["limit"] / keys["increment"] > MOST_STEPS:
+        raise table.error(
+            "increment",
+            f"is {keys['increment']:g}: {keys['limit'] / keys['increment']:.3g} of them make the limit of "
+            f"{keys['limit']:g}; at most {MOST_STEPS} do",
+        )
+    if keys["rotation"] is None:
+        keys["rotation"] = 1.0 if keys["rotation_centre"] is not None else 0.0
+    try:
+        return solver.Settlement(**keys, blocks=blocks)
+    except ValueError as error:
+        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
+
+
+def _displacement(table: Table) -> float | None:
+    value = table.number("displacement")
+    if value is not None and value < 0.0:
+        raise table.error("displacement", f"is {value:g}; give a length in m of at least 0")
+    return None if value is None else float(value)
+
+
+def _control(table: Table) -> solver.ControlDisplacement | None:
+    if not table.values:
+        return None
+    keys = {
+        "direction": table.pair("direction", (1.0, 0.0)),
+        "point": table.pair("point"),
+        "increment": table.number("increment", 0.01, positive=True),
+        "limit": table.number("limit", 1.0, positive=True),
+        "tolerance": table.number("tolerance", positive=True),
+    }
+    block = table.text("block")
+    table.finish()
+    if block is None:
+        raise table.error("block", "is missing; name the block whose displacement grows")
+    try:
+        return solver.ControlDisplacement(block, **keys)
+    except ValueError as error:
+        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
+
+
+def _load(table: Table) -> LoadCase:
+    given = set(table.values)
+    load = LoadCase(
+        kind=table.text("kind", "dead", among=("dead", "live")),
+        blocks=table.text("blocks", "*"),
+        weight_fraction=table.pair("weight_fraction"),
+        force=table.pair("force", (0.0, 0.0)),
+        point=table.pair("point"),
+        moment=table.number("moment", 0.0),
+        pressure=table.number("pressure"),
+        direction=table.pair("direction", (0.0, -1.0)),
+        edge=table.whole("edge", 1),
+        positions=_positions(table),
+    )
+    table.finish()
+    if load.direction == (0.0, 0.0):
+        raise table.error("direction", "is [0, 0]; give the direction in which the pressure pushes")
+    for key in ("direction", "edge"):
+        if key in given and load.pressure is None:
+            raise table.error(key, "is that of a pressure; add pressure = ... [Pa]")
+    if load.edge is not None and "direction" in given:
+        raise table.error("direction", "and edge are both given; pressure on an edge is perpendicular to it")
+    if load.positions:
+        if load.kind != "live" or load.force == (0.0, 0.0):
+            raise table.error("positions", 'are those of a live force; give kind = "live" and force = [fx, fy]')
+        for key in ("blocks", "weight_fraction", "point", "moment", "pressure"):
+            if key in given:
+                raise table.error(key, "does not go with positions: the force stands on what is topmost at each")
+    elif load.weight_fraction is None and load.pressure is None and load.force == (0.0, 0.0) and not load.moment:
+        raise table.error("force", "is missing or zero; give force, moment, weight_fraction or pressure")
+    return load
+
+
+def _positions(table: Table) -> tuple[float, ...]:
+    given = table.numbers("positions")
+    if given is None:
+        return ()
+    if len(given) != 3 or given[2] != int(given[2]) or given[2] < 2 or given[0] >= given[1]:
+        raise table.error("positions", f"is {list(given)}; give [first x, last x, number of places], at least 2 places")
+    return tuple(np.linspace(given[0], given[1], int(given[2])).tolist())
+
+
+def _controls(table: Table, overlap_tolerance: float | None) -> solver.Controls:
+    default = solver.Controls()
+    counts = {}
+    for key in ("event_refinement", "correctors", "falling_frames"):
+        value = table.number(key, getattr(default, key))
+        if value < (0 if key == "falling_frames" else 1) or value != int(value):
+            raise table.error(key, f"is {value:g}; give a whole number")
+        if value > MOST_STEPS:
+            raise table.error(key, f"is {value:g}; give at most {MOST_STEPS}")
+        counts[key] = int(value)
+    trust_region = table.number("trust_region", positive=True)
+    return solver.Controls(trust_region=trust_region, overlap_tolerance=overlap_tolerance, **counts)

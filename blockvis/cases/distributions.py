@@ -1,0 +1,162 @@
+"""Named distributions of the numbers that are not known: read, checked, and turned into values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import special
+
+from blockvis.suggestions import nearest, refuse_unknown
+
+#: The numbers each distribution needs, by its name; "normal" and "lognormal" may be cut off by lower and upper.
+KINDS: dict[str, tuple[str, ...]] = {
+    "uniform": ("lower", "upper"),
+    "loguniform": ("lower", "upper"),
+    "triangular": ("lower", "mode", "upper"),
+    "normal": ("mean", "deviation"),
+    "lognormal": ("mean", "deviation"),
+    "beta": ("alpha", "beta", "lower", "upper"),
+}
+
+_CUT = ("normal", "lognormal")
+
+#: A truncated distribution of which less than this lies inside its limits is a mistake, not a distribution.
+LEAST_INSIDE = 1e-6
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """A distribution with its numbers; made by :func:`read_distribution`, which checks them.
+
+    Attributes
+    ----------
+    kind : str
+        A key of :data:`KINDS`.
+    numbers : mapping of str to float
+        Mean and deviation are those of the variable itself before it is cut off, also for "lognormal".
+    """
+
+    kind: str
+    numbers: Mapping[str, float]
+
+    def quantile(self, probability: np.ndarray) -> np.ndarray:
+        """(n,) array: the values below which the variable stays with the given (n,) probabilities.
+
+        Examples
+        --------
+        >>> Distribution("uniform", {"lower": 2.0, "upper": 4.0}).quantile([0.25, 0.5])
+        array([2.5, 3. ])
+        """
+        p, n = np.asarray(probability, dtype=float), self.numbers
+        if self.kind in _CUT:
+            below, inside = self._inside()
+            # Rounding may carry a value a hair beyond a limit that has a physical meaning.
+            value = self._uncut(special.ndtri(below + p * inside))
+            value = np.clip(value, n.get("lower", -np.inf), n.get("upper", np.inf))
+        elif self.kind == "uniform":
+            value = n["lower"] + p * (n["upper"] - n["lower"])
+        elif self.kind == "loguniform":
+            value = n["lower"] * (n["upper"] / n["lower"]) ** p
+        elif self.kind == "triangular":
+            low, mode, high = n["lower"], n["mode"], n["upper"]
+            rising = low + np.sqrt(p * (high - low) * (mode - low))
+            falling = high - np.sqrt((1.0 - p) * (high - low) * (high - mode))
+            value = np.where(p * (high - low) <= mode - low, rising, falling)
+        else:
+            value = n["lower"] + (n["upper"] - n["lower"]) * special.betaincinv(n["alpha"], n["beta"], p)
+        return np.asarray(value)
+
+    @property
+    def lowest(self) -> float:
+        """The value below which the variable never is."""
+        return self.numbers.get("lower", 0.0 if self.kind == "lognormal" else -math.inf)
+
+    def _uncut(self, normal: np.ndarray) -> np.ndarray:
+        """Standard normal values as those of the variable."""
+        if self.kind == "normal":
+            return self.numbers["mean"] + self.numbers["deviation"] * normal
+        centre, spread = self._logarithm()
+        return np.exp(centre + spread * normal)
+
+    def _logarithm(self) -> tuple[float, float]:
+        """Mean and deviation of the logarithm of a lognormal variable."""
+        variance = math.log1p((self.numbers["deviation"] / self.numbers["mean"]) ** 2)
+        return math.log(self.numbers["mean"]) - variance / 2.0, math.sqrt(variance)
+
+    def _inside(self) -> tuple[float, float]:
+        """Probability below the lower limit, and between the limits, before the variable is cut off."""
+
+        def below(value: float) -> float:
+            if self.kind == "normal":
+                return float(special.ndtr((value - self.numbers["mean"]) / self.numbers["deviation"]))
+            centre, spread = self._logarithm()
+            return 0.0 if value <= 0.0 else float(special.ndtr((math.log(value) - centre) / spread))
+
+        low = below(self.numbers["lower"]) if "lower" in self.numbers else 0.0
+        high = below(self.numbers["upper"]) if "upper" in self.numbers else 1.0
+        return low, high - low
+
+
+def read_distribution(
+    values: Mapping[str, Any], where: str, defaults: Mapping[str, float] | None = None
+) -> Distribution:
+    """The distribution of a table, checked.
+
+    Parameters
+    ----------
+    values : mapping
+        ``distribution``, the name, and its numbers.
+    where : str
+        What the messages start with.
+    defaults : mapping of str to float, optional
+        Numbers that may be left out.
+
+    Raises
+    ------
+    ValueError
+        For a name that does not exist (with the nearest), a number that is missing or none, limits in the wrong order,
+        and limits between which nothing lies.
+
+    Examples
+    --------
+    >>> read_distribution({"distribution": "normal", "mean": 0.6, "deviation": -0.1}, "friction")
+    Traceback (most recent call last):
+        ...
+    ValueError: friction: deviation is -0.1; give a number above 0
+    """
+    values = dict(values)
+    kind = values.pop("distribution", None)
+    if kind not in KINDS:
+        hint = nearest(kind, list(KINDS)) if isinstance(kind, str) else ""
+        problem = f"distribution is {kind!r}{hint}" if kind is not None else "names no distribution"
+        raise ValueError(f"{where}: {problem}; choose from {', '.join(KINDS)}")
+    needed = KINDS[kind]
+    refuse_unknown(values, [*needed, *(("lower", "upper") if kind in _CUT else ())], f"{where}: distribution '{kind}'")
+    numbers = {key: float(value) for key, value in (defaults or {}).items() if key in needed}
+    for key, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise ValueError(f"{where}: {key} is {value!r}; give a number")
+        numbers[key] = float(value)
+    for key in needed:
+        if key not in numbers:
+            raise ValueError(f"{where}: distribution '{kind}' needs {' and '.join(needed)}; {key} is missing")
+    positive = {"lognormal": ("mean", "deviation"), "normal": ("deviation",), "loguniform": ("lower",)}
+    for key in (*positive.get(kind, ()), *(("alpha", "beta") if kind == "beta" else ())):
+        if numbers[key] <= 0.0:
+            raise ValueError(f"{where}: {key} is {numbers[key]:g}; give a number above 0")
+    low, high = numbers.get("lower", -math.inf), numbers.get("upper", math.inf)
+    if low >= high:
+        raise ValueError(f"{where}: lower is {low:g} and upper is {high:g}; lower must be the smaller")
+    if kind == "triangular" and not low <= numbers["mode"] <= high:
+        raise ValueError(f"{where}: mode is {numbers['mode']:g}; it must lie between {low:g} and {high:g}")
+    found = Distribution(kind, numbers)
+    if kind in _CUT and found._inside()[1] < LEAST_INSIDE:
+        raise ValueError(
+            f"{where}: of a {kind} variable with mean {numbers['mean']:g} and deviation {numbers['deviation']:g} "
+            f"nothing lies between {low:g} and {high:g}; move the limits"
+        )
+    return found

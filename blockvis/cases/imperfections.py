@@ -1,0 +1,281 @@
+"""Imperfections: what no drawing knows of old masonry, drawn at random from a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import shapely
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import spsolve
+from scipy.spatial import cKDTree
+
+import solver
+from blockvis.suggestions import nearest
+
+from .distributions import Distribution, read_distribution
+
+#: What each kind scatters, and the numbers of its distribution that may be left out.
+IMPERFECTIONS: dict[str, dict[str, float]] = {
+    "vertices": {"mean": 0.0},
+    "friction": {"mean": 1.0},
+    "density": {"mean": 1.0},
+}
+
+#: Corners this near, as a fraction of the width of the thinnest block, are one corner of several blocks: the
+#: overlap that is accepted of a drawing.
+SAME_PLACE = 1e-3
+
+#: A corner moves at most by this fraction of the distance to the next corner, and of the width of its blocks, so that
+#: no block turns inside out.
+LARGEST_SHARE = 0.25
+
+#: An edge changes by at most this fraction of its length; where it would by more, what is drawn for the corners around
+#: it is halved, at most so many times.
+LARGEST_CHANGE, HALVINGS = 0.5, 12
+
+#: Imperfections of which more corners than this have to be held back are too large for the blocks.
+MOST_HELD_BACK = 0.1
+
+#: Rounds of Newton's method in which corners on edges find their places: displacements are small against the edges, so
+#: that four reach rounding, and one is to spare.
+ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class Imperfection:
+    """One ``[[imperfections]]`` entry.
+
+    Attributes
+    ----------
+    kind : str
+        "vertices": each coordinate of the displacement of a corner [m]; "friction": a factor on the coefficient of each
+        pair of blocks; "density": a factor on that of each block.
+    distribution : Distribution
+    seed : int
+    """
+
+    kind: str
+    distribution: Distribution
+    seed: int = 0
+
+
+def read_imperfection(values: Mapping[str, Any], where: str) -> Imperfection:
+    """The imperfection of a table, checked.
+
+    Parameters
+    ----------
+    values : mapping
+        ``kind``, ``seed`` and the keys of :func:`blockvis.cases.distributions.read_distribution`.
+    where : str
+        What the messages start with.
+
+    Raises
+    ------
+    ValueError
+    """
+    values = dict(values)
+    kind, seed = values.pop("kind", None), values.pop("seed", 0)
+    if kind not in IMPERFECTIONS:
+        hint = nearest(kind, list(IMPERFECTIONS)) if isinstance(kind, str) else ""
+        raise ValueError(f"{where} kind is {kind!r}{hint}; choose from {', '.join(IMPERFECTIONS)}")
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
+        raise ValueError(f"{where} seed is {seed!r}; give a whole number of at least 0")
+    distribution = read_distribution(values, f"{where} kind '{kind}'", IMPERFECTIONS[kind])
+    if kind != "vertices" and distribution.lowest < 0.0:
+        raise ValueError(
+            f"{where} kind '{kind}': a factor may become negative; give lower, for instance lower = 0.2, or take "
+            "'lognormal'"
+        )
+    if kind == "density" and distribution.lowest == 0.0 and distribution.kind != "lognormal":
+        raise ValueError(
+            f"{where} kind 'density': a factor may become 0, but blocks have a weight; give a larger lower"
+        )
+    return Imperfection(kind, distribution, seed)
+
+
+def joint_scatter(imperfections: Sequence[Imperfection]) -> solver.JointScatter | None:
+    """The scatter of friction from joint to joint, if there is any."""
+    for one in imperfections:
+        if one.kind == "friction":
+            return solver.JointScatter(one.seed, one.distribution.quantile)
+    return None
+
+
+def imperfect(assembly: solver.Assembly, imperfections: Sequence[Imperfection]) -> solver.Assembly:
+    """The assembly with its corners and densities scattered.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    imperfections : sequence of Imperfection
+        Those of friction belong to the joints: see :func:`joint_scatter`.
+
+    Raises
+    ------
+    ValueError
+        For displacements of corners that are too large for the blocks.
+    """
+    for one in imperfections:
+        if one.kind == "density":
+            factor = one.distribution.quantile(_uniform(one, assembly.n_blocks))
+            assembly = replace(assembly, density=np.where(assembly.free, assembly.density * factor, assembly.density))
+        elif one.kind == "vertices":
+            assembly = moved_corners(assembly, one)
+    return assembly
+
+
+def _uniform(imperfection: Imperfection, *shape: int) -> np.ndarray:
+    # Each kind has a stream of its own: another imperfection with the same seed must not repeat it.
+    stream = list(IMPERFECTIONS).index(imperfection.kind)
+    return np.random.default_rng([imperfection.seed, stream]).uniform(2.0**-54, 1.0 - 2.0**-53, size=shape)
+
+
+def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solver.Assembly:
+    """The assembly with its corners moved at random, faces plane and joints closed.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    imperfection : Imperfection
+        Of kind "vertices".
+
+    Notes
+    -----
+    Corners in one place move together. A corner in the middle of another block's edge slides along this edge, wherever
+    the edge itself goes: bed joints of a wall stay straight from end to end, head joints move and tilt. Corners that
+    supports share stay.
+    """
+    vertices, owner = assembly.vertices, assembly.block_of_vertex
+    near = SAME_PLACE * float(assembly.widths.min())
+    place = _places(vertices, near)
+    n = int(place.max()) + 1
+    count = np.bincount(place)
+    positions = np.column_stack([np.bincount(place, weights=vertices[:, k]) / count for k in (0, 1)])
+    rails = _rails(assembly, positions, place, near)
+
+    share = np.full(n, np.inf)
+    np.minimum.at(share, place, assembly.widths[owner])
+    if n > 1:
+        share = np.minimum(share, cKDTree(positions).query(positions, k=2)[0][:, 1])
+    drawn = imperfection.distribution.quantile(_uniform(imperfection, n, 2))
+    held = np.zeros(n, dtype=bool)
+    held[place[~assembly.free[owner]]] = True
+    drawn[held] = 0.0
+    size = np.hypot(*drawn.T)
+    too_far = size > LARGEST_SHARE * share
+    if too_far.sum() > MOST_HELD_BACK * max((~held).sum(), 1):
+        raise ValueError(
+            f"imperfections of kind 'vertices' move {int(too_far.sum())} of {int((~held).sum())} corners by more than "
+            f"a quarter of what lies beside them, typically {np.median(LARGEST_SHARE * share):.3g} m; make them "
+            "smaller"
+        )
+    drawn *= np.where(too_far, LARGEST_SHARE * share / np.maximum(size, 1e-300), 1.0)[:, None]
+    new = _settled(positions, drawn, rails, place, assembly.next_vertex)
+    for _ in range(HALVINGS):
+        # A cut brick has edges much shorter than those its corners slide along; what moves these moves them too.
+        distorted = _distorted(assembly, positions, new, place)
+        if not distorted.any():
+            break
+        near_by = set(place[distorted[owner]].tolist())
+        rail_ends = [(place[rails[p]], place[assembly.next_vertex[rails[p]]]) for p in near_by if p in rails]
+        drawn[sorted(near_by.union(*rail_ends))] /= 2.0
+        new = _settled(positions, drawn, rails, place, assembly.next_vertex)
+
+    try:
+        return solver.Assembly.from_outlines(
+            np.split(new[place], assembly.offsets[1:-1]),
+            names=assembly.names,
+            roles=list(map(str, assembly.roles)),
+            density=assembly.density,
+            thickness=assembly.thickness,
+            materials=assembly.materials,
+        )
+    except ValueError as error:
+        raise ValueError(f"with imperfections of kind 'vertices' {error}; give smaller ones") from None
+
+
+def _places(vertices: np.ndarray, near: float) -> np.ndarray:
+    """(n_vertices,) int array: a number per corner, the same for corners in one place."""
+    pairs = cKDTree(vertices).query_pairs(near, output_type="ndarray")
+    graph = sp.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(vertices),) * 2)
+    return connected_components(graph, directed=False)[1].astype(int)
+
+
+def _rails(assembly: solver.Assembly, positions: np.ndarray, place: np.ndarray, near: float) -> dict[int, int]:
+    """The edge that each place inside an edge slides along, named by the vertex it starts at.
+
+    A place inside straight edges of two blocks has these on both sides and room for no third, but for the accuracy of
+    the drawing: the longest edge is taken.
+    """
+    start, end = positions[place], positions[place[assembly.next_vertex]]
+    edges = shapely.linestrings(np.stack([start, end], axis=1))
+    point, edge = shapely.STRtree(edges).query(shapely.points(positions), predicate="dwithin", distance=near)
+    length = np.hypot(*(end - start).T)
+    tangent = (end - start)[edge] / length[edge, None]
+    along = ((positions[point] - start[edge]) * tangent).sum(axis=1)
+    # A block's own corner that touches another of its edges is no joint.
+    owned = np.unique(place.astype(np.int64) * assembly.n_blocks + assembly.block_of_vertex)
+    own = np.isin(point.astype(np.int64) * assembly.n_blocks + assembly.block_of_vertex[edge], owned)
+    inside = (along > near) & (along < length[edge] - near) & ~own
+    point, edge = point[inside], edge[inside]
+    shortest_first = np.lexsort((-edge, length[edge], point))
+    return dict(zip(point[shortest_first].tolist(), edge[shortest_first].tolist(), strict=True))
+
+
+def _distorted(assembly: solver.Assembly, positions: np.ndarray, new: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """(n_blocks,) bool array: blocks of which an edge has changed by more than half its length."""
+    following = assembly.next_vertex
+    before = positions[place[following]] - positions[place]
+    change = new[place[following]] - new[place] - before
+    too_much = np.hypot(*change.T) > LARGEST_CHANGE * np.hypot(*before.T)
+    return np.bincount(assembly.block_of_vertex, weights=too_much, minlength=assembly.n_blocks) > 0
+
+
+def _settled(
+    positions: np.ndarray, drawn: np.ndarray, rails: Mapping[int, int], place: np.ndarray, following: np.ndarray
+) -> np.ndarray:
+    """(n, 2) array [m]: where the places go, those on rails on the line between the rail's new ends.
+
+    A place on a rail slides by what was drawn for it along the rail's old direction, and lies on the line through the
+    rail's ends wherever these go: two equations for each, solved together by Newton's method because the end of one
+    rail may itself lie on another, as along a course of running bond.
+    """
+    new = positions + drawn
+    if not rails:
+        return new
+    on = np.array(sorted(rails))
+    edge = np.array([rails[point] for point in on.tolist()])
+    start, end = place[edge], place[following[edge]]
+    direction = positions[end] - positions[start]
+    length = np.hypot(*direction.T)
+    direction /= length[:, None]
+    target = (new[on] * direction).sum(axis=1)
+    unknown = np.full(len(positions), -1)
+    unknown[on] = np.arange(len(on))
+    row = np.arange(len(on))
+    for _ in range(ROUNDS):
+        along, beside = (new[end] - new[start]) / length[:, None], (new[on] - new[start]) / length[:, None]
+        off = along[:, 0] * beside[:, 1] - along[:, 1] * beside[:, 0]
+        slid = (new[on] * direction).sum(axis=1) - target
+        # Derivatives of off with respect to the place, the end and the start of its rail, times the length.
+        of_place = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        of_end = np.stack([beside[:, 1], -beside[:, 0]], axis=1)
+        entries = [(2 * row, on, direction), (2 * row + 1, on, of_place)]
+        entries += [(2 * row + 1, end, of_end), (2 * row + 1, start, -of_place - of_end)]
+        rows, columns, values = [], [], []
+        for equation, point, derivative in entries:
+            moves = unknown[point] >= 0
+            for axis in (0, 1):
+                rows.append(equation[moves])
+                columns.append(2 * unknown[point[moves]] + axis)
+                values.append(derivative[moves, axis])
+        matrix = sp.csc_array(
+            (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(2 * len(on),) * 2
+        )
+        residual = np.stack([slid, off * length], axis=1).ravel()
+        new[on] -= spsolve(matrix, residual).reshape(-1, 2)
+    return new

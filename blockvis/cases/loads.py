@@ -1,0 +1,134 @@
+"""The loads of a case on its blocks: self-weight, dead and live loads, and a live load that moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import numpy as np
+
+import solver
+from blockvis.suggestions import nearest
+
+
+@dataclass(frozen=True)
+class LoadCase:
+    """One ``[[loads]]`` entry.
+
+    Attributes
+    ----------
+    kind : str
+        "dead" or "live".
+    blocks : str
+        A name or pattern.
+    weight_fraction : (2,) tuple, optional
+    force : (2,) tuple [N]
+    point : (2,) tuple [m], optional
+    moment : float [N·m]
+    pressure : float, optional [Pa]
+        On the faces that ``direction`` meets first, or on ``edge``.
+    direction : (2,) tuple
+        Where the pressure pushes.
+    edge : int, optional
+        Number of the edge, from 1, that the pressure pushes into: counter-clockwise from the first corner.
+    positions : tuple of float [m]
+        Places x of a force that moves over the structure, on its topmost surface; empty where it does not.
+    """
+
+    kind: str = "dead"
+    blocks: str = "*"
+    weight_fraction: tuple[float, float] | None = None
+    force: tuple[float, float] = (0.0, 0.0)
+    point: tuple[float, float] | None = None
+    moment: float = 0.0
+    pressure: float | None = None
+    direction: tuple[float, float] = (0.0, -1.0)
+    edge: int | None = None
+    positions: tuple[float, ...] = ()
+
+
+def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path) -> solver.Loads:
+    """Self-weight and the loads that stand still, in N.
+
+    Parameters
+    ----------
+    entries : sequence of LoadCase
+    assembly : solver.Assembly
+    source : Path
+        The case file, for messages.
+
+    Raises
+    ------
+    ValueError
+        For a pattern that matches no free block, an edge that a block does not have.
+    """
+    weight = solver.self_weight(assembly)
+    parts = {"dead": weight.dead.copy(), "live": weight.live.copy()}
+    for number, load in enumerate(entries):
+        if load.positions:
+            continue
+        chosen = _chosen(load, assembly, f"{source}: [loads {number + 1}] blocks")
+        if load.weight_fraction is not None:
+            parts[load.kind] += solver.weight_fraction(assembly, load.weight_fraction, chosen)
+        for block in chosen if (load.force != (0.0, 0.0) or load.moment) else ():
+            parts[load.kind] += solver.point_load(assembly, block, load.force, point=load.point, moment=load.moment)
+        if load.pressure is not None and load.edge is None:
+            parts[load.kind] += solver.surface_pressure(assembly, load.pressure, load.direction, blocks=chosen)
+        if load.pressure is not None and load.edge is not None:
+            for block in chosen:
+                has = len(assembly.outline(block))
+                if load.edge > has:
+                    raise ValueError(
+                        f"{source}: [loads {number + 1}] edge is {load.edge}; block '{assembly.names[block]}' has "
+                        f"edges 1 to {has}"
+                    )
+                parts[load.kind] += solver.edge_pressure(assembly, block, load.edge - 1, load.pressure)
+    return solver.Loads(parts["dead"], parts["live"])
+
+
+def moving_loads(
+    entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path
+) -> tuple[np.ndarray, Callable[[int], np.ndarray]]:
+    """Positions (n,) [m] of the load that moves, none without one, and the live load (n_blocks, 3) at the k-th of them.
+
+    Parameters are those of :func:`loads_of`.
+
+    Raises
+    ------
+    ValueError
+        For a position at which nothing, or a support, is below.
+    """
+    moving = next(((number, load) for number, load in enumerate(entries, start=1) if load.positions), None)
+    if moving is None:
+        return np.zeros(0), lambda k: np.zeros((assembly.n_blocks, 3))
+    number, load = moving
+    for x in load.positions:
+        try:
+            solver.load_on_top(assembly, x, load.force)
+        except ValueError as error:
+            raise ValueError(f"{source}: [loads {number}] positions: {error}") from None
+    # One at a time: each is as long as the list of blocks.
+    return np.array(load.positions), lambda k: solver.load_on_top(assembly, load.positions[k], load.force)
+
+
+def with_moving_load(
+    loads: solver.Loads, entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path, x: float | None
+) -> solver.Loads:
+    """The loads with the one that moves standing at x [m]; as they are where there is no such place."""
+    places, live = moving_loads(entries, assembly, source)
+    if x is None or len(places) == 0:
+        return loads
+    return solver.Loads(loads.dead, loads.live + live(int(np.argmin(np.abs(places - x)))))
+
+
+def _chosen(load: LoadCase, assembly: solver.Assembly, where: str) -> np.ndarray:
+    chosen = [i for i, name in enumerate(assembly.names) if fnmatchcase(name, load.blocks)]
+    chosen = [i for i in chosen if assembly.free[i]]
+    if not chosen:
+        raise ValueError(
+            f"{where} '{load.blocks}' matches no free block{nearest(load.blocks, assembly.names)}; "
+            f"the layout has {', '.join(assembly.names[:12])}"
+        )
+    return np.array(chosen)

@@ -1,0 +1,107 @@
+"""A table of a TOML file that knows which of its keys have been asked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from blockvis.suggestions import nearest
+
+
+class Table:
+    """A table of the case file that knows which of its keys have been asked for."""
+
+    def __init__(self, values: Mapping[str, Any], where: str, source: Path) -> None:
+        if not isinstance(values, Mapping):
+            raise ValueError(f"{source}: [{where}] must be a table of keys, not {values!r}")
+        self.values, self.where, self.source = values, where, source
+        self.known: list[str] = []
+
+    def take(self, key: str, default: Any = None) -> Any:
+        self.known.append(key)
+        return self.values.get(key, default)
+
+    def number(self, key: str, default: float | None = None, *, positive: bool = False) -> Any:
+        value = self.take(key, default)
+        if value is None:
+            return None
+        if not is_number(value):
+            raise self.error(key, f"is {shortened(value)}; give a number")
+        if positive and value <= 0.0:
+            raise self.error(key, f"is {value:g}; give a positive number")
+        return float(value)
+
+    def pair(self, key: str, default: tuple[float, float] | None = None) -> Any:
+        value = self.take(key, default)
+        if value is None:
+            return None
+        if not isinstance(value, (list, tuple)) or len(value) != 2 or not all(map(is_number, value)):
+            raise self.error(key, f"is {shortened(value)}; give two numbers [x, y]")
+        return float(value[0]), float(value[1])
+
+    def text(self, key: str, default: str | None = None, *, among: Sequence[str] = ()) -> Any:
+        value = self.take(key, default)
+        if value is None:
+            return None
+        if not isinstance(value, str):
+            raise self.error(key, f"is {value!r}; give a text in quotes")
+        if among and value not in among:
+            raise self.error(key, f"is '{value}'{nearest(value, among)}; choose from {', '.join(among)}")
+        return value
+
+    def numbers(self, key: str) -> tuple[float, ...] | None:
+        value = self.take(key)
+        if value is None:
+            return None
+        right = isinstance(value, Sequence) and not isinstance(value, str) and len(value) > 0
+        if not right or not all(type(v) in (int, float) and math.isfinite(v) for v in value):
+            raise self.error(key, f"is {value!r}; give a list of numbers")
+        return tuple(float(v) for v in value)
+
+    def whole(self, key: str, least: int) -> int | None:
+        value = self.number(key)
+        if value is not None and (value < least or value != int(value)):
+            raise self.error(key, f"is {value:g}; give a whole number of at least {least}")
+        return None if value is None else int(value)
+
+    def table(self, key: str) -> Table:
+        return Table(self.take(key, {}), f"{self.where}.{key}" if self.where else key, self.source)
+
+    def tables(self, key: str) -> list[Table]:
+        value = self.take(key, [])
+        entries = [value] if isinstance(value, Mapping) else value
+        if not isinstance(entries, list):
+            raise self.error(key, f"must be [[{key}]] tables, not {value!r}")
+        return [
+            Table(entry, f"{key} {i + 1}" if len(entries) > 1 else key, self.source) for i, entry in enumerate(entries)
+        ]
+
+    def error(self, key: str, problem: str) -> ValueError:
+        where = f"[{self.where}] {key}" if self.where else f"[{key}]"
+        return ValueError(f"{self.source}: {where} {problem}")
+
+    def finish(self) -> None:
+        """Refuses keys nobody asked for, naming the nearest one that exists."""
+        for key in self.values:
+            if key not in self.known:
+                raise self.error(key, f"is not a key here{nearest(key, self.known)}; keys are {', '.join(self.known)}")
+
+
+def is_number(value: object) -> bool:
+    """Whether it is a number that a double holds; TOML has whole numbers of any size."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def shortened(value: object) -> str:
+    """A value as an error message shows it."""
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**30:
+        return "a number too large for any length or force"
+    words = repr(value)
+    return words if len(words) <= 120 else f"{words[:100]} ..."

@@ -1,0 +1,169 @@
+"""Layout files read and written: the suffix chooses the format."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.atomic_files import whole_file
+from blockvis.formats import FORMATS, Format
+from blockvis.layout.assemble import assemble
+from blockvis.layout.inspect import Inspection, inspected
+from blockvis.layout.layout import Layout, layout_of, ring_areas
+from blockvis.layout.outlines import without_collinear
+from blockvis.layout.units import chosen_unit, metres_per
+
+from .reading import Reading
+
+#: Coordinates beyond this [m] belong to no building on Earth; double precision leaves less than 0.1 mm there.
+LARGEST_COORDINATE = 1e8
+
+#: Corners of one block: more make checks quadratic in them expensive and are never meant.
+MOST_CORNERS = 2000
+
+
+class MissingFile(FileNotFoundError, ValueError):
+    """There is no file of that name."""
+
+
+def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: float | None = None) -> Layout:
+    """Reads the blocks that a file draws.
+
+    Parameters
+    ----------
+    path : str or Path
+        The suffix chooses the format; see :data:`blockvis.formats.FORMATS`.
+    unit : str, optional
+        Unit of the file's lengths; holds over what the file says.
+    chord_tolerance : float, optional [m]
+        Largest distance of an arc from the chords that replace it; a thousandth of its radius where not given.
+
+    Raises
+    ------
+    ValueError
+        With the reason and the remedy, for whatever is not a drawing of blocks.
+    """
+    path = Path(path)
+    if not path.exists():
+        near = difflib.get_close_matches(path.name, _names_in(path.parent), n=3)
+        hint = f"; did you mean {' or '.join(near)}?" if near else "; check the path"
+        raise MissingFile(f"there is no file '{path}'{hint}")
+    if path.is_dir():
+        raise ValueError(f"'{path}' is a folder; give a layout file")
+    if path.stat().st_size == 0:
+        raise ValueError(f"'{path}' is empty (0 bytes); export it again")
+    if unit is not None:
+        metres_per(unit)
+    layout = _read_by_suffix(path, Reading(unit=unit, chord_tolerance=chord_tolerance))
+    if layout.n_blocks == 0:
+        raise ValueError(f"'{path}' draws no block; draw each block as one closed outline or meshed surface")
+    for i, ring in enumerate(layout.outlines):
+        if not np.isfinite(ring).all():
+            bad = ring[~np.isfinite(ring).all(axis=1)][0]
+            raise ValueError(
+                f"'{path}': block '{layout.names[i]}' has a corner at {bad.tolist()}; "
+                "coordinates must be finite numbers: repair the file"
+            )
+    sizes = np.sqrt(np.abs(ring_areas(layout.outlines)))
+    chosen, note = chosen_unit(unit, layout.unit, sizes)
+    factor = metres_per(chosen)
+    outlines = tuple(without_collinear(ring * factor) for ring in layout.outlines)
+    for name, ring in zip(layout.names, outlines, strict=True):
+        if len(ring) > MOST_CORNERS:
+            raise ValueError(
+                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
+            )
+    largest = max(float(np.abs(ring).max()) for ring in outlines)
+    if largest > LARGEST_COORDINATE:
+        raise ValueError(
+            f"'{path}' has a coordinate of {largest:.3g} m; corners must lie within {LARGEST_COORDINATE:.0e} m of the "
+            "origin: check the unit or repair the file"
+        )
+    thickness = None if layout.thickness is None else layout.thickness * factor
+    notes = layout.notes + ((note,) if note else ())
+    return replace(layout, outlines=outlines, thickness=thickness, unit=chosen, notes=notes, source=str(path))
+
+
+def write_layout(layout: Layout, path: str | Path) -> None:
+    """Writes a drawing to a layout file; the suffix chooses the format, lengths in m."""
+    if layout.n_blocks == 0:
+        raise ValueError(f"there is no block to write to '{path}'")
+    _write_by_suffix(layout, Path(path))
+
+
+def read(
+    path: str | Path,
+    *,
+    roles: Mapping[str, str] | None = None,
+    supports: Sequence[Mapping[str, Any]] = (),
+    density: float = 2000.0,
+    thickness: float = 1.0,
+    unit: str | None = None,
+    joint_thickness: float | str = 0.0,
+    overlap_tolerance: float | None = None,
+    chord_tolerance: float | None = None,
+) -> solver.Assembly:
+    """Reads a layout file into an assembly; parameters of :func:`read_layout` and :func:`assemble`."""
+    layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance)
+    return assemble(
+        layout,
+        roles=roles,
+        supports=supports,
+        density=density,
+        thickness=thickness,
+        joint_thickness=joint_thickness,
+        overlap_tolerance=overlap_tolerance,
+    )
+
+
+def save_layout(assembly: solver.Assembly, path: str | Path, *, pose: solver.Pose | None = None) -> None:
+    """Writes an assembly to a layout file, as drawn or where a pose has its blocks."""
+    write_layout(layout_of(assembly, pose=pose), path)
+
+
+def inspect(path: str | Path, *, unit: str | None = None) -> Inspection:
+    """Reads a layout file and measures what it holds.
+
+    Parameters
+    ----------
+    path : str or Path
+    unit : str, optional
+        Unit of the file's lengths; holds over what the file says.
+    """
+    return inspected(read_layout(path, unit=unit))
+
+
+def _names_in(folder: Path) -> list[str]:
+    return [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
+
+
+def _read_by_suffix(path: Path, reading: Reading) -> Layout:
+    """Reads a file through the module that its suffix names."""
+    return _module_of(path, "read").read(path, reading)
+
+
+def _write_by_suffix(layout: Layout, path: Path) -> None:
+    """Writes a file, whole or not at all, through the module that its suffix names."""
+    module = _module_of(path, "write")
+    with whole_file(path) as partial:
+        module.write(layout, partial)
+
+
+def _module_of(path: Path, verb: str) -> Any:
+    return importlib.import_module(f"blockvis.formats.{_format(path, verb).module}")
+
+
+def _format(path: Path, verb: str) -> Format:
+    suffix = path.suffix.lower()
+    known = FORMATS.get(suffix)
+    if known is None or not (known.reads if verb == "read" else known.writes):
+        able = sorted(key for key, value in FORMATS.items() if (value.reads if verb == "read" else value.writes))
+        raise ValueError(f"'{path}': cannot {verb} '{suffix or 'a file without suffix'}'; use one of {' '.join(able)}")
+    return known

@@ -1,0 +1,312 @@
+"""Arches on springers: circular, segmental, pointed and basket-handle."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+import solver
+from blockvis.layout.outlines import without_collinear
+
+from .dimensions import MOST_VOUSSOIRS, above_zero, whole
+
+
+def arch(
+    *,
+    radius: float = 1.0,
+    thickness_ratio: float = 0.15,
+    embrace: float = 180.0,
+    voussoirs: int = 12,
+    density: float = 2000.0,
+    depth: float = 1.0,
+) -> solver.Assembly:
+    """A circular arch of equal voussoirs between two springers.
+
+    Parameters
+    ----------
+    radius : float [m]
+        Of the centreline.
+    thickness_ratio : float
+        Thickness over radius.
+    embrace : float [degrees]
+        Angle between the springing joints, at most 180.
+    voussoirs : int
+        Quadrilaterals with all four corners on the circles.
+    density : float [kg/m³]
+    depth : float [m]
+        Out of plane.
+
+    Returns
+    -------
+    solver.Assembly
+        Voussoirs from left to right, then "left springer" (fixed) and "right springer" (moving), whose
+        joints are twice as wide as the arch is thick.
+
+    Examples
+    --------
+    >>> arch(voussoirs=12).n_blocks
+    14
+    """
+    if not 0.0 < embrace <= 180.0:
+        raise ValueError(f"embrace is {embrace:g} degrees; give an angle above 0 and up to 180")
+    voussoirs = whole("voussoirs", voussoirs, 2, MOST_VOUSSOIRS)
+    if not 0.0 < thickness_ratio < 2.0:
+        raise ValueError(f"thickness_ratio is {thickness_ratio:g}; give thickness / radius between 0 and 2")
+    half = math.radians(embrace) / 2.0
+    angles = np.linspace(math.pi / 2 + half, math.pi / 2 - half, voussoirs + 1)
+    thickness = thickness_ratio * radius
+    inner, outer = radius - thickness / 2.0, radius + thickness / 2.0
+    bearings = radial_joints(inner - thickness / 2.0, outer + thickness / 2.0, angles[[0, -1]])
+    outlines = voussoir_outlines(radial_joints(inner, outer, angles))
+    return _on_springers(outlines, bearings, angles, thickness, density, depth)
+
+
+def segmental_arch(
+    *,
+    span: float = 2.0,
+    rise: float = 0.5,
+    thickness: float = 0.25,
+    voussoirs: int = 11,
+    density: float = 2000.0,
+    depth: float = 1.0,
+) -> solver.Assembly:
+    """An arch along one arc of a circle, by span and rise.
+
+    Parameters
+    ----------
+    span, rise : float [m]
+        Of the intrados; a rise of half the span gives a semicircle.
+    thickness : float [m]
+        Radial.
+    voussoirs : int
+        Quadrilaterals with all four corners on the circles.
+    density : float [kg/m³]
+    depth : float [m]
+        Out of plane.
+
+    Returns
+    -------
+    solver.Assembly
+        Voussoirs from left to right, "left springer" (fixed), "right springer" (moving). The springing line
+        of the intrados is y = 0, the middle of the span x = 0.
+
+    Examples
+    --------
+    >>> segmental_arch(span=2.0, rise=0.5, voussoirs=9).names[4]
+    'voussoir 5'
+    """
+    joints, angles = segmental_joints(span, rise, thickness, voussoirs)
+    return _on_springers(voussoir_outlines(joints), _bearings(joints), angles, thickness, density, depth)
+
+
+def pointed_arch(
+    *,
+    span: float = 2.0,
+    rise: float = 1.5,
+    thickness: float = 0.25,
+    voussoirs: int = 14,
+    density: float = 2000.0,
+    depth: float = 1.0,
+) -> solver.Assembly:
+    """A pointed (Gothic) arch: two arcs with their centres on the springing line.
+
+    Parameters
+    ----------
+    span, rise : float [m]
+        Of the intrados; the rise is at least half the span. A rise of 0.866 spans is the equilateral arch.
+    thickness : float [m]
+        Radial.
+    voussoirs : int
+        An even number meets in a joint at the apex, an odd one has a keystone astride it.
+    density : float [kg/m³]
+    depth : float [m]
+        Out of plane.
+
+    Returns
+    -------
+    solver.Assembly
+        Voussoirs from left to right, "left springer" (fixed), "right springer" (moving).
+
+    Examples
+    --------
+    >>> pointed_arch(span=2.0, rise=3**0.5, voussoirs=12).n_blocks
+    14
+    """
+    span, rise, thickness = above_zero("span", span), above_zero("rise", rise), above_zero("thickness", thickness)
+    n = whole("voussoirs", voussoirs, 2, MOST_VOUSSOIRS)
+    if rise < span / 2.0:
+        raise ValueError(
+            f"rise is {rise:g} m for a span of {span:g} m; a pointed arch rises at least {span / 2.0:g} m: "
+            "take a basket-handle or segmental arch"
+        )
+    centre = (rise**2 - span**2 / 4.0) / span
+    inner, outer = centre + span / 2.0, centre + span / 2.0 + thickness
+    to_apex = math.atan2(rise, centre)
+    angles = math.pi - to_apex * np.arange(n // 2 + 1) / (n / 2.0)
+    left = radial_joints(inner, outer, angles) + np.array([centre, 0.0])
+    apex = np.array([[0.0, rise], [0.0, math.sqrt(outer**2 - centre**2)]])
+    mirror = np.array([-1.0, 1.0])
+    if n % 2 == 0:
+        left[-1] = apex
+        joints = np.concatenate([left, left[-2::-1] * mirror])
+        outlines = voussoir_outlines(joints)
+    else:
+        right = left[::-1] * mirror
+        joints = np.concatenate([left, right])
+        outlines = voussoir_outlines(joints)
+        keystone = [left[-1, 0], left[-1, 1], apex[1], right[0, 1], right[0, 0], apex[0]]
+        outlines[n // 2] = without_collinear(np.array(keystone), 1e-9)
+    return _on_springers(outlines, _bearings(joints), np.array([math.pi, 0.0]), thickness, density, depth)
+
+
+def basket_handle_arch(
+    *,
+    span: float = 3.0,
+    rise: float = 1.0,
+    thickness: float = 0.3,
+    voussoirs: int = 15,
+    density: float = 2000.0,
+    depth: float = 1.0,
+) -> solver.Assembly:
+    """A basket-handle (three-centred) arch: three arcs of 60° that run into each other without a kink.
+
+    Parameters
+    ----------
+    span, rise : float [m]
+        Of the intrados; the rise is between 0.134 and 0.5 spans.
+    thickness : float [m]
+        Radial.
+    voussoirs : int
+        Equally long along the intrados.
+    density : float [kg/m³]
+    depth : float [m]
+        Out of plane.
+
+    Returns
+    -------
+    solver.Assembly
+        Voussoirs from left to right, "left springer" (fixed), "right springer" (moving).
+
+    Notes
+    -----
+    Huygens' construction: with half span a and rise r, the centres are d = 2 (a - r) / (√3 - 1) apart, the radius
+    of the haunches is a - d/2 and that of the crown larger by d.
+
+    Examples
+    --------
+    >>> basket_handle_arch(span=3.0, rise=1.0, voussoirs=15).n_blocks
+    17
+    """
+    span, rise, thickness = above_zero("span", span), above_zero("rise", rise), above_zero("thickness", thickness)
+    n = whole("voussoirs", voussoirs, 2, MOST_VOUSSOIRS)
+    apart = (span - 2.0 * rise) / (math.sqrt(3.0) - 1.0)
+    haunch = span / 2.0 - apart / 2.0
+    if apart < 0.0 or haunch <= 0.0:
+        raise ValueError(
+            f"rise is {rise:g} m for a span of {span:g} m; a basket-handle arch rises between "
+            f"{(1.0 - math.sqrt(3.0) / 2.0) * span:.4g} and {span / 2.0:g} m: take a "
+            f"{'pointed' if apart < 0.0 else 'segmental'} arch"
+        )
+    crown, sixty = haunch + apart, math.pi / 3.0
+    lengths = np.array([haunch, crown, haunch]) * sixty
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    along = np.linspace(0.0, ends[-1], n + 1)
+    angles = math.pi - np.interp(along, ends, sixty * np.arange(4))
+    centres = np.array([[-apart / 2.0, 0.0], [0.0, -apart * math.sqrt(3.0) / 2.0], [apart / 2.0, 0.0]])
+    arc = np.clip(np.searchsorted(ends, along, side="right") - 1, 0, 2)
+    radii = np.array([haunch, crown, haunch])[arc]
+    direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    radial = np.stack([radii, radii + thickness], axis=1)
+    joints = centres[arc][:, None, :] + radial[:, :, None] * direction[:, None, :]
+    return _on_springers(voussoir_outlines(joints), _bearings(joints), angles, thickness, density, depth)
+
+
+def radial_joints(inner: float, outer: float, angles: np.ndarray) -> np.ndarray:
+    """Joints of an arch along a circle about the origin.
+
+    Parameters
+    ----------
+    inner, outer : float [m]
+        Radii of the intrados and the extrados.
+    angles : (n,) array [rad]
+        Counter-clockwise from the x axis.
+
+    Returns
+    -------
+    (n, 2, 2) array [m]
+        Joint, end on the intrados or the extrados, coordinate.
+    """
+    ends = [[(r * math.cos(a), r * math.sin(a)) for r in (inner, outer)] for a in angles.tolist()]
+    return np.array(ends)
+
+
+def segmental_joints(span: float, rise: float, thickness: float, voussoirs: int) -> tuple[np.ndarray, np.ndarray]:
+    """Joints of a segmental arch over the middle of its span, and their angles.
+
+    Parameters
+    ----------
+    span, rise : float [m]
+        Of the intrados.
+    thickness : float [m]
+    voussoirs : int
+
+    Returns
+    -------
+    joints : (voussoirs + 1, 2, 2) array [m]
+        From left to right; the intrados springs at y = 0.
+    angles : (voussoirs + 1,) array [rad]
+    """
+    span, rise, thickness = above_zero("span", span), above_zero("rise", rise), above_zero("thickness", thickness)
+    n = whole("voussoirs", voussoirs, 2, MOST_VOUSSOIRS)
+    if rise > span / 2.0 * (1.0 + 1e-12):
+        raise ValueError(
+            f"rise is {rise:g} m for a span of {span:g} m; a segmental arch rises at most {span / 2.0:g} m: "
+            "take a pointed arch"
+        )
+    radius = (span**2 / 4.0 + rise**2) / (2.0 * rise)
+    # Of the semicircle exactly a quarter turn, which the arcsine gives to half the digits only.
+    half = math.pi / 2.0 if rise >= span / 2.0 else math.atan2(span / 2.0, radius - rise)
+    angles = np.linspace(math.pi / 2.0 + half, math.pi / 2.0 - half, n + 1)
+    joints = radial_joints(radius, radius + thickness, angles) - np.array([0.0, radius - rise])
+    joints[[0, -1], 0] = [[-span / 2.0, 0.0], [span / 2.0, 0.0]]
+    if half == math.pi / 2.0:
+        joints[[0, -1], 1, 1] = 0.0
+    return joints, angles
+
+
+def voussoir_outlines(joints: np.ndarray) -> list[np.ndarray]:
+    """The quadrilaterals between (n + 1, 2, 2) joints [m], n outlines from left to right."""
+    return [np.array([a[0], a[1], b[1], b[0]]) for a, b in pairwise(joints)]
+
+
+def _bearings(joints: np.ndarray) -> np.ndarray:
+    """The first and last of the joints, (2, 2, 2) array [m], lengthened by half the arch's thickness at either end."""
+    springing = joints[[0, -1]]
+    half = (springing[:, 1] - springing[:, 0]) / 2.0
+    return springing + np.stack([-half, half], axis=1)
+
+
+def _on_springers(
+    outlines: list[np.ndarray],
+    bearings: np.ndarray,
+    angles: np.ndarray,
+    thickness: float,
+    density: float,
+    depth: float,
+) -> solver.Assembly:
+    """The arch between a fixed springer on the left and a moving one on the right, both twice its thickness deep."""
+    n = len(outlines)
+    outlines = list(outlines)
+    for joint, angle, sense in ((bearings[0], angles[0], 1.0), (bearings[-1], angles[-1], -1.0)):
+        away = 2.0 * thickness * sense * np.array([-math.sin(angle), math.cos(angle)])
+        outlines.append(np.array([joint[0], joint[1], joint[1] + away, joint[0] + away]))
+    return solver.Assembly.from_outlines(
+        outlines,
+        names=[*(f"voussoir {i + 1}" for i in range(n)), "left springer", "right springer"],
+        roles=[solver.FREE] * n + [solver.FIXED, solver.MOVING],
+        materials=["stone"] * n + ["ground"] * 2,
+        density=density,
+        thickness=depth,
+    )

@@ -1,0 +1,49 @@
+"""Bonds: where the head joints of each course are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+BONDS = ("running", "stack", "english")
+
+#: A brick cut shorter than this fraction of its length is joined to its neighbour: shorter than the closer (a quarter)
+#: that a mason would still lay.
+SHORTEST_BRICK = 0.2
+
+
+def head_joints(bond: str, course: int, width: float, brick_length: float) -> np.ndarray:
+    """Head joints of one course of a wall, both ends included.
+
+    Parameters
+    ----------
+    bond : {"running", "stack", "english"}
+    course : int
+        From 0 at the bottom. Even courses are whole bricks (stretchers); odd ones are shifted by half a brick in
+        running bond, and in English bond are headers with a queen closer next to each end.
+    width, brick_length : float [m]
+
+    Returns
+    -------
+    (n,) array [m]
+        From 0 to the width; a last brick that would be too short is joined to the one before.
+
+    Examples
+    --------
+    >>> head_joints("running", 1, 3.0, 1.0).tolist()
+    [0.0, 0.5, 1.5, 2.5, 3.0]
+    >>> head_joints("english", 1, 2.0, 1.0).tolist()
+    [0.0, 0.5, 0.75, 1.25, 1.5, 2.0]
+    """
+    n = int(np.ceil(2.0 * width / brick_length)) + 2
+    if course % 2 == 0 or bond == "stack":
+        inside = np.arange(1, n) * brick_length
+    elif bond == "running":
+        inside = (np.arange(n) + 0.5) * brick_length
+    else:
+        headers = (0.75 + 0.5 * np.arange(n)) * brick_length
+        last = width - 0.5 * brick_length
+        headers = headers[headers < last - SHORTEST_BRICK * brick_length]
+        inside = np.unique(np.concatenate([[0.5 * brick_length], headers, [last]]))
+    shortest = SHORTEST_BRICK * brick_length
+    inside = inside[(inside > shortest) & (inside < width - shortest)]
+    return np.concatenate([[0.0], inside, [width]])

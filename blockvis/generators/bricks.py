@@ -1,0 +1,154 @@
+"""Bricks laid course by course, cut around openings, slivers joined to their neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from blockvis.layout.outlines import without_collinear
+
+from .bonds import SHORTEST_BRICK, head_joints
+
+#: All corners lie on a grid of this fraction of the brick height, so that cuts leave no splinters of rounding errors.
+GRID = 1e-10
+
+#: A piece lower than this fraction of a course is joined to a neighbour, like one that is too short.
+LOWEST_BRICK = 0.3
+
+#: So is a piece into which no circle of this fraction of the brick height in diameter fits: the end of a wedge.
+NARROWEST = 0.25
+
+
+@dataclass(frozen=True)
+class Bond:
+    """How a wall is bonded.
+
+    Attributes
+    ----------
+    kind : {"running", "stack", "english"}
+    brick_length, brick_height : float [m]
+    """
+
+    kind: str
+    brick_length: float
+    brick_height: float
+
+    @property
+    def grid(self) -> float:
+        """Spacing of the grid on which all corners lie [m]."""
+        return GRID * self.brick_height
+
+
+@dataclass(frozen=True)
+class Brick:
+    """A brick or what is left of it.
+
+    Attributes
+    ----------
+    course : int
+        From 0 at the bottom.
+    shape : shapely.Polygon [m]
+    """
+
+    course: int
+    shape: shapely.Polygon
+
+
+def lay_bricks(bond: Bond, width: float, courses: int) -> list[Brick]:
+    """The bricks of a wall without openings, course by course from the left; its lower left corner is (0, 0)."""
+    bricks = []
+    levels = bond.brick_height * np.arange(courses + 1)
+    for course in range(courses):
+        joints = head_joints(bond.kind, course, width, bond.brick_length)
+        for left, right in pairwise(joints):
+            bricks.append(Brick(course, shapely.box(left, levels[course], right, levels[course + 1])))
+    shapes = shapely.set_precision([brick.shape for brick in bricks], bond.grid)
+    return [replace(brick, shape=shape) for brick, shape in zip(bricks, shapes, strict=True)]
+
+
+def cut_bricks(bond: Bond, bricks: Sequence[Brick], rings: Sequence[np.ndarray]) -> list[Brick]:
+    """What is left of the bricks outside the rings.
+
+    Parameters
+    ----------
+    bond : Bond
+    bricks : sequence of Brick
+    rings : sequence of (n, 2) arrays [m]
+
+    Returns
+    -------
+    list of Brick
+        Each in one piece; a sliver has been joined to the neighbour with which it makes the least bent block.
+    """
+    kept = list(bricks)
+    for ring in rings:
+        hole = shapely.Polygon(ring)
+        shapely.prepare(hole)
+        pieces: list[Brick] = []
+        for brick in kept:
+            if not hole.intersects(brick.shape):
+                pieces.append(brick)
+                continue
+            rest = shapely.set_precision(brick.shape.difference(hole), bond.grid)
+            parts = shapely.get_parts(rest)
+            pieces += [Brick(brick.course, part) for part in parts if part.area > 0.0]
+        kept = pieces
+    return _without_slivers(bond, kept)
+
+
+def brick_outline(brick: Brick) -> np.ndarray:
+    """(n, 2) array [m]: corners of a brick, none of them on a straight line between its neighbours."""
+    return without_collinear(shapely.get_coordinates(brick.shape)[:-1], 1e-9)
+
+
+def _without_slivers(bond: Bond, bricks: list[Brick]) -> list[Brick]:
+    bricks = list(bricks)
+    stuck: set[int] = set()
+    while True:
+        slivers = [i for i, brick in enumerate(bricks) if i not in stuck and _is_sliver(bond, brick.shape)]
+        if not slivers:
+            return bricks
+        i = min(slivers, key=lambda k: bricks[k].shape.area)
+        neighbour = _best_neighbour(bond, bricks, i)
+        if neighbour is None:
+            stuck.add(i)
+            continue
+        larger = max(i, neighbour, key=lambda k: bricks[k].shape.area)
+        bricks[neighbour] = Brick(bricks[larger].course, _joined(bond, bricks[i].shape, bricks[neighbour].shape))
+        del bricks[i]
+        stuck = {k - (k > i) for k in stuck}
+
+
+def _is_sliver(bond: Bond, shape: shapely.Polygon) -> bool:
+    left, low, right, high = shape.bounds
+    if right - left < SHORTEST_BRICK * bond.brick_length * (1.0 - 1e-9):
+        return True
+    if high - low < LOWEST_BRICK * bond.brick_height:
+        return True
+    if len(shape.exterior.coords) == 5 and shape.area > 0.999 * (right - left) * (high - low):
+        return False
+    return bool(shape.buffer(-NARROWEST / 2.0 * bond.brick_height).is_empty)
+
+
+def _best_neighbour(bond: Bond, bricks: list[Brick], sliver: int) -> int | None:
+    """The neighbour with which a sliver makes the block that fills most of its convex hull."""
+    shape = bricks[sliver].shape
+    best, fullest = None, 0.0
+    for i in np.flatnonzero(shapely.intersects([brick.shape for brick in bricks], shape)).tolist():
+        if i == sliver or shape.boundary.intersection(bricks[i].shape.boundary).length < 0.01 * bond.brick_height:
+            continue
+        whole = _joined(bond, shape, bricks[i].shape)
+        if whole.geom_type != "Polygon" or len(whole.interiors):
+            continue
+        filled = whole.area / whole.convex_hull.area
+        if filled > fullest * (1.0 + 1e-9):
+            best, fullest = i, filled
+    return best
+
+
+def _joined(bond: Bond, first: shapely.Polygon, second: shapely.Polygon) -> shapely.Polygon:
+    return shapely.union(first, second, grid_size=bond.grid)

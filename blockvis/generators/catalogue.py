@@ -1,0 +1,78 @@
+"""Layouts by name, as case files and the command line ask for them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import solver
+from blockvis.suggestions import nearest, refuse_unknown
+
+from .arches import arch, basket_handle_arch, pointed_arch, segmental_arch
+from .frames import arch_on_piers, buttressed_arch, column, portal
+from .walls import facade, panel, wall
+
+#: Every layout by its name.
+LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
+    "arch": arch,
+    "segmental arch": segmental_arch,
+    "pointed arch": pointed_arch,
+    "basket-handle arch": basket_handle_arch,
+    "arch on piers": arch_on_piers,
+    "buttressed arch": buttressed_arch,
+    "column": column,
+    "portal": portal,
+    "panel": panel,
+    "wall": wall,
+    "facade": facade,
+}
+
+
+def parameters_of(name: str) -> dict[str, Any]:
+    """Parameters of a layout and their defaults.
+
+    Examples
+    --------
+    >>> parameters_of("column")["blocks"]
+    5
+    """
+    return {key: value.default for key, value in inspect.signature(_layout(name)).parameters.items()}
+
+
+def build(name: str, parameters: Mapping[str, Any] | None = None) -> solver.Assembly:
+    """The layout of a name with the given parameters, the others at their defaults.
+
+    Parameters
+    ----------
+    name : str
+        A key of :data:`LAYOUTS`; "-" and "_" count as spaces.
+    parameters : mapping, optional
+        Numbers, texts, lists and tables, as TOML and JSON have them. A number that must be whole may be 12.0.
+
+    Raises
+    ------
+    ValueError
+        For a name or parameter that does not exist, naming the nearest, and for values that make no layout.
+
+    Examples
+    --------
+    >>> build("portal", {"column_blocks": 3}).n_blocks
+    9
+    """
+    parameters = dict(parameters or {})
+    refuse_unknown(parameters, list(parameters_of(name)), f"layout '{name}'")
+    return _layout(name)(**parameters)
+
+
+def _layout(name: str) -> Callable[..., solver.Assembly]:
+    plain = {_plain(known): layout for known, layout in LAYOUTS.items()}
+    if _plain(str(name)) not in plain:
+        raise ValueError(
+            f"there is no layout '{name}'{nearest(str(name), list(LAYOUTS))}; choose from {', '.join(LAYOUTS)}"
+        )
+    return plain[_plain(str(name))]
+
+
+def _plain(name: str) -> str:
+    return name.lower().replace("-", " ").replace("_", " ").replace("ç", "c")

@@ -1,0 +1,161 @@
+"""Openings in walls, and what spans them: lintels, flat, segmental and round arches."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from blockvis.suggestions import refuse_unknown
+
+from .arches import segmental_joints, voussoir_outlines
+from .dimensions import above_zero, at_least_zero, choice, finite, whole
+
+HEADS = ("lintel", "flat arch", "segmental arch", "round arch", "none")
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A rectangular opening in a wall, and its head.
+
+    Attributes
+    ----------
+    x, y : float [m]
+        Lower left corner; y is the sill, 0 for a door.
+    width, height : float [m]
+        Of the rectangle; an arch springs at its top.
+    head : {"lintel", "flat arch", "segmental arch", "round arch", "none"}
+    depth : float [m]
+        Height of a lintel or flat arch, thickness of an arch.
+    bearing : float [m]
+        Of a lintel, on either side.
+    rise : float [m]
+        Of a segmental arch, at the intrados.
+    skew : float [degrees]
+        Lean of the skewbacks of a flat arch from the vertical.
+    voussoirs : int
+    """
+
+    x: float
+    y: float
+    width: float
+    height: float
+    head: str
+    depth: float
+    bearing: float
+    rise: float
+    skew: float
+    voussoirs: int
+
+    @property
+    def top(self) -> float:
+        """Level of the top of the rectangle [m]."""
+        return self.y + self.height
+
+
+def checked_opening(
+    values: Mapping[str, Any], number: int, *, brick_length: float, brick_height: float, wall_height: float
+) -> Opening:
+    """An opening from its keys, with defaults from the bricks.
+
+    Parameters
+    ----------
+    values : mapping
+        Keys as in :class:`Opening`; ``x``, ``y``, ``width`` and ``height`` are needed. The head is a lintel by
+        default, or none where the opening reaches the top of the wall.
+    number : int
+        From 1, for messages.
+    brick_length, brick_height, wall_height : float [m]
+
+    Raises
+    ------
+    ValueError
+        Names the opening, the key and the remedy.
+    """
+    where = f"opening {number}"
+    if not isinstance(values, Mapping):
+        raise ValueError(f"{where} is {values!r}; give a table with x, y, width and height in m, and a head")
+    refuse_unknown(values, [field.name for field in fields(Opening)], where)
+    for key in ("x", "y", "width", "height"):
+        if key not in values:
+            raise ValueError(f"{where} has no {key}; give x, y, width and height in m")
+    x, y = at_least_zero(f"{where}: x", values["x"]), at_least_zero(f"{where}: y", values["y"])
+    width, height = above_zero(f"{where}: width", values["width"]), above_zero(f"{where}: height", values["height"])
+    to_top = y + height >= wall_height * (1.0 - 1e-9)
+    head = choice(f"{where}: head", values.get("head", "none" if to_top else "lintel"), HEADS)
+    courses = math.ceil(brick_length / brick_height - 1e-9)
+    depths = {"lintel": 2 * brick_height, "flat arch": courses * brick_height}
+    depth = above_zero(f"{where}: depth", values.get("depth", depths.get(head, brick_length)))
+    rise = above_zero(f"{where}: rise", values.get("rise", width / 2.0 if head == "round arch" else width / 6.0))
+    if head == "round arch" and rise != width / 2.0:
+        raise ValueError(
+            f"{where}: rise is {rise:g} m; that of a round arch is {width / 2.0:g} m: take a segmental arch"
+        )
+    skew = finite(f"{where}: skew", values.get("skew", 20.0), "degrees")
+    if not 0.0 < skew < 60.0:
+        raise ValueError(f"{where}: skew is {skew:g} degrees; give an angle above 0 and below 60")
+    return Opening(
+        x=x,
+        y=y,
+        width=width,
+        height=height,
+        head=head,
+        depth=depth,
+        bearing=above_zero(f"{where}: bearing", values.get("bearing", brick_length / 2.0)),
+        rise=rise,
+        skew=skew,
+        voussoirs=whole(
+            f"{where}: voussoirs",
+            values.get("voussoirs", _odd((math.pi / 2.0 if head == "round arch" else 1.0) * width / brick_height)),
+            2,
+        ),
+    )
+
+
+def _odd(number: float) -> int:
+    """The nearest odd number of at least three: an arch has a keystone."""
+    return max(3, 2 * round((number - 1.0) / 2.0) + 1)
+
+
+def head_joints_of(opening: Opening) -> np.ndarray | None:
+    """Joints of the head's voussoirs, (n + 1, 2, 2) array [m] from left to right; None where it has none."""
+    middle, n = opening.x + opening.width / 2.0, opening.voussoirs
+    if opening.head in ("segmental arch", "round arch"):
+        joints, _ = segmental_joints(opening.width, opening.rise, opening.depth, n)
+        joints = joints + np.array([middle, opening.top])
+        joints[0, 0], joints[-1, 0] = (opening.x, opening.top), (opening.x + opening.width, opening.top)
+        return joints
+    if opening.head == "flat arch":
+        lower = np.linspace(opening.x, opening.x + opening.width, n + 1)
+        spread = opening.depth * math.tan(math.radians(opening.skew))
+        upper = np.linspace(opening.x - spread, opening.x + opening.width + spread, n + 1)
+        levels = np.broadcast_to([opening.top, opening.top + opening.depth], (n + 1, 2))
+        return np.stack([np.stack([lower, upper], axis=1), levels], axis=2)
+    return None
+
+
+def head_outlines(opening: Opening, joints: np.ndarray | None) -> list[np.ndarray]:
+    """Outlines of the lintel or the voussoirs from left to right, (4, 2) arrays [m]; none where there is no head."""
+    if joints is not None:
+        return voussoir_outlines(joints)
+    return [_lintel(opening)] if opening.head == "lintel" else []
+
+
+def opening_ring(opening: Opening, joints: np.ndarray | None) -> np.ndarray:
+    """What the bricks leave free, (n, 2) array [m]: the rectangle, its head and what is under the head."""
+    left, right = opening.x, opening.x + opening.width
+    sides = [[left, opening.top], [left, opening.y], [right, opening.y], [right, opening.top]]
+    if joints is not None:
+        return np.concatenate([sides, joints[::-1, 1]])
+    if opening.head == "lintel":
+        return np.concatenate([sides, _lintel(opening)[[1, 2, 3, 0]]])
+    return np.array(sides)
+
+
+def _lintel(opening: Opening) -> np.ndarray:
+    left, right = opening.x - opening.bearing, opening.x + opening.width + opening.bearing
+    low, high = opening.top, opening.top + opening.depth
+    return np.array([[left, low], [right, low], [right, high], [left, high]])

@@ -1,0 +1,372 @@
+"""Brick walls: any bond, any openings, a ground of which a part settles; the façade and the panel are such walls."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import shapely
+
+import solver
+
+from .bonds import BONDS, SHORTEST_BRICK
+from .bricks import LOWEST_BRICK, Bond, brick_outline, cut_bricks, lay_bricks
+from .dimensions import MOST_BLOCKS, above_zero, choice, finite, pair, whole
+from .openings import Opening, checked_opening, head_joints_of, head_outlines, opening_ring
+
+#: An edge of an opening this near a joint, as a fraction of their spacing, was meant to be on it.
+ROUNDING = 1e-6
+
+
+def wall(
+    *,
+    bricks: int | None = None,
+    courses: int | None = None,
+    width: float | None = None,
+    height: float | None = None,
+    brick_length: float = 0.25,
+    brick_height: float = 0.1,
+    bond: str = "running",
+    openings: Sequence[Mapping[str, Any]] = (),
+    settling: Sequence[float] | None = None,
+    density: float = 1800.0,
+    depth: float = 0.25,
+) -> solver.Assembly:
+    """A brick wall with openings on a ground of which a part may settle.
+
+    Parameters
+    ----------
+    bricks, courses : int, optional
+        Brick lengths along the wall, and courses; 12 and 18 by default.
+    width, height : float [m], optional
+        Instead of these; a width that is no whole number of bricks ends in cut bricks, a height must be a whole
+        number of courses.
+    brick_length, brick_height : float [m]
+    bond : {"running", "stack", "english"}
+    openings : sequence of mappings
+        Each with ``x``, ``y`` (lower left corner), ``width`` and ``height`` [m] and a ``head``: "lintel", "flat
+        arch", "segmental arch", "round arch" or "none"; see :class:`~blockvis.generators.openings.Opening` for the
+        other keys. Arches spring at the top of the rectangle.
+    settling : (float, float) [m], optional
+        The ground from the first x to the second is a moving support; all of it is fixed by default.
+    density : float [kg/m³]
+    depth : float [m]
+        Out of plane.
+
+    Returns
+    -------
+    solver.Assembly
+        "brick 1-1" (course from the bottom, position from the left) ..., "lintel 2" or "voussoir 2-1" ... over the
+        second opening, and the ground: "ground", or "ground left", "ground middle" and "ground right". The lower
+        left corner of the wall is (0, 0).
+
+    Raises
+    ------
+    ValueError
+        For dimensions that are no positive numbers, and openings that leave the wall or overlap each other.
+
+    Examples
+    --------
+    >>> window = {"x": 1.0, "y": 0.6, "width": 1.0, "height": 0.6, "head": "segmental arch", "voussoirs": 9}
+    >>> wall(bricks=12, courses=18, openings=[window], settling=[1.5, 3.0]).names[-1]
+    'ground right'
+    """
+    bonded = Bond(
+        choice("bond", bond, BONDS), above_zero("brick_length", brick_length), above_zero("brick_height", brick_height)
+    )
+    width, courses = _size(bonded, bricks, courses, width, height)
+    if courses * width / bonded.brick_length > MOST_BLOCKS:
+        raise ValueError(
+            f"the wall has {courses:g} courses of {width / bonded.brick_length:.4g} bricks; a layout has at most "
+            f"{MOST_BLOCKS} blocks"
+        )
+    height = courses * bonded.brick_height
+    holes = _placed(bonded, openings, width, height)
+    rings = [opening_ring(opening, joints) for opening, joints in holes]
+    _check_room(bonded, rings, width, height)
+    laid = cut_bricks(bonded, lay_bricks(bonded, width, courses), rings)
+    laid.sort(key=lambda brick: (brick.course, brick.shape.bounds[0], brick.shape.bounds[1]))
+    outlines, names, materials = [], [], []
+    position, course = 0, -1
+    for brick in laid:
+        position = position + 1 if brick.course == course else 1
+        course = brick.course
+        outlines.append(brick_outline(brick))
+        names.append(f"brick {course + 1}-{position}")
+        materials.append("brick")
+    for number, (opening, joints) in enumerate(holes, start=1):
+        for i, outline in enumerate(head_outlines(opening, joints), start=1):
+            outlines.append(outline)
+            names.append(f"voussoir {number}-{i}" if joints is not None else f"lintel {number}")
+            materials.append("stone")
+    roles = [solver.FREE] * len(outlines)
+    for name, role, outline in _ground(width, bonded.brick_length, settling):
+        outlines.append(outline)
+        names.append(name)
+        materials.append("ground")
+        roles.append(role)
+    return solver.Assembly.from_outlines(
+        outlines, names=names, roles=roles, materials=materials, density=density, thickness=depth
+    )
+
+
+def facade(
+    *,
+    bricks: int = 40,
+    courses: int = 48,
+    brick_length: float = 0.25,
+    brick_height: float = 0.125,
+    storeys: int = 2,
+    windows: int = 2,
+    window_bricks: float = 8.0,
+    window_courses: int = 12,
+    sill_courses: int = 5,
+    voussoirs: int = 15,
+    rise_courses: float = 2.5,
+    settling_from: float | None = None,
+    density: float = 1800.0,
+    depth: float = 0.25,
+) -> solver.Assembly:
+    """A façade in running bond with rows of windows under segmental arches; its right part settles.
+
+    Parameters
+    ----------
+    bricks, courses : int
+        Brick lengths along the façade, and courses.
+    brick_length, brick_height : float [m]
+    storeys, windows : int
+        Rows of windows, and windows in each.
+    window_bricks : float
+        Width of a window in brick lengths.
+    window_courses, sill_courses : int
+        Height of a window to the springing of its arch, and of the wall under its sill from the floor, in courses.
+    voussoirs : int
+        Of each arch, which is one brick thick.
+    rise_courses : float
+        Rise of each arch at the intrados, in courses.
+    settling_from : float [m], optional
+        The ground from this x to the right is a moving support; the right third by default.
+    density : float [kg/m³]
+    depth : float [m]
+        Out of plane.
+
+    Returns
+    -------
+    solver.Assembly
+        As :func:`wall`; windows are numbered from the left, storey by storey.
+
+    Examples
+    --------
+    >>> house = facade(bricks=20, courses=24, storeys=1, windows=1)
+    >>> house.names[-2:]
+    ('ground left', 'ground right')
+    """
+    n, rows = whole("bricks", bricks, 2), whole("courses", courses, 1)
+    length, course = above_zero("brick_length", brick_length), above_zero("brick_height", brick_height)
+    storeys, windows = whole("storeys", storeys, 1), whole("windows", windows, 0)
+    span = above_zero("window_bricks", window_bricks, "brick lengths")
+    high, sill = whole("window_courses", window_courses, 1), whole("sill_courses", sill_courses, 0)
+    rise = course * above_zero("rise_courses", rise_courses, "courses")
+    pier = (n - windows * span) / (windows + 1)
+    if pier < 1.0:
+        raise ValueError(
+            f"bricks is {n}, too few for {windows} windows of {span:g} bricks with a brick between them; give at least "
+            f"{int(np.ceil(windows * span + windows + 1))}"
+        )
+    openings = [
+        {
+            "x": length * round(2.0 * (pier + i * (pier + span))) / 2.0,
+            "y": course * (storey * (rows // storeys) + sill),
+            "width": length * span,
+            "height": course * high,
+            "head": "segmental arch",
+            "rise": rise,
+            "depth": length,
+            "voussoirs": voussoirs,
+        }
+        for storey in range(storeys)
+        for i in range(windows)
+    ]
+    start = 2.0 / 3.0 * n * length if settling_from is None else finite("settling_from", settling_from)
+    return wall(
+        bricks=n,
+        courses=rows,
+        brick_length=length,
+        brick_height=course,
+        openings=openings,
+        settling=(start, n * length),
+        density=density,
+        depth=depth,
+    )
+
+
+def panel(
+    *,
+    nb: int = 5,
+    nc: int = 6,
+    x_s: float | None = None,
+    block_height: float = 1.0,
+    density: float = 2000.0,
+    depth: float = 1.0,
+) -> solver.Assembly:
+    """A running-bond panel of blocks twice as long as high, on a base that settles to the right of x_s.
+
+    Parameters
+    ----------
+    nb, nc : int
+        Blocks along the panel, and courses; courses of whole blocks and those that start and end with a half block
+        alternate, from a whole one at the bottom.
+    x_s : float [m], optional
+        The base is fixed under x < x_s and moves under x > x_s; the middle by default.
+    block_height : float [m]
+    density : float [kg/m³]
+    depth : float [m]
+        Out of plane.
+
+    Returns
+    -------
+    solver.Assembly
+        As :func:`wall`.
+
+    Examples
+    --------
+    >>> panel(nb=3, nc=4, x_s=3.0).n_blocks
+    16
+    """
+    high, n = above_zero("block_height", block_height), whole("nb", nb, 1)
+    width = 2.0 * high * n
+    start = width / 2.0 if x_s is None else finite("x_s", x_s)
+    if not 0.0 < start < width:
+        raise ValueError(f"x_s is {start:g} m; give an x inside the panel, between 0 and {width:g} m")
+    return wall(
+        bricks=n,
+        courses=whole("nc", nc, 1),
+        brick_length=2.0 * high,
+        brick_height=high,
+        settling=(start, width),
+        density=density,
+        depth=depth,
+    )
+
+
+def _size(
+    bond: Bond, bricks: int | None, courses: int | None, width: float | None, height: float | None
+) -> tuple[float, int]:
+    """Width [m] and courses of a wall."""
+    for size, number, names in ((width, bricks, "width and bricks"), (height, courses, "height and courses")):
+        if size is not None and number is not None:
+            raise ValueError(f"{names} are both given, {size:g} m and {number}; give one of them")
+    if width is None:
+        width = whole("bricks", 12 if bricks is None else bricks, 1) * bond.brick_length
+    width = above_zero("width", width)
+    if width < 0.5 * bond.brick_length:
+        raise ValueError(f"width is {width:g} m, less than half a brick; give at least {0.5 * bond.brick_length:g} m")
+    if height is None:
+        return width, whole("courses", 18 if courses is None else courses, 1)
+    fitting = above_zero("height", height) / bond.brick_height
+    if round(fitting) < 1 or abs(fitting - round(fitting)) > 1e-6:
+        near = sorted({max(1, int(np.floor(fitting))), int(np.ceil(fitting))})
+        raise ValueError(
+            f"height is {height:g} m, {fitting:.4g} courses of {bond.brick_height:g} m; give "
+            f"{' or '.join(f'{k * bond.brick_height:g}' for k in near)} m, or another brick_height"
+        )
+    return width, round(fitting)
+
+
+def _placed(
+    bond: Bond, openings: Sequence[Mapping[str, Any]], width: float, height: float
+) -> list[tuple[Opening, np.ndarray | None]]:
+    """The openings with the joints of their voussoirs, checked against the wall."""
+    if isinstance(openings, (str, Mapping)) or not isinstance(openings, Sequence):
+        raise ValueError(f"openings is {openings!r}; give a list of tables with x, y, width, height and head")
+    placed = []
+    for number, values in enumerate(openings, start=1):
+        opening = checked_opening(
+            values,
+            number,
+            brick_length=bond.brick_length,
+            brick_height=bond.brick_height,
+            wall_height=height,
+        )
+        where, right = f"opening {number}", opening.x + opening.width
+        if right > width * (1.0 + 1e-9):
+            raise ValueError(
+                f"{where} ends at x = {right:g} m, outside the wall of {width:g} m; move it or widen the wall"
+            )
+        if opening.top > height * (1.0 + 1e-9):
+            raise ValueError(f"{where} ends at y = {opening.top:g} m, above the wall of {height:g} m; lower it")
+        for side, pier in (("left", opening.x), ("right", width - right)):
+            least = SHORTEST_BRICK * bond.brick_length
+            if 1e-9 * width < pier < least:
+                raise ValueError(
+                    f"{where} leaves {pier:.4g} m of wall on its {side}; leave at least {least:g} m, or nothing"
+                )
+        opening = _on_joints(bond, opening)
+        placed.append((opening, head_joints_of(opening)))
+    return placed
+
+
+def _on_joints(bond: Bond, opening: Opening) -> Opening:
+    """The opening with its edges moved onto the joints of the bond that they miss by a rounding error."""
+
+    def moved(value: float, spacing: float) -> float:
+        nearest = round(value / spacing) * spacing
+        return nearest if abs(value - nearest) <= ROUNDING * spacing else value
+
+    x, y = moved(opening.x, bond.brick_length / 4.0), moved(opening.y, bond.brick_height)
+    right = moved(opening.x + opening.width, bond.brick_length / 4.0)
+    top = moved(opening.top, bond.brick_height)
+    rise = (right - x) / 2.0 if opening.head == "round arch" else opening.rise
+    return replace(opening, x=x, y=y, width=right - x, height=top - y, rise=rise)
+
+
+def _check_room(bond: Bond, rings: Sequence[np.ndarray], width: float, height: float) -> None:
+    """Refuses heads that leave the wall or splinters above and below, and openings that overlap, heads included."""
+    least = LOWEST_BRICK * bond.brick_height
+    small = 1e-9 * max(width, height)
+    for number, ring in enumerate(rings, start=1):
+        low, high = ring.min(axis=0), ring.max(axis=0)
+        if low[0] < -small or high[0] > width + small or high[1] > height + small:
+            raise ValueError(
+                f"opening {number} with its head reaches from x = {low[0]:g} to {high[0]:g} m and up to "
+                f"y = {high[1]:g} m, "
+                f"outside the wall of {width:g} × {height:g} m; move it, or choose another head"
+            )
+        for place, rest in (("under its sill", low[1]), ("above it", height - high[1])):
+            if small < rest < least:
+                raise ValueError(
+                    f"opening {number} leaves {rest:.4g} m of wall {place}; leave at least {least:g} m, or nothing"
+                )
+    shapes = [shapely.Polygon(ring) for ring in rings]
+    for i, j in combinations(range(len(shapes)), 2):
+        shared = shapes[i].intersection(shapes[j]).area
+        if shared > small * max(width, height):
+            raise ValueError(
+                f"opening {i + 1} and opening {j + 1} overlap by {shared:.3g} m², heads included; move them apart"
+            )
+
+
+def _ground(width: float, brick_length: float, settling: Sequence[float] | None) -> list[tuple[str, str, np.ndarray]]:
+    """Name, role and outline of the parts of the ground, from left to right; it reaches a brick past the wall."""
+    ends = [-brick_length, width + brick_length]
+    if settling is None:
+        return [("ground", solver.FIXED, _box(ends[0], -brick_length, ends[1], 0.0))]
+    first, last = pair("settling", settling)
+    if first >= width or last <= 0.0:
+        raise ValueError(f"settling is [{first:g}, {last:g}] m, beside the wall; choose a part of 0 to {width:g} m")
+    inside = [x for x in (first, last) if 1e-9 * width < x < width * (1.0 - 1e-9)]
+    stops = [ends[0], *inside, ends[1]]
+    names = {1: ["ground"], 2: ["ground left", "ground right"], 3: ["ground left", "ground middle", "ground right"]}
+    parts = []
+    for name, left, right in zip(names[len(stops) - 1], stops[:-1], stops[1:], strict=True):
+        middle = (max(left, 0.0) + min(right, width)) / 2.0
+        role = solver.MOVING if first < middle < last else solver.FIXED
+        parts.append((name, role, _box(left, -brick_length, right, 0.0)))
+    return parts
+
+
+def _box(left: float, low: float, right: float, high: float) -> np.ndarray:
+    return np.array([[left, low], [right, low], [right, high], [left, high]])

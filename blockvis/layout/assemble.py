@@ -1,0 +1,182 @@
+"""From a layout to an assembly: roles, supports, what the layout leaves open."""
+
+from __future__ import annotations
+
+import difflib
+import fnmatch
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+import solver
+
+from .layout import Layout
+from .repair import duplicates, mended
+
+
+def assemble(
+    layout: Layout,
+    *,
+    roles: Mapping[str, str] | None = None,
+    supports: Sequence[Mapping[str, Any]] = (),
+    density: float = 2000.0,
+    thickness: float = 1.0,
+    joint_thickness: float | str = 0.0,
+    overlap_tolerance: float | None = None,
+) -> solver.Assembly:
+    """Makes an assembly of a drawing.
+
+    Parameters
+    ----------
+    layout : Layout
+    roles : mapping of str to {"free", "fixed", "moving"}, optional
+        Keys are names of blocks, groups (layers) or materials, or patterns of them (``"springer *"``). A block's
+        own name holds over its group, a name over a pattern, a later key over an earlier one.
+    supports : sequence of mappings
+        Support blocks that the file does not contain: ``name``, ``role`` and ``outline`` [m] of each, perhaps
+        ``density``, ``thickness`` and ``material``.
+    density : float [kg/m³]
+        Where the drawing has none.
+    thickness : float [m]
+        Where the drawing has none.
+    joint_thickness : float [m] or "auto"
+        Gaps between facing edges up to this width are closed to their midline.
+    overlap_tolerance : float, optional [m]
+        Overlaps up to this depth are resolved to their midline, deeper ones are an error.
+
+    Raises
+    ------
+    ValueError
+        For a role that is none, or whose name matches nothing.
+    """
+    for note in layout.notes:
+        if note.startswith("unit clash"):
+            warnings.warn(f"{layout.source}: {note}", stacklevel=2)
+    n_drawn = layout.n_blocks
+    twins = duplicates(layout.outlines)
+    if twins:
+        later = {copy for _, copy in twins}
+        listed = ", ".join(f"'{layout.names[copy]}' = '{layout.names[first]}'" for first, copy in twins[:20])
+        more = f" and {len(twins) - 20} more" if len(twins) > 20 else ""
+        warnings.warn(
+            f"{len(twins)} of {n_drawn} blocks are drawn twice and were dropped: {listed}{more}", stacklevel=2
+        )
+        layout = layout.chosen([i for i in range(n_drawn) if i not in later])
+        n_drawn = layout.n_blocks
+    layout = _with_supports(layout, supports)
+    assembly = solver.Assembly.from_outlines(
+        layout.outlines,
+        names=layout.names,
+        roles=_matched_roles(layout, roles or {}),
+        density=_filled(layout.density, density, layout.n_blocks),
+        thickness=_filled(layout.thickness, thickness, layout.n_blocks),
+        materials=layout.materials,
+    )
+    outlines, _ = mended(
+        assembly,
+        joint_thickness=joint_thickness,
+        overlap_tolerance=overlap_tolerance,
+        anchored=np.arange(layout.n_blocks) >= n_drawn,
+    )
+    return solver.Assembly.from_outlines(
+        outlines,
+        names=assembly.names,
+        roles=list(map(str, assembly.roles)),
+        density=assembly.density,
+        thickness=assembly.thickness,
+        materials=assembly.materials,
+    )
+
+
+def _filled(given: np.ndarray | None, default: float, n: int) -> np.ndarray:
+    if given is None:
+        return np.full(n, float(default))
+    return np.where(np.isnan(given), float(default), given)
+
+
+def _with_supports(layout: Layout, supports: Sequence[Mapping[str, Any]]) -> Layout:
+    if not supports:
+        return layout
+    known = {"name", "role", "outline", "density", "thickness", "material"}
+    added: dict[str, list[Any]] = {key: [] for key in known}
+    for k, support in enumerate(supports):
+        name = str(support.get("name", f"support {k}"))
+        strange = sorted(set(support) - known)
+        if strange:
+            raise ValueError(f"support '{name}' has the key '{strange[0]}'; its keys are {', '.join(sorted(known))}")
+        if "outline" not in support:
+            raise ValueError(f"support '{name}' has no outline; give its corners [[x, y], ...] in m")
+        try:
+            outline = np.asarray(support["outline"], dtype=float)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"support '{name}': its outline must be corners [[x, y], ...] in m; {error}") from None
+        if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
+            raise ValueError(f"support '{name}' needs at least three corners [x, y]; its shape is {outline.shape}")
+        added["name"].append(name)
+        added["outline"].append(outline)
+        added["role"].append(_checked_role(str(support.get("role", solver.FIXED)), f"support '{name}'"))
+        added["material"].append(str(support.get("material", "")))
+        added["density"].append(float(support.get("density", np.nan)))
+        added["thickness"].append(float(support.get("thickness", np.nan)))
+    nothing = np.full(layout.n_blocks, np.nan)
+    return replace(
+        layout,
+        outlines=layout.outlines + tuple(added["outline"]),
+        names=layout.names + tuple(added["name"]),
+        groups=layout.groups + ("",) * len(supports),
+        roles=layout.roles + tuple(added["role"]),
+        materials=layout.materials + tuple(added["material"]),
+        density=np.append(nothing if layout.density is None else layout.density, added["density"]),
+        thickness=np.append(nothing if layout.thickness is None else layout.thickness, added["thickness"]),
+    )
+
+
+def _checked_role(role: str, whose: str) -> str:
+    if role not in solver.ROLES:
+        raise ValueError(f"{whose} has role '{role}'; roles are {', '.join(solver.ROLES)}")
+    return role
+
+
+def _matched_roles(layout: Layout, roles: Mapping[str, str]) -> list[str]:
+    """Role of every block: what the caller says, then what the file says, then its own name, else free."""
+    found = []
+    for name, group, role in zip(layout.names, layout.groups, layout.roles, strict=True):
+        said = (role, group.strip().lower(), name.strip().lower())
+        found.append(next((word for word in said if word in solver.ROLES), solver.FREE))
+    labels = {"name": layout.names, "group": layout.groups, "material": layout.materials}
+    by_name: list[tuple[list[int], str]] = []
+    by_group: list[tuple[list[int], str]] = []
+    by_pattern: list[tuple[list[int], str]] = []
+    for key, role in roles.items():
+        _checked_role(role, f"roles: '{key}'")
+        for kind, values in labels.items():
+            hits = [i for i, value in enumerate(values) if value == key]
+            if hits:
+                (by_name if kind == "name" else by_group).append((hits, role))
+                break
+        else:
+            hits = [
+                i
+                for i in range(layout.n_blocks)
+                if any(values[i] and fnmatch.fnmatchcase(values[i], key) for values in labels.values())
+            ]
+            if not hits:
+                raise ValueError(_unmatched(key, layout))
+            by_pattern.append((hits, role))
+    for hits, role in by_pattern + by_group + by_name:
+        for i in hits:
+            found[i] = role
+    return found
+
+
+def _unmatched(key: str, layout: Layout) -> str:
+    labels = [*dict.fromkeys(label for label in (*layout.groups, *layout.materials, *layout.names) if label)]
+    closeness = {label: difflib.SequenceMatcher(None, key.lower(), label.lower()).ratio() for label in labels[:2000]}
+    nearest = sorted(closeness, key=lambda label: -closeness[label])
+    listed = ", ".join(f"'{label}'" for label in nearest[:12])
+    more = f" and {len(labels) - 12} more" if len(labels) > 12 else ""
+    where = layout.source or "the drawing"
+    return f"roles: '{key}' matches no block, group or layer of {where}; it has {listed}{more}; correct the name"

@@ -1,0 +1,60 @@
+"""The block table: what a layout says of each block beside its outline, as rows of plain values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+import solver
+
+from .layout import Layout
+
+
+def rows_of(layout: Layout) -> list[dict[str, Any]]:
+    """What a drawing says of each block beside its outline; what it does not say is left out."""
+    rows = []
+    for i in range(layout.n_blocks):
+        row: dict[str, Any] = {"name": layout.names[i]}
+        for key, values in (("group", layout.groups), ("role", layout.roles), ("material", layout.materials)):
+            if values[i]:
+                row[key] = values[i]
+        for key, numbers in (("thickness", layout.thickness), ("density", layout.density)):
+            if numbers is not None and math.isfinite(numbers[i]):
+                row[key] = float(numbers[i])
+        rows.append(row)
+    return rows
+
+
+def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
+    """The drawing with what the rows, one per block, say of its blocks."""
+    entries: list[Mapping[str, Any]] = [row if isinstance(row, dict) else {} for row in rows]
+
+    def words(key: str, default: Sequence[str]) -> tuple[str, ...]:
+        return tuple(str(row.get(key, value)) for row, value in zip(entries, default, strict=True))
+
+    def numbers(key: str) -> np.ndarray | None:
+        if not any(key in row for row in entries):
+            return None
+        try:
+            return np.array([float(row.get(key, math.nan)) for row in entries])
+        except (TypeError, ValueError):
+            bad = next(row[key] for row in entries if key in row and not isinstance(row[key], int | float))
+            raise ValueError(f"a block has {key} {bad!r}; give a number") from None
+
+    roles = words("role", [""] * layout.n_blocks)
+    for name, role in zip(words("name", layout.names), roles, strict=True):
+        if role and role not in solver.ROLES:
+            raise ValueError(f"block '{name}' has role '{role}' in the file; roles are {', '.join(solver.ROLES)}")
+    return replace(
+        layout,
+        names=words("name", layout.names),
+        groups=words("group", [""] * layout.n_blocks),
+        roles=roles,
+        materials=words("material", [""] * layout.n_blocks),
+        thickness=numbers("thickness"),
+        density=numbers("density"),
+    )

@@ -1,0 +1,1 @@
+"""Joints of a layout: facing edges found, and moved onto their midline."""

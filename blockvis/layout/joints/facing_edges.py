@@ -1,0 +1,196 @@
+"""Facing edges: which edges of different blocks look at each other across a gap, and how wide it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Edges face each other when their outward normals point at each other within acos(0.8) = 37 degrees.
+FACING = -0.8
+
+#: A gap below this fraction of the size of the drawing is no gap: what drawing programs leave of rounding.
+CLOSED = 1e-9
+
+
+@dataclass(frozen=True)
+class Facing:
+    """Stretches along which an edge of one block faces an edge of another.
+
+    An edge is named by the flat number of the corner it starts at.
+
+    Attributes
+    ----------
+    edge_a, edge_b : (n,) int arrays
+    gaps : (n, 2) array [m]
+        Distance at both ends of the stretch, across its midline; negative where the blocks overlap.
+    midline : (n, 2, 2) array [m]
+        Both ends of the midline.
+    lengths : (n,) array [m]
+    """
+
+    edge_a: np.ndarray
+    edge_b: np.ndarray
+    gaps: np.ndarray
+    midline: np.ndarray
+    lengths: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.edge_a)
+
+    def chosen(self, keep: np.ndarray) -> Facing:
+        """Only these stretches."""
+        return Facing(self.edge_a[keep], self.edge_b[keep], self.gaps[keep], self.midline[keep], self.lengths[keep])
+
+
+@dataclass(frozen=True)
+class Edges:
+    """All edges of all outlines, counter-clockwise, flat."""
+
+    start: np.ndarray
+    end: np.ndarray
+    block: np.ndarray
+    offsets: np.ndarray
+
+    @property
+    def along(self) -> np.ndarray:
+        d = self.end - self.start
+        return d / np.hypot(*d.T)[:, None]
+
+
+def edges_of(outlines: Sequence[np.ndarray]) -> Edges:
+    counts = np.array([len(ring) for ring in outlines])
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    start = np.concatenate(outlines)
+    following = np.arange(1, len(start) + 1)
+    following[offsets[1:] - 1] = offsets[:-1]
+    return Edges(start, start[following], np.repeat(np.arange(len(counts)), counts), offsets)
+
+
+def facing_edges(outlines: Sequence[np.ndarray], reach: float, overlap: float = 0.0) -> Facing:
+    """Finds the stretches along which edges of different blocks face each other.
+
+    Parameters
+    ----------
+    outlines : sequence of (n, 2) arrays [m]
+        Counter-clockwise.
+    reach : float [m]
+        Widest gap.
+    overlap : float [m]
+        Deepest overlap.
+
+    Notes
+    -----
+    A pair of edges is measured across the bisector of its two lines, so that both sides see the same midline. Of
+    stretches that lie behind one another only the nearest counts.
+    """
+    import shapely
+
+    edges = edges_of(outlines)
+    margin = max(reach, overlap) * 1.0001
+    low, high = np.minimum(edges.start, edges.end) - margin / 2, np.maximum(edges.start, edges.end) + margin / 2
+    tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
+    a, b = tree.query(tree.geometries)
+    along = edges.along
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    keep = (a < b) & (edges.block[a] != edges.block[b])
+    a, b = a[keep], b[keep]
+    keep = (outward[a] * outward[b]).sum(axis=1) < FACING
+    a, b = a[keep], b[keep]
+    axis = along[a] - along[b]
+    axis /= np.maximum(np.hypot(*axis.T), 1e-300)[:, None]
+    normal = np.stack([axis[:, 1], -axis[:, 0]], axis=1)
+    origin = edges.start[a]
+
+    def measured(which: np.ndarray, index: str) -> tuple[np.ndarray, np.ndarray]:
+        points = getattr(edges, index)[which] - origin
+        return (points * axis).sum(axis=1), (points * normal).sum(axis=1)
+
+    (a0, ha0), (a1, ha1) = measured(a, "start"), measured(a, "end")
+    (b1, hb1), (b0, hb0) = measured(b, "start"), measured(b, "end")
+    first, last = np.maximum(a0, b0), np.minimum(a1, b1)
+    shortest = np.minimum(a1 - a0, b1 - b0)
+
+    def heights(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return (
+            ha0 + (at - a0) / (a1 - a0) * (ha1 - ha0),
+            hb0 + (at - b0) / (b1 - b0) * (hb1 - hb0),
+        )
+
+    full = last - first
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gap_first, gap_last = np.subtract(*heights(first)[::-1]), np.subtract(*heights(last)[::-1])
+        # Cut the stretch to where the gap is within bounds.
+        slope = (gap_last - gap_first) / full
+        for exact, sign in ((reach, 1.0), (-overlap, -1.0)):
+            bound = exact + sign * 1e-6 * max(reach, overlap)
+            limit = first + (bound - gap_first) / slope
+            last, first = (
+                np.where((sign * gap_last > sign * bound) & np.isfinite(limit), np.minimum(last, limit), last),
+                np.where((sign * gap_first > sign * bound) & np.isfinite(limit), np.maximum(first, limit), first),
+            )
+        keep = (full > 1e-3 * shortest) & (last - first >= 0.5 * full)
+        ends = [(at, *heights(at)) for at in (first, last)]
+    gaps = np.stack([hb - ha for _, ha, hb in ends], axis=1)
+    keep &= (gaps <= reach * (1 + 2e-6) + 1e-12).all(axis=1) & (gaps >= -overlap * (1 + 2e-6) - 1e-12).all(axis=1)
+    middle = np.stack([origin + at[:, None] * axis + ((ha + hb) / 2)[:, None] * normal for at, ha, hb in ends], axis=1)
+    found = Facing(a[keep], b[keep], gaps[keep], middle[keep], (last - first)[keep])
+    return _nearest(found, edges)
+
+
+def _nearest(found: Facing, edges: Edges) -> Facing:
+    """Without stretches that are seen through another block: those behind a nearer stretch of the same edge."""
+    keep = np.ones(len(found), dtype=bool)
+    mean = found.gaps.mean(axis=1)
+    along = edges.along
+    for side in (found.edge_a, found.edge_b):
+        order = np.argsort(side, kind="stable")
+        starts = np.flatnonzero(np.r_[True, side[order][1:] != side[order][:-1]])
+        for first, last in zip(starts, np.r_[starts[1:], len(order)], strict=True):
+            members = order[first:last]
+            if len(members) < 2:
+                continue
+            at = np.sort((found.midline[members] - edges.start[side[members[0]]]) @ along[side[members[0]]], axis=1)
+            shared = np.minimum(at[:, None, 1], at[None, :, 1]) - np.maximum(at[:, None, 0], at[None, :, 0])
+            size = np.minimum(at[:, 1] - at[:, 0], (at[:, 1] - at[:, 0])[:, None])
+            behind = (shared > 0.5 * size) & (mean[members][:, None] > mean[members][None, :])
+            keep[members[behind.any(axis=1)]] = False
+    return found.chosen(keep)
+
+
+def proposed_thickness(outlines: Sequence[np.ndarray]) -> tuple[float, Facing]:
+    """The joint thickness that closes all mortar joints of a drawing, and the stretches it was measured on.
+
+    Parameters
+    ----------
+    outlines : sequence of (n, 2) arrays [m]
+        Counter-clockwise.
+
+    Returns
+    -------
+    thickness : float [m]
+        0 where there are no gaps.
+    open_stretches : Facing
+        Those with a gap.
+
+    Notes
+    -----
+    Looks as far as half of the width of the usual block (twice its area over its perimeter): a wider gap is an
+    opening. The thickness is the widest gap found, rounded up to two digits.
+    """
+    edges = edges_of(outlines)
+    lengths = np.add.reduceat(np.hypot(*(edges.end - edges.start).T), edges.offsets[:-1])
+    cross = edges.start[:, 0] * edges.end[:, 1] - edges.start[:, 1] * edges.end[:, 0]
+    areas = np.add.reduceat(cross, edges.offsets[:-1]) / 2.0
+    reach = 0.5 * float(np.median(2.0 * np.abs(areas) / lengths))
+    found = facing_edges(outlines, reach)
+    scale = float(np.ptp(edges.start, axis=0).max())
+    widest = found.gaps.max(axis=1)
+    found = found.chosen(widest > 10 * CLOSED * scale)
+    if len(found) == 0:
+        return 0.0, found
+    largest = float(found.gaps.max())
+    digit = 10.0 ** (math.floor(math.log10(largest)) - 1)
+    return float(np.round(math.ceil(largest / digit - 1e-6) * digit, 12)), found

@@ -1,0 +1,223 @@
+"""Joints that no common line serves: one side extended and cut along the other, corners left close together welded."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.layout.outlines import without_collinear
+
+from .facing_edges import CLOSED, Edges, Facing
+from .midlines import Line, moved_outlines, normal_form
+
+#: Corners closer than this fraction of the joint thickness become one where blocks were cut along each other.
+WELD = 0.2
+
+#: A moved corner farther than this many joint thicknesses from the drawn one is cut off: its edges are nearly parallel.
+LONGEST_MITRE = 3.0
+
+
+def cut_along(
+    base: list[np.ndarray],
+    edges: Edges,
+    found: Facing,
+    uncommon: list[int],
+    lines: dict[int, Line],
+    still: np.ndarray,
+    thickness: float,
+) -> list[np.ndarray]:
+    """Along stretches without a common line, extends the shorter edge and cuts it along the other one."""
+    import shapely
+
+    overshoot: dict[int, float] = {}
+    strips: dict[int, list[np.ndarray]] = {}
+    size = np.hypot(*(edges.end - edges.start).T)
+    for k in uncommon:
+        a, b = int(found.edge_a[k]), int(found.edge_b[k])
+        extended, straight = (a, b) if (still[edges.block[b]], size[b]) >= (still[edges.block[a]], size[a]) else (b, a)
+        if still[edges.block[extended]]:
+            extended, straight = straight, extended
+        normal, level = _outward_form(edges, lines, straight)
+        target = found.midline[k] + (level - found.midline[k] @ normal)[:, None] * normal
+        own_normal, own_level = _outward_form(edges, lines, extended)
+        needed = float((target @ own_normal - own_level).max()) + 0.1 * thickness
+        overshoot[extended] = max(overshoot.get(extended, 0.0), needed)
+        strips.setdefault(extended, []).append(found.midline[k])
+    if not overshoot:
+        return base
+    further = dict(lines)
+    for edge, distance in overshoot.items():
+        normal, level = _outward_form(edges, lines, edge)
+        further[edge] = Line([], normal, level + distance)
+    extended_rings = moved_outlines(edges, further, 2.0 * LONGEST_MITRE * thickness)
+    shapes = [shapely.Polygon(ring) for ring in base]
+    tree = shapely.STRtree(shapes)
+    final = list(base)
+    changed = sorted({int(edges.block[edge]) for edge in overshoot})
+    for block in changed:
+        own = [edge for edge in overshoot if edges.block[edge] == block]
+        strip = shapely.union_all(
+            [_strip(edges, edge, stretch, thickness, overshoot[edge]) for edge in own for stretch in strips[edge]]
+        )
+        wide = shapely.Polygon(extended_rings[block]).buffer(0)
+        shape = shapely.union_all([shapes[block].buffer(0), shapely.intersection(wide, strip)])
+        near = [int(j) for j in tree.query(shape) if j != block]
+        cut = shapely.difference(shape, shapely.union_all([shapes[j].buffer(0) for j in near]))
+        pieces = [piece for piece in getattr(cut, "geoms", [cut]) if piece.geom_type == "Polygon"]
+        if pieces:
+            shapes[block] = shapely.Polygon(max(pieces, key=lambda piece: piece.area).exterior)
+            final[block] = np.array(shapely.orient_polygons(shapes[block]).exterior.coords)[:-1]
+    involved = {int(edges.block[edge]) for k in uncommon for edge in (found.edge_a[k], found.edge_b[k])}
+    return welded(final, sorted(involved), still, WELD * thickness, CLOSED * float(np.ptp(edges.start, axis=0).max()))
+
+
+def parted(rings: list[np.ndarray], still: np.ndarray, thickness: float, closed: float) -> list[np.ndarray]:
+    """Outlines whose corners at junctions of several joints do not reach into each other.
+
+    Parameters
+    ----------
+    rings : list of (n, 2) arrays [m]
+        Counter-clockwise.
+    still : (n_blocks,) bool array
+        Blocks that keep their outline.
+    thickness : float [m]
+        Of the joints.
+    closed : float [m]
+        Overlap that is rounding.
+
+    Notes
+    -----
+    Where the joints of a crossing miss each other a little, its corners are drawn to one point; where blocks still
+    overlap afterwards, the larger one, or the one that keeps its outline, cuts the other.
+    """
+    import shapely
+
+    first, second, _ = _overlaps(rings, closed)
+    if len(first) == 0:
+        return rings
+    rings = welded(rings, sorted({*map(int, first), *map(int, second)}), still, WELD * thickness, closed / 10.0)
+    result = list(rings)
+    for i, j, _ in zip(*_overlaps(rings, closed), strict=True):
+        shapes = {int(k): shapely.Polygon(result[k]).buffer(0) for k in (i, j)}
+        small, large = sorted(shapes, key=lambda k: (bool(still[k]), shapes[k].area))
+        if still[small]:
+            continue
+        cut = shapely.difference(shapes[small], shapes[large])
+        pieces = [piece for piece in getattr(cut, "geoms", [cut]) if piece.geom_type == "Polygon"]
+        if pieces:
+            whole = shapely.Polygon(max(pieces, key=lambda piece: piece.area).exterior)
+            result[small] = np.array(shapely.orient_polygons(whole).exterior.coords)[:-1]
+    return result
+
+
+def _overlaps(rings: list[np.ndarray], closed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
+    return solver.overlap_depths(np.concatenate(rings), offsets, closed)
+
+
+def _outward_form(edges: Edges, lines: dict[int, Line], edge: int) -> tuple[np.ndarray, float]:
+    """The line of an edge with its normal out of the block."""
+    normal, level = normal_form(edges, lines, edge)
+    along = edges.end[edge] - edges.start[edge]
+    sign = 1.0 if normal @ np.array([along[1], -along[0]]) >= 0 else -1.0
+    return sign * normal, sign * level
+
+
+def _strip(edges: Edges, edge: int, stretch: np.ndarray, thickness: float, distance: float) -> Any:
+    """The ground that an extended edge may take: before its stretch, and on to its ends where little is left over."""
+    import shapely
+
+    start, along = edges.start[edge], edges.end[edge] - edges.start[edge]
+    size = float(np.hypot(*along))
+    along = along / size
+    outward = np.array([along[1], -along[0]])
+    first, last = np.sort((stretch - start) @ along)
+    spare = max(0.5 * size, thickness)
+    first = -2.0 * LONGEST_MITRE * thickness if first <= spare else first
+    last = size + 2.0 * LONGEST_MITRE * thickness if size - last <= spare else last
+    corners = [start + x * along + y * outward for x, y in ((first, 0.0), (last, 0.0), (last, 0.0), (first, 0.0))]
+    reach = (2.0 * thickness + distance) * outward
+    return shapely.Polygon(
+        [corners[0] - thickness * outward, corners[1] - thickness * outward, corners[2] + reach, corners[3] + reach]
+    )
+
+
+def welded(
+    rings: list[np.ndarray], involved: list[int], still: np.ndarray, reach: float, closed: float
+) -> list[np.ndarray]:
+    """Draws corners that cutting has left close together to one point, in all blocks that share them.
+
+    Parameters
+    ----------
+    rings : list of (n, 2) arrays [m]
+    involved : list of int
+        Blocks whose corners may move.
+    still : (n_blocks,) bool array
+        Blocks whose corners stay.
+    reach : float [m]
+        Corners closer than this become one.
+    closed : float [m]
+        A corner closer than this to an edge lies on it.
+
+    Notes
+    -----
+    Steps far smaller than a block are no masonry and mislead the search for contacts. Every corner that lies on an
+    edge of a neighbour is given to that neighbour first, so that both sides move alike.
+    """
+    import shapely
+    from scipy.cluster.hierarchy import fcluster, linkage
+    from scipy.spatial import cKDTree
+
+    tree = shapely.STRtree([shapely.Polygon(ring) for ring in rings])
+    near = sorted({int(j) for i in involved for j in tree.query(shapely.Polygon(rings[i]).buffer(2 * reach))})
+    points = np.concatenate([rings[i] for i in near])
+    index = cKDTree(points)
+    shared = {i: _with_corners_on_edges(rings[i], points, index, max(10 * closed, 1e-7 * reach)) for i in near}
+    movable = np.concatenate([np.zeros((0, 2)), *(shared[i] for i in involved if not still[i] and i in shared)])
+    movable = np.unique(np.round(movable, 12), axis=0)
+    if len(movable) < 2:
+        return rings
+    group = fcluster(linkage(movable, "complete"), reach, "distance")
+    count = np.bincount(group)
+    centre = np.stack([np.bincount(group, movable[:, axis]) / np.maximum(count, 1) for axis in (0, 1)], axis=1)
+    anchors = [shared[i] for i in near if still[i]]
+    if anchors:
+        distance, nearest = cKDTree(np.concatenate(anchors)).query(centre)
+        centre = np.where((distance <= reach)[:, None], np.concatenate(anchors)[nearest], centre)
+    lookup = cKDTree(movable)
+    result = list(rings)
+    for i in near:
+        if still[i]:
+            continue
+        distance, nearest = lookup.query(shared[i])
+        moved = np.where((distance <= max(10 * closed, 1e-7 * reach))[:, None], centre[group[nearest]], shared[i])
+        apart = np.hypot(*(moved - np.roll(moved, 1, axis=0)).T) > closed
+        extent = float(np.ptp(moved, axis=0).max())
+        if extent <= closed:
+            # Joints wider than the block: it keeps its outline, and the overlap is refused by name.
+            continue
+        ring = without_collinear(moved[apart], 10 * closed / extent)
+        if len(ring) >= 3 and shapely.Polygon(ring).is_valid:
+            result[i] = ring
+    return result
+
+
+def _with_corners_on_edges(ring: np.ndarray, points: np.ndarray, index: Any, closed: float) -> np.ndarray:
+    """The ring with every given point that lies on one of its edges as a corner."""
+    result = []
+    for start, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+        along = end - start
+        size = float(np.hypot(*along))
+        candidates = points[index.query_ball_point((start + end) / 2.0, 0.5 * size + closed)]
+        offset = candidates - start
+        position = offset @ along / size
+        aside = np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0]) / size
+        inside = (aside <= closed) & (position > closed) & (position < size - closed)
+        order = np.argsort(position[inside])
+        result.append(start)
+        for point in candidates[inside][order]:
+            if np.hypot(*(point - result[-1])) > closed:
+                result.append(point)
+    return np.array(result)

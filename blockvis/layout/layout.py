@@ -1,0 +1,111 @@
+"""Layout: what a drawing says of its blocks, before they become an assembly. Knows no format."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import solver
+
+#: Halves of characters, as they come from escaped JSON and from bytes that are no text.
+_HALVES = re.compile("[\ud800-\udfff]")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Outlines of blocks with what the file says of each.
+
+    Attributes
+    ----------
+    outlines : tuple of (n, 2) arrays [m]
+        Corners of each block in order, first corner not repeated.
+    names : tuple of str
+        One per block; may repeat.
+    groups : tuple of str
+        Physical group or layer of each block, "" for none.
+    roles : tuple of str
+        "free", "fixed", "moving", or "" where the file says nothing.
+    materials : tuple of str
+    thickness : (n_blocks,) array [m] or None
+        Out of plane; NaN for a block of which the file says nothing.
+    density : (n_blocks,) array [kg/m³] or None
+        NaN for a block of which the file says nothing.
+    unit : str
+        Unit of length the file was read in; inside a format's reader the unit the file states, "" for none.
+    notes : tuple of str
+        What the reader assumed or dropped.
+    source : str
+        Where the drawing came from.
+    """
+
+    outlines: tuple[np.ndarray, ...]
+    names: tuple[str, ...]
+    groups: tuple[str, ...] = ()
+    roles: tuple[str, ...] = ()
+    materials: tuple[str, ...] = ()
+    thickness: np.ndarray | None = None
+    density: np.ndarray | None = None
+    unit: str = "m"
+    notes: tuple[str, ...] = ()
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        n = len(self.outlines)
+        for what in ("groups", "roles", "materials"):
+            if not getattr(self, what):
+                object.__setattr__(self, what, ("",) * n)
+        for what in ("names", "groups", "roles", "materials"):
+            if len(getattr(self, what)) != n:
+                raise ValueError(f"{n} outlines but {len(getattr(self, what))} {what}; give one per block")
+        # A file in another encoding than it says leaves halves of characters, which no other file can hold.
+        note = "characters that are none in the file's encoding are shown as \ufffd"
+        for what in ("names", "groups", "roles", "materials"):
+            words = getattr(self, what)
+            whole = tuple(_HALVES.sub("\ufffd", word) for word in words)
+            if whole != tuple(words) and note not in self.notes:
+                object.__setattr__(self, "notes", (*self.notes, note))
+            object.__setattr__(self, what, whole)
+
+    @property
+    def n_blocks(self) -> int:
+        """Number of outlines."""
+        return len(self.outlines)
+
+    def chosen(self, blocks: Sequence[int] | np.ndarray) -> Layout:
+        """The same drawing with only these blocks, in this order."""
+        keep = [int(i) for i in blocks]
+        return replace(
+            self,
+            outlines=tuple(self.outlines[i] for i in keep),
+            names=tuple(self.names[i] for i in keep),
+            groups=tuple(self.groups[i] for i in keep),
+            roles=tuple(self.roles[i] for i in keep),
+            materials=tuple(self.materials[i] for i in keep),
+            thickness=None if self.thickness is None else self.thickness[keep],
+            density=None if self.density is None else self.density[keep],
+        )
+
+
+def ring_areas(outlines: Sequence[np.ndarray]) -> np.ndarray:
+    """(n,) array: area of each outline, positive counter-clockwise."""
+    areas = np.zeros(len(outlines))
+    for i, ring in enumerate(outlines):
+        x, y = (ring - ring[0]).T
+        areas[i] = (x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0
+    return areas
+
+
+def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> Layout:
+    """The drawing of an assembly, as drawn or where a pose has its blocks."""
+    vertices = assembly.vertices if pose is None else solver.moved_vertices(assembly, pose)
+    return Layout(
+        outlines=tuple(np.split(vertices, assembly.offsets[1:-1])),
+        names=assembly.names,
+        roles=tuple(map(str, assembly.roles)),
+        materials=assembly.materials,
+        thickness=assembly.thickness,
+        density=assembly.density,
+    )

@@ -1,0 +1,233 @@
+"""Cells to outlines: edges used once, chained to rings; collinear points merged; arcs to chords; flat from 3D."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+#: A point this close to the chord of its neighbours, as a fraction of the size of the block, lies on it:
+#: single precision files (VTK, STL) leave 6e-8 of the coordinate.
+COLLINEAR = 1e-6
+
+#: Spread of the third coordinate, as a fraction of the size of the drawing, that still counts as flat.
+FLAT = 1e-6
+
+#: Largest angle of a chord: half a hexagon, whatever the tolerance.
+LARGEST_CHORD = math.pi / 6.0
+
+
+def ring_area(ring: np.ndarray) -> float:
+    """Area enclosed by a (n, 2) ring, positive counter-clockwise."""
+    x, y = (ring - ring[0]).T
+    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0
+
+
+def flattened(points: np.ndarray, where: str) -> tuple[np.ndarray, str]:
+    """The two coordinates that a flat drawing uses.
+
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) array
+    where : str
+        Named in the error.
+
+    Returns
+    -------
+    flat : (n, 2) array
+        (x, y); of a drawing that stands upright (x, z) or (y, z).
+    note : str
+        "" where nothing was assumed.
+    """
+    if points.shape[1] == 2 or len(points) == 0:
+        return points[:, :2], ""
+    if not np.isfinite(points).all():
+        bad = points[~np.isfinite(points).all(axis=1)][0]
+        raise ValueError(f"{where} has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+    spread = np.ptp(points, axis=0)
+    for axis, (kept, names) in {2: ((0, 1), ""), 1: ((0, 2), "(x, z)"), 0: ((1, 2), "(y, z)")}.items():
+        if spread[axis] <= FLAT * spread.max():
+            note = f"the drawing stands upright: its {names} were read as (x, y)" if names else ""
+            return points[:, kept], note
+    raise ValueError(
+        f"{where} is not flat: its points spread over {spread[0]:.4g} × {spread[1]:.4g} × {spread[2]:.4g}; "
+        "draw the blocks in the plane, or give closed prismatic bodies"
+    )
+
+
+def outlines_of_cells(
+    points: np.ndarray, cells: Sequence[Sequence[int]] | Sequence[np.ndarray], owner: np.ndarray, names: Sequence[str]
+) -> list[np.ndarray]:
+    """One outline per block from the cells that cover it: the edges used once.
+
+    Parameters
+    ----------
+    points : (n_points, 2) array
+    cells : sequence of sequences of int
+        Points around each cell, curved sides with the points on them.
+    owner : (n_cells,) int array
+        Block of each cell, 0 to n_blocks - 1.
+    names : sequence of str
+        One per block, for messages.
+
+    Returns
+    -------
+    list of (n, 2) arrays
+        Counter-clockwise, collinear points merged.
+    """
+    counts = np.array([len(cell) for cell in cells])
+    flat = np.concatenate([np.asarray(cell, dtype=np.int64) for cell in cells])
+    ends = np.cumsum(counts)
+    following = np.arange(1, len(flat) + 1)
+    following[ends - 1] = ends - counts
+    start, end, block = flat, flat[following], np.repeat(np.asarray(owner), counts)
+    real = start != end
+    start, end, block = start[real], end[real], block[real]
+    key = np.stack([block, np.minimum(start, end), np.maximum(start, end)], axis=1)
+    order = np.lexsort(key.T[::-1])
+    ordered = key[order]
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    group = np.cumsum(new) - 1
+    once = np.sort(order[np.bincount(group)[group] == 1])
+    edges: list[list[tuple[int, int]]] = [[] for _ in names]
+    for i in once:
+        edges[block[i]].append((int(start[i]), int(end[i])))
+    return [_ring(points, edges[b], names[b]) for b in range(len(names))]
+
+
+def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> np.ndarray:
+    loops = _loops(edges, points, name)
+    if not loops:
+        raise ValueError(
+            f"block '{name}' has no outline: each of its edges belongs to two cells; its cells are in the file twice"
+        )
+    rings = [points[loop] for loop in loops]
+    if len(rings) > 1:
+        by_area = sorted(rings, key=lambda ring: abs(ring_area(ring)))
+        outer, inner = by_area[-1], by_area[-2]
+        x, y = inner.mean(axis=0)
+        if _contains(outer, inner[0]):
+            raise ValueError(
+                f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, "
+                "or fill the hole with a block"
+            )
+        raise ValueError(
+            f"block '{name}' is in {len(rings)} separate pieces, one around ({x:.6g}, {y:.6g}); give each its own block"
+        )
+    ring = rings[0]
+    return without_collinear(ring if ring_area(ring) > 0 else ring[::-1])
+
+
+def _loops(edges: list[tuple[int, int]], points: np.ndarray, name: str) -> list[list[int]]:
+    neighbours: dict[int, list[int]] = {}
+    for a, b in edges:
+        neighbours.setdefault(a, []).append(b)
+        neighbours.setdefault(b, []).append(a)
+    for node, others in neighbours.items():
+        if len(others) != 2:
+            x, y = points[node]
+            raise ValueError(
+                f"the outline of block '{name}' meets itself at ({x:.6g}, {y:.6g}), where {len(others)} of its edges "
+                "end; a block is one piece with one outline"
+            )
+    loops, seen = [], set()
+    for first in neighbours:
+        if first in seen:
+            continue
+        loop, previous, node = [first], first, neighbours[first][0]
+        seen.add(first)
+        while node != first:
+            loop.append(node)
+            seen.add(node)
+            one, other = neighbours[node]
+            previous, node = node, (other if one == previous else one)
+        loops.append(loop)
+    return loops
+
+
+def _contains(ring: np.ndarray, point: np.ndarray) -> bool:
+    a, b = ring, np.roll(ring, -1, axis=0)
+    straddles = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
+    a, b = a[straddles], b[straddles]
+    x = a[:, 0] + (point[1] - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
+    return bool((x > point[0]).sum() % 2)
+
+
+def without_collinear(ring: np.ndarray, tolerance: float = COLLINEAR) -> np.ndarray:
+    """The ring without points that lie on the line between their neighbours.
+
+    Parameters
+    ----------
+    ring : (n, 2) array
+    tolerance : float
+        Largest distance of a dropped point from the edge that replaces it, as a fraction of the ring's extent.
+
+    Examples
+    --------
+    >>> without_collinear(np.array([[0, 0], [1, 0], [2, 0], [2, 1], [0, 1]])).tolist()
+    [[0, 0], [2, 0], [2, 1], [0, 1]]
+    """
+    if len(ring) > 1 and (ring[0] == ring[-1]).all():
+        ring = ring[:-1]
+    if len(ring) < 4:
+        return ring
+    limit = tolerance * float(np.ptp(ring, axis=0).max())
+    # Start at a true corner: the point farthest from the first one, then from that one.
+    first = int(np.argmax(((ring - ring[0]) ** 2).sum(axis=1)))
+    ring = np.roll(ring, -first, axis=0)
+    closed = np.vstack([ring, ring[:1]])
+    kept, k, n = [0], 0, len(ring)
+    while k < n:
+        # The farthest point that one straight edge reaches without leaving a dropped point aside, by doubling
+        # and halving: a ring of a million points on one line must not take a million squared steps.
+        end, step = k + 1, 1
+        while end + step <= n and _fits(closed[k], closed[k + 1 : end + step], closed[end + step], limit):
+            end, step = end + step, 2 * step
+        while step > 1:
+            step //= 2
+            if end + step <= n and _fits(closed[k], closed[k + 1 : end + step], closed[end + step], limit):
+                end += step
+        kept.append(end)
+        k = end
+    corners = np.sort((np.array(kept[:-1]) + first) % n)
+    return np.roll(ring, first, axis=0)[corners] if len(corners) >= 3 else ring
+
+
+def _fits(a: np.ndarray, dropped: np.ndarray, b: np.ndarray, limit: float) -> bool:
+    along = b - a
+    length = float(np.hypot(*along))
+    if length <= limit:
+        return False
+    offset = dropped - a
+    distance = np.abs(along[0] * offset[:, 1] - along[1] * offset[:, 0]) / length
+    position = offset @ along / length
+    ordered = (np.diff(position) >= 0).all() and position[0] >= 0 and position[-1] <= length
+    return bool((distance <= limit).all() and ordered)
+
+
+def arc_points(
+    centre: np.ndarray, radius: float, start: float, sweep: float, tolerance: float | None = None
+) -> np.ndarray:
+    """Points on an arc so that its chords stay within a tolerance of it, both ends included.
+
+    Parameters
+    ----------
+    centre : (2,) array
+    radius : float
+    start, sweep : float [rad]
+        First angle and signed opening, counter-clockwise positive.
+    tolerance : float, optional
+        Largest distance between arc and chord; a thousandth of the radius by default.
+
+    Returns
+    -------
+    (n, 2) array
+    """
+    allowed = radius * 1e-3 if tolerance is None else tolerance
+    widest = LARGEST_CHORD if allowed >= radius else min(LARGEST_CHORD, 2.0 * math.acos(1.0 - allowed / radius))
+    # A tolerance far below the radius must not fill the memory: 4096 chords per turn are finer than any drawing.
+    n = min(max(1, math.ceil(abs(sweep) / widest - 1e-9)), 4096)
+    angles = start + sweep * np.linspace(0.0, 1.0, n + 1)
+    return centre + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)

@@ -1,0 +1,143 @@
+"""What a drawing needs before it is an assembly: duplicates dropped, overlaps resolved or refused, joints closed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+import solver
+
+from .joints.close import Closing, close_joints
+from .joints.facing_edges import proposed_thickness
+
+#: Two outlines closer than this fraction of the size of a block, corner by corner, are one block drawn twice.
+SAME = 1e-6
+
+#: Depth of an overlap that counts as careless drawing, as a fraction of the width of the usual block.
+CARELESS = 0.02
+
+#: Overlaps below this fraction of the width of the usual block are rounding and stay what they are.
+ROUNDING = 1e-6
+
+
+def block_widths(assembly: solver.Assembly) -> np.ndarray:
+    """(n_blocks,) array [m]: twice the area over half the perimeter, the width of a long thin block."""
+    return 4.0 * assembly.areas / np.add.reduceat(assembly.edge_lengths, assembly.offsets[:-1])
+
+
+def duplicates(outlines: Sequence[np.ndarray]) -> list[tuple[int, int]]:
+    """Blocks drawn twice, as pairs (first, later copy).
+
+    Parameters
+    ----------
+    outlines : sequence of (n, 2) arrays [m]
+    """
+    centres = np.array([(ring.min(axis=0) + ring.max(axis=0)) / 2.0 for ring in outlines])
+    sizes = np.array([float(np.ptp(ring, axis=0).max()) for ring in outlines])
+    cell = 4.0 * SAME * float(np.median(sizes))
+    found: dict[int, int] = {}
+    # Four grids, shifted by half a cell, so that no pair is parted by a grid line in all of them.
+    for shift in ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)):
+        places: dict[tuple[float, float], list[int]] = {}
+        for i, (x, y) in enumerate(np.floor(centres / cell + shift)):
+            if i in found:
+                continue
+            earlier = places.setdefault((float(x), float(y)), [])
+            twin = next((k for k in earlier if _same(outlines[k], outlines[i], SAME * sizes[i])), None)
+            if twin is None:
+                earlier.append(i)
+            else:
+                found[i] = twin
+    return sorted((first, later) for later, first in found.items())
+
+
+def _same(one: np.ndarray, other: np.ndarray, tolerance: float) -> bool:
+    if len(one) != len(other):
+        return False
+    distance = np.abs(one[:, None, :] - other[None, :, :]).max(axis=2)
+    return bool((distance.min(axis=0) <= tolerance).all() and (distance.min(axis=1) <= tolerance).all())
+
+
+def overlaps(assembly: solver.Assembly, tolerance: float) -> list[tuple[int, int, float]]:
+    """Pairs of blocks that overlap by more than a tolerance [m], with the depth [m], deepest first."""
+    i, j, depth = solver.overlap_depths(assembly.vertices, assembly.offsets, tolerance)
+    return [(int(i[k]), int(j[k]), float(depth[k])) for k in np.argsort(-depth)]
+
+
+def mended(
+    assembly: solver.Assembly,
+    *,
+    joint_thickness: float | str,
+    overlap_tolerance: float | None,
+    anchored: np.ndarray,
+) -> tuple[list[np.ndarray], list[str]]:
+    """Outlines with overlaps resolved and joints closed, and notes on what was done.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        Without duplicates.
+    joint_thickness : float [m] or "auto"
+    overlap_tolerance : float, optional [m]
+        A fiftieth of the width of the usual block where not given.
+    anchored : (n_blocks,) bool array
+        Blocks that keep their outline.
+
+    Raises
+    ------
+    ValueError
+        For an overlap deeper than the tolerance, naming both blocks.
+    """
+    outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
+    free = ~anchored if not anchored.all() else anchored
+    width = float(np.median(block_widths(assembly)[free]))
+    tolerance = CARELESS * width if overlap_tolerance is None else float(overlap_tolerance)
+    if not (np.isfinite(tolerance) and tolerance >= 0):
+        raise ValueError(f"overlap_tolerance is {tolerance:g} m; it must be a length of at least 0")
+    found = [(i, j, d) for i, j, d in overlaps(assembly, ROUNDING * width) if not (anchored[i] and anchored[j])]
+    if found and found[0][2] > tolerance:
+        i, j, depth = found[0]
+        x, y = (assembly.centroids[i] + assembly.centroids[j]) / 2.0
+        deep = sum(1 for _, _, d in found if d > tolerance)
+        others = f"; {deep - 1} more pairs overlap" if deep > 1 else ""
+        raise ValueError(
+            f"block {i} ('{assembly.names[i]}') overlaps block {j} ('{assembly.names[j]}') by {depth:.3g} m near "
+            f"({x:.6g}, {y:.6g}); move them apart or raise overlap_tolerance ({tolerance:.3g} m){others}"
+        )
+    thickness, notes = _thickness(joint_thickness, [outlines[i] for i in np.flatnonzero(free)], width)
+    if not found and thickness == 0:
+        return outlines, notes
+    depth = min(tolerance, 1.01 * found[0][2]) if found else 0.0
+    closing = close_joints(outlines, thickness, overlap=depth, anchored=anchored)
+    notes += _notes(closing, thickness, found)
+    return list(closing.outlines), notes
+
+
+def _thickness(asked: float | str, outlines: list[np.ndarray], usual: float) -> tuple[float, list[str]]:
+    if isinstance(asked, str):
+        if asked.strip().lower() != "auto":
+            raise ValueError(f"joint_thickness is '{asked}'; give a length in m or \"auto\"")
+        thickness, _ = proposed_thickness(outlines)
+        return thickness, [f'joint_thickness "auto" found {thickness:g} m']
+    thickness = float(asked)
+    if not (np.isfinite(thickness) and thickness >= 0):
+        raise ValueError(f"joint_thickness is {thickness:g} m; it must be a length of at least 0")
+    if thickness > usual:
+        raise ValueError(
+            f"joint_thickness is {thickness:g} m, more than the usual block is wide ({usual:.3g} m); give the width of "
+            "the mortar joints in m"
+        )
+    return thickness, []
+
+
+def _notes(closing: Closing, thickness: float, found: list[tuple[int, int, float]]) -> list[str]:
+    notes = []
+    if found:
+        notes.append(f"{len(found)} overlaps of up to {found[0][2]:.3g} m were resolved to their midline")
+    if thickness:
+        notes.append(
+            f"{closing.n_joints} stretches of joints of up to {max(closing.largest_gap, 0.0):.3g} m were closed to "
+            f"their midline, {closing.n_cut} of them by cutting one side along the other"
+        )
+    return notes

@@ -1,0 +1,84 @@
+"""Lengths in the units that drawings are made in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: Metres per unit.
+UNITS = {
+    "m": 1.0,
+    "mm": 1e-3,
+    "cm": 1e-2,
+    "dm": 1e-1,
+    "km": 1e3,
+    "in": 0.0254,
+    "ft": 0.3048,
+    "yd": 0.9144,
+    "pt": 0.0254 / 72.0,
+    "px": 0.0254 / 96.0,
+}
+
+_OTHER_NAMES = {
+    "metre": "m", "meter": "m", "metres": "m", "meters": "m", "millimetre": "mm", "millimeter": "mm",
+    "millimetres": "mm", "millimeters": "mm", "centimetre": "cm", "centimeter": "cm", "centimetres": "cm",
+    "centimeters": "cm", "decimeters": "dm", "decimetres": "dm", "kilometers": "km", "kilometres": "km",
+    "inch": "in", "inches": "in", "foot": "ft", "feet": "ft", "yard": "yd", "yards": "yd", "point": "pt", "pixel": "px",
+}  # fmt: skip
+
+#: Median size (root of the area) of a masonry block [m]: from a mosaic-sized chip to a megalith.
+PLAUSIBLE_SIZE = (0.02, 20.0)
+
+
+def metres_per(unit: str) -> float:
+    """Metres per unit of length.
+
+    Raises
+    ------
+    ValueError
+        For a unit that has no length here.
+
+    Examples
+    --------
+    >>> metres_per("inches")
+    0.0254
+    """
+    name = unit.strip()
+    name = _OTHER_NAMES.get(name.lower(), name if name in UNITS else name.lower())
+    if name not in UNITS:
+        raise ValueError(f"unit '{unit}' is not known; the units of length are {', '.join(UNITS)}")
+    return UNITS[name]
+
+
+def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str, str]:
+    """The unit to read a file in, and the note that says why.
+
+    Parameters
+    ----------
+    given : str or None
+        What the caller asks for; it always holds.
+    stated : str
+        What the file says of itself, "" for nothing.
+    sizes : (n_blocks,) array
+        Root of the area of each block, in the unit of the file.
+
+    Returns
+    -------
+    unit : str
+    note : str
+        "" where there is nothing to say.
+    """
+    median = float(np.median(sizes)) if len(sizes) else 1.0
+    if given is not None:
+        clash = bool(stated) and metres_per(stated) != metres_per(given)
+        note = f"the file says its unit is {stated}; it was read in {given} because that was asked for" if clash else ""
+        return given, note
+    if not stated:
+        return "m", "the file does not say its unit; m was assumed"
+    low, high = PLAUSIBLE_SIZE
+    in_stated, in_metres = median * metres_per(stated), median
+    if not low <= in_stated <= high and low <= in_metres <= high:
+        return "m", (
+            f"unit clash: the file says its unit is {stated}, which makes the median block {in_stated:.3g} m in size; "
+            f"m was assumed, which makes it {in_metres:.3g} m; give unit=... to settle it"
+        )
+    return stated, ""

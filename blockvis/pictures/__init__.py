@@ -1,0 +1,1 @@
+"""Pictures: stills, films and curves of a response."""

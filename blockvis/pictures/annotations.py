@@ -1,0 +1,297 @@
+"""What a picture marks on the blocks: open and sliding joints, hinges, resultants, parts. Geometry only, no drawing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+import solver
+
+#: A joint is shown open from this fraction of the block size on; on an ordinary brick it is a tenth of a millimetre.
+SMALLEST_OPENING = 1e-3
+
+#: What lies between faces is a crack up to this distance: on the path, in block sizes or lengths of the joint; in
+#: the fall, where blocks tumble apart, in lengths of the joint only, and up to this angle [rad].
+WIDEST_STANDING, WIDEST_FALLING, STEEPEST_FALLING = 1.5, 0.6, 1.0
+
+#: A joint is shown sliding from this fraction of the speed of the fastest block on: the slip of the others is not seen.
+SMALLEST_SLIP = 1e-2
+
+#: What cracks and blocks enclose without covering it belongs to the cracks from this fraction of the block size squared
+#: (what is smaller is rounding) up to that: where several cracks meet.
+SMALLEST_POCKET, LARGEST_POCKET = 1e-5, 2.0
+
+#: Faces count as one joint of the drawing when they are apart by at most this fraction of the block size.
+TOUCHING = 2e-3
+
+#: Faces count as parallel up to this sine.
+PARALLEL = 0.05
+
+#: Resultants below this fraction of the largest are not drawn.
+SMALLEST_RESULTANT = 2e-3
+
+
+def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """(n, 2, 2) array [m]: edges of the outline around each part, its blocks merged.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    corners : (n_vertices, 2) array [m]
+    parts : (n_blocks,) int array
+        As ``solver.rigid_parts`` gives them.
+    """
+    edges = [np.zeros((0, 2, 2))]
+    # Faces that touch leave slivers where the last digit differs: grown together, then shrunk back.
+    seam = 1e-3 * assembly.block_size
+    for part in range(int(parts.max(initial=-1)) + 1):
+        blocks = np.flatnonzero(parts == part)
+        outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in blocks]
+        merged = shapely.union_all(shapely.buffer(outlines, seam, join_style="mitre"))
+        merged = shapely.buffer(merged, -seam, join_style="mitre").simplify(0.1 * seam)
+        for polygon in shapely.get_parts(merged):
+            for ring in shapely.get_rings(polygon):
+                points = shapely.get_coordinates(ring)
+                edges.append(np.stack([points[:-1], points[1:]], axis=1))
+    return np.concatenate(edges)
+
+
+@dataclass(frozen=True)
+class DrawnJoints:
+    """Pairs of faces that touch in the drawing.
+
+    Attributes
+    ----------
+    block_a, block_b : (n_joints,) int arrays
+    ends : (n_joints, 2, 2) array [m]
+        Both ends of the common length, where the drawing has them.
+    normals : (n_joints, 2) array
+        Unit normal in the drawing, from ``block_b`` into ``block_a``.
+    """
+
+    block_a: np.ndarray
+    block_b: np.ndarray
+    ends: np.ndarray
+    normals: np.ndarray
+
+
+@dataclass(frozen=True)
+class Marks:
+    """What is marked at one pose.
+
+    Attributes
+    ----------
+    cracks : (n_cracks, 4, 2) array [m]
+        Quadrilateral between the faces of each open joint: both ends on block a, then back along block b.
+    openings : (n_cracks,) array [m]
+        Largest distance of the two faces of each, unmagnified.
+    pockets : tuple of (n, 2) arrays [m]
+        Outlines of what is enclosed where cracks meet.
+    sliding : (n_sliding, 2, 2) array [m]
+        Ends of each sliding joint.
+    hinges : (n_hinges, 2) array [m]
+    """
+
+    cracks: np.ndarray
+    openings: np.ndarray
+    pockets: tuple[np.ndarray, ...]
+    sliding: np.ndarray
+    hinges: np.ndarray
+
+
+def drawn_joints(assembly: solver.Assembly) -> DrawnJoints:
+    """Finds the faces that touch in the drawing; where they part later there is a crack."""
+    tolerance = TOUCHING * assembly.block_size
+    contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * tolerance)
+    touching = np.abs(contacts.gaps) <= tolerance
+    vertex, edge_b = contacts.vertex[touching], contacts.edge[touching]
+    # The corner belongs to two faces of block a; either may lie on the edge of block b.
+    edge_a = np.concatenate([vertex, assembly.previous_vertex[vertex]])
+    edge_b = np.concatenate([edge_b, edge_b])
+    pairs = np.unique(np.stack([np.minimum(edge_a, edge_b), np.maximum(edge_a, edge_b)], axis=1), axis=0)
+    a, b = pairs[:, 0], pairs[:, 1]
+    start, stop = assembly.vertices[b], assembly.vertices[assembly.next_vertex[b]]
+    length = assembly.edge_lengths[b]
+    tangent = (stop - start) / length[:, None]
+    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    ends_a = np.stack([assembly.vertices[a], assembly.vertices[assembly.next_vertex[a]]], axis=1) - start[:, None]
+    along = np.einsum("nij,nj->ni", ends_a, tangent)
+    across = np.abs(np.einsum("nij,nj->ni", ends_a, normal))
+    lean = np.abs(across[:, 1] - across[:, 0]) / assembly.edge_lengths[a]
+    low = np.maximum(0.0, along.min(axis=1))
+    high = np.minimum(length, along.max(axis=1))
+    keep = (high - low > 10.0 * tolerance) | (high - low > 0.5 * np.minimum(length, assembly.edge_lengths[a]))
+    keep &= (lean < PARALLEL) & (across.min(axis=1) <= 2.0 * tolerance) & (along[:, 0] > along[:, 1])
+    ends = np.stack([start + low[:, None] * tangent, start + high[:, None] * tangent], axis=1)
+    owner = assembly.block_of_vertex
+    return DrawnJoints(owner[a][keep], owner[b][keep], ends[keep], normal[keep])
+
+
+def marks_of(assembly: solver.Assembly, joints: DrawnJoints, increment: solver.Increment, shown: solver.Pose) -> Marks:
+    """Cracks, sliding joints and hinges of an increment, on blocks shown at a pose.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    joints : DrawnJoints
+    increment : solver.Increment
+        Its contact states decide about hinges and sliding.
+    shown : solver.Pose
+        Where the blocks are drawn: the increment's own pose, or a magnified one.
+    """
+    contacts, states = increment.contacts, increment.states
+    points = _middle(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
+    falling = increment.status == solver.Status.FALLING
+    cracks, openings, cracked = _cracks(assembly, joints, increment.pose, shown, falling)
+    return Marks(
+        cracks=cracks,
+        openings=openings,
+        pockets=() if falling else _pockets(assembly, cracks, cracked, shown),
+        sliding=_sliding(contacts, slipping(increment), points),
+        hinges=_apart(points[states == solver.ContactState.HINGING], 0.05 * assembly.block_size),
+    )
+
+
+def slipping(increment: solver.Increment) -> np.ndarray:
+    """(n_contacts,) bool array: contact points that slide fast enough to be seen."""
+    fastest = np.abs(increment.velocity[:, :2]).max(initial=0.0)
+    seen = np.abs(increment.displacements[:, 1]) > SMALLEST_SLIP * fastest
+    return (increment.states == solver.ContactState.SLIDING) & seen
+
+
+def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Resultant of the contact forces of each pair of blocks.
+
+    Returns
+    -------
+    points : (n, 2) array [m]
+        Where the resultant crosses the joint, at the increment's pose.
+    forces : (n, 2) array [N]
+        On ``blocks[:, 0]``.
+    blocks : (n, 2) int array
+    """
+    contacts = increment.contacts
+    turned = contacts.block_a > contacts.block_b
+    low, high = (
+        np.where(turned, contacts.block_b, contacts.block_a),
+        np.where(turned, contacts.block_a, contacts.block_b),
+    )
+    force = np.einsum("ki,kij->kj", increment.forces, contacts.frames) * np.where(turned, -1.0, 1.0)[:, None]
+    carrying = increment.forces[:, 0] > 0.0
+    pairs, which = np.unique(np.stack([low, high], axis=1)[carrying], axis=0, return_inverse=True)
+    which = which.ravel()
+    forces, points = np.zeros((len(pairs), 2)), np.zeros((len(pairs), 2))
+    normal = increment.forces[carrying, 0]
+    np.add.at(forces, which, force[carrying])
+    np.add.at(points, which, normal[:, None] * contacts.points[carrying])
+    weight = np.bincount(which, weights=normal, minlength=len(pairs))
+    return points / weight[:, None], forces, pairs
+
+
+def _middle(
+    points: np.ndarray, block_a: np.ndarray, block_b: np.ndarray, before: solver.Pose, after: solver.Pose
+) -> np.ndarray:
+    """Points carried by both of their blocks, half-way: magnified, the two are no longer in the same place."""
+    return (solver.carried(points, block_a, before, after) + solver.carried(points, block_b, before, after)) / 2.0
+
+
+def _cracks(
+    assembly: solver.Assembly, joints: DrawnJoints, pose: solver.Pose, shown: solver.Pose, falling: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Quadrilaterals of the open joints, their openings [m], and the blocks beside them."""
+    drawn = solver.Pose.initial(assembly)
+
+    def sides(at: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
+        on_a = np.stack([solver.carried(joints.ends[:, k], joints.block_a, drawn, at) for k in (0, 1)], axis=1)
+        on_b = np.stack([solver.carried(joints.ends[:, k], joints.block_b, drawn, at) for k in (0, 1)], axis=1)
+        return on_a, on_b
+
+    on_a, on_b = sides(pose)
+    turn = pose.rotations[joints.block_b]
+    c, s = np.cos(turn), np.sin(turn)
+    normal = np.stack(
+        [c * joints.normals[:, 0] - s * joints.normals[:, 1], s * joints.normals[:, 0] + c * joints.normals[:, 1]],
+        axis=1,
+    )
+    length = np.hypot(*(joints.ends[:, 1] - joints.ends[:, 0]).T)
+    opening = np.einsum("nij,nj->ni", on_a - on_b, normal).max(axis=1)
+    apart = np.hypot(*np.moveaxis(on_a - on_b, 2, 0)).min(axis=1)
+    # Blocks that have parted altogether have no joint any more: what lies between them is air, not a crack.
+    if falling:
+        turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])
+        together = (apart < WIDEST_FALLING * length) & (turn < STEEPEST_FALLING)
+    else:
+        together = apart < np.maximum(length, WIDEST_STANDING * assembly.block_size)
+    is_open = (opening > SMALLEST_OPENING * assembly.block_size) & together
+    on_a, on_b = sides(shown)
+    beside = np.unique(np.concatenate([joints.block_a[is_open], joints.block_b[is_open]]))
+    return np.concatenate([on_a, on_b[:, ::-1]], axis=1)[is_open], opening[is_open], beside
+
+
+def _pockets(
+    assembly: solver.Assembly, cracks: np.ndarray, cracked: np.ndarray, shown: solver.Pose
+) -> tuple[np.ndarray, ...]:
+    """What lies between several cracks and belongs to no pair of faces: where a brick has left its corner."""
+    if len(cracks) < 2:
+        return ()
+    size = assembly.block_size
+    corners = solver.moved_vertices(assembly, shown)
+    blocks = [corners[assembly.offsets[b] : assembly.offsets[b + 1]] for b in range(assembly.n_blocks)]
+    # Crossed where one end has closed up, so the hull; a hair wider, or a joint just not open would let the pocket out.
+    filled = shapely.buffer(
+        shapely.convex_hull(shapely.multipoints(cracks)), SMALLEST_OPENING * size, join_style="mitre", quad_segs=1
+    )
+    near = [shapely.Polygon(blocks[b]) for b in cracked]
+    covered = shapely.union_all([*shapely.buffer(near, 0.0), *filled])
+    holes = [
+        shapely.Polygon(ring)
+        for part in shapely.get_parts(covered)
+        for ring in part.interiors
+        if SMALLEST_POCKET * size**2 < shapely.Polygon(ring).area < LARGEST_POCKET * size**2
+    ]
+    if not holes:
+        return ()
+    # Not what has been open from the start, nor where blocks without a crack stand.
+    tree = shapely.STRtree([shapely.Polygon(outline) for outline in blocks])
+    drawn = shapely.STRtree([shapely.Polygon(assembly.outline(b)) for b in range(assembly.n_blocks)])
+    pockets = []
+    for hole in holes:
+        inside = hole.representative_point()
+        if len(tree.query(inside, predicate="intersects")) == 0 and len(drawn.query(inside, predicate="intersects")):
+            pockets.append(shapely.get_coordinates(hole)[:-1])
+    return tuple(pockets)
+
+
+def _sliding(contacts: solver.Contacts, slips: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """The stretch of each sliding joint between the outermost of its contact points that slip."""
+    k = np.flatnonzero(slips)
+    if len(k) == 0:
+        return np.zeros((0, 2, 2))
+    low = np.minimum(contacts.block_a[k], contacts.block_b[k])
+    high = np.maximum(contacts.block_a[k], contacts.block_b[k])
+    _, which = np.unique(np.stack([low, high], axis=1), axis=0, return_inverse=True)
+    which = which.ravel()
+    n = int(which.max()) + 1
+    first = np.zeros(n, dtype=int)
+    first[which[::-1]] = k[::-1]
+    tangent = contacts.frames[first, 1]
+    place = ((points[k] - points[first][which]) * tangent[which]).sum(axis=1)
+    lowest, highest = np.zeros(n), np.zeros(n)
+    np.minimum.at(lowest, which, place)
+    np.maximum.at(highest, which, place)
+    # A joint that slides on one point only still needs a length to be seen.
+    short = 0.15 * np.median(highest - lowest) if (highest > lowest).any() else 0.0
+    lowest, highest = lowest - short, highest + short
+    base = points[first]
+    return np.stack([base + lowest[:, None] * tangent, base + highest[:, None] * tangent], axis=1)
+
+
+def _apart(points: np.ndarray, distance: float) -> np.ndarray:
+    """One point of each group closer together than ``distance``: two corners of one hinge are one hinge."""
+    if len(points) < 2:
+        return points
+    cell = np.floor(points / distance).astype(np.int64)
+    _, first = np.unique(cell, axis=0, return_index=True)
+    return points[np.sort(first)]

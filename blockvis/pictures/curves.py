@@ -1,0 +1,300 @@
+"""The curve of a response, reaction or load multiplier: a file of its own, or a panel beside the blocks."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from PIL import Image, ImageDraw
+
+import solver
+from blockvis.atomic_files import whole_file
+from blockvis.results.quantities import (
+    POSITION,
+    governing,
+    parameter_word,
+    path_parameters,
+    path_values,
+    reads_multipliers,
+)
+
+from . import palette
+from .captions import MOST_OVER_LOWEST, force_unit, parameter_label, parameter_unit, value_label
+
+#: Suffixes of the files that draw_curve writes.
+CURVE_SUFFIXES = (".png", ".svg", ".pdf")
+
+#: More changes of hinges than this are not numbered one by one.
+MOST_EVENTS = 12
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happens on the path.
+
+    Attributes
+    ----------
+    parameter : float [m or rad]
+        Settlement over all phases, or control displacement.
+    value : float
+        Reaction [N or N·m] or load multiplier.
+    text : str
+    """
+
+    parameter: float
+    value: float
+    text: str
+
+
+def draw_curve(
+    response: solver.Response, path: str | os.PathLike[str], *, size: tuple[float, float] = (8.0, 5.0)
+) -> Path:
+    """Draws the reaction against the settlement, absolute and over the weight, with the events on the way.
+
+    For limit loads and pushovers the load multiplier against what they run over: settlement, position of the load or
+    control displacement; a single limit load as a rigid-plastic diagram.
+
+    Parameters
+    ----------
+    response : solver.Response
+    path : path
+        Ending in .png, .svg or .pdf.
+    size : (float, float) [inch]
+        Width and height; a PNG has 200 pixels per inch.
+
+    Returns
+    -------
+    pathlib.Path
+    """
+    path = Path(path)
+    if path.suffix.lower() not in CURVE_SUFFIXES:
+        raise ValueError(f"'{path.name}' is no curve that blockvis draws; end its name in {', '.join(CURVE_SUFFIXES)}")
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.add_subplot()
+    _draw(axes, response, events=True)
+    with whole_file(path) as partial:
+        figure.savefig(partial, dpi=200)
+    return path
+
+
+def events_of(response: solver.Response) -> list[Event]:
+    """Where the set of hinges or sliding joints changes along the path.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    path = response.path
+    total, values = path_parameters(path), path_values(response)
+    found = []
+    kinds = ((solver.ContactState.HINGING, "hinge"), (solver.ContactState.SLIDING, "sliding joint"))
+    # Each is asked for its contact points once: they may come from a file.
+    pairs = ([_pairs(increment.states, increment.contacts, state) for state, _ in kinds] for increment in path)
+    for k, (earlier, later) in enumerate(pairwise(pairs), start=1):
+        text = []
+        for (_, word), before, after in zip(kinds, earlier, later, strict=True):
+            if before != after:
+                some = f"{len(after) or 'no'} {word}{'s' if len(after) != 1 else ''}"
+                text.append(some if len(before) != len(after) else f"{word}s move")
+        if text:
+            found.append(Event(float(total[k]), float(values[k]), ", ".join(text)))
+    return found
+
+
+class CurvePanel:
+    """The curve beside the blocks, drawn once, with a dot that moves.
+
+    Parameters
+    ----------
+    response : solver.Response
+    size : (int, int)
+        Width and height in pixels.
+    text : int
+        Height of the text in pixels.
+    """
+
+    def __init__(self, response: solver.Response, size: tuple[int, int], text: int) -> None:
+        self._response, self._text = response, text
+        figure = Figure(figsize=(size[0] / 100.0, size[1] / 100.0), dpi=100, layout="constrained")
+        canvas = FigureCanvasAgg(figure)
+        axes = figure.add_subplot()
+        _draw(axes, response, events=False, text=text * 0.62)
+        canvas.draw()
+        self._picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
+        per_length, _ = parameter_unit(response)
+        total = path_parameters(response.path)
+        factor, _ = force_unit(response)
+        values = np.nan_to_num(path_values(response) / factor)
+        places = (
+            axes.transData.transform(np.column_stack([total * per_length, values])) if len(total) else np.zeros((0, 2))
+        )
+        self._total = total
+        self._places = np.column_stack([places[:, 0], size[1] - places[:, 1]])
+        self._offsets = {
+            i.phase: float(t - i.settlement) for t, i in zip(total[::-1], response.path[::-1], strict=True)
+        }
+
+    def image(self, increment: solver.Increment) -> Image.Image:
+        """The curve with the dot at an increment; at the end of the curve during the fall."""
+        picture = self._picture.copy()
+        if len(self._total) == 0:
+            return picture
+        falling = increment.status == solver.Status.FALLING
+        at = self._offsets.get(increment.phase, 0.0) + increment.settlement
+        if falling and self._response.analysis != "limit load":
+            at = self._total[-1]
+        x, y = (float(np.interp(at, self._total, self._places[:, k])) for k in (0, 1))
+        r = 0.34 * self._text
+        draw = ImageDraw.Draw(picture)
+        draw.ellipse((x - r, y - r, x + r, y + r), fill=palette.WARNING if falling else palette.SETTLEMENT)
+        return picture
+
+
+def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 11.0) -> None:
+    path = response.path
+    factor, _ = force_unit(response)
+    moment = any(s.unit == "rad" for s in response.settlements)
+    per_length, _ = parameter_unit(response)
+    total = path_parameters(path) * per_length
+    values = path_values(response) / factor
+    known = values[np.isfinite(values)]
+    axes.set_ylabel(value_label(response), fontsize=text)
+    axes.tick_params(labelsize=0.9 * text)
+    axes.grid(color="#e4e4e4", linewidth=0.8)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(x=0.02, y=0.12)
+    if len(known):
+        low, high = min(0.0, known.min()), max(0.0, known.max())
+        if parameter_word(response) == POSITION:
+            high = min(high, MOST_OVER_LOWEST * max(known.min(), 0.0) or high)
+        axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
+    if parameter_word(response) == POSITION and len(path) == 1:
+        _draw_single(axes, known, text)
+        return
+    blue = palette.hexadecimal(palette.FORCE)
+    axes.plot(total, values, "-", color=blue, linewidth=2.0, zorder=3)
+    if events:
+        axes.plot(total, values, "o", color=blue, markersize=3.0, zorder=3)
+    axes.set_xlabel(parameter_label(response), fontsize=text)
+    axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5))
+    if not moment and not reads_multipliers(response) and response.total_weight > 0:
+        weight = response.total_weight / factor
+        over_weight = axes.secondary_yaxis(
+            "right", functions=(lambda r: np.asarray(r) / weight, lambda w: np.asarray(w) * weight)
+        )
+        over_weight.set_ylabel("reaction / weight W", fontsize=text)
+        over_weight.tick_params(labelsize=0.9 * text)
+    if parameter_word(response) == POSITION:
+        _mark_lowest(axes, response, text, events)
+    elif events:
+        _mark_events(axes, response, factor, text)
+    if response.collapse is not None and len(path):
+        _mark_collapse(axes, response, total, values, text, events)
+
+
+def _draw_single(axes: Axes, known: np.ndarray, text: float) -> None:
+    """One limit load has no curve: rigid up to it, then a mechanism whose size is open."""
+    axes.set_xlim(0.0, 1.0)
+    axes.set_xticks([])
+    axes.set_xlabel("displacement of the mechanism (first order, any size)", fontsize=text)
+    if len(known) == 0:
+        axes.set_ylim(0.0, 1.0)
+        axes.set_yticks([])
+        axes.text(0.5, 0.5, "no finite limit load", transform=axes.transAxes, ha="center", fontsize=text)
+        return
+    alpha = float(known[0])
+    blue = palette.hexadecimal(palette.FORCE)
+    axes.plot([0.0, 0.0, 0.97], [0.0, alpha, alpha], "-", color=blue, linewidth=2.5, zorder=3, clip_on=False)
+    axes.annotate("", (1.0, alpha), (0.96, alpha), arrowprops={"arrowstyle": "->", "color": blue, "linewidth": 2.0})
+    axes.annotate(
+        f"α = {alpha:.6g}", (0.5, alpha), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=text
+    )
+
+
+def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool) -> None:
+    lowest = governing(response)
+    if lowest is None or not np.isfinite(lowest.load_multiplier):
+        return
+    red = palette.hexadecimal(palette.WARNING)
+    place = (lowest.settlement, lowest.load_multiplier)
+    axes.plot(*place, "o", color=red, markersize=8 if words else 5, zorder=4)
+    if words:
+        axes.annotate(
+            f"lowest α = {place[1]:.5g} at x = {place[0]:.4g} m",
+            (0.5, 0.96),
+            xycoords="axes fraction",
+            ha="center",
+            va="top",
+            fontsize=text,
+            color=red,
+        )
+
+
+def _mark_collapse(
+    axes: Axes, response: solver.Response, total: np.ndarray, reactions: np.ndarray, text: float, words: bool
+) -> None:
+    collapse = response.collapse
+    assert collapse is not None
+    red = palette.hexadecimal(palette.WARNING)
+    what = "no capacity" if response.analysis == "pushover" else "collapse"
+    # Phases before the last shift the curve.
+    per_length, _ = parameter_unit(response)
+    low, middle, high = per_length * np.array([collapse.bracket[0], collapse.displacement, collapse.bracket[1]])
+    start = total[-1] - per_length * response.path[-1].settlement
+    axes.axvspan(start + low, start + high, color=red, alpha=0.25, linewidth=0)
+    axes.axvline(start + middle, color=red, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
+    axes.plot(total[-1:], reactions[-1:], "X", color=red, markersize=9 if words else 6, zorder=4)
+    if words:
+        axes.annotate(
+            f"{what} at {collapse.displacement:.5g} {collapse.unit}\n"
+            f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]",
+            (start + middle, 0.96 if response.analysis == "pushover" else 0.04),
+            xycoords=("data", "axes fraction"),
+            xytext=(-6, 0),
+            textcoords="offset points",
+            ha="right",
+            va="top" if response.analysis == "pushover" else "bottom",
+            fontsize=0.9 * text,
+            color=red,
+        )
+
+
+def _mark_events(axes: Axes, response: solver.Response, factor: float, text: float) -> None:
+    found = events_of(response)
+    if not found:
+        return
+    ink = palette.hexadecimal(palette.INK)
+    per_length, _ = parameter_unit(response)
+    x, y = [e.parameter * per_length for e in found], [e.value / factor for e in found]
+    axes.plot(x, y, "o", color="white", markeredgecolor=ink, markersize=7, zorder=4, label="hinges or sliding change")
+    if len(found) <= MOST_EVENTS:
+        low, high = axes.get_xlim()
+        above = True
+        for number in range(1, len(found) + 1):
+            # Under the curve where it would run into the number before.
+            close = number > 1 and abs(x[number - 1] - x[number - 2]) < 0.03 * (high - low)
+            above = not (close and above)
+            axes.annotate(
+                str(number), (x[number - 1], y[number - 1]), xytext=(0, 8 if above else -8),
+                textcoords="offset points", ha="center", va="bottom" if above else "top", fontsize=0.8 * text,
+            )  # fmt: skip
+        lines = [f"{n}  {e.text}" for n, e in enumerate(found, 1)]
+        axes.text(
+            0.02, 0.04, "\n".join(lines), transform=axes.transAxes, va="bottom", fontsize=0.8 * text, linespacing=1.4,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+        )  # fmt: skip
+    else:
+        axes.legend(loc="upper left", fontsize=0.8 * text, frameon=False)
+
+
+def _pairs(states: np.ndarray, contacts: solver.Contacts, state: solver.ContactState) -> set[tuple[int, int]]:
+    chosen = states == state
+    a, b = contacts.block_a[chosen], contacts.block_b[chosen]
+    return set(zip(np.minimum(a, b).tolist(), np.maximum(a, b).tolist(), strict=True))

@@ -1,0 +1,519 @@
+"""One set-up for all pictures of a response: scene, sheet, legend, caption, and the frames of the film."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import chain
+
+import numpy as np
+import shapely
+from PIL import Image
+
+import solver
+from blockvis.numbers import force_text, rounded_length
+from blockvis.results.quantities import POSITION, governing, parameter_word, reads_multipliers
+
+from . import annotations as marks
+from . import palette
+from .annotations import part_outlines
+from .captions import badge_of, matters, state_text
+from .curves import CurvePanel
+from .flat_scene import Scene, magnified
+from .frame import ColourBar, Key, Sheet, framed
+from .hatching import cut_into_triangles
+from .live_load import LiveLoads
+
+#: Resultants and hinges of more blocks than this hide what they stand on.
+FEW_BLOCKS = 300
+
+#: Joints open by less than this fraction of the block size are drawn half as wide: not every hair is a crack.
+FINE_CRACK = 0.01
+
+#: Joints open by more than this fraction need no line: the middle of a wide crack may lie on a third block.
+WIDE_CRACK = 0.2
+
+#: Up to this many parts of a mechanism are tinted one by one.
+MOST_PARTS = 16
+
+#: The forces of this many increments tell what is usual.
+FORCES_OF = 100
+
+#: Single pictures up to this size [pixels] are drawn at four times their size, so that flat slopes show no steps.
+FINE_UP_TO = 2600
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the pictures show.
+
+    Attributes
+    ----------
+    magnification : float
+        Of displacements and rotations; 1 is true scale.
+    colour_by : {"material", "displacement"}
+    forces : {"auto", "thrust", "points", "none"}
+        Resultant of each joint, forces at the contact points, or neither; resultants of structures with few blocks
+        where it is left to the picture.
+    joints : bool
+        Mark open and sliding joints and hinges.
+    """
+
+    magnification: float = 1.0
+    colour_by: str = "material"
+    forces: str = "auto"
+    joints: bool = True
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.magnification) and self.magnification > 0.0):
+            raise ValueError(f"magnification is {self.magnification:g}; it must be a positive number, 1 is true scale")
+        for name, allowed in (
+            ("colour_by", ("material", "displacement")),
+            ("forces", ("auto", "thrust", "points", "none")),
+        ):
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} is '{getattr(self, name)}'; choose from {', '.join(allowed)}")
+
+
+@dataclass
+class _Seen:
+    """What all pictures of some increments have to agree on.
+
+    Attributes
+    ----------
+    sampled : frozenset of int
+        Numbers of the increments whose forces tell what is usual.
+    largest : float [m]
+        Displacement of any free block.
+    cracks, sliding, hinges : bool
+        Whether any is marked anywhere.
+    largest_force : float [N]
+    forces : list of arrays [N]
+        Sizes, of the increments sampled.
+    """
+
+    sampled: frozenset[int]
+    largest: float = 0.0
+    cracks: bool = False
+    sliding: bool = False
+    hinges: bool = False
+    largest_force: float = 0.0
+    forces: list[np.ndarray] = field(default_factory=list)
+
+
+class Studio:
+    """A scene and its sheet, set up for some increments of one response."""
+
+    def __init__(
+        self,
+        response: solver.Response,
+        look: Look,
+        size: tuple[int, int],
+        increments: tuple[solver.Increment, ...],
+        *,
+        curve: bool = False,
+        extra: tuple[solver.Pose, ...] = (),
+    ) -> None:
+        if look.forces == "auto":
+            few = response.assembly.n_blocks <= FEW_BLOCKS
+            look = replace(look, forces="thrust" if few else "none")
+        self.response, self.look, self.increments = response, look, increments
+        assembly = self.assembly = response.assembly
+        self.joints = marks.drawn_joints(assembly)
+        self._seen = _Seen(sampled=_sampled([k for k, i in enumerate(increments) if matters(i, response)]))
+        frame = framed(assembly, chain([solver.Pose.initial(assembly)], self._surveyed(), extra))
+        self.largest = self._seen.largest
+        bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
+        beside = round(0.36 * size[0]) if curve else 0
+        self.sheet = Sheet(size, bar, beside)
+        self.panel = CurvePanel(response, _size_of(self.sheet.beside), self.sheet.text) if curve else None
+        self.live = LiveLoads(response, increments, float(frame.size.max()))
+        frame = frame.holding(self.live.tails)
+        fill = palette.block_colours(assembly.materials, assembly.free)
+        self.fill = fill
+        self.tints: np.ndarray | None = None
+        fine = max(size) <= FINE_UP_TO and len(increments) == 1
+        self.scene = Scene(assembly, frame, self.sheet.inside_size, fill, supersampling=4 if fine else 2)
+        self.force_scale, self.force_shown = self._force_scale()
+        self._show_start()
+        self._keys: list[Key] | None = None
+
+    def __enter__(self) -> Studio:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.scene.close()
+
+    def _surveyed(self) -> Iterator[solver.Pose]:
+        """The poses as shown, one after another; notes what else all pictures have to agree on.
+
+        Increments may come from files: each is looked at once, and nothing of its size is kept.
+        """
+        seen, look = self._seen, self.look
+        for number, increment in enumerate(self.increments):
+            seen.largest = max(seen.largest, _largest_displacement(self.assembly, increment))
+            if look.joints:
+                found = marks.marks_of(self.assembly, self.joints, increment, increment.pose)
+                seen.cracks |= len(found.cracks) > 0
+                seen.sliding |= len(found.sliding) > 0
+                seen.hinges |= len(self._hinges(found)) > 0
+            if look.forces != "none" and matters(increment, self.response):
+                sizes = np.hypot(*_joint_forces(increment, look.forces)[1].T)
+                seen.largest_force = max(seen.largest_force, float(sizes.max(initial=0.0)))
+                if number in seen.sampled:
+                    seen.forces.append(sizes)
+            yield magnified(self.assembly, increment.pose, look.magnification)
+
+    def picture(
+        self, increment: solver.Increment, pose: solver.Pose | None = None, s: float | None = None, note: str = ""
+    ) -> Image.Image:
+        """The sheet of one increment; with its blocks at another pose and settlement for frames in between."""
+        true = increment.pose if pose is None else pose
+        shown = magnified(self.assembly, true, self.look.magnification)
+        at = replace(increment, pose=true, contacts=_contacts_at(increment, true)) if pose is not None else increment
+        self.scene.pose(shown, self._vertex_colours(true))
+        self._draw_joints(at, shown)
+        self._draw_forces(at, shown)
+        self._draw_ground(shown)
+        self._draw_settlement_arrow(at, shown)
+        self._draw_live_load(increment, shown)
+        falling = increment.status == solver.Status.FALLING
+        title, detail = _caption(self.response, at, self.look, s)
+        return self.sheet.composed(
+            self.scene.image(),
+            title=title,
+            detail=note or detail,
+            badge=badge_of(self.response) if falling else "",
+            keys=self.keys(),
+            pixel=self.scene.pixel,
+            beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, settlement=s)),
+        )
+
+    def frames(self, fps: float, seconds: float) -> Iterator[Image.Image]:
+        """The frames of the film."""
+        path = [i for i in self.increments if matters(i, self.response)]
+        fall = [i for i in self.increments if i.status == solver.Status.FALLING]
+        picture = None
+        for increment, pose, s in _even_motion(path, max(2, round(fps * seconds))):
+            picture = self.picture(increment, pose, s)
+            yield picture
+        if picture is not None:
+            yield from (picture for _ in range(round(0.6 * fps)))
+        for increment in fall:
+            picture = self.picture(increment)
+            yield picture
+        if picture is not None:
+            yield from (picture for _ in range(round(1.2 * fps)))
+
+    def show_motion(self, pose: solver.Pose, displaced: solver.Pose, parts: np.ndarray) -> None:
+        """Tints, outlines and arrows of where a mechanism takes the parts that move as one.
+
+        Where there are many parts the speed is tinted instead, and arrows stand on a grid.
+        """
+        assembly, scene, block = self.assembly, self.scene, self.assembly.block_of_vertex
+        before, after = solver.moved_vertices(assembly, pose), solver.moved_vertices(assembly, displaced)
+        n = int(parts.max(initial=-1)) + 1
+        if n <= MOST_PARTS:
+            tints = palette.part_colours(self.fill, parts)[block]
+            outlines = part_outlines(assembly, after, parts)
+            scene.lines("motion outline", outlines, palette.SETTLEMENT, self.scene.size[1] / 600.0)
+            chosen = [np.flatnonzero(parts == part) for part in range(n)]
+        else:
+            travel = np.hypot(*(after - before).T)
+            tints = palette.displacement_colours(0.75 * travel / travel[assembly.free[block]].max())
+            tints = np.where(assembly.free[block][:, None], tints, self.fill[block])
+            cell = np.floor(pose.positions / (0.07 * scene.frame.size.max())).astype(np.int64)
+            moves = np.flatnonzero(parts >= 0)
+            _, first = np.unique(cell[moves], axis=0, return_index=True)
+            chosen = [moves[[k]] for k in first]
+        scene.pose(pose, tints)
+        self.tints = tints
+        tails, tips = np.zeros((len(chosen), 2)), np.zeros((len(chosen), 2))
+        for k, blocks in enumerate(chosen):
+            weight = assembly.areas[blocks] / assembly.areas[blocks].sum()
+            tails[k] = weight @ pose.positions[blocks]
+            tips[k] = solver.carried(tails[[k]], blocks[:1], pose, displaced)[0]
+        self._arrows("motion", tails, tips, 0.6)
+
+    def keys(self) -> list[Key]:
+        """The legend: what is marked anywhere in the increments shown, so that it stands still."""
+        if self._keys is None:
+            keys = []
+            if self.look.joints:
+                seen = self._seen
+                keys += [Key("area", "open joint", palette.OPEN)] if seen.cracks else []
+                keys += [Key("line", "sliding joint", palette.SLIDING)] if seen.sliding else []
+                keys += [Key("dot", "hinge", palette.HINGE)] if seen.hinges else []
+            if self.force_shown > 0:
+                text = ("compression " if self.look.forces == "thrust" else "contact force ") + force_text(
+                    self.force_shown
+                )
+                length = self.force_shown * self.force_scale / self.scene.pixel
+                keys.append(Key("bar", text, palette.FORCE, length))
+            if self.live.largest > 0.0:
+                keys.append(Key("line", self.live.words, palette.LIVE))
+            if any(layer.startswith("motion") for layer in self.scene.layers):
+                keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT))
+            self._keys = keys
+        return self._keys
+
+    def _hinges(self, found: marks.Marks) -> np.ndarray:
+        """Hinges worth a dot: in a wall of many blocks nearly every brick turns a little about some corner."""
+        return found.hinges if self.assembly.n_blocks <= FEW_BLOCKS else found.hinges[:0]
+
+    def _vertex_colours(self, pose: solver.Pose) -> np.ndarray | None:
+        if self.look.colour_by != "displacement":
+            return self.tints
+        moved = solver.moved_vertices(self.assembly, pose) - self.assembly.vertices
+        colours = palette.displacement_colours(np.hypot(*moved.T) / (self.largest or 1.0))
+        block = self.assembly.block_of_vertex
+        return np.where(self.assembly.free[block][:, None], colours, self.fill[block])
+
+    def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> None:
+        if not self.look.joints:
+            return
+        scene, thin = self.scene, self.scene.size[1] / 1080.0
+        found = marks.marks_of(self.assembly, self.joints, increment, shown)
+        scene.polygons("crack", found.cracks, palette.OPEN)
+        scene.polygons("crack/pocket", cut_into_triangles(found.pockets), palette.OPEN)
+        middle = (found.cracks[:, [0, 1]] + found.cracks[:, [3, 2]]) / 2.0 if len(found.cracks) else found.cracks
+        width = found.openings / self.assembly.block_size
+        fine, wide = width < FINE_CRACK, width * self.look.magnification > WIDE_CRACK
+        scene.lines("crack edge", middle[~fine & ~wide], palette.OPEN, self._line(2.2 * thin))
+        scene.lines("crack edge/fine", middle[fine], palette.OPEN, self._line(1.1 * thin))
+        scene.lines("sliding", found.sliding, palette.SLIDING, self._line(5.0 * thin))
+        radius = float(np.clip(0.09 * self.assembly.block_size / scene.pixel, 3.0 * thin, 11.0 * thin))
+        scene.discs("hinge/rim", self._hinges(found), radius * 1.35, palette.PAPER)
+        scene.discs("hinge top", self._hinges(found), radius, palette.HINGE)
+
+    def _line(self, pixels: float) -> float:
+        return max(pixels, 1.2)
+
+    def _draw_forces(self, increment: solver.Increment, shown: solver.Pose) -> None:
+        if self.look.forces == "none" or self.force_shown == 0:
+            return
+        scene = self.scene
+        if increment.status == solver.Status.FALLING:
+            # There is no equilibrium, and so no forces that would mean anything.
+            scene.polygons("force", np.zeros((0, 4, 2)), palette.FORCE)
+            scene.lines("force line", np.zeros((0, 2, 2)), palette.FORCE, 1.0)
+            return
+        points, forces, blocks = _joint_forces(increment, self.look.forces)
+        size = np.hypot(*forces.T)
+        kept = size > marks.SMALLEST_RESULTANT * size.max(initial=0.0)
+        points, forces, blocks, size = points[kept], forces[kept], blocks[kept], size[kept]
+        first, second = (solver.carried(points, blocks[:, k], increment.pose, shown) for k in (0, 1))
+        points = (first + second) / 2.0
+        unit = forces / size[:, None]
+        half = unit * (0.5 * self.force_scale * size)[:, None]
+        thick = 0.5 * max(2.0, scene.size[1] / 320.0) * scene.pixel
+        side = np.stack([-unit[:, 1], unit[:, 0]], axis=1) * thick
+        bars = [points - half - side, points + half - side, points + half + side, points - half + side]
+        scene.polygons("force", np.stack(bars, axis=1), palette.FORCE)
+        if self.look.forces == "thrust":
+            scene.lines("force line", _thrust_line(points, blocks, self.assembly), palette.FORCE, scene.size[1] / 500.0)
+
+    def _force_scale(self) -> tuple[float, float]:
+        """Length per force [m/N] and the force of the legend [N]; 0 where none is drawn."""
+        largest = self._seen.largest_force
+        if largest == 0.0:
+            return 0.0, 0.0
+        every = np.concatenate(self._seen.forces)
+        every = every if every.max(initial=0.0) > 0.0 else np.full(1, largest)
+        # What most joints carry is a block long: one corner that carries everything shall not make the rest vanish.
+        usual = float(np.quantile(every[every > marks.SMALLEST_RESULTANT * largest], 0.9))
+        extent = float(self.scene.frame.size.max())
+        scale = max(1.3 * self.assembly.block_size, 0.015 * extent) / usual
+        scale = min(scale, 0.12 * extent / largest)
+        return scale, rounded_length(min(largest, 0.12 * extent / scale))
+
+    def _show_start(self) -> None:
+        """The first position of the moving supports, behind everything."""
+        moving = self.assembly.moving[self.assembly.block_of_vertex]
+        start = _edges(self.assembly, self.assembly.vertices)[moving]
+        self.scene.lines("ghost", start, palette.GHOST, self.scene.size[1] / 800.0)
+
+    def _draw_ground(self, shown: solver.Pose) -> None:
+        """A heavy line where supports carry the structure."""
+        joints, free = self.joints, self.assembly.free
+        drawn = solver.Pose.initial(self.assembly)
+        lines = []
+        for block, other in ((joints.block_a, joints.block_b), (joints.block_b, joints.block_a)):
+            on = ~free[block] & free[other]
+            ends = [solver.carried(joints.ends[on, k], block[on], drawn, shown) for k in (0, 1)]
+            lines.append(np.stack(ends, axis=1))
+        self.scene.lines("ground", np.concatenate(lines), palette.INK, max(1.2, self.scene.size[1] / 320.0))
+
+    def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose) -> None:
+        """The live load times its multiplier, arrows to scale that end where it acts."""
+        if self.live.largest > 0.0:
+            self._arrows("live", *self.live.arrows(increment, shown), 0.55, palette.LIVE)
+
+    def _draw_settlement_arrow(self, increment: solver.Increment, shown: solver.Pose) -> None:
+        assembly, scene = self.assembly, self.scene
+        if not self.response.settlements:
+            return
+        phase = self.response.settlements[min(increment.phase, len(self.response.settlements) - 1)]
+        part = np.flatnonzero(phase.taking_part(assembly))
+        rate = phase.rate(assembly, solver.Pose.initial(assembly), 0.0)
+        corners = solver.moved_vertices(assembly, shown)
+        window = shapely.box(*scene.frame.low, *scene.frame.high)
+        outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in part]
+        seen = [(b, o) for b, o in zip(part, shapely.intersection(outlines, window), strict=True) if not o.is_empty]
+        if len(seen) > 4:
+            seen = [seen[len(seen) // 2]]
+        length = 0.055 * float(scene.frame.size.max())
+        tails, tips = [], []
+        for block, outline in seen:
+            # A bent support may have its centroid outside.
+            inside = outline.centroid if outline.contains(outline.centroid) else outline.point_on_surface()
+            place = np.array(inside.coords[0])
+            arm = place - shown.positions[block]
+            speed = rate[block, :2] + rate[block, 2] * np.array([-arm[1], arm[0]])
+            if np.hypot(*speed) > 0:
+                along = speed / np.hypot(*speed) * length
+                tails.append(place - along / 2.0)
+                tips.append(place + along / 2.0)
+        self._arrows("arrow", np.array(tails).reshape(-1, 2), np.array(tips).reshape(-1, 2), 1.0)
+
+    def _arrows(
+        self,
+        layer: str,
+        tails: np.ndarray,
+        tips: np.ndarray,
+        weight: float,
+        fill: tuple[int, int, int] = palette.SETTLEMENT,
+    ) -> None:
+        scene = self.scene
+        thick = weight * scene.size[1] / 110.0 * scene.pixel
+        for name, grown, colour in (("rim", 1.0, palette.PAPER), ("top", 0.0, fill)):
+            shafts, heads = _arrow_shapes(tails, tips, thick, grown * weight * scene.size[1] / 360.0 * scene.pixel)
+            scene.polygons(f"{layer} {name}/shaft", shafts, colour)
+            scene.polygons(f"{layer} {name}/head", heads, colour)
+
+
+def _sampled(numbers: list[int]) -> frozenset[int]:
+    """As many of the numbers as are enough to tell a usual force, evenly chosen."""
+    chosen = np.linspace(0, len(numbers) - 1, min(len(numbers), FORCES_OF)).round().astype(int)
+    return frozenset(numbers[k] for k in chosen)
+
+
+def _arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: float) -> tuple[np.ndarray, np.ndarray]:
+    """Shafts (n, 4, 2) and heads (n, 3, 2) of arrows, a margin ``grown`` larger all around [m]."""
+    along = tips - tails
+    length = np.hypot(*along.T)
+    kept = length > 1.2 * thick
+    tails, tips, along, length = tails[kept], tips[kept], along[kept], length[kept]
+    unit = along / length[:, None]
+    side = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+    head = np.minimum(2.6 * thick, 0.6 * length)[:, None]
+    neck = tips - head * unit
+    half = thick / 2.0 + grown
+    start = tails - grown * unit
+    shafts = np.stack([start - half * side, neck - half * side, neck + half * side, start + half * side], axis=1)
+    wing = 0.55 * head + 1.6 * grown
+    back, tip = neck - grown * unit, tips + 2.0 * grown * unit
+    heads = np.stack([back - wing * side, tip, back + wing * side], axis=1)
+    return shafts, heads
+
+
+def _joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    if kind == "thrust":
+        return marks.resultants(increment)
+    contacts = increment.contacts
+    carrying = increment.forces[:, 0] > 0.0
+    force = np.einsum("ki,kij->kj", increment.forces, contacts.frames)
+    blocks = np.stack([contacts.block_a, contacts.block_b], axis=1)
+    return contacts.points[carrying], force[carrying], blocks[carrying]
+
+
+def _thrust_line(points: np.ndarray, blocks: np.ndarray, assembly: solver.Assembly) -> np.ndarray:
+    """(n, 2, 2) array [m]: the line from joint to joint, where every block has two at most: an arch, a column."""
+    owner = np.concatenate([blocks[:, 0], blocks[:, 1]])
+    which = np.concatenate([np.arange(len(blocks))] * 2)
+    counts = np.bincount(owner, minlength=assembly.n_blocks)
+    if counts[assembly.free].max(initial=0) > 2:
+        return np.zeros((0, 2, 2))
+    order = np.argsort(owner, kind="stable")
+    owner, which = owner[order], which[order]
+    pairs = (owner[1:] == owner[:-1]) & assembly.free[owner[1:]]
+    return np.stack([points[which[:-1][pairs]], points[which[1:][pairs]]], axis=1)
+
+
+def _contacts_at(increment: solver.Increment, pose: solver.Pose) -> solver.Contacts:
+    """The increment's contact points carried to a pose nearby."""
+    contacts = increment.contacts
+    first, second = (
+        solver.carried(contacts.points, block, increment.pose, pose) for block in (contacts.block_a, contacts.block_b)
+    )
+    return replace(contacts, points=(first + second) / 2.0)
+
+
+def _even_motion(
+    path: list[solver.Increment], n: int
+) -> Iterator[tuple[solver.Increment, solver.Pose | None, float | None]]:
+    """``n`` frames at even settlement: the increment before each, the pose in between, and the settlement."""
+    if not path:
+        return
+    reached, before, last = [], 0.0, 0.0
+    for previous, increment in zip([path[0], *path], path, strict=False):
+        if increment.phase != previous.phase:
+            before = last
+        last = before + increment.settlement
+        reached.append(last)
+    total = np.array(reached)
+    if total[-1] <= total[0]:
+        yield path[-1], None, None
+        return
+    for at in np.linspace(total[0], total[-1], n):
+        k = int(np.clip(np.searchsorted(total, at, side="right") - 1, 0, len(path) - 1))
+        if k == len(path) - 1 or at <= total[k]:
+            yield path[k], None, None
+            continue
+        t = (at - total[k]) / (total[k + 1] - total[k])
+        a, b = path[k].pose, path[k + 1].pose
+        pose = solver.Pose(a.positions + t * (b.positions - a.positions), a.rotations + t * (b.rotations - a.rotations))
+        start = path[k].settlement if path[k].phase == path[k + 1].phase else 0.0
+        yield path[k], pose, start + t * (path[k + 1].settlement - start)
+
+
+def _caption(response: solver.Response, increment: solver.Increment, look: Look, s: float | None) -> tuple[str, str]:
+    title = state_text(increment, response, s)
+    detail = _state(response, increment)
+    if len(response.settlements) > 1:
+        detail += f"   ·   phase {increment.phase + 1} of {len(response.settlements)}"
+    scale = "true scale" if look.magnification == 1.0 else f"displacements × {look.magnification:g}"
+    return title, f"{detail}   ·   {scale}   ·   W = {force_text(response.total_weight)}"
+
+
+def _state(response: solver.Response, increment: solver.Increment) -> str:
+    swung = response.analysis == "limit load" and response.collapse is None
+    if increment.status == solver.Status.FALLING:
+        if swung and response.path:
+            return "pseudo-motion: the mechanism at the limit load, followed to first order and out of scale"
+        return "no equilibrium, no dynamics: the mechanism followed step by step"
+    if response.analysis == "limit load":
+        flow = f"limit state, {response.limits[0].flow} friction" if response.limits else "limit state"
+        lowest = len(response.path) > 1 and parameter_word(response) == POSITION and _decides(response, increment)
+        return flow + (f"   ·   the lowest of {len(response.path)} positions" if lowest else "")
+    if response.stop == solver.Status.COLLAPSED and increment.settlement == response.path[-1].settlement:
+        return "last equilibrium before " + ("capacity is lost" if reads_multipliers(response) else "collapse")
+    return "equilibrium"
+
+
+def _decides(response: solver.Response, increment: solver.Increment) -> bool:
+    lowest = governing(response)
+    return lowest is not None and lowest.settlement == increment.settlement
+
+
+def _largest_displacement(assembly: solver.Assembly, increment: solver.Increment) -> float:
+    moved = solver.moved_vertices(assembly, increment.pose) - assembly.vertices
+    return float(np.hypot(*moved.T)[assembly.free[assembly.block_of_vertex]].max(initial=0.0))
+
+
+def _edges(assembly: solver.Assembly, corners: np.ndarray) -> np.ndarray:
+    return np.stack([corners, corners[assembly.next_vertex]], axis=1)
+
+
+def _size_of(box: tuple[int, int, int, int]) -> tuple[int, int]:
+    return box[2] - box[0], box[3] - box[1]

@@ -1,0 +1,305 @@
+"""The frame of a picture: the part of the world it shows; caption, scale bar, legend and colour bar around it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+import solver
+from blockvis.numbers import length_text, rounded_length
+
+from . import palette
+
+#: Height of the text as a fraction of the height of the picture, and its least size in pixels.
+TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 36.0, 12
+
+
+@dataclass(frozen=True)
+class Key:
+    """One entry of the legend.
+
+    Attributes
+    ----------
+    kind : {"area", "line", "dot", "bar"}
+    text : str
+    colour : (int, int, int)
+    length : float
+        Pixels, of a bar drawn to scale.
+    """
+
+    kind: str
+    text: str
+    colour: tuple[int, int, int]
+    length: float = 0.0
+
+
+@dataclass(frozen=True)
+class ColourBar:
+    """The scale of displacements.
+
+    Attributes
+    ----------
+    largest : float [m]
+    """
+
+    largest: float
+
+
+class Sheet:
+    """Where the picture of the blocks and the words around it go.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height in pixels.
+    colour_bar : ColourBar, optional
+    beside : PIL.Image.Image, optional
+        A picture to the right of the blocks, as high as they are.
+    """
+
+    def __init__(self, size: tuple[int, int], colour_bar: ColourBar | None = None, beside_width: int = 0) -> None:
+        self.size = size
+        width, height = size
+        self.text = max(SMALLEST_TEXT, round(min(height, width * 0.7) * TEXT_FRACTION))
+        self.pad = max(6, round(0.9 * self.text))
+        self.header = round(3.6 * self.text)
+        self.footer = round(2.9 * self.text)
+        self.colour_bar = colour_bar
+        right = beside_width + (round(7.6 * self.text) if colour_bar else 0)
+        #: Left, top, right, bottom of the blocks' picture, in pixels.
+        self.inside = (0, self.header, width - right, height - self.footer)
+        self.beside = (width - beside_width, self.header, width, height - self.footer)
+
+    @property
+    def inside_size(self) -> tuple[int, int]:
+        """Width and height of the blocks' picture in pixels."""
+        left, top, right, bottom = self.inside
+        return right - left, bottom - top
+
+    def composed(
+        self,
+        picture: Image.Image,
+        *,
+        title: str,
+        detail: str,
+        badge: str = "",
+        keys: Sequence[Key] = (),
+        pixel: float,
+        beside: Image.Image | None = None,
+    ) -> Image.Image:
+        """The whole sheet.
+
+        Parameters
+        ----------
+        picture : PIL.Image.Image
+            Of the blocks, of :attr:`inside_size`.
+        title, detail : str
+            First and second line of the caption.
+        badge : str
+            A warning at the upper right.
+        keys : sequence of Key
+        pixel : float [m]
+            Size of a pixel, for the scale bar.
+        beside : PIL.Image.Image, optional
+        """
+        page = Image.new("RGB", self.size, palette.PAPER)
+        page.paste(picture, self.inside[:2])
+        if beside is not None:
+            page.paste(beside, self.beside[:2])
+        draw = ImageDraw.Draw(page)
+        self._caption(draw, title, detail, badge)
+        end = self._scale_bar(draw, pixel)
+        self._legend(draw, keys, end + 2 * self.pad)
+        if self.colour_bar is not None:
+            self._colour_bar(page, draw, self.colour_bar)
+        return page
+
+    def _caption(self, draw: ImageDraw.ImageDraw, title: str, detail: str, badge: str) -> None:
+        right = self.size[0] - self.pad
+        if badge:
+            font = _font(round(0.9 * self.text), bold=True)
+            width, half = draw.textlength(badge, font), 0.75 * self.text
+            box = (right - width - 1.2 * self.text, self.pad, right, self.pad + 2 * half)
+            draw.rounded_rectangle(box, radius=half * 0.5, fill=palette.WARNING)
+            draw.text((box[0] + 0.6 * self.text, self.pad + half), badge, palette.PAPER, font, anchor="lm")
+            right = round(box[0] - self.pad)
+        room = right - self.pad
+        font = _fitting(title, round(1.15 * self.text), room, bold=True)
+        draw.text((self.pad, self.pad + 0.72 * self.text), title, palette.INK, font, anchor="lm")
+        font = _fitting(detail, round(0.9 * self.text), self.size[0] - 2 * self.pad)
+        draw.text((self.pad, self.pad + 2.15 * self.text), detail, palette.FAINT, font, anchor="lm")
+
+    def _scale_bar(self, draw: ImageDraw.ImageDraw, pixel: float) -> int:
+        """Draws it; its right end in pixels."""
+        length = rounded_length(0.2 * self.inside_size[0] * pixel)
+        pixels = round(length / pixel)
+        thick = max(2, round(self.text / 9))
+        x, y = self.pad, self.size[1] - self.pad - round(0.35 * self.text)
+        tick = round(0.28 * self.text)
+        draw.rectangle((x, y - thick // 2, x + pixels, y - thick // 2 + thick - 1), fill=palette.INK)
+        for end in (x, x + pixels - thick + 1):
+            draw.rectangle((end, y - tick, end + thick - 1, y + tick), fill=palette.INK)
+        font = _font(round(0.9 * self.text))
+        label = length_text(length)
+        draw.text((x + pixels / 2, y - tick - 0.15 * self.text), label, palette.INK, font, anchor="mb")
+        return int(max(x + pixels, x + pixels / 2 + draw.textlength(label, font) / 2))
+
+    def _legend(self, draw: ImageDraw.ImageDraw, keys: Sequence[Key], left: int) -> None:
+        if not keys:
+            return
+        size = round(0.9 * self.text)
+        swatch, space, gap = 1.5 * self.text, 0.45 * self.text, 1.4 * self.text
+
+        def width(font: ImageFont.FreeTypeFont) -> float:
+            return sum(max(swatch, k.length) + space + draw.textlength(k.text, font) for k in keys) + gap * (
+                len(keys) - 1
+            )
+
+        room = self.size[0] - self.pad - left
+        font = _font(size)
+        while width(font) > room and size > 8:
+            size -= 1
+            gap *= 0.93
+            font = _font(size)
+        x, y = self.size[0] - self.pad - width(font), self.size[1] - self.pad - 0.35 * self.text
+        for key in keys:
+            wide = max(swatch, key.length)
+            _swatch(draw, key, x, y, wide, self.text)
+            x += wide + space
+            draw.text((x, y), key.text, palette.INK, font, anchor="lm")
+            x += draw.textlength(key.text, font) + gap
+
+    def _colour_bar(self, page: Image.Image, draw: ImageDraw.ImageDraw, bar: ColourBar) -> None:
+        left, top, bottom = self.inside[2] + self.text, self.inside[1], self.inside[3]
+        height = round(0.62 * (bottom - top))
+        top += round(0.2 * (bottom - top))
+        ramp = palette.displacement_colours(np.linspace(1.0, 0.0, height))
+        strip = np.repeat(ramp[:, None, :], round(0.9 * self.text), axis=1)
+        page.paste(Image.fromarray(strip), (left, top))
+        draw.rectangle((left, top, left + strip.shape[1] - 1, top + height - 1), outline=palette.OUTLINE)
+        font = _font(round(0.85 * self.text))
+        unit, factor = ("mm", 1e3) if bar.largest < 1.0 else ("m", 1.0)
+        step = rounded_length(bar.largest * factor / 4.0)
+        value = 0.0
+        while value <= bar.largest * factor * (1 + 1e-9):
+            y = (
+                top + height - 1 - value / (bar.largest * factor) * (height - 1)
+                if bar.largest > 0
+                else top + height - 1
+            )
+            x = left + strip.shape[1]
+            draw.line((x, y, x + 0.3 * self.text, y), fill=palette.INK, width=max(1, self.text // 14))
+            draw.text((x + 0.5 * self.text, y), f"{value:g}", palette.INK, font, anchor="lm")
+            value += step
+            if bar.largest == 0:
+                break
+        draw.text((left, top - 0.6 * self.text), f"displacement\n[{unit}]", palette.INK, font, anchor="ld")
+
+
+def _swatch(draw: ImageDraw.ImageDraw, key: Key, x: float, y: float, wide: float, text: float) -> None:
+    if key.kind == "area":
+        draw.rectangle((x, y - 0.38 * text, x + wide, y + 0.38 * text), fill=key.colour)
+    elif key.kind == "dot":
+        r = 0.3 * text
+        draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=key.colour)
+    else:
+        half = 0.13 * text if key.kind == "line" else 0.17 * text
+        length = key.length or wide
+        draw.rectangle((x + wide - length, y - half, x + wide, y + half), fill=key.colour)
+
+
+def _fitting(text: str, size: int, room: float, bold: bool = False) -> ImageFont.FreeTypeFont:
+    """The largest font up to ``size`` in which the text fits."""
+    font = _font(size, bold)
+    while size > 7 and font.getlength(text) > room:
+        size -= 1
+        font = _font(size, bold)
+    return font
+
+
+@cache
+def _font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
+    # matplotlib ships the DejaVu fonts, so pictures look the same on every machine.
+    import matplotlib
+
+    folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+    return ImageFont.truetype(str(folder / ("DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf")), max(size, 6))
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The part of the world that a picture shows.
+
+    Attributes
+    ----------
+    low, high : (2,) arrays [m]
+        Opposite corners.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+
+    @property
+    def size(self) -> np.ndarray:
+        """(2,) array [m]: width and height."""
+        return self.high - self.low
+
+    def holding(self, points: np.ndarray) -> Frame:
+        """This frame, grown where points (n, 2) [m] lie beyond it, with a margin."""
+        margin = 0.02 * float(self.size.max())
+        if len(points) == 0:
+            return self
+        return Frame(
+            np.minimum(self.low, points.min(axis=0) - margin), np.maximum(self.high, points.max(axis=0) + margin)
+        )
+
+    def fitted(self, width: int, height: int) -> Frame:
+        """The smallest frame around this one with the proportions of a picture of ``width`` × ``height`` pixels."""
+        centre = (self.low + self.high) / 2.0
+        scale = max(self.size[0] / width, self.size[1] / height)
+        half = np.array([width, height]) * scale / 2.0
+        return Frame(centre - half, centre + half)
+
+
+class _Box:
+    """Bounds of points that come bit by bit."""
+
+    def __init__(self) -> None:
+        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
+
+    def hold(self, points: np.ndarray) -> None:
+        self.low, self.high = np.minimum(self.low, points.min(axis=0)), np.maximum(self.high, points.max(axis=0))
+
+
+def framed(
+    assembly: solver.Assembly, poses: Iterable[solver.Pose], margin: float = 0.04, supports: float = 0.13
+) -> Frame:
+    """The frame in which every free block stays over all poses.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    poses : iterable of solver.Pose
+        As drawn, magnified if they are; gone through once.
+    margin : float
+        Empty border, as a fraction of the larger dimension.
+    supports : float
+        Supports are shown as far as this fraction of the larger dimension beyond the free blocks; drawings have
+        supports of any extent.
+    """
+    free = assembly.free[assembly.block_of_vertex]
+    inner, outer = _Box(), _Box()
+    for pose in poses:
+        corners = solver.moved_vertices(assembly, pose)
+        inner.hold(corners[free] if free.any() else corners)
+        outer.hold(corners[~free] if (~free).any() else corners)
+    low, high = inner.low, inner.high
+    size = float((high - low).max())
+    low = np.minimum(low, np.maximum(outer.low, low - supports * size))
+    high = np.maximum(high, np.minimum(outer.high, high + supports * size))
+    return Frame(low - margin * size, high + margin * size)

@@ -1,0 +1,91 @@
+"""What fills the outlines: triangles of the blocks, hatch lines of the supports."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+import solver
+
+
+def triangles(assembly: solver.Assembly) -> np.ndarray:
+    """(n_triangles, 4) array of VTK cells over the vertices of the assembly; bent outlines included.
+
+    VTK fills a non-convex polygon as if it were convex, so the cutting is done here.
+    """
+    counts, offsets = np.diff(assembly.offsets), assembly.offsets
+    bent = np.zeros(assembly.n_blocks, dtype=bool)
+    bent[assembly.block_of_vertex[~assembly.convex_vertex]] = True
+    fans = []
+    for count in np.unique(counts[~bent]):
+        first = offsets[:-1][~bent & (counts == count)]
+        for k in range(1, count - 1):
+            fans.append(np.column_stack([np.full(len(first), 3), first, first + k, first + k + 1]))
+    for block in np.flatnonzero(bent):
+        fans.append(_ears(assembly.outline(int(block)), int(offsets[block])))
+    return np.concatenate(fans)
+
+
+def cut_into_triangles(outlines: Sequence[np.ndarray]) -> np.ndarray:
+    """(n, 3, 2) array [m]: triangles that fill outlines, (k, 2) arrays [m] counter-clockwise, bent ones included."""
+    cut = [outline[_ears(outline, 0)[:, 1:]] for outline in outlines]
+    return np.concatenate([np.zeros((0, 3, 2)), *cut])
+
+
+def _ears(outline: np.ndarray, first: int) -> np.ndarray:
+    """VTK cells of the triangles of one outline, by cutting ears."""
+    left = list(range(len(outline)))
+    cells = []
+    while len(left) > 3:
+        n = len(left)
+        areas, blocked = np.zeros(n), np.zeros(n, dtype=bool)
+        for k in range(n):
+            a, b, c = (outline[left[(k + j) % n]] for j in (-1, 0, 1))
+            areas[k] = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+            others = outline[[left[(k + j) % n] for j in range(2, n - 1)]]
+            blocked[k] = _any_inside(others, a, b, c)
+        # A point where three corners are in line makes an ear without area: cut it, it draws nothing.
+        ears = np.flatnonzero((areas >= -1e-12 * np.abs(areas).max()) & ~blocked)
+        k = int(ears[0]) if len(ears) else int(np.argmax(areas))
+        cells.append([3, *(first + left[(k + j) % n] for j in (-1, 0, 1))])
+        left.pop(k)
+    cells.append([3, *(first + i for i in left)])
+    return np.array(cells)
+
+
+def _any_inside(points: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
+    inside = np.ones(len(points), dtype=bool)
+    for start, stop in ((a, b), (b, c), (c, a)):
+        along, rest = stop - start, points - start
+        inside &= along[0] * rest[:, 1] - along[1] * rest[:, 0] >= 0.0
+    at_corner = [(points == corner).all(axis=1) for corner in (a, b, c)]
+    return bool((inside & ~np.logical_or.reduce(at_corner)).any())
+
+
+def hatch_lines(
+    assembly: solver.Assembly, supports: np.ndarray, low: np.ndarray, high: np.ndarray, spacing: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the hatch lines inside the supports, (2 n, 2) [m] in the drawing, and the block of each end."""
+    box = shapely.box(*low, *high)
+    points, blocks = [np.zeros((0, 2))], [np.zeros(0, dtype=int)]
+    for block in supports:
+        area = shapely.intersection(shapely.Polygon(assembly.outline(int(block))), box)
+        if area.is_empty:
+            continue
+        x0, y0, x1, y1 = area.bounds
+        # Lines x - y = constant at multiples of the spacing, the same over all supports.
+        step = spacing * np.sqrt(2.0)
+        levels = np.arange(np.ceil((x0 - y1) / step), np.floor((x1 - y0) / step) + 1) * step
+        if len(levels) == 0:
+            continue
+        reach = np.array([[y0, y1]])
+        ends = np.stack([levels[:, None] + reach, np.broadcast_to(reach, (len(levels), 2))], axis=2)
+        parts = shapely.get_parts(shapely.intersection(shapely.linestrings(ends), area))
+        parts = parts[shapely.get_type_id(parts) == 1]
+        parts = parts[shapely.get_num_points(parts) == 2]
+        coordinates = shapely.get_coordinates(parts)
+        points.append(coordinates)
+        blocks.append(np.full(len(coordinates), block))
+    return np.concatenate(points), np.concatenate(blocks)

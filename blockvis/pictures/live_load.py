@@ -1,0 +1,194 @@
+"""The live load of an increment as a picture shows it: where it acts and how much."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import solver
+from blockvis.numbers import force_text
+from blockvis.results.quantities import POSITION, parameter_word
+
+#: Loads below this fraction of the largest are rounding.
+ROUNDING = 1e-5
+
+#: Length of the longest arrow, as a fraction of the picture.
+LENGTH = 0.11
+
+#: More arrows than this are drawn as resultants, a grid cell each, of this fraction of the picture.
+MOST_ARROWS, CELL = 24, 0.12
+
+
+@dataclass(frozen=True)
+class LiveLoad:
+    """Live loads times their multiplier, in the multiplier's sign.
+
+    Attributes
+    ----------
+    points : (n, 2) array [m]
+        Where they act, at ``pose``.
+    forces : (n, 2) array [N]
+    blocks : (n,) int array
+        The block each acts on, or one of those whose resultant it is.
+    pose : solver.Pose
+        Of these blocks alone.
+    """
+
+    points: np.ndarray
+    forces: np.ndarray
+    blocks: np.ndarray
+    pose: solver.Pose
+
+    @classmethod
+    def none(cls) -> LiveLoad:
+        """No load."""
+        nowhere = solver.Pose(np.zeros((0, 2)), np.zeros(0))
+        return cls(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, dtype=int), nowhere)
+
+    def carried(self, pose: solver.Pose) -> np.ndarray:
+        """(n, 2) array [m]: where the points are when all blocks are at another pose."""
+        if len(self.points) == 0:
+            return self.points
+        there = solver.Pose(pose.positions[self.blocks], pose.rotations[self.blocks])
+        return solver.carried(self.points, np.arange(len(self.blocks)), self.pose, there)
+
+    @property
+    def largest(self) -> float:
+        """[N]"""
+        return float(np.hypot(*self.forces.T).max(initial=0.0))
+
+
+def live_load_of(response: solver.Response, increment: solver.Increment, extent: float) -> LiveLoad:
+    """The live load of an increment; none in a settlement, in a fall, or where it is unbounded.
+
+    Parameters
+    ----------
+    response : solver.Response
+    increment : solver.Increment
+    extent : float [m]
+        Of the picture.
+
+    Notes
+    -----
+    It is what the contact forces balance beyond the dead load, so that it is right for every position of a load that
+    moves, whose place is not kept with the increment.
+    """
+    standing = increment.status == solver.Status.EQUILIBRIUM or response.analysis == "limit load"
+    finite = np.isfinite(increment.load_multiplier) and increment.load_multiplier != 0.0
+    if response.analysis == "settlement" or not (standing and finite):
+        return LiveLoad.none()
+    assembly, pose = response.assembly, increment.pose
+    live = -(solver.block_forces(increment.contacts, pose, increment.forces) + response.loads.dead)
+    live[~assembly.free] = 0.0
+    size = np.hypot(*live[:, :2].T)
+    blocks = np.flatnonzero(size > ROUNDING * np.abs(live).max(initial=0.0))
+    if len(blocks) == 0:
+        return LiveLoad.none()
+    points = np.array([_entry(assembly, pose, int(block), live[block]) for block in blocks])
+    forces = live[blocks, :2]
+    if len(blocks) > MOST_ARROWS:
+        return _gathered(points, forces, blocks, pose, CELL * extent)
+    return LiveLoad(points, forces, blocks, _of(blocks, pose))
+
+
+class LiveLoads:
+    """The live loads of some increments as arrows to one scale, which end where the loads act.
+
+    Parameters
+    ----------
+    response : solver.Response
+    increments : iterable of solver.Increment
+        Gone through once.
+    extent : float [m]
+        Of the picture.
+    """
+
+    def __init__(self, response: solver.Response, increments: Iterable[solver.Increment], extent: float) -> None:
+        self._swinging = response.analysis == "limit load" and response.collapse is None
+        self._loads: dict[tuple[int, float], LiveLoad] = {}
+        if response.analysis != "settlement":
+            # Frames of a swinging mechanism have the load of their limit state.
+            states = {_place(state): state for state in response.path}
+            for increment in increments:
+                place = _place(increment)
+                if place not in self._loads:
+                    self._loads[place] = live_load_of(response, states.get(place, increment), extent)
+        self._places = parameter_word(response) == POSITION and len(self._loads) > 1
+        if self._places:
+            # From place to place the limit differs a hundredfold; what shall be seen is where the load is.
+            for place, load in self._loads.items():
+                self._loads[place] = replace(load, forces=load.forces / (load.largest or 1.0))
+        self.largest = max((load.largest for load in self._loads.values()), default=0.0)
+        self._scale = LENGTH * extent / (self.largest or 1.0)
+
+    @property
+    def words(self) -> str:
+        """For the legend."""
+        scale = " (not to scale)" if self._places else f", longest arrow {force_text(self.largest)}"
+        return f"live load · α{scale}"
+
+    @property
+    def tails(self) -> np.ndarray:
+        """(n, 2) array [m]: where the arrows of all increments begin, at their poses."""
+        tails = [load.points - load.forces * self._scale for load in self._loads.values()]
+        return np.concatenate([np.zeros((0, 2)), *tails])
+
+    def arrows(self, increment: solver.Increment, pose: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
+        """Tails and tips (n, 2) [m] of one of the increments, its blocks at a pose; none in a fall.
+
+        Parameters
+        ----------
+        increment : solver.Increment
+        pose : solver.Pose
+        """
+        nothing = np.zeros((0, 2))
+        if self.largest == 0.0 or (increment.status == solver.Status.FALLING and not self._swinging):
+            return nothing, nothing
+        load = self._loads[_place(increment)]
+        tips = load.carried(pose)
+        return tips - load.forces * self._scale, tips
+
+
+def _place(increment: solver.Increment) -> tuple[int, float]:
+    return increment.phase, increment.settlement
+
+
+def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.ndarray) -> np.ndarray:
+    """Where the line of a load enters its block; its centroid where the load acts there, as a weight does."""
+    centre, force, moment = pose.positions[block], load[:2], float(load[2])
+    size = float(np.hypot(*force))
+    if abs(moment) < 1e-3 * size * assembly.block_size:
+        return centre
+    through = centre + moment / size**2 * np.array([force[1], -force[0]])
+    corners = solver.moved_vertices(assembly, pose)[assembly.offsets[block] : assembly.offsets[block + 1]]
+    unit = force / size
+    across = np.array([-unit[1], unit[0]])
+    a = (corners - through) @ across
+    b = np.roll(a, -1)
+    crossing = np.flatnonzero((a <= 0.0) != (b <= 0.0))
+    if len(crossing) == 0:
+        # A moment too large for its force: its line passes beside the block.
+        return centre
+    along = (corners - through) @ unit
+    following = np.roll(along, -1)
+    part = a[crossing] / (a[crossing] - b[crossing])
+    depth = along[crossing] + part * (following[crossing] - along[crossing])
+    return np.asarray(through + depth.min() * unit)
+
+
+def _gathered(points: np.ndarray, forces: np.ndarray, blocks: np.ndarray, pose: solver.Pose, cell: float) -> LiveLoad:
+    """Resultants of the loads in each cell of a grid, where their weights meet."""
+    place = np.floor((points - points.min(axis=0)) / cell).astype(np.int64)
+    _, first, which = np.unique(place, axis=0, return_index=True, return_inverse=True)
+    which, n = which.ravel(), len(first)
+    size = np.hypot(*forces.T)
+    weight = np.bincount(which, weights=size, minlength=n)
+    sums = [np.bincount(which, weights=forces[:, k], minlength=n) for k in (0, 1)]
+    middles = [np.bincount(which, weights=size * points[:, k], minlength=n) / weight for k in (0, 1)]
+    return LiveLoad(np.stack(middles, axis=1), np.stack(sums, axis=1), blocks[first], _of(blocks[first], pose))
+
+
+def _of(blocks: np.ndarray, pose: solver.Pose) -> solver.Pose:
+    return solver.Pose(pose.positions[blocks], pose.rotations[blocks])

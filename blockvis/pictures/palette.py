@@ -1,0 +1,105 @@
+"""The colours of all pictures, so that a crack looks the same in a still, in the animation and on the page."""
+
+from __future__ import annotations
+
+import numpy as np
+
+PAPER = (255, 255, 255)
+INK = (38, 38, 38)
+FAINT = (120, 120, 120)
+OUTLINE = (92, 82, 68)
+SUPPORT = (206, 209, 213)
+HATCH = (140, 146, 153)
+GHOST = (165, 165, 165)
+OPEN = (226, 78, 27)
+SLIDING = (126, 55, 178)
+FORCE = (20, 92, 168)
+HINGE = (17, 17, 17)
+SETTLEMENT = (0, 121, 107)
+LIVE = (190, 24, 118)
+WARNING = (190, 30, 30)
+
+#: Fills by material, in the order of their sorted names: sandstone, brick, slate, tuff, moss, ash.
+STONES = np.array(
+    [(228, 217, 194), (214, 176, 152), (190, 198, 204), (222, 206, 154), (190, 203, 176), (212, 200, 208)], dtype=float
+)
+
+#: Words in the name of a material that choose its stone; languages of the drawings we have met.
+HINTS = {1: ("brick", "mattone", "backstein", "brique", "ladrillo"), 2: ("slate", "granite"), 3: ("tuff", "tufo")}
+
+#: Tints of the parts of a mechanism, so that neighbours differ: blue, green, violet, ochre, rose, teal.
+PARTS = np.array(
+    [(151, 190, 224), (172, 208, 160), (196, 178, 222), (236, 206, 136), (231, 178, 186), (150, 208, 204)], dtype=float
+)
+
+#: Blocks of one material differ in lightness by up to this fraction, as stones do; it also tells neighbours apart.
+SHADE = 0.035
+
+#: Pale to deep blue-green, even in lightness, and light enough at its end for outlines to show.
+RAMP = np.array(
+    [
+        (240, 243, 243),
+        (205, 228, 231),
+        (168, 212, 218),
+        (131, 194, 204),
+        (101, 174, 188),
+        (78, 151, 170),
+        (58, 128, 151),
+        (45, 105, 131),
+    ],
+    dtype=float,
+)  # fmt: skip
+
+
+def block_colours(materials: tuple[str, ...], free: np.ndarray) -> np.ndarray:
+    """(n_blocks, 3) uint8 array: fill of each block by material, supports grey.
+
+    Parameters
+    ----------
+    materials : tuple of str
+        One per block.
+    free : (n_blocks,) bool array
+    """
+    # Only materials of free blocks take a stone: a support's own material shall not shift the others.
+    kinds = sorted({m for m, is_free in zip(materials, free, strict=True) if is_free})
+    hinted = {kind: k for kind in kinds for k, words in HINTS.items() if any(w in kind.lower() for w in words)}
+    rest = [k for k in range(len(STONES)) if k not in hinted.values()]
+    others = [kind for kind in kinds if kind not in hinted]
+    number = hinted | {kind: rest[k % len(rest)] for k, kind in enumerate(others)}
+    colours = STONES[[number.get(m, 0) for m in materials]]
+    # A fixed low-discrepancy sequence: the same picture every time, neighbours never alike.
+    shade = 1.0 + SHADE * (2.0 * ((np.arange(len(materials)) * 0.6180339887) % 1.0) - 1.0)
+    colours = np.where(free[:, None], colours * shade[:, None], SUPPORT)
+    return np.clip(np.rint(colours), 0, 255).astype(np.uint8)
+
+
+def part_colours(fill: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """(n_blocks, 3) uint8 array: fills with the parts of a mechanism tinted.
+
+    Parameters
+    ----------
+    fill : (n_blocks, 3) uint8 array
+    parts : (n_blocks,) int array
+        -1 where a block stands still.
+    """
+    tint = PARTS[parts % len(PARTS)]
+    return np.where(parts[:, None] >= 0, np.rint(0.3 * fill + 0.7 * tint), fill).astype(np.uint8)
+
+
+def displacement_colours(fraction: np.ndarray) -> np.ndarray:
+    """(n, 3) uint8 array: colours of the displacement scale, ``fraction`` (n,) from 0 to 1, clamped."""
+    place = np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0) * (len(RAMP) - 1)
+    below = np.minimum(place.astype(int), len(RAMP) - 2)
+    rest = (place - below)[:, None]
+    return np.rint(RAMP[below] * (1.0 - rest) + RAMP[below + 1] * rest).astype(np.uint8)
+
+
+def hexadecimal(colour: tuple[int, int, int]) -> str:
+    """The colour as CSS and matplotlib write it.
+
+    Examples
+    --------
+    >>> hexadecimal((255, 0, 16))
+    '#ff0010'
+    """
+    return "#{:02x}{:02x}{:02x}".format(*colour)

@@ -1,0 +1,139 @@
+"""A script for ParaView that opens the results folder and colours it as the pictures do."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from string import Template
+
+from blockvis.atomic_files import write_whole
+
+from . import palette
+
+_SCRIPT = Template('''\
+"""Opens these results in ParaView: View > Python Shell > Run Script, or paraview --script=paraview_colours.py
+
+Blocks are coloured by displacement [m], with their outlines; hinges and sliding points by state, with arrows
+of the contact forces [N]. Cells are triangulated first: ParaView fills bent polygons wrongly otherwise.
+"""
+
+import os
+
+from paraview.simple import *
+
+here = os.path.dirname(os.path.abspath(__file__)) if "__file__" in globals() else os.getcwd()
+view = GetActiveViewOrCreate("RenderView")
+view.Background = [1.0, 1.0, 1.0]
+view.UseColorPaletteForBackground = 0
+view.OrientationAxesVisibility = 0
+view.InteractionMode = "2D"
+
+blocks = OpenDataFile(os.path.join(here, "blocks.pvd"))
+contacts = OpenDataFile(os.path.join(here, "contacts.pvd"))
+RenameSource("blocks", blocks)
+RenameSource("contact points", contacts)
+scene = GetAnimationScene()
+scene.UpdateAnimationUsingDataTimeSteps()
+times = list(blocks.TimestepValues) if hasattr(blocks.TimestepValues, "__len__") else [blocks.TimestepValues]
+last = times[-1] if times else 0.0
+scene.AnimationTime = last
+UpdatePipeline(last, blocks)
+UpdatePipeline(last, contacts)
+
+surface = ExtractSurface(Input=blocks)
+RenameSource("blocks, surface", surface)
+filled = Triangulate(Input=surface)
+RenameSource("blocks, filled", filled)
+faces = Show(filled, view)
+faces.Representation = "Surface"
+faces.Ambient, faces.Diffuse, faces.Specular = 1.0, 0.0, 0.0
+ColorBy(faces, ("CELLS", "displacement", "Magnitude"))
+scale = GetColorTransferFunction("displacement")
+scale.RGBPoints = [$ramp]
+scale.ColorSpace = "RGB"
+UpdatePipeline(last, filled)
+scale.RescaleTransferFunction(0.0, max(filled.CellData["displacement"].GetRange(-1)[1], 1e-12))
+faces.SetScalarBarVisibility(view, True)
+bar = GetScalarBar(scale, view)
+bar.Title, bar.ComponentTitle = "displacement [m]", ""
+bar.TitleColor = bar.LabelColor = [0.1, 0.1, 0.1]
+bar.TitleFontSize = bar.LabelFontSize = 12
+bar.AutomaticLabelFormat, bar.LabelFormat, bar.RangeLabelFormat = 0, "%.3g", "%.3g"
+bar.WindowLocation, bar.ScalarBarLength = "Lower Right Corner", 0.35
+
+edges = ExtractEdges(Input=blocks)
+RenameSource("outlines", edges)
+outlines = Show(edges, view)
+ColorBy(outlines, None)
+outlines.AmbientColor = outlines.DiffuseColor = [$outline]
+outlines.LineWidth = 1.0
+
+carrying = Threshold(Input=contacts, Scalars=["POINTS", "state"])
+carrying.LowerThreshold, carrying.UpperThreshold = 1.0, 3.0
+RenameSource("contact points that carry force", carrying)
+moving = Threshold(Input=contacts, Scalars=["POINTS", "state"])
+moving.LowerThreshold, moving.UpperThreshold = 2.0, 3.0
+RenameSource("hinges and sliding points", moving)
+points = Show(moving, view)
+points.Representation = "Points"
+points.PointSize = 5.0
+ColorBy(points, ("POINTS", "state"))
+states = GetColorTransferFunction("state")
+states.InterpretValuesAsCategories = 1
+states.Annotations = ["0", "open", "1", "sticking", "2", "sliding", "3", "hinging"]
+states.IndexedColors = [$open, $sticking, $sliding, $hinge]
+points.SetScalarBarVisibility(view, True)
+state_bar = GetScalarBar(states, view)
+state_bar.Title, state_bar.ComponentTitle = "contact", ""
+state_bar.TitleColor = state_bar.LabelColor = [0.1, 0.1, 0.1]
+state_bar.TitleFontSize = state_bar.LabelFontSize = 12
+state_bar.WindowLocation, state_bar.ScalarBarLength = "Upper Right Corner", 0.25
+
+forces = Glyph(Input=carrying, GlyphType="Arrow")
+forces.OrientationArray, forces.ScaleArray = ["POINTS", "force"], ["POINTS", "force"]
+UpdatePipeline(last, carrying)
+largest = carrying.PointData["normal_force"].GetRange()[1] if carrying.PointData.GetNumberOfArrays() else 0.0
+low, high = blocks.GetDataInformation().GetBounds()[0:2]
+forces.ScaleFactor = 0.1 * (high - low) / largest if largest > 0 else 1.0
+forces.GlyphMode = "All Points"
+RenameSource("contact forces", forces)
+arrows = Show(forces, view)
+arrows.ColorArrayName = ["POINTS", ""]
+arrows.AmbientColor = arrows.DiffuseColor = [$force]
+arrows.Ambient, arrows.Diffuse = 1.0, 0.0
+
+ResetCamera(view)
+Render(view)
+''')
+
+
+def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
+    """Writes ``paraview_colours.py`` beside ``blocks.pvd`` and ``contacts.pvd``.
+
+    Parameters
+    ----------
+    folder : path
+        The results folder.
+
+    Returns
+    -------
+    pathlib.Path
+    """
+    path = Path(folder) / "paraview_colours.py"
+    ramp = []
+    for k, (r, g, b) in enumerate(palette.RAMP):
+        ramp += [k / (len(palette.RAMP) - 1), r / 255.0, g / 255.0, b / 255.0]
+    text = _SCRIPT.substitute(
+        ramp=", ".join(f"{v:.4f}" for v in ramp),
+        outline=_fractions(palette.OUTLINE),
+        open=_fractions(palette.OPEN),
+        sticking=_fractions(palette.FAINT),
+        sliding=_fractions(palette.SLIDING),
+        hinge=_fractions(palette.HINGE),
+        force=_fractions(palette.FORCE),
+    )
+    return write_whole(path, text)
+
+
+def _fractions(colour: tuple[int, int, int]) -> str:
+    return ", ".join(f"{c / 255.0:.4f}" for c in colour)

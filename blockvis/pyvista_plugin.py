@@ -1,0 +1,97 @@
+"""Blockvis as a guest of PyVista: layouts through ``pyvista.read`` and ``save``, and ``mesh.blockvis``.
+
+    import pyvista, blockvis.pyvista_plugin
+    mesh = pyvista.read("wall.dxf")
+    response = mesh.blockvis.settle({"right": "moving", "left": "fixed"}, direction=(1, 0), friction_coefficient=0.6)
+
+Importing this module registers everything. What PyVista reads or writes itself stays its own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pyvista as pv
+
+import solver
+
+from .formats.pyvista_files import dataset_of, layout_of_dataset
+from .formats.read import read_layout, write_layout
+from .layout.assemble import assemble
+from .layout.layout import Layout
+
+
+def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:
+    """A layout as a dataset of one polygon per block; options are those of ``blockvis.formats.read.read_layout``."""
+    return dataset_of(read_layout(path, **options))
+
+
+def _writer(dataset: Any, path: str, **options: Any) -> None:
+    """Writes the blocks of a dataset to a layout file."""
+    write_layout(layout_of_dataset(dataset), path)
+
+
+def _registered(register: Any, suffixes: Sequence[str], handler: Any) -> tuple[str, ...]:
+    taken = []
+    for suffix in suffixes:
+        # PyVista refuses a suffix that it serves itself; then it stays PyVista's.
+        with contextlib.suppress(ValueError):
+            register(suffix, handler)
+            taken.append(suffix)
+    return tuple(taken)
+
+
+#: Suffixes that ``pyvista.read`` now takes through blockvis.
+READS = _registered(pv.register_reader, (".dxf", ".json", ".msh", ".svg"), _reader)
+
+#: Suffixes that ``dataset.save`` now takes through blockvis.
+WRITES = _registered(pv.register_writer, (".dxf", ".json", ".msh", ".svg"), _writer)
+
+
+class BlockvisAccessor:
+    """The blocks of a polygon mesh: ``mesh.blockvis``.
+
+    A cell array ``block_id`` says which cells are one block; without it every polygon is one, and triangles that
+    share points are one. ``name``, ``role``, ``material``, ``density`` and ``thickness`` are used where present.
+    """
+
+    def __init__(self, mesh: Any) -> None:
+        self._mesh = mesh
+
+    def layout(self) -> Layout:
+        """The blocks as a drawing, lengths taken as m."""
+        return layout_of_dataset(self._mesh)
+
+    def assembly(self, roles: Mapping[str, str] | None = None, **options: Any) -> solver.Assembly:
+        """The blocks as an assembly; the options are those of :func:`blockvis.layout.assemble.assemble`."""
+        return assemble(self.layout(), roles=roles, **options)
+
+    def settle(
+        self,
+        roles: Mapping[str, str] | None = None,
+        *,
+        direction: tuple[float, float] = (0.0, -1.0),
+        increment: float = 0.01,
+        limit: float = 0.5,
+        friction_coefficient: float = 0.6,
+        **options: Any,
+    ) -> solver.Response:
+        """Settles the moving supports until the structure falls.
+
+        Parameters
+        ----------
+        roles : mapping of str to {"free", "fixed", "moving"}, optional
+        direction : (2,) tuple
+            Of the moving supports.
+        increment, limit : float [m]
+        friction_coefficient : float
+        **options
+            Those of :func:`blockvis.layout.assemble.assemble`: supports, joint_thickness, density ...
+        """
+        motion = solver.Settlement(direction=direction, increment=increment, limit=limit)
+        return solver.settle(self.assembly(roles, **options), motion, friction_coefficient=friction_coefficient)
+
+
+pv.register_dataset_accessor("blockvis", pv.DataSet)(BlockvisAccessor)

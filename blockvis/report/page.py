@@ -1,0 +1,450 @@
+"""The page that plays: one self-contained HTML file with the mechanism, the curve, the numbers and the case."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import os
+import zlib
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+import solver
+from blockvis.atomic_files import write_whole
+from blockvis.numbers import force_text, rounded_length
+from blockvis.pictures import annotations as marks
+from blockvis.pictures import palette
+from blockvis.pictures.captions import (
+    MOST_OVER_LOWEST,
+    badge_of,
+    force_unit,
+    parameter_label,
+    parameter_unit,
+    state_text,
+    value_label,
+)
+from blockvis.pictures.frame import Frame, framed
+from blockvis.pictures.live_load import LiveLoads
+from blockvis.results.quantities import (
+    POSITION,
+    governing,
+    parameter_word,
+    path_parameters,
+    path_values,
+    reads_multipliers,
+)
+from blockvis.results.tables import limit_states
+
+#: Increments beyond this many are thinned out evenly; the page stays below 2 MB for a thousand blocks. Of more than
+#: four thousand blocks fewer are shown, so that poses times blocks stay what a browser can hold.
+MOST_FRAMES, MOST_POSES, FEWEST_FRAMES = 160, 640_000, 24
+
+#: Lengths are stored in this fraction of the extent of the structure, rotations in this many radians.
+FINENESS, TURN_UNIT = 1e-6, 1e-6
+
+#: Forces are stored in this fraction of the largest.
+FORCE_FINENESS = 1e-3
+
+#: Seconds the path takes at even settlement, and each frame of the fall.
+PATH_SECONDS, FALL_SECONDS = 6.0, 0.06
+
+
+def write_report(
+    response: solver.Response, path: str | os.PathLike[str], case_text: str = "", *, title: str = ""
+) -> Path:
+    """Writes the page.
+
+    Parameters
+    ----------
+    response : solver.Response
+    path : path
+    case_text : str
+        The case file, shown as it is.
+    title : str
+        Of the page; what happened, where it is not given.
+
+    Returns
+    -------
+    pathlib.Path
+    """
+    return write_whole(path, report_html(response, case_text, title=title))
+
+
+def report_html(response: solver.Response, case_text: str = "", *, title: str = "") -> str:
+    """The page as text; parameters as those of :func:`write_report`.
+
+    Notes
+    -----
+    Everything that comes from a file (names, materials, the case) is escaped or goes through ``textContent``; the page
+    forbids itself any request.
+    """
+    if not response.increments:
+        raise ValueError(f"there is no increment to show: {response.message or response.stop}")
+    page = files("blockvis") / "report"
+    # No "<" may survive in the data: a name with "</script>" in it would end the script.
+    model = json.dumps(_model(response), ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
+    return Template((page / "player.html").read_text(encoding="utf-8")).substitute(
+        title=html.escape(title or _title(response)),
+        badge=html.escape(badge_of(response)),
+        style=(page / "player.css").read_text(encoding="utf-8"),
+        script=(page / "player.js").read_text(encoding="utf-8"),
+        summary=_rows(_summary(response)),
+        certificate=_rows(_certificate(response)),
+        case=html.escape(case_text or "no case file: the analysis was called from Python"),
+        case_open=" open" if case_text else "",
+        model=model,
+    )
+
+
+def _model(response: solver.Response) -> dict[str, Any]:
+    assembly = response.assembly
+    shown = _thinned(response.increments, assembly.n_blocks)
+    frame, largest = _surveyed(assembly, shown)
+    live = LiveLoads(response, shown, float(frame.size.max()))
+    frame = frame.holding(live.tails)
+    # Coordinates far from the origin (UTM) would waste the digits.
+    origin = np.round(frame.low, 3)
+    unit = FINENESS * float(frame.size.max())
+    tables = _Tables(assembly, shown, origin, unit, largest)
+    force_length = tables.force_length(assembly.block_size, float(frame.size.max()))
+    shown_force = rounded_length(largest)
+    packed = _packed_geometry(assembly, origin, unit) | tables.packed() | _packed_live(live, shown, origin, unit)
+    arrows = [["area", live.words, palette.hexadecimal(palette.LIVE)]] if live.largest > 0.0 else []
+    materials = list(assembly.materials)
+    roles = {role: number for number, role in enumerate(solver.ROLES)}
+    fills = palette.block_colours(assembly.materials, assembly.free)
+    return {
+        "unit": unit,
+        "turn_unit": TURN_UNIT,
+        "origin": origin.tolist(),
+        "bounds": [*(frame.low - origin).tolist(), *(frame.high - origin).tolist()],
+        "block_size": assembly.block_size,
+        "smallest_opening": marks.SMALLEST_OPENING * assembly.block_size,
+        "widest": [marks.WIDEST_STANDING * assembly.block_size, marks.WIDEST_FALLING, marks.STEEPEST_FALLING],
+        "names": list(assembly.names),
+        "materials": materials,
+        "roles": [roles[str(role)] for role in assembly.roles],
+        "fills": [palette.hexadecimal((int(r), int(g), int(b))) for r, g, b in fills],
+        "colours": {
+            name: palette.hexadecimal(getattr(palette, name.upper()))
+            for name in (
+                "ink", "outline", "support", "hatch", "open", "sliding", "force", "hinge", "settlement", "warning",
+                "live",
+            )
+        },
+        "frames": _frames(response, shown),
+        "times": _times(shown),
+        "curve": _curve(response),
+        "force_unit": FORCE_FINENESS * largest,
+        "force_length": force_length,
+        "force_scale": [shown_force, force_text(shown_force)],
+        "legend": [
+            ["area", "open joint", palette.hexadecimal(palette.OPEN)],
+            ["dot", "hinge", palette.hexadecimal(palette.HINGE)],
+            ["dot", "sliding", palette.hexadecimal(palette.SLIDING)],
+            ["area", "resultant of a joint", palette.hexadecimal(palette.FORCE)],
+            *arrows,
+        ],
+        "packed": packed,
+    }  # fmt: skip
+
+
+def _thinned(increments: tuple[solver.Increment, ...], n_blocks: int) -> list[solver.Increment]:
+    """All increments, or an even choice of them with the last equilibrium kept."""
+    most = max(FEWEST_FRAMES, min(MOST_FRAMES, MOST_POSES // n_blocks))
+    if len(increments) <= most:
+        return list(increments)
+    last = max((k for k, i in enumerate(increments) if i.status == solver.Status.EQUILIBRIUM), default=0)
+    chosen = np.unique([*np.linspace(0, len(increments) - 1, most - 1).round().astype(int), last])
+    return [increments[k] for k in chosen]
+
+
+def _surveyed(assembly: solver.Assembly, shown: list[solver.Increment]) -> tuple[Frame, float]:
+    """The frame that holds all poses, and the largest resultant of a joint in equilibrium [N], or 1."""
+    largest = 0.0
+
+    def poses() -> Iterator[solver.Pose]:
+        nonlocal largest
+        yield solver.Pose.initial(assembly)
+        for increment in shown:
+            yield increment.pose
+            if increment.status != solver.Status.FALLING:
+                largest = max(largest, float(np.hypot(*marks.resultants(increment)[1].T).max(initial=0.0)))
+
+    frame = framed(assembly, poses())
+    return frame, largest or 1.0
+
+
+def _packed(values: np.ndarray, rows: int) -> dict[str, Any]:
+    """Integers as differences along the first axis, split in planes of bytes, deflated, in base 64."""
+    table = np.asarray(values).astype("<i4").reshape(rows, -1) if rows else np.zeros((0, 1), dtype="<i4")
+    steps = np.diff(table, axis=0, prepend=np.zeros((1, table.shape[1]), dtype="<i4"))
+    planes = steps.reshape(-1, 1).view(np.uint8).T
+    data = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
+    return {"rows": rows, "columns": table.shape[1], "data": data}
+
+
+def _rounded(values: np.ndarray, unit: float) -> np.ndarray:
+    return np.rint(np.asarray(values, dtype=float) / unit).astype(np.int64).astype(np.int32)
+
+
+def _packed_geometry(assembly: solver.Assembly, origin: np.ndarray, unit: float) -> dict[str, Any]:
+    joints = marks.drawn_joints(assembly)
+    n = len(joints.block_a)
+    return {
+        "vertices": _packed(_rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
+        "offsets": _packed(assembly.offsets, len(assembly.offsets)),
+        "centroids": _packed(_rounded(assembly.centroids - origin, unit), assembly.n_blocks),
+        "joint_blocks": _packed(np.stack([joints.block_a, joints.block_b], axis=1), n),
+        "joint_ends": _packed(_rounded(joints.ends - origin, unit), n),
+    }
+
+
+class _Tables:
+    """What changes from frame to frame, as integers: motion, resultants of the joints, hinges (1), sliding points (2).
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    shown : list of solver.Increment
+        Gone through once.
+    origin : (2,) array [m]
+    unit : float [m]
+    largest : float [N]
+        Resultant; a part of it is the unit of force.
+    """
+
+    def __init__(
+        self, assembly: solver.Assembly, shown: list[solver.Increment], origin: np.ndarray, unit: float, largest: float
+    ) -> None:
+        # A thousandth of the picture is where a force sits; finer places would only fill the file.
+        coarse = round(FORCE_FINENESS / FINENESS / 4.0)
+        self.n, self.largest = len(shown), largest
+        self.travel, self.turn = [], []
+        self.places, self.vectors, self.sizes = _empty(2), _empty(2), [np.zeros(0)]
+        self.mark_places, self.mark_kinds = _empty(2), [np.zeros(0, dtype=np.int32)]
+        for increment in shown:
+            moved = increment.pose.displacements(assembly)
+            self.travel.append(_rounded(moved[:, :2], unit))
+            self.turn.append(_rounded(moved[:, 2], TURN_UNIT))
+            points, forces, _ = marks.resultants(increment)
+            size = np.hypot(*forces.T) * (increment.status != solver.Status.FALLING)
+            kept = size > marks.SMALLEST_RESULTANT * largest
+            self.places.append(_rounded(points[kept] - origin, unit * coarse) * coarse)
+            self.vectors.append(_rounded(forces[kept], FORCE_FINENESS * largest))
+            self.sizes.append(size[kept])
+            hinging, sliding = increment.states == solver.ContactState.HINGING, marks.slipping(increment)
+            places = np.concatenate([increment.contacts.points[hinging], increment.contacts.points[sliding]])
+            self.mark_places.append(_rounded(places - origin, unit))
+            self.mark_kinds.append(np.repeat([1, 2], [hinging.sum(), sliding.sum()]))
+
+    def force_length(self, block_size: float, extent: float) -> float:
+        """Length per force [m/N]."""
+        sizes, largest = np.concatenate(self.sizes), self.largest
+        usual = float(np.quantile(sizes, 0.9)) if len(sizes) else largest
+        return min(max(1.5 * block_size, 0.015 * extent) / usual, 0.12 * extent / largest)
+
+    def packed(self) -> dict[str, Any]:
+        """As the page unpacks them."""
+        forces, found = (np.cumsum([len(k) for k in rows]).tolist() for rows in (self.sizes, self.mark_kinds))
+        return {
+            "travel": _packed(np.stack(self.travel), self.n),
+            "turn": _packed(np.stack(self.turn), self.n),
+            "force_first": _packed(forces, len(forces)),
+            "force_place": _packed(np.concatenate(self.places), forces[-1]),
+            "force_vector": _packed(np.concatenate(self.vectors), forces[-1]),
+            "mark_first": _packed(found, len(found)),
+            "mark_place": _packed(np.concatenate(self.mark_places), found[-1]),
+            "mark_kind": _packed(np.concatenate(self.mark_kinds), found[-1]),
+        }
+
+
+def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
+    """Arrows of the live load, frame after frame; no more than their first numbers where there are none."""
+    found = [
+        live.arrows(increment, increment.pose) if live.largest > 0.0 else (np.zeros((0, 2)),) * 2 for increment in shown
+    ]
+    first = np.cumsum([0, *(len(tips) for _, tips in found)]).tolist()
+    tails, tips = (np.concatenate([np.zeros((0, 2)), *ends]) for ends in zip(*found, strict=True))
+    return {
+        "live_first": _packed(first, len(first)),
+        "live_tail": _packed(_rounded(tails - origin, unit), first[-1]),
+        "live_tip": _packed(_rounded(tips - origin, unit), first[-1]),
+    }
+
+
+def _empty(columns: int) -> list[np.ndarray]:
+    return [np.zeros((0, columns), dtype=np.int32)]
+
+
+def _frames(response: solver.Response, shown: list[solver.Increment]) -> list[dict[str, Any]]:
+    place = {id(increment): k for k, increment in enumerate(response.path)}
+    frames = []
+    for increment in shown:
+        falling = increment.status == solver.Status.FALLING
+        caption = state_text(increment, response).replace("   ·   ", "  ·  ")
+        if len(response.settlements) > 1:
+            caption += f"  ·  phase {increment.phase + 1}"
+        frames.append({"caption": caption, "falling": falling, "curve": place.get(id(increment), len(response.path))})
+    return frames
+
+
+def _times(shown: list[solver.Increment]) -> list[float]:
+    """Seconds at which each frame plays: even settlement, then the fall."""
+    path = path_parameters(tuple(i for i in shown if i.status != solver.Status.FALLING))
+    path = path - path[:1]
+    total = float(path[-1]) if len(path) and path[-1] > 0 else 1.0
+    times: list[float] = []
+    for k in range(len(shown)):
+        if k < len(path):
+            times.append(max(PATH_SECONDS * float(path[k]) / total, times[-1] + 0.02 if times else 0.0))
+        else:
+            pause = 0.6 if k == len(path) and times else FALL_SECONDS
+            times.append((times[-1] + pause) if times else 0.0)
+    return [round(t, 4) for t in times]
+
+
+def _curve(response: solver.Response) -> dict[str, Any]:
+    per_length, _ = parameter_unit(response)
+    factor, _ = force_unit(response)
+    x = path_parameters(response.path) * per_length
+    y = path_values(response) / factor
+    known = y[np.isfinite(y)]
+    low, high = min(0.0, float(known.min(initial=0.0))), max(0.0, float(known.max(initial=0.0)))
+    if parameter_word(response) == POSITION and len(known):
+        high = min(high, MOST_OVER_LOWEST * max(float(known.min()), 0.0) or high)
+    high = high + 0.08 * (high - low) if high > low else 1.0
+    collapse = None
+    if response.collapse is not None and len(x):
+        start = float(x[-1]) - per_length * response.path[-1].settlement
+        collapse = start + per_length * response.collapse.displacement
+    first = min(0.0, float(x.min(initial=0.0))) * 1.02
+    widest = max([float(x.max(initial=0.0)), collapse or 0.0]) * 1.02 or 1.0
+
+    def ticks(low: float, high: float, n: int) -> list[float]:
+        return [float(f"{t:.6g}") for t in MaxNLocator(n).tick_values(low, high) if low <= t <= high]
+
+    return {
+        "settlement": [float(f"{v:.7g}") for v in x],
+        "reaction": [float(f"{v:.7g}") if np.isfinite(v) else None for v in y],
+        "collapse": collapse,
+        "x_min": first,
+        "x_max": widest,
+        "y_min": low,
+        "y_max": high,
+        "x_ticks": ticks(first, widest, 5),
+        "y_ticks": ticks(low, high, 5),
+        "x_label": parameter_label(response),
+        "y_label": value_label(response),
+    }
+
+
+def _title(response: solver.Response) -> str:
+    if reads_multipliers(response):
+        return _capacity_title(response)
+    if response.collapse is not None:
+        return f"Collapse at a settlement of {response.collapse.displacement:.5g} {response.collapse.unit}"
+    return {
+        solver.Status.LIMIT_REACHED: "Standing at the end of the settlement",
+        solver.Status.NO_INITIAL_EQUILIBRIUM: "No equilibrium before any settlement",
+        solver.Status.SOLVER_FAILED: "The solver failed; the path up to there",
+    }.get(response.stop, "Settling masonry")
+
+
+def _capacity_title(response: solver.Response) -> str:
+    state = governing(response)
+    if response.analysis == "pushover":
+        if response.collapse is not None:
+            return f"No capacity left at a control displacement of {response.collapse.displacement:.5g} m"
+        return f"Pushover: {response.stop}"
+    if state is None or not np.isfinite(state.load_multiplier):
+        return response.message or f"Limit load: {response.stop}"
+    where = ""
+    if len(response.path) > 1:
+        where = (
+            f" at {parameter_word(response)} {state.settlement:.5g} {parameter_unit(response)[1].replace('mm', 'm')}"
+        )
+    return f"Limit load: α = {state.load_multiplier:.5g}{where}"
+
+
+def _capacity_rows(response: solver.Response) -> list[tuple[str, str]]:
+    """The numbers of a limit load or a pushover."""
+    rows, path, state = [], response.path, governing(response)
+    if response.collapse is not None:
+        c = response.collapse
+        what = "zero capacity at" if response.analysis == "pushover" else "settlement alone: collapse at"
+        rows.append((what, f"{c.displacement:.6g} {c.unit}, between {c.bracket[0]:.6g} and {c.bracket[1]:.6g}"))
+    if response.analysis == "pushover" and path:
+        values = path_values(response)
+        rows.append(("load multiplier α at the start", f"{values[0]:.6g}"))
+        rows.append(("largest, last", f"{np.nanmax(values):.6g}, {values[-1]:.6g}"))
+    elif state is not None and np.isfinite(state.load_multiplier):
+        limit = next((limit for limit, told in limit_states(response) if told is state), None)
+        rows.append(("load multiplier α", f"{state.load_multiplier:.6g}"))
+        if limit is not None:
+            rows.append(("static, kinematic value", f"{limit.bounds[0]:.7g}, {limit.bounds[1]:.7g}"))
+            rows.append(("friction", limit.flow))
+            rows.append(("live load at α = 1", force_text(limit.live_force)))
+        if parameter_word(response) == POSITION and len(path) > 1:
+            rows.append(("lowest of", f"{len(path)} positions, at x = {state.settlement:.5g} m"))
+        elif response.settlements:
+            rows.append(("after a settlement of", f"{state.settlement:.6g} {response.settlements[-1].unit}"))
+            rows.append(("before it", f"{path[0].load_multiplier:.6g}"))
+    return rows
+
+
+def _summary(response: solver.Response) -> list[tuple[str, str]]:
+    assembly, path, weight = response.assembly, response.path, response.total_weight
+    moment = bool(response.settlements) and response.settlements[0].unit == "rad"
+
+    def reaction(value: float) -> str:
+        over = "" if moment or weight <= 0 else f" = {value / weight:.4f} W"
+        return force_text(value, moment) + over
+
+    rows = [("analysis", response.analysis), ("status", str(response.stop))]
+    if reads_multipliers(response):
+        rows += _capacity_rows(response)
+    elif response.collapse is not None:
+        c = response.collapse
+        rows.append(("collapse displacement", f"{c.displacement:.6g} {c.unit}"))
+        rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))
+    if path and not reads_multipliers(response):
+        rows.append(("first reaction", reaction(path[0].reaction)))
+        rows.append(("last reaction", reaction(path[-1].reaction)))
+    frames = "of pseudo-motion" if badge_of(response).startswith("MECHANISM") else "falling"
+    rows += [
+        ("weight W", force_text(weight)),
+        ("blocks", f"{assembly.n_blocks} ({int(assembly.free.sum())} free)"),
+        ("contact points", str(len(response.increments[0].contacts.points))),
+        ("increments", f"{len(path)} in equilibrium, {len(response.increments) - len(path)} {frames}"),
+        ("solver time", f"{sum(i.seconds for i in response.increments):.1f} s"),
+    ]
+    if response.message and response.collapse is None:
+        rows.append(("message", response.message))
+    return rows
+
+
+def _certificate(response: solver.Response) -> list[tuple[str, str]]:
+    checked = [i.certificate for i in response.path] or [i.certificate for i in response.increments]
+
+    def largest(name: str) -> float:
+        return max(abs(getattr(c, name)) for c in checked)
+
+    return [
+        ("largest unbalanced force / total load", f"{largest('equilibrium_residual'):.1e}"),
+        ("deepest overlap", f"{largest('largest_penetration'):.1e} m"),
+        ("lower and upper bound differ by", f"{largest('duality_gap'):.1e}"),
+        ("complementarity", f"{largest('complementarity'):.1e}"),
+        ("kinematic violation / block size", f"{largest('kinematic_violation'):.1e}"),
+    ]
+
+
+def _rows(rows: list[tuple[str, str]]) -> str:
+    return "".join(f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>" for name, value in rows)

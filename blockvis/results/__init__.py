@@ -1,0 +1,1 @@
+"""The results folder: written as a run goes, reopened without solving."""

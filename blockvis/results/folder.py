@@ -1,0 +1,373 @@
+"""The results folder: written as the run goes, reopened without solving."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import weakref
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+import solver
+from blockvis.atomic_files import PARTIAL, make_folder, write_whole
+
+from .increments import StoredIncrement, StoredIncrements, packed_increment
+from .npz import checked_arrays, packed, unpacked
+from .quantities import parameter_word
+from .record import RECORD, Record, read_record, versions
+from .tables import (
+    CAPACITY_TABLES,
+    COLUMNS,
+    row_of_increment,
+    stored_limits,
+    stored_parameters,
+    summary_of,
+    write_capacity,
+)
+
+#: Where a run can go on from, beside the increments it belongs to.
+CHECKPOINT = "checkpoint.npz"
+
+#: Files that list or sum up others; what a run starts with; pictures of the results.
+_LISTS = ("summary.json", "response.csv", "blocks.pvd", "contacts.pvd", *CAPACITY_TABLES)
+_STARTED = (RECORD, CHECKPOINT, "assembly.npz")
+_PICTURES = (
+    *("report.html", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
+    *(f"collapse{suffix}" for suffix in (".mp4", ".gif", ".webp")),
+)
+
+C = TypeVar("C")
+
+
+class ResultsExist(ValueError):
+    """The results folder holds a run already."""
+
+
+def refuse_results(path: str | Path, overwrite: bool = False) -> None:
+    """Raises :class:`ResultsExist` if a folder holds results that may not be replaced."""
+    path = Path(path)
+    if path.exists() and not path.is_dir():
+        raise ResultsExist(f"'{path}' is a file; choose a folder with -o")
+    names = ("increments", *_LISTS, *_STARTED, *_PICTURES)
+    if not overwrite and any((path / name).exists() for name in names):
+        unfinished = not (path / "summary.json").exists() and (path / RECORD).exists()
+        go_on = f"go on with it by blockvis run --resume {path}, " if unfinished else ""
+        found = next(name for name in names if (path / name).exists())
+        raise ResultsExist(
+            f"'{path}' holds results already ({found}); {go_on}choose another folder with -o or add --force"
+        )
+
+
+class ResultsFolder:
+    """A results folder that grows with the run: readable at every moment, whatever ends it.
+
+    Parameters
+    ----------
+    path : str or Path
+    assembly : solver.Assembly
+    record : Record, optional
+        What the run is made from.
+    overwrite : bool
+        Whether results that are there already may be replaced.
+    parameter : {"settlement", "control displacement", "load position"}
+        What the path runs over.
+
+    Raises
+    ------
+    ResultsExist
+        If the folder holds results and ``overwrite`` is false, or another run is writing to it.
+
+    Notes
+    -----
+    The checkpoint is written last of what belongs to an increment: whatever a killed run has left beyond it is taken
+    away when the run goes on.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        assembly: solver.Assembly,
+        *,
+        record: Record | None = None,
+        overwrite: bool = False,
+        parameter: str = "settlement",
+    ) -> None:
+        self.parameter = parameter
+        self.path, self.assembly, self.record = Path(path), assembly, record or Record(versions=versions())
+        self.increments: list[StoredIncrement] = []
+        self._files = StoredIncrements(self.path)
+        refuse_results(self.path, overwrite)
+        make_folder(self.path / "increments")
+        self._release = _held(self, self.path)
+        # What lists others goes first, so that nothing ever points to a file that is gone.
+        for name in (*_LISTS, *_PICTURES, *_STARTED):
+            (self.path / name).unlink(missing_ok=True)
+        self._remove_from(0)
+        write_whole(self.path / "assembly.npz", _packed(_assembly_arrays(assembly)))
+        write_whole(self.path / RECORD, self.record.text())
+        self._start_table()
+
+    @classmethod
+    def reopened(cls, path: str | Path, parameter: str, kind: type[C]) -> tuple[ResultsFolder, C | None]:
+        """The folder of a run that was stopped, as it was after its last checkpoint, and that checkpoint.
+
+        Parameters
+        ----------
+        path : str or Path
+        parameter : str
+            As of the folder.
+        kind : type
+            Of the checkpoint.
+
+        Raises
+        ------
+        ValueError
+            If the folder holds no run.
+        """
+        results = cls.__new__(cls)
+        results.path, results.parameter = Path(path), parameter
+        results.record = read_record(results.path)
+        results.assembly = _stored_assembly(results.path)
+        results._release = _held(results, results.path)
+        results._files = StoredIncrements(results.path)
+        results.increments, checkpoint, count = [], None, 0
+        stored = results.path / CHECKPOINT
+        if stored.is_file():
+            try:
+                checkpoint, extra = unpacked(stored.read_bytes(), kind)
+                count = int(extra["increments"])
+                results.increments = [results._files.opened(k) for k in range(count)]
+            except (ValueError, KeyError, OSError) as error:
+                raise ValueError(f"'{results.path}' cannot go on ({error}); run the case again with --force") from None
+        (results.path / "summary.json").unlink(missing_ok=True)
+        results._start_table()
+        for number, increment in enumerate(results.increments):
+            results._add_row(number, increment)
+        results._write_lists()
+        results._remove_from(count)
+        return results, checkpoint
+
+    def add(self, increment: solver.Increment) -> None:
+        """Writes one increment: its VTU files, its row, PVD files that list everything so far, and where to go on.
+
+        Of what is written the folder keeps the numbers; see :mod:`blockvis.results.increments`.
+        """
+        from blockvis.vtk_files import write_vtu
+
+        from .datasets import block_dataset, contact_dataset
+
+        number = len(self.increments)
+        folder = self.path / "increments"
+        write_vtu(block_dataset(self.assembly, increment), folder / f"blocks_{number:05d}.vtu", last=False)
+        write_vtu(contact_dataset(self.assembly, increment), folder / f"contacts_{number:05d}.vtu", last=False)
+        write_whole(self._files.file(number), packed_increment(increment))
+        self.increments.append(self._files.told(number, increment))
+        self._add_row(number, increment)
+        self._write_lists()
+        if increment.checkpoint is not None:
+            write_whole(self.path / CHECKPOINT, packed(increment.checkpoint, increments=number + 1))
+
+    def finish(self, response: solver.Response, seconds: float) -> dict[str, Any]:
+        """Writes and returns the summary."""
+        self._write_lists()
+        write_capacity(response, self.path)
+        summary = summary_of(response, seconds=seconds, record=self.record)
+        write_whole(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
+        self._release()
+        return summary
+
+    def _start_table(self) -> None:
+        self._rows = io.StringIO()
+        self._table = csv.writer(self._rows, lineterminator="\n")
+        own = () if self.parameter == "settlement" else (self.parameter.replace(" ", "_"),)
+        self._table.writerow((*COLUMNS, *own))
+
+    def _add_row(self, number: int, increment: solver.Increment) -> None:
+        if increment.status == solver.Status.EQUILIBRIUM:
+            self._table.writerow(
+                row_of_increment(number, increment, solver.total_weight(self.assembly), self.parameter)
+            )
+
+    def _write_lists(self) -> None:
+        """The table and the lists of files, of everything so far."""
+        from blockvis.vtk_files import write_pvd
+
+        from .datasets import output_times
+
+        write_whole(self.path / "response.csv", self._rows.getvalue(), last=False)
+        times = output_times(self.increments)
+        for kind in ("blocks", "contacts"):
+            entries = [(t, f"increments/{kind}_{i:05d}.vtu") for i, t in enumerate(times)]
+            write_pvd(self.path / f"{kind}.pvd", entries, last=False)
+
+    def _remove_from(self, count: int) -> None:
+        """Removes the files of increments from a number on, and what was being written when a run was killed."""
+        folder = self.path / "increments"
+        for old in [*folder.glob("*.vtu"), *folder.glob("*.npz")]:
+            number = old.stem.rpartition("_")[2]
+            if not old.name.startswith(".") and number.isdigit() and int(number) >= count:
+                old.unlink()
+        for half in (*self.path.glob(PARTIAL), *folder.glob(PARTIAL)):
+            half.unlink()
+
+
+def _held(owner: ResultsFolder, folder: Path) -> Callable[[], None]:
+    """Holds the folder for one run, until what is returned is called or the process ends, however it ends."""
+    try:
+        import fcntl
+    except ImportError:
+        return lambda: None
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        raise ResultsExist(
+            f"another run is writing to '{folder}'; wait for it, end it, or choose another folder with -o"
+        ) from None
+    except OSError:
+        # A file system without locks: then the user has to know.
+        pass
+    return weakref.finalize(owner, os.close, handle)
+
+
+def write(response: solver.Response, folder: str | Path, *, overwrite: bool = False) -> Path:
+    """Writes the results folder of a response: VTU per increment, PVD, CSV and summary.json.
+
+    Parameters
+    ----------
+    response : solver.Response
+    folder : str or Path
+    overwrite : bool
+        Whether results that are there already may be replaced.
+
+    Raises
+    ------
+    ResultsExist
+    ValueError
+        If the response is read from that very folder.
+    """
+    for increment in response.increments:
+        if isinstance(increment, StoredIncrement) and increment.folder and _is_same(increment.folder, Path(folder)):
+            raise ValueError(f"the response is read from '{folder}' itself; write it to another folder")
+    results = ResultsFolder(folder, response.assembly, overwrite=overwrite, parameter=parameter_word(response))
+    for increment in response.increments:
+        results.add(increment)
+    results.finish(response, sum(i.seconds for i in response.increments))
+    return results.path
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    return one.resolve() == other.resolve()
+
+
+def _packed(arrays: Mapping[str, Any]) -> bytes:
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def _assembly_arrays(assembly: solver.Assembly) -> dict[str, Any]:
+    return {
+        "vertices": assembly.vertices,
+        "offsets": assembly.offsets,
+        "names": np.array(assembly.names),
+        "roles": assembly.roles,
+        "density": assembly.density,
+        "thickness": assembly.thickness,
+        "materials": np.array(assembly.materials),
+    }
+
+
+def _stored_assembly(folder: Path) -> solver.Assembly:
+    if not (folder / "assembly.npz").is_file():
+        raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
+    try:
+        stored = checked_arrays(folder / "assembly.npz")
+        offsets = stored["offsets"].tolist()
+        # Checked like a drawing: the file may come from anywhere.
+        return solver.Assembly.from_outlines(
+            [stored["vertices"][first:last] for first, last in pairwise(offsets)],
+            names=list(map(str, stored["names"])),
+            roles=list(map(str, stored["roles"])),
+            density=stored["density"],
+            thickness=stored["thickness"],
+            materials=list(map(str, stored["materials"])),
+        )
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise ValueError(f"'{folder / 'assembly.npz'}' cannot be read ({error}); run the case again") from None
+
+
+def stored_case(folder: str | Path) -> str:
+    """Text of the case that a results folder was written from; empty where it was written from Python."""
+    for name in ("summary.json", RECORD):
+        file = Path(folder) / name
+        if file.is_file():
+            return str(json.loads(file.read_text(encoding="utf-8")).get("case", ""))
+    return ""
+
+
+def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
+    """The response of a results folder as far as the folder itself tells it, and its summary, {} where it has none.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    solver.Response
+        Whose increments read their arrays from the folder when they are asked for; with the loads and interfaces of
+        no case.
+    dict
+
+    Raises
+    ------
+    ValueError
+        If the folder holds no results.
+    """
+    assembly = _stored_assembly(folder)
+    files = StoredIncrements(folder)
+    increments = [files.opened(k) for k in range(len(files))]
+    summary: dict[str, Any] = {}
+    if (folder / "summary.json").is_file():
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    response = solver.Response(
+        assembly=assembly,
+        settlements=stored_parameters(summary),
+        interfaces=solver.Interfaces(),
+        loads=solver.self_weight(assembly),
+        increments=tuple(increments),
+        stop=solver.Status(summary.get("status", solver.Status.INTERRUPTED)),
+        message=summary.get("message", ""),
+        collapse=_collapse_of(summary, increments, assembly),
+        analysis=summary.get("analysis", "settlement"),
+        limits=stored_limits(summary, increments),
+    )
+    return response, summary
+
+
+def _collapse_of(
+    summary: Mapping[str, Any], increments: Sequence[solver.Increment], assembly: solver.Assembly
+) -> solver.Collapse | None:
+    if summary.get("collapse_bracket") is None:
+        return None
+    mechanism = np.zeros((assembly.n_blocks, 3))
+    falling = [i for i in increments if i.status == solver.Status.FALLING]
+    if falling:
+        motion = falling[0].velocity
+        mechanism = motion / max(np.abs(motion * [1.0, 1.0, assembly.block_size]).max(), 1e-300)
+    return solver.Collapse(
+        displacement=summary["collapse_displacement"],
+        bracket=(summary["collapse_bracket"][0], summary["collapse_bracket"][1]),
+        reaction=summary["collapse_reaction"],
+        mechanism=mechanism,
+        unit=summary.get("settlement_unit", "m"),
+        words=summary.get("mechanism") or "",
+    )

@@ -1,0 +1,111 @@
+"""What a run was made from: kept in its results folder from the start, so that the folder alone is enough to go on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+#: Name of the file in the results folder.
+RECORD = "run.json"
+
+#: Packages whose version may change the last digits of a result.
+_DECIDING = ("python", "platform", "blockvis", "numpy", "scipy", "highspy")
+
+
+@dataclass(frozen=True)
+class Record:
+    """What a run was made from.
+
+    Attributes
+    ----------
+    case : str
+        Text of the case file; empty where the run came from Python.
+    case_file, layout_file : str
+        Absolute paths; empty where there is none.
+    case_sha256, layout_sha256 : str
+    versions : dict
+        Of Python and of the packages, and the platform.
+    """
+
+    case: str = ""
+    case_file: str = ""
+    case_sha256: str = ""
+    layout_file: str = ""
+    layout_sha256: str = ""
+    versions: dict[str, str] = field(default_factory=dict)
+
+    def text(self) -> str:
+        """As JSON."""
+        return json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n"
+
+    def inputs(self) -> dict[str, str | None]:
+        """For summary.json: names and checksums of the files that were read."""
+        return {
+            "case_file": Path(self.case_file).name or None,
+            "case_sha256": self.case_sha256 or None,
+            "layout_file": Path(self.layout_file).name or None,
+            "layout_sha256": self.layout_sha256 or None,
+        }
+
+    def changes(self) -> list[str]:
+        """What is no longer as it was when the run began, in words."""
+        notes = []
+        for what, file, checksum in (
+            ("case", self.case_file, self.case_sha256),
+            ("layout", self.layout_file, self.layout_sha256),
+        ):
+            if not file:
+                continue
+            if not Path(file).is_file():
+                notes.append(f"the {what} file '{file}' is gone; the run goes on with what it read from it")
+            elif checksum_of(Path(file)) != checksum:
+                notes.append(f"the {what} file '{file}' has changed; the run goes on with what it read from it")
+        now = versions()
+        changed = [f"{name} {self.versions.get(name)} → {now[name]}" for name in _DECIDING if self.differs(name, now)]
+        if changed:
+            notes.append(f"not what the run began with: {', '.join(changed)}; the last digits may differ")
+        return notes
+
+    def differs(self, name: str, now: dict[str, str]) -> bool:
+        """Whether a package has another version than when the run began."""
+        return self.versions.get(name) != now[name]
+
+
+def read_record(folder: Path) -> Record:
+    """The record of a results folder.
+
+    Raises
+    ------
+    ValueError
+        If the folder has none: it holds no run, or one that was stopped before it began.
+    """
+    path = folder / RECORD
+    if not path.is_file():
+        raise ValueError(
+            f"'{folder}' holds no run that could go on (no {RECORD} in it); start it with blockvis run CASE.toml -o "
+            f"{folder} --force"
+        )
+    try:
+        return Record(**json.loads(path.read_text(encoding="utf-8")))
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"'{path}' is not what a run wrote ({error}); run the case again with --force") from None
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, of the packages that a result depends on, and the platform."""
+    found = {"python": platform.python_version(), "platform": platform.platform()}
+    for name in ("blockvis", "numpy", "scipy", "highspy", "pyvista", "vtk", "meshio"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def checksum_of(path: Path) -> str:
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

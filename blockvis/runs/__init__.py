@@ -1,0 +1,1 @@
+"""Runs: a case solved from its file to its results folder."""

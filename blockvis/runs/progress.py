@@ -1,0 +1,110 @@
+"""Progress of a run on stderr; quiet where nobody watches."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TextIO
+
+import solver
+
+#: Seconds between two redrawings of the bar.
+REDRAW = 0.1
+
+
+class Progress:
+    """A bar that follows the settlement of the phase towards its limit.
+
+    Parameters
+    ----------
+    settlements : tuple of solver.Settlement
+    stream : text stream, optional
+        stderr by default; nothing is written unless it is a terminal.
+    """
+
+    def __init__(self, settlements: tuple[solver.Settlement, ...], stream: TextIO | None = None) -> None:
+        self.settlements = settlements
+        self.stream = sys.stderr if stream is None else stream
+        self.shown = self.stream.isatty()
+        self.started = time.perf_counter()
+        self.last, self.count = -1.0, 0
+
+    def increment(self, increment: solver.Increment) -> None:
+        """Shows an increment."""
+        self.count += 1
+        if not self.shown or time.perf_counter() - self.last < REDRAW:
+            return
+        falls = increment.status == solver.Status.FALLING
+        what = "falls" if falls else f"reaction {increment.reaction:.5g} N"
+        if increment.load_multiplier and not falls:
+            what = f"load multiplier {increment.load_multiplier:.5g}"
+        if not self.settlements:
+            self._line(f"{what}, {self.count} increments")
+            return
+        settlement = self.settlements[increment.phase]
+        part = min(increment.settlement / settlement.limit, 1.0)
+        word = "settlement" if isinstance(settlement, solver.Settlement) else "control displacement"
+        self._line(
+            f"[{'#' * int(24 * part):<24}] {word} {increment.settlement:.4g} of at most {settlement.limit:g} "
+            f"{settlement.unit}, {what}, {self.count} increments"
+        )
+
+    def picture(self, done: int, total: int) -> None:
+        """Shows how many frames of the animation are drawn."""
+        if self.shown and (done == total or time.perf_counter() - self.last >= REDRAW):
+            self._line(f"[{'#' * (24 * done // max(total, 1)):<24}] frame {done} of {total}")
+
+    def done(self) -> None:
+        """Clears the bar."""
+        if self.shown:
+            self.stream.write("\r\x1b[K")
+            self.stream.flush()
+
+    def _line(self, text: str) -> None:
+        self.last = time.perf_counter()
+        self.stream.write(f"\r\x1b[K{text}, {self.last - self.started:.1f} s")
+        self.stream.flush()
+
+
+class StudyProgress:
+    """A bar that counts the runs of a study; in a terminal or a notebook.
+
+    Parameters
+    ----------
+    total : int
+        Runs of the study.
+    before : int
+        Of these, finished earlier.
+    shown : bool, optional
+        By default, where somebody watches.
+    stream : text stream, optional
+        stderr by default.
+    """
+
+    def __init__(self, total: int, before: int = 0, *, shown: bool | None = None, stream: TextIO | None = None) -> None:
+        self.total, self.before, self.count, self.failed = total, before, 0, 0
+        self.stream = sys.stderr if stream is None else stream
+        watched = self.stream.isatty() or "ipykernel" in sys.modules
+        self.shown = watched if shown is None else shown and watched
+        self.started = time.perf_counter()
+        self.last = -1.0
+
+    def finished(self, *, failed: bool = False) -> None:
+        """Counts a run."""
+        self.count += 1
+        self.failed += failed
+        now, done = time.perf_counter(), self.before + self.count
+        if not self.shown or (now - self.last < REDRAW and done < self.total):
+            return
+        self.last = now
+        rest = (self.total - done) * (now - self.started) / self.count
+        without = f", {self.failed} without result" if self.failed else ""
+        bar = "#" * (24 * done // max(self.total, 1))
+        self.stream.write(f"\r\x1b[K[{bar:<24}] run {done} of {self.total}{without}, about {rest:.0f} s left")
+        self.stream.flush()
+
+    def done(self) -> None:
+        """Clears the bar."""
+        if self.shown:
+            self.stream.write("\r\x1b[K")
+            self.stream.flush()

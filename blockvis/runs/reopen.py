@@ -1,0 +1,45 @@
+"""A results folder reopened as the response it was written from, with the loads and interfaces of its case."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import solver
+from blockvis.cases.build import case_interfaces, case_loads
+from blockvis.cases.case import parse_case
+from blockvis.cases.loads import with_moving_load
+from blockvis.results.folder import stored_case, stored_response
+
+
+def open_results(folder: str | Path) -> solver.Response:
+    """Reopens a results folder as the response it was written from, without solving.
+
+    Parameters
+    ----------
+    folder : str or Path
+
+    Returns
+    -------
+    solver.Response
+        Whose increments read their arrays from the folder when they are asked for; the settlements' limits and
+        the loads are known only where the case can be read back from the summary.
+
+    Raises
+    ------
+    ValueError
+        If the folder holds no results.
+    """
+    folder = Path(folder)
+    response, summary = stored_response(folder)
+    text = stored_case(folder)
+    if not text:
+        return response
+    case = parse_case(text, folder / "case.toml")
+    loads = case_loads(case, response.assembly)
+    return replace(
+        response,
+        settlements=response.settlements if "parameter" in summary else case.settlements,
+        interfaces=case_interfaces(case),
+        loads=with_moving_load(loads, case.loads, response.assembly, case.source, summary.get("governing_position")),
+    )

@@ -1,0 +1,260 @@
+"""One case from its file to its results folder."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.atomic_files import PARTIAL
+from blockvis.cases.build import case_assembly
+from blockvis.cases.case import Case, parse_case, read_case
+from blockvis.results.folder import ResultsFolder, refuse_results
+from blockvis.results.record import Record, checksum_of, read_record, versions
+from blockvis.runs.reopen import open_results
+
+from .plan import Plan, checkpoint_kind, parameter_of, planned
+from .progress import Progress
+
+#: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
+AS_DRAWN = 0.02
+
+
+def record_of(case: Case) -> Record:
+    """The record of a case; without its text where the case was changed in Python and is not what the text says."""
+    return Record(
+        case=case.text if case.text and parse_case(case.text, case.source) == case else "",
+        case_file=str(case.source.resolve()) if case.source.is_file() else "",
+        case_sha256=checksum_of(case.source) if case.source.is_file() else "",
+        layout_file="" if case.file is None else str(case.file.resolve()),
+        layout_sha256="" if case.file is None else checksum_of(case.file),
+        versions=versions(),
+    )
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished run.
+
+    Attributes
+    ----------
+    response : solver.Response
+        Whose increments read their arrays from the folder when they are asked for.
+    folder : Path
+    summary : dict
+        What summary.json holds.
+    missing : tuple of str
+        What could not be drawn, and why.
+    had_finished : bool
+        Whether there was nothing left to solve when it was asked to go on.
+    """
+
+    response: solver.Response
+    folder: Path
+    summary: dict[str, Any]
+    missing: tuple[str, ...] = field(default=())
+    had_finished: bool = False
+
+
+def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overwrite: bool = False) -> Run:
+    """Solves a case and writes everything: VTU, PVD, CSV, summary, pictures.
+
+    Parameters
+    ----------
+    case : Case, or path of a case file
+    folder : str or Path, optional
+        Results folder; the name of the case with "-results" in the working directory by default.
+    overwrite : bool
+        Whether results that are there already may be replaced.
+
+    Returns
+    -------
+    Run
+        Also after an interruption by Ctrl-C: what was finished is written, with status "interrupted".
+
+    Raises
+    ------
+    ValueError
+        For bad input, before anything is written.
+    """
+    if not isinstance(case, Case):
+        case = read_case(case)
+    folder = Path(f"{case.source.stem}-results") if folder is None else Path(folder)
+    refuse_results(folder, overwrite)
+    assembly = case_assembly(case)
+    plan = planned(case, assembly)
+    try:
+        results = ResultsFolder(
+            folder, assembly, record=record_of(case), overwrite=overwrite, parameter=parameter_of(case)
+        )
+    except OSError as error:
+        raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
+    return _followed(case, results, plan)
+
+
+def resume_run(folder: str | Path) -> Run:
+    """Goes on with a run that was stopped, from its results folder alone, to the result it would have had.
+
+    Parameters
+    ----------
+    folder : str or Path
+        That a run has written, whatever ended it.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    ValueError
+        If the folder holds no run, or one that was made from Python and cannot be followed again.
+
+    Notes
+    -----
+    A settlement and a pushover go on from their last equilibrium, limit loads behind the last that was found; a
+    settlement that comes before them and had not ended starts again. Files of the case that have
+    changed are named in a warning, and not read again. Of a run that has finished, what is not drawn yet is drawn.
+    """
+    folder = Path(folder)
+    record = read_record(folder)
+    if not record.case:
+        raise ValueError(f"'{folder}' was written from Python, without a case file; run it again from there")
+    case = parse_case(record.case, Path(record.case_file or folder / "case.toml"))
+    finished = _finished(folder)
+    if finished is not None:
+        response = open_results(folder)
+        missing: tuple[str, ...] = ()
+        if not all((folder / name).is_file() for name in _drawn(case)):
+            missing = draw_results(response, folder, animation=case.animation, case_text=case.text)
+        return Run(response, folder, finished, missing, had_finished=True)
+    for note in record.changes():
+        warnings.warn(note, stacklevel=2)
+    results, checkpoint = ResultsFolder.reopened(folder, parameter_of(case), checkpoint_kind(case))
+    return _followed(case, results, planned(case, results.assembly, checkpoint, tuple(results.increments)))
+
+
+def _finished(folder: Path) -> dict[str, Any] | None:
+    """The summary of a run that came to its end; None where it was stopped."""
+    if not (folder / "summary.json").is_file():
+        return None
+    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    return None if summary["status"] == solver.Status.INTERRUPTED else summary
+
+
+def _drawn(case: Case) -> list[str]:
+    return ["report.html", "mechanism.png", *([case.animation] if case.animation else [])]
+
+
+def _followed(case: Case, results: ResultsFolder, plan: Plan) -> Run:
+    """Follows the increments to their end or to Ctrl-C, writing each, and draws what came out."""
+    folder = results.path
+    progress = Progress(plan.settlements)
+    ending = solver.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
+    try:
+        while True:
+            try:
+                increment = next(plan.steps)
+            except StopIteration as stop:
+                ending = stop.value
+                break
+            results.add(increment)
+            if len(plan.limits) == len(results.increments):
+                plan.told(results.increments[-1])
+            if len(results.increments) == 1:
+                _note_settled(results.assembly, increment)
+            for note in increment.notes:
+                warnings.warn(note, stacklevel=2)
+            progress.increment(increment)
+    except KeyboardInterrupt:
+        plan.steps.close()
+    except OSError as error:
+        raise _given_up(folder, error) from None
+    finally:
+        progress.done()
+    response = plan.response(results.increments, ending)
+    missing: tuple[str, ...] = ()
+    try:
+        summary = results.finish(response, sum(i.seconds for i in response.increments))
+        if ending.stop is not solver.Status.INTERRUPTED:
+            missing = draw_results(response, folder, animation=case.animation, case_text=case.text)
+    except OSError as error:
+        raise _given_up(folder, error) from None
+    return Run(response, folder, summary, missing)
+
+
+def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
+    """Says so where the blocks as drawn were in no equilibrium and found one a little further."""
+    moved = np.hypot(*first.pose.displacements(assembly)[:, :2].T)
+    block = int(np.argmax(moved))
+    if first.status == solver.Status.EQUILIBRIUM and moved[block] > AS_DRAWN * assembly.block_size:
+        warnings.warn(
+            f"before any settlement '{assembly.names[block]}' moved by {moved[block]:.3g} m until it came to rest: as "
+            "drawn the blocks do not stand; look for gaps between them (joint_thickness) or a missing support",
+            stacklevel=2,
+        )
+
+
+def _given_up(folder: Path, error: OSError) -> OSError:
+    """Takes away half a file when the disk is full or gone in the middle of a run; what to say and do about it."""
+    for half in folder.rglob(PARTIAL):
+        half.unlink(missing_ok=True)
+    return OSError(
+        f"could not write to '{folder}': {_reason(error)}; what is there stays as it is: make room and go on with "
+        f"blockvis run --resume {folder}"
+    )
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error).strip().partition("\n")[0]
+
+
+def draw_results(
+    response: solver.Response,
+    folder: Path,
+    *,
+    animation: str | None = "collapse.mp4",
+    case_text: str = "",
+) -> tuple[str, ...]:
+    """Draws the pictures of a results folder.
+
+    Parameters
+    ----------
+    response : solver.Response
+    folder : Path
+    animation : str or None
+        File name in the folder; the suffix chooses mp4, gif or webp.
+    case_text : str
+        Shown in the report.
+
+    Returns
+    -------
+    tuple of str
+        What could not be drawn, and why; empty where all is there.
+    """
+    from blockvis.pictures.curves import draw_curve
+    from blockvis.pictures.opengl import RenderingUnavailable, rendering_available
+    from blockvis.pictures.paraview import write_paraview_macro
+    from blockvis.pictures.render import animate, draw_mechanism
+    from blockvis.report.page import write_report
+
+    if not response.increments:
+        return ()
+    write_paraview_macro(folder)
+    write_report(response, folder / "report.html", case_text)
+    if response.path:
+        draw_curve(response, folder / "curve.png")
+    problem = rendering_available()
+    if problem is not None:
+        return (problem,)
+    try:
+        draw_mechanism(response, folder / "mechanism.png")
+        if animation is not None:
+            animate(response, folder / animation)
+    except RenderingUnavailable as error:
+        return (str(error),)
+    return ()

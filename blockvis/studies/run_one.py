@@ -1,0 +1,210 @@
+"""One run of a study: from the values of a case to a row of the table, whatever happens on the way."""
+
+from __future__ import annotations
+
+import io
+import time
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.cases.build import case_assembly, case_interfaces, case_loads
+from blockvis.cases.case import Case, case_of
+
+from .study_file import run_values
+
+#: Status of a run that gave no result, besides "solver failed".
+FAILED = "failed"
+
+#: Joints that a class names one by one; of more, their number is told.
+NAMED_JOINTS = 8
+
+#: Largest movement in the picture of a mechanism, as a fraction of the size of the structure.
+SWING = 0.05
+
+
+class _OutOfTime(RuntimeError):
+    """The run took longer than the study allows."""
+
+
+def run_once(
+    values: Mapping[str, Any], source: str, order: Mapping[str, Any], n_seeded: int, seconds: float | None = None
+) -> tuple[dict[str, Any], bytes]:
+    """Carries out one run.
+
+    Parameters
+    ----------
+    values : mapping
+        The base case as TOML has it.
+    source : str
+        The case file; paths in the case are relative to its folder.
+    order : mapping
+        Number, seed and values of the run, as :meth:`blockvis.studies.study_file.Study.order` gives them.
+    n_seeded : int
+        How many of the imperfections get the run's seed.
+    seconds : float, optional [s]
+        After this time the run is given up.
+
+    Returns
+    -------
+    row : dict
+        Of the table. A run that raises has the status "failed" and says why in ``message``.
+    shape : bytes
+        The mechanism to be drawn, as a packed npz; empty where there is none.
+    """
+    started = time.perf_counter()
+    try:
+        # Notes about the drawing would come once per run; a single run by hand shows them.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found, shape = _outcome(case_of(run_values(values, order, n_seeded), Path(source)), seconds)
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is this run's result and must not end the study
+        return failed_row(order, _reason(error), time.perf_counter() - started), b""
+    return _row(order, **found, seconds=time.perf_counter() - started), shape
+
+
+def failed_row(order: Mapping[str, Any], message: str, seconds: float = 0.0) -> dict[str, Any]:
+    """The row of a run without result.
+
+    Parameters
+    ----------
+    order : mapping
+    message : str
+    seconds : float [s]
+    """
+    return _row(order, status=FAILED, message=message, seconds=seconds)
+
+
+def _row(order: Mapping[str, Any], **found: Any) -> dict[str, Any]:
+    return {"run": order["run"], "seed": order["seed"], "parameters": dict(order["point"]), **found}
+
+
+def _reason(error: Exception) -> str:
+    kind = "" if isinstance(error, (ValueError, _OutOfTime)) else f"{type(error).__name__}: "
+    return f"{kind}{error}".strip() or type(error).__name__
+
+
+def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
+    assembly = case_assembly(case)
+    # The first frame of the fall tells the mechanism; no one looks at the others.
+    controls = replace(case.controls, falling_frames=1)
+    steps = solver.settlement_increments(
+        assembly,
+        case.settlements,
+        interfaces=case_interfaces(case),
+        loads=case_loads(case, assembly),
+        controls=controls,
+    )
+    started = time.perf_counter()
+    # Of the path a study keeps the ends.
+    first = last = falling = None
+    n_path = n_programs = 0
+    while True:
+        try:
+            increment = next(steps)
+        except StopIteration as stop:
+            ending: solver.Ending = stop.value
+            break
+        if increment.status is solver.Status.FALLING:
+            falling = increment
+        else:
+            first, last = first or increment, increment
+            n_path, n_programs = n_path + 1, n_programs + increment.programs
+        if seconds is not None and time.perf_counter() - started > seconds:
+            raise _OutOfTime(f"took longer than {seconds:g} s, at a settlement of {increment.settlement:.6g}")
+    before = [0.0, *np.cumsum([s.limit for s in case.settlements])]
+    found: dict[str, Any] = {
+        "status": str(ending.stop),
+        "message": ending.message if ending.collapse is None else "",
+        "unit": case.settlements[-1].unit,
+        "last_settlement": float(last.settlement + before[last.phase]) if last else 0.0,
+        "initial_reaction": float(first.reaction) if first else None,
+        "collapse_reaction": None,
+        "total_weight": solver.total_weight(assembly),
+        "increments": n_path,
+        "programs": n_programs,
+    }
+    if ending.collapse is not None and last is not None:
+        offset = before[last.phase]
+        low, high = (float(offset + s) for s in ending.collapse.bracket)
+        found |= {"collapse_displacement": (low + high) / 2.0, "bracket_low": low, "bracket_high": high}
+        found["last_settlement"] = low
+        found["collapse_reaction"] = float(ending.collapse.reaction)
+    elif ending.stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
+        # It falls before anything has settled.
+        found |= {"collapse_displacement": 0.0, "bracket_low": 0.0, "bracket_high": 0.0}
+    if falling is None or "collapse_displacement" not in found:
+        return found, b""
+    mechanism = solver.mechanism_of(assembly, falling)
+    found |= {
+        "mechanism": str(mechanism),
+        "mechanism_class": mechanism_class(mechanism),
+        "macro_blocks": len(mechanism.motions),
+        "hinges": len(mechanism.hinges),
+        "sliding_joints": len(mechanism.sliding),
+    }
+    return found, _shape(assembly, falling, mechanism)
+
+
+def mechanism_class(mechanism: solver.Mechanism) -> str:
+    """The class of a mechanism: its hinges and sliding joints by name, or where there are many, their number.
+
+    Parameters
+    ----------
+    mechanism : solver.Mechanism
+
+    Returns
+    -------
+    str
+        The same for the same joints, whatever the size and the scale of the motion.
+    """
+    n, hinges, sliding = len(mechanism.motions), mechanism.hinges, mechanism.sliding
+    parts = f"{n} part{'' if n == 1 else 's'}"
+    if len(hinges) + len(sliding) > NAMED_JOINTS:
+        counted = ((len(hinges), "hinge"), (len(sliding), "sliding joint"))
+        return ", ".join([parts, *(f"{k} {what}{'' if k == 1 else 's'}" for k, what in counted if k)])
+    words = [parts] if len(hinges) + len(sliding) == 0 else []
+    words += [
+        f"{what} {_joints(mechanism.names, pairs.tolist())}"
+        for what, pairs in (("hinges", hinges), ("sliding", sliding))
+        if len(pairs)
+    ]
+    return "; ".join(words)
+
+
+def _joints(names: Sequence[str], pairs: Sequence[Sequence[int]]) -> str:
+    """Pairs of blocks, what their names have in common said once: "voussoir 3|4, 6|7"."""
+    words, before = [], None
+    for pair in pairs:
+        first, second = (names[i] for i in sorted(pair, key=lambda i: (len(names[i]), names[i])))
+        kind, _, number = first.rpartition(" ")
+        other, _, last = second.rpartition(" ")
+        alike = bool(kind) and kind == other
+        words.append(f"{'' if kind == before else f'{kind} '}{number}|{last}" if alike else f"{first}|{second}")
+        before = kind if alike else None
+    return ", ".join(words)
+
+
+def _shape(assembly: solver.Assembly, falling: solver.Increment, mechanism: solver.Mechanism) -> bytes:
+    """The blocks where the mechanism takes them, in single precision: for a small picture."""
+    free = assembly.free[assembly.block_of_vertex]
+    at_rest = solver.moved_vertices(assembly, falling.pose)
+    size = float(np.ptp(at_rest[free], axis=0).max())
+    step = solver.moved_vertices(assembly, solver.swung(falling.pose, falling.velocity * 1e-6)) - at_rest
+    fastest = float(np.hypot(*step[free].T).max()) / 1e-6
+    moved = solver.swung(falling.pose, falling.velocity * (SWING * size / fastest if fastest > 0.0 else 0.0))
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        vertices=solver.moved_vertices(assembly, moved).astype(np.float32),
+        at_rest=at_rest.astype(np.float32),
+        offsets=assembly.offsets.astype(np.int32),
+        parts=mechanism.parts.astype(np.int16),
+        free=assembly.free,
+    )
+    return buffer.getvalue()

@@ -1,0 +1,404 @@
+"""Plan: the study file, read and checked before anything is started."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blockvis.cases.build import case_assembly
+from blockvis.cases.case import case_of, read_case
+from blockvis.cases.distributions import Distribution, read_distribution
+from blockvis.cases.imperfections import read_imperfection
+from blockvis.suggestions import nearest, refuse_unknown
+
+from .sampling import METHODS, Design, designed
+from .value_paths import parse_path, put
+
+#: Columns of the table that are no parameters.
+RESERVED = (
+    "run", "status", "collapse_displacement", "bracket_low", "bracket_high", "last_settlement", "unit",
+    "mechanism_class", "mechanism", "macro_blocks", "hinges", "sliding_joints", "initial_reaction",
+    "collapse_reaction", "total_weight", "increments", "programs", "seconds", "seed", "message",
+)  # fmt: skip
+
+#: Most runs of one study: rows are files in one folder, and their table is made in memory.
+MOST_RUNS = 1_000_000
+
+#: So many runs are checked as cases before anything starts, which takes a few seconds; of a larger study, a later one
+#: that is no case is recorded as failed.
+CHECKED = 10_000
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number, or other value, of the case that is varied.
+
+    Attributes
+    ----------
+    path : str
+        Where in the case file, as ``material.friction_coefficient``.
+    name : str
+        Its column in the table; the path unless the study gives a shorter one.
+    also : tuple of str
+        Further paths that get the same value.
+    distribution : Distribution or None
+    values : tuple
+        Instead of a distribution: the values to choose from.
+    weights : (n_values,) array
+        Their probabilities.
+    points : int
+        Values that a grid takes from the distribution.
+    """
+
+    path: str
+    name: str
+    also: tuple[str, ...]
+    distribution: Distribution | None
+    values: tuple[Any, ...]
+    weights: np.ndarray
+    points: int
+
+    @property
+    def numeric(self) -> bool:
+        """Whether every value is a number."""
+        return all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in self.values)
+
+    @property
+    def n_levels(self) -> int:
+        """Values that a grid takes."""
+        return self.points if self.distribution is not None else len(self.values)
+
+    def value(self, probability: float) -> Any:
+        """The value below which the parameter stays with a probability; for a list, its entry there."""
+        if self.distribution is not None:
+            return float(self.distribution.quantile(np.array([probability]))[0])
+        return self.values[
+            min(int(np.searchsorted(np.cumsum(self.weights), probability, "right")), len(self.values) - 1)
+        ]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A checked study. The keys are those of the study file; see the README.
+
+    Attributes
+    ----------
+    source : Path
+        The study file.
+    case_source : Path
+        The base case; paths in it are relative to its folder.
+    values : dict
+        The base case as TOML has it, with the study's imperfections in front of its own.
+    n_seeded : int
+        The first of these imperfections get a new seed in every run.
+    parameters : tuple of Parameter
+    method : str
+    runs : int
+        As the study file has it: of a "saltelli" design the size of its two independent samples.
+    repeats : int
+        Runs per point of a grid, with different imperfections.
+    seed : int
+    seconds : float or None
+        Longest time of one run [s].
+    keep : tuple of int
+        Runs whose whole results folder is written.
+    """
+
+    source: Path
+    case_source: Path
+    values: dict[str, Any]
+    n_seeded: int
+    parameters: tuple[Parameter, ...]
+    method: str
+    runs: int
+    repeats: int
+    seed: int
+    seconds: float | None
+    keep: tuple[int, ...]
+
+    @cached_property
+    def design(self) -> Design:
+        """The runs: probabilities of the parameters, and the seed of each."""
+        levels = [p.n_levels for p in self.parameters]
+        return designed(self.method, self.runs, levels, self.repeats, self.seed, scattered=self.n_seeded > 0)
+
+    @property
+    def n_runs(self) -> int:
+        """How many runs there are in all."""
+        return len(self.design.seeds)
+
+    def point(self, run: int) -> dict[str, Any]:
+        """Value of every parameter in a run, by name."""
+        probability = self.design.probabilities[run]
+        return {p.name: p.value(float(u)) for p, u in zip(self.parameters, probability, strict=True)}
+
+    def order(self, run: int) -> dict[str, Any]:
+        """What :func:`blockvis.studies.run_one.run_once` needs to know of one run besides the base case."""
+        point = self.point(run)
+        paths = {path: point[p.name] for p in self.parameters for path in (p.path, *p.also)}
+        return {"run": run, "seed": int(self.design.seeds[run]), "paths": paths, "point": point}
+
+    def values_of(self, run: int) -> dict[str, Any]:
+        """The case of one run as TOML has it."""
+        return run_values(self.values, self.order(run), self.n_seeded)
+
+    def definition(self) -> dict[str, Any]:
+        """Everything the rows depend on, part by part, for comparison with that of rows that are there already."""
+        case = {k: v for k, v in self.values.items() if k not in ("output", "imperfections")}
+        file = case_of(self.values, self.case_source).file
+        parts = {
+            "case": case,
+            "imperfections": self.values.get("imperfections", []),
+            "parameters": {
+                p.name: [p.path, p.also, p.values, p.weights.tolist(), p.points]
+                + ([p.distribution.kind, dict(p.distribution.numbers)] if p.distribution else [])
+                for p in self.parameters
+            },
+            "method": self.method,
+            "runs": self.runs,
+            "repeats": self.repeats,
+            "seed": self.seed,
+            "layout file": "" if file is None else hashlib.sha256(file.read_bytes()).hexdigest(),
+        }
+        return {what: hashlib.sha256(repr(_sorted(part)).encode()).hexdigest()[:16] for what, part in parts.items()}
+
+
+def run_values(values: Mapping[str, Any], order: Mapping[str, Any], n_seeded: int) -> dict[str, Any]:
+    """The case of a run: the base case with the run's values and seeds put in.
+
+    Parameters
+    ----------
+    values : mapping
+        The base case as TOML has it.
+    order : mapping
+        As :meth:`Study.order` gives it.
+    n_seeded : int
+        How many of the imperfections get the run's seed.
+    """
+    case = copy.deepcopy(dict(values))
+    for path, value in order["paths"].items():
+        put(case, parse_path(path), copy.deepcopy(value))
+    for imperfection in case.get("imperfections", [])[:n_seeded]:
+        imperfection["seed"] = order["seed"]
+    return case
+
+
+def read_study(source: str | Path | Mapping[str, Any]) -> Study:
+    """Reads and checks a study file, and every run of it as a case.
+
+    Parameters
+    ----------
+    source : str, Path or mapping
+        The file, or what would stand in it; there a ``case`` is relative to the working directory.
+
+    Raises
+    ------
+    ValueError
+        Names the file, the key and the remedy: an unknown parameter path, an impossible distribution, a run that is no
+        case.
+    """
+    if isinstance(source, Mapping):
+        return _study(source, Path("study"))
+    path = Path(source)
+    if not path.is_file():
+        raise ValueError(f"there is no study file '{path}'")
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: is not a text file ({error.reason} at byte {error.start})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{path}: {error}; a study file is TOML") from None
+    return _study(values, path)
+
+
+def _study(given: Mapping[str, Any], source: Path) -> Study:
+    where = f"{source}: "
+    refuse_unknown(given, ["study", "parameters", "imperfections"], f"{source}")
+    head = given.get("study")
+    if not isinstance(head, Mapping):
+        raise ValueError(f"{where}[study] is missing; name the case and the number of runs there")
+    keys = ["case", "method", "runs", "repeats", "seed", "seconds", "keep"]
+    refuse_unknown(head, keys, f"{where}[study]")
+    values, case_source = _base_case(head.get("case"), source)
+    parameters = _parameters(given.get("parameters", {}), where)
+    imperfections = _imperfections(given.get("imperfections", []), where)
+    if not parameters and not imperfections:
+        raise ValueError(f"{where}nothing is varied; give [parameters] or [[imperfections]]")
+    if imperfections:
+        values["imperfections"] = [*imperfections, *_as_list(values.get("imperfections", []))]
+    method = head.get("method", "latin hypercube")
+    if method not in METHODS:
+        hint = nearest(str(method), list(METHODS))
+        raise ValueError(f"{where}[study] method is {method!r}{hint}; choose from {', '.join(METHODS)}")
+    seconds = head.get("seconds")
+    if seconds is not None and not (_is_number(seconds) and seconds > 0):
+        raise ValueError(f"{where}[study] seconds is {seconds!r}; give a positive number, the longest time of one run")
+    if method == "grid" and "runs" in head:
+        raise ValueError(
+            f"{where}[study] runs is given, but a grid has as many as its values make; give repeats instead"
+        )
+    if method != "grid" and "repeats" in head:
+        raise ValueError(f"{where}[study] repeats belong to a grid; give runs")
+    study = Study(
+        source=source,
+        case_source=case_source,
+        values=values,
+        n_seeded=len(imperfections),
+        parameters=parameters,
+        method=method,
+        runs=_whole(head, "runs", 64, 1, where),
+        repeats=_whole(head, "repeats", 1, 1, where),
+        seed=_whole(head, "seed", 1, 0, where),
+        seconds=None if seconds is None else float(seconds),
+        keep=tuple(_as_list(head.get("keep", []))),
+    )
+    _check(study, where)
+    return study
+
+
+def _check(study: Study, where: str) -> None:
+    base = case_of(study.values, study.case_source)
+    if base.analysis != "settlement":
+        raise ValueError(f"{base.source}: a study follows settlements, but [analysis] kind is '{base.analysis}'")
+    for p in study.parameters:
+        if study.method == "grid" and p.distribution is not None and p.points < 2:
+            raise ValueError(f'{where}[parameters] "{p.path}": a grid needs points, the number of values to take')
+        if study.method == "grid" and len(p.weights) and np.ptp(p.weights) > 0.0:
+            raise ValueError(f'{where}[parameters] "{p.path}": a grid takes every value once; weights are for samples')
+    try:
+        n = study.n_runs
+    except ValueError as error:
+        raise ValueError(f"{where}[study] {error}") from None
+    if n > MOST_RUNS:
+        raise ValueError(f"{where}the study has {n:,} runs; at most {MOST_RUNS:,} make one study")
+    if study.method == "grid" and study.repeats > 1 and not study.n_seeded:
+        raise ValueError(f"{where}[study] repeats is {study.repeats}, but without [[imperfections]] they are all alike")
+    for run in study.keep:
+        if isinstance(run, bool) or not isinstance(run, int) or not 0 <= run < n:
+            raise ValueError(f"{where}[study] keep names run {run!r}; runs are numbered from 0 to {n - 1}")
+    # Each parameter alone first: a message then names the path that is wrong, not a run.
+    first = study.order(0)
+    for p in study.parameters:
+        for path in (p.path, *p.also):
+            alone = {**first, "paths": {path: first["paths"][path]}}
+            try:
+                case_of(run_values(study.values, alone, study.n_seeded), study.case_source)
+            except ValueError as error:
+                raise ValueError(f'{where}[parameters] "{path}": {error}') from None
+    try:
+        # So that a wrong argument of a layout is found, which only the layout itself knows.
+        case_assembly(case_of(study.values_of(0), study.case_source))
+    except ValueError as error:
+        raise ValueError(f"{where}run 0 cannot be built: {error}") from None
+    for run in range(min(n, CHECKED)):
+        try:
+            case_of(study.values_of(run), study.case_source)
+        except ValueError as error:
+            shown = ", ".join(f"{name} = {value}" for name, value in study.point(run).items())
+            raise ValueError(f"{where}run {run} ({shown}) is no case: {error}") from None
+
+
+def _base_case(given: Any, source: Path) -> tuple[dict[str, Any], Path]:
+    if isinstance(given, Mapping):
+        return copy.deepcopy(dict(given)), source.absolute()
+    if not isinstance(given, (str, Path)):
+        raise ValueError(f"{source}: [study] case is {given!r}; name a case file, relative to the study file")
+    path = (source.parent / given).absolute()
+    text = read_case(path).text
+    return tomllib.loads(text), path
+
+
+def _parameters(given: Any, where: str) -> tuple[Parameter, ...]:
+    if not isinstance(given, Mapping):
+        raise ValueError(f'{where}[parameters] must be a table, "material.friction_coefficient" = ...')
+    found = [_parameter(path, value, f'{where}[parameters] "{path}"') for path, value in given.items()]
+    names = [p.name for p in found]
+    for name in names:
+        if name in RESERVED:
+            raise ValueError(f"{where}[parameters] name '{name}' is a column of the table already; choose another")
+        if names.count(name) > 1:
+            raise ValueError(f"{where}[parameters] two parameters are named '{name}'; choose another name for one")
+    paths = [path for p in found for path in (p.path, *p.also)]
+    for path in paths:
+        if paths.count(path) > 1:
+            raise ValueError(f'{where}[parameters] "{path}" is varied twice')
+    return tuple(found)
+
+
+def _parameter(path: str, given: Any, where: str) -> Parameter:
+    if isinstance(given, list):
+        given = {"values": given}
+    if not isinstance(given, Mapping):
+        raise ValueError(f"{where} is {given!r}; give a list of values, or a table with a distribution")
+    table = dict(given)
+    name, also, points = table.pop("name", path), table.pop("also", []), table.pop("points", 0)
+    if not isinstance(name, str) or not name:
+        raise ValueError(f"{where}: name is {name!r}; give a text in quotes")
+    if isinstance(points, bool) or not isinstance(points, int) or points < 0:
+        raise ValueError(f"{where}: points is {points!r}; give a whole number")
+    also = tuple(_as_list(also))
+    for one in (path, *also):
+        try:
+            parse_path(str(one))
+        except ValueError as error:
+            raise ValueError(f"{where}: {error}") from None
+    if "values" not in table:
+        return Parameter(path, name, also, read_distribution(table, where), (), np.zeros(0), points)
+    values = table.pop("values")
+    weights = table.pop("weights", None)
+    refuse_unknown(table, ["values", "weights", "name", "also"], where)
+    if not isinstance(values, Sequence) or isinstance(values, str) or len(values) == 0:
+        raise ValueError(f"{where}: values is {values!r}; give a list of at least one")
+    share = np.ones(len(values))
+    if weights is not None:
+        if not (isinstance(weights, Sequence) and len(weights) == len(values) and all(map(_is_number, weights))):
+            raise ValueError(f"{where}: weights is {weights!r}; give a number for each of the {len(values)} values")
+        share = np.array(weights, dtype=float)
+        if (share < 0.0).any() or share.sum() <= 0.0:
+            raise ValueError(f"{where}: weights is {weights!r}; give numbers of at least 0, not all 0")
+    return Parameter(path, name, also, None, tuple(values), share / share.sum(), 0)
+
+
+def _imperfections(given: Any, where: str) -> list[dict[str, Any]]:
+    found = []
+    for number, table in enumerate(_as_list(given)):
+        if not isinstance(table, Mapping):
+            raise ValueError(f"{where}[[imperfections]] must be tables, not {table!r}")
+        if "seed" in table:
+            raise ValueError(
+                f"{where}[imperfections {number + 1}] seed: the study gives every run its own; "
+                "a fixed one belongs in the case"
+            )
+        read_imperfection(table, f"{where}[imperfections {number + 1}]")
+        found.append(dict(table))
+    return found
+
+
+def _as_list(given: Any) -> list[Any]:
+    return list(given) if isinstance(given, (list, tuple)) else [given]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and bool(np.isfinite(value))
+
+
+def _whole(table: Mapping[str, Any], key: str, default: int, least: int, where: str) -> int:
+    value = table.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ValueError(f"{where}[study] {key} is {value!r}; give a whole number of at least {least}")
+    return value
+
+
+def _sorted(part: Any) -> Any:
+    """The same values in one order, so that a table written otherwise compares alike."""
+    if isinstance(part, Mapping):
+        return sorted((str(k), _sorted(v)) for k, v in part.items())
+    return [_sorted(v) for v in part] if isinstance(part, (list, tuple)) else part

@@ -1,0 +1,242 @@
+"""Ledger: the folder of a study. A finished run is a line of a file that only grows, and is never lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import solver
+from blockvis.atomic_files import flush, make_folder, whole_file, write_whole
+
+from .run_one import FAILED
+from .study_file import RESERVED, Study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: The file of the rows, one JSON object per line.
+RUNS = "runs.jsonl"
+
+#: Status of a run without result.
+NO_RESULT = (FAILED, str(solver.Status.SOLVER_FAILED), str(solver.Status.INTERRUPTED))
+
+_TEXTS = ("status", "unit", "mechanism_class", "mechanism", "message")
+_COUNTS = ("run", "seed", "macro_blocks", "hinges", "sliding_joints", "increments", "programs")
+
+
+class StudyExists(ValueError):
+    """The folder holds something else already."""
+
+
+def has_failed(row: Mapping[str, Any]) -> bool:
+    """Whether a run gave no result."""
+    return row["status"] in NO_RESULT
+
+
+def finished_runs(folder: str | Path) -> int:
+    """How many runs the folder of a study holds."""
+    file = Path(folder) / RUNS
+    return file.read_bytes().count(b"\n") if file.is_file() else 0
+
+
+class Ledger:
+    """The folder of a study.
+
+    Parameters
+    ----------
+    folder : str or Path
+    study : Study
+    force : bool
+        Whether rows of another study may be thrown away.
+
+    Raises
+    ------
+    StudyExists
+        If the folder holds rows of another study, or something that is no study.
+    """
+
+    def __init__(self, folder: str | Path, study: Study, *, force: bool = False) -> None:
+        self.folder, self.study = Path(folder), study
+        self.rows: dict[int, dict[str, Any]] = {}
+        # The run that shows each mechanism, by the file of its picture.
+        self._first: dict[Path, int | None] = {}
+        self._whole = True
+        record, definition = self.folder / "study.json", study.definition()
+        if self.folder.exists() and not self.folder.is_dir():
+            raise StudyExists(f"'{self.folder}' is a file; choose another folder with -o")
+        if record.is_file():
+            stored = _read(record) or {}
+            changed = [k for k, v in definition.items() if stored.get("definition", {}).get(k) != v]
+            if changed and not force:
+                raise StudyExists(
+                    f"'{self.folder}' holds {len(self._stored())} finished runs of another study: {', '.join(changed)} "
+                    f"{'has' if len(changed) == 1 else 'have'} changed; choose another folder with -o, or throw these "
+                    "runs away with --force"
+                )
+            if force:
+                self._clear()
+        elif self.folder.is_dir() and any(self.folder.iterdir()):
+            raise StudyExists(f"'{self.folder}' holds something that is no study; choose another folder with -o")
+        make_folder(self.folder / "mechanisms")
+        write_whole(
+            record,
+            _json(
+                {
+                    "study": str(study.source),
+                    "case": str(study.case_source),
+                    "values": study.values,
+                    "n_runs": study.n_runs,
+                    "method": study.method,
+                    "seed": study.seed,
+                    "definition": definition,
+                    "versions": {name: version(name) for name in ("blockvis", "numpy", "scipy", "highspy", "dask")},
+                }
+            ),
+        )
+        self.rows |= self._stored()
+
+    def missing(self, *, retry_failed: bool = False) -> list[int]:
+        """The runs still to be made, in order."""
+        done = {run for run, row in self.rows.items() if not (retry_failed and has_failed(row))}
+        return [run for run in range(self.study.n_runs) if run not in done]
+
+    def add(self, finished: Sequence[tuple[dict[str, Any], bytes]]) -> None:
+        """Records finished runs, and the mechanism of a run if no earlier one shows this class.
+
+        Parameters
+        ----------
+        finished : sequence of (dict, bytes)
+            Rows and shapes, as :func:`blockvis.studies.run_one.run_once` gives them.
+        """
+        for row, shape in finished:
+            if shape:
+                self._add_shape(row, shape)
+        lines = "".join(json.dumps(row, ensure_ascii=False) + "\n" for row, _ in finished)
+        with open(self.folder / RUNS, "ab") as stream:
+            begun = stream.tell() > 0
+            if begun and not self._whole:
+                stream.write(b"\n")
+            self._whole = True
+            stream.write(lines.encode())
+            stream.flush()
+            os.fsync(stream.fileno())
+        if not begun:
+            flush(self.folder)
+        self.rows |= {row["run"]: row for row, _ in finished}
+
+    def _add_shape(self, row: Mapping[str, Any], shape: bytes) -> None:
+        file = self.shape_file(row["mechanism_class"])
+        if file not in self._first:
+            self._first[file] = _first_run(file)
+        first = self._first[file]
+        if first is None or row["run"] < first:
+            self._first[file] = row["run"]
+            with np.load(_buffer(shape)) as stored:
+                arrays = {name: stored[name] for name in stored.files}
+            write_whole(file, _packed({**arrays, "run": np.array(row["run"])}))
+
+    def shape_file(self, mechanism_class: str) -> Path:
+        """Where the picture of a class is kept."""
+        return self.folder / "mechanisms" / f"{sha256(mechanism_class.encode()).hexdigest()[:12]}.npz"
+
+    def table(self) -> pd.DataFrame:
+        """The finished runs, a row each, in order."""
+        import pandas as pd
+
+        names = [p.name for p in self.study.parameters]
+        columns = ["run", "status", *names, *RESERVED[2:]]
+        records = [
+            {**{name: _plain(row["parameters"].get(name)) for name in names}, **row}
+            for _, row in sorted(self.rows.items())
+        ]
+        table = pd.DataFrame.from_records(records, columns=columns)
+        for column in RESERVED:
+            if column in _COUNTS:
+                table[column] = table[column].astype("Int64")
+            elif column in _TEXTS:
+                table[column] = table[column].astype("string").fillna("")
+            else:
+                table[column] = table[column].astype("float64")
+        return table
+
+    def write_table(self) -> pd.DataFrame:
+        """Writes table.csv and table.parquet, each whole or not at all, and returns the table."""
+        table = self.table()
+        for name, save in (("table.csv", table.to_csv), ("table.parquet", table.to_parquet)):
+            with whole_file(self.folder / name) as partial:
+                save(partial, index=False)
+        return table
+
+    def write_summary(self, summary: Mapping[str, Any]) -> None:
+        """Writes summary.json."""
+        finished = {"finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
+        write_whole(self.folder / "summary.json", _json({**summary, **finished}))
+
+    def _stored(self) -> dict[int, dict[str, Any]]:
+        """The rows that are there; a line that some accident has broken counts as a run that was never made."""
+        file, rows = self.folder / RUNS, {}
+        lines = file.read_bytes().split(b"\n") if file.is_file() else [b""]
+        # The last line is whole if it ends: a run killed while it was written has left half of it.
+        self._whole = not lines[-1]
+        for line in lines:
+            try:
+                row = json.loads(line)
+            except ValueError:
+                continue
+            if isinstance(row, dict) and isinstance(row.get("run"), int) and 0 <= row["run"] < self.study.n_runs:
+                rows[row["run"]] = row
+        return rows
+
+    def _clear(self) -> None:
+        """Removes what a study writes, and nothing else."""
+        for file in (self.folder / "mechanisms").glob("*.npz"):
+            file.unlink()
+        for name in (RUNS, "table.csv", "table.parquet", "summary.json", *(f"{p}.png" for p in PICTURES)):
+            (self.folder / name).unlink(missing_ok=True)
+
+
+#: The pictures of a study.
+PICTURES = ("fragility", "sensitivity", "scatter", "mechanisms")
+
+
+def _plain(value: Any) -> Any:
+    """A list or table as text, because a column holds numbers or texts."""
+    return json.dumps(value) if isinstance(value, (list, dict)) else value
+
+
+def _first_run(file: Path) -> int | None:
+    if not file.is_file():
+        return None
+    with np.load(file) as stored:
+        return int(stored["run"])
+
+
+def _buffer(data: bytes) -> Any:
+    from io import BytesIO
+
+    return BytesIO(data)
+
+
+def _packed(arrays: Mapping[str, Any]) -> bytes:
+    buffer = _buffer(b"")
+    np.savez_compressed(buffer, **arrays)
+    return bytes(buffer.getvalue())
+
+
+def _json(value: Any) -> bytes:
+    return (json.dumps(value, indent=1, ensure_ascii=False, default=str) + "\n").encode()
+
+
+def _read(file: Path) -> Any:
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None

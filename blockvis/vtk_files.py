@@ -1,0 +1,76 @@
+"""VTK files that a viewer can open while the run that writes them goes on."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import pyvista as pv
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+from .atomic_files import write_whole
+
+
+def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True) -> Path:
+    """Writes a dataset as VTU, whole or not at all.
+
+    Parameters
+    ----------
+    dataset : pyvista.UnstructuredGrid
+    path : path
+        Its folder is made where it does not exist.
+    last : bool
+        As of :func:`blockvis.atomic_files.whole_file`.
+
+    Returns
+    -------
+    pathlib.Path
+
+    Notes
+    -----
+    Inline binary with zlib and 64-bit headers: what ParaView from 5.11 on, pyvista and meshio all read. Appended
+    raw data, VTK's default, fails in ParaView 5.11 above some 10 kB.
+    """
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(dataset)
+    # Into memory first: on a full disk VTK's writer ends the process.
+    writer.WriteToOutputStringOn()
+    writer.SetDataModeToBinary()
+    writer.SetCompressorTypeToZLib()
+    writer.SetHeaderTypeToUInt64()
+    if writer.Write() != 1:
+        raise OSError(f"VTK could not write {path}")
+    return write_whole(path, writer.GetOutputString(), last=last)
+
+
+def write_pvd(
+    path: str | os.PathLike[str], entries: Iterable[tuple[float, str | os.PathLike[str]]], *, last: bool = True
+) -> Path:
+    """Writes the list of files of a time series, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+    entries : iterable of (time, file)
+        Files as given, relative to the folder of ``path``.
+    last : bool
+        As of :func:`blockvis.atomic_files.whole_file`.
+
+    Returns
+    -------
+    pathlib.Path
+    """
+    lines = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
+        "  <Collection>",
+        *(
+            f'    <DataSet timestep="{time:.12g}" group="" part="0" file={quoteattr(Path(file).as_posix())}/>'
+            for time, file in entries
+        ),
+        "  </Collection>",
+        "</VTKFile>",
+    ]
+    return write_whole(path, "\n".join(lines) + "\n", last=last)

@@ -1,0 +1,1 @@
+"""Analyses: settlement, pushover and limit load."""

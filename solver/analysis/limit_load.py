@@ -1,0 +1,447 @@
+"""Limit load: the largest multiplier of the live loads that a structure carries at one geometry; its mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from solver.assembly import Assembly, check_blocks
+from solver.equilibrium import equilibrium_matrix
+from solver.geometry.contacts import Contacts
+from solver.geometry.planar_contacts import find_contacts
+from solver.interfaces import InterfaceLaw, Interfaces
+from solver.kinematics import Pose, moved_vertices
+from solver.loads import Loads, checked_loads
+from solver.lp.problem import LinearProgram, Unbounded
+from solver.lp.solve import solve_lp
+from solver.program.increment import FALLING_FRACTION
+from solver.program.strength import Admissible, point_strength
+from solver.results.certificate import Certificate
+from solver.results.limit import Envelope, LimitLoad, LimitStatus
+
+#: Largest gap of a closed contact point: in the drawing, as a fraction of the width of the thinnest block, the accuracy
+#: also accepted for overlaps; at a computed pose, as a fraction of the block size, a hundred times its accuracy.
+DRAWN_GAP = 1e-3
+COMPUTED_GAP = 1e-6
+
+#: Largest gap, in block sizes, of a contact point that may close within a displacement.
+REACH = 0.25
+
+#: Non-associative flow: part of the new normal forces in the next program, while wandering and while settling, and
+#: part of the dilatancy that is kept.
+RELAXATION, SETTLING_RELAXATION = 0.5, 0.9
+DILATANCY_KEPT = 0.5
+
+#: Non-associative flow has converged when the multiplier changes by less than the first and shear forces exceed
+#: friction by less than the second, relative to the multiplier and to the largest normal force.
+MULTIPLIER_CHANGE = 1e-7
+FRICTION_EXCESS = 1e-6
+
+#: Programs of the non-associative sequence: without preference among equal forces, which wanders to low multipliers,
+#: and then at most, near the forces of the lowest, to convergence.
+WANDERING, SETTLING = 40, 100
+
+#: Cost of a change of a normal force in the non-associative programs, in multipliers: it only decides between equals.
+CHANGE_COST = 1e-8
+
+#: Cost of unbalanced force in the non-associative programs, in multipliers: far above that of any real mechanism.
+UNBALANCED_COST = 1e3
+
+
+def limit_load(
+    assembly: Assembly,
+    *,
+    loads: Loads,
+    friction_coefficient: float = 0.6,
+    interfaces: Interfaces | None = None,
+    pose: Pose | None = None,
+    flow: str = "associative",
+    closed_gap: float | None = None,
+    displacement: float = 0.0,
+    overlap_tolerance: float | None = None,
+) -> LimitLoad:
+    """The largest multiplier of the live loads at which the structure can be in equilibrium.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        Fixed and moving supports both stand still.
+    loads : Loads
+        Dead loads, and the live loads that the multiplier scales. For the other direction give minus the live loads.
+    friction_coefficient : float
+        Of every interface, where ``interfaces`` is not given.
+    interfaces : Interfaces, optional
+    pose : Pose, optional
+        The geometry: that of an increment gives the capacity left after a settlement. The drawing by default.
+    flow : {"associative", "non-associative"}
+        Whether sliding joints lift by friction coefficient times slip, or do not lift.
+    closed_gap : float, optional [m]
+        Contact points with a larger gap are open and carry nothing. By default a thousandth of the width of the
+        thinnest block in the drawing, a millionth of the block size at a given pose.
+    displacement : float [m]
+        How far the live loads may move along themselves, on average, while joints close. 0: what is open carries
+        nothing. A wall of many bricks whose joints slide has openings of hundredths of a millimetre after a settlement,
+        and its strict limit load is that of the one loosest brick.
+    overlap_tolerance : float, optional [m]
+        Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
+
+    Returns
+    -------
+    LimitLoad
+
+    Raises
+    ------
+    ValueError
+        For no free block, overlapping blocks, loads of the wrong shape, no live load on a free block.
+    SolveError
+        If HiGHS gives no solution that passes its check.
+
+    Notes
+    -----
+    Associative flow, over multipliers λ ≥ 0 of the rays n ∓ μ t of the friction cones and α ≥ 0:
+
+        maximise α  subject to  A λ + dead + α live = 0  for every free block
+
+    Its dual is the kinematic program: minimise - dead · q over mechanisms q with N(q) ≥ μ |T(q)| at every closed
+    contact point and live · q = 1. Livesley (1978), https://doi.org/10.1002/nme.1620121207, for the static form; both
+    bounds are recomputed from the forces and from the mechanism. The multiplier is the exact limit load of the model
+    with associative flow, and an upper bound for every other flow rule with the same friction.
+
+    Cohesion c and compressive strength σ of the interfaces, off by default, give each contact point its part A of the
+    face between two blocks (half the distance to its neighbours, times the thickness): |T| ≤ μ N + c A and
+    0 ≤ N ≤ σ A, joints still without tension. A face of two corners thus carries moments up to σ A b / 2 with all of
+    its force at the ends: more than the stress block of a continuous face, so that crushing at a toe is found later
+    than it comes. What crushes moves by the same flow rule.
+
+    With a displacement δ, points that are open by a gap g carry at a price: maximise α - Σ g N / w, where w is δ times
+    the sum of the live forces; its dual has N(q) + g ≥ μ |T(q)| and live · q = w. That is the first program of a
+    pushover with an increment δ. At closed joints it is the limit load, whatever δ is; the two values then enclose the
+    optimum of this program.
+
+    Non-associative flow is a sequence of such programs in the manner of Gilbert, Casapulla & Ahmed (2006),
+    https://doi.org/10.1016/j.compstruc.2006.02.005: the friction cone of each point is replaced by
+    |T| ≤ μ N⁰ + ψ (N - N⁰), with N⁰ out of the normal forces of the programs before and a dilatancy ψ that falls from
+    μ to zero. Ours first wanders among equal solutions, which leads to low multipliers, and then settles near the
+    lowest. Where it converges (N = N⁰) the forces obey Coulomb friction and balance the loads, the mechanism does not
+    lift where it slides, and the power of the loads is what friction takes: a complete solution for friction without
+    dilatancy, never above the associative value. It is not proved to be the least: such a structure may have several
+    limit loads, depending on how it was loaded, and may fall below this one. Its two values agree where it has
+    converged, but are no bounds. Convergence is not proved either; "not converged" says so and gives the last
+    program. Where the associative limit load is unbounded, so is what is given here, although friction without
+    dilatancy might slide.
+    """
+    if flow not in ("associative", "non-associative"):
+        raise ValueError(f"flow is '{flow}'; it is 'associative' or 'non-associative'")
+    check_blocks(assembly, overlap_tolerance)
+    loads = checked_live(assembly, loads)
+    interfaces = interfaces or Interfaces(InterfaceLaw(friction_coefficient))
+    if closed_gap is None:
+        closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
+    pose = Pose.initial(assembly) if pose is None else pose
+    if not (np.isfinite(displacement) and displacement >= 0.0):
+        raise ValueError(f"displacement is {displacement:g} m; it must be a finite number of at least 0")
+    problem = _Problem.stated(assembly, interfaces, loads, pose, closed_gap, displacement)
+    balanced, status = problem.balanced(with_live=False), LimitStatus.FOUND
+    if balanced.falls:
+        falling, status = balanced, LimitStatus.HELD
+        balanced = problem.balanced(with_live=True)
+        if balanced.falls:
+            return problem.result(falling, LimitStatus.NO_EQUILIBRIUM, flow, 2)
+    try:
+        found = problem.associative(balanced)
+    except Unbounded:
+        return problem.result(balanced, LimitStatus.UNBOUNDED, flow, 2)
+    if flow == "associative":
+        return problem.result(found, status, flow, 2)
+    return problem.non_associative(found, status)
+
+
+@dataclass(frozen=True)
+class _State:
+    """Forces (n_contacts, 2), multiplier and velocity of one program, in its units.
+
+    ``unbalanced`` is what the dead load alone leaves, per row; ``drag`` (n_contacts,) the friction force that slip
+    works against without being in the normal forces' power.
+    """
+
+    forces: np.ndarray
+    multiplier: float
+    velocity: np.ndarray
+    unbalanced: np.ndarray
+    gap: float
+    falls: bool = False
+    drag: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """One geometry and its loads in units of block size and mean block load; rows of the free blocks."""
+
+    assembly: Assembly
+    pose: Pose
+    contacts: Contacts
+    friction: np.ndarray
+    length: float
+    force: float
+    matrix: sp.csr_array
+    dead: np.ndarray
+    live: np.ndarray
+    live_size: float
+    live_force: float
+    price: np.ndarray
+    cohesion: np.ndarray
+    crushing: np.ndarray
+
+    @classmethod
+    def stated(
+        cls,
+        assembly: Assembly,
+        interfaces: Interfaces,
+        loads: Loads,
+        pose: Pose,
+        closed_gap: float,
+        displacement: float,
+    ) -> _Problem:
+        length, free = assembly.block_size, assembly.free
+        reach = max(closed_gap, REACH * length) if displacement > 0.0 else closed_gap
+        vertices = moved_vertices(assembly, pose)
+        contacts = find_contacts(assembly, vertices, reach)
+        around = contacts if interfaces.dry else find_contacts(assembly, vertices, max(reach, REACH * length))
+        cohesion, crushing = point_strength(assembly, interfaces, contacts, around)
+        units = np.array([1.0, 1.0, length])
+        weights = np.abs(loads.dead[free] / units)
+        live = loads.live[free] / units
+        force = float(weights.sum() / len(weights)) or float(np.abs(live).max())
+        size = float(np.abs(live).max())
+        # What a unit of normal force costs in multipliers of the scaled live load.
+        price = np.zeros(len(contacts))
+        if displacement > 0.0:
+            total = float(np.hypot(*live[:, :2].T).sum() + np.abs(live[:, 2]).sum())
+            price = np.where(contacts.gaps > closed_gap, contacts.gaps, 0.0) / displacement * (size / total)
+        return cls(
+            assembly=assembly,
+            pose=pose,
+            contacts=contacts,
+            friction=interfaces.friction(assembly, contacts.block_a, contacts.block_b),
+            length=length,
+            force=force,
+            matrix=sp.csr_array(equilibrium_matrix(contacts, pose, length))[np.repeat(free, 3)],
+            dead=(loads.dead[free] / units / force).ravel(),
+            live=(live / size).ravel(),
+            live_size=size / force,
+            live_force=float(np.hypot(*loads.live[free, :2].sum(axis=0))),
+            price=price,
+            cohesion=cohesion / force,
+            crushing=crushing / force,
+        )
+
+    @property
+    def admissible(self) -> Admissible:
+        """What the contact points can carry, associative."""
+        return Admissible.of(self.friction, self.cohesion, self.crushing)
+
+    def balanced(self, *, with_live: bool) -> _State:
+        """The least unbalanced force that the dead load leaves, and how the blocks move where it is not nothing."""
+        carried, rows = self.admissible, len(self.dead)
+        columns = carried.columns
+        n = columns.shape[1]
+        identity = sp.identity(rows, format="csc")
+        live = sp.csc_array(self.live[:, None] * float(with_live))
+        balance = [self.matrix @ columns, live, identity, -identity]
+        program = LinearProgram(
+            cost=np.concatenate([np.zeros(n + 1), np.ones(2 * rows)]),
+            matrix=sp.csc_array(sp.block_array([balance, [carried.limits, None, None, None]], format="csc")),
+            lower=np.append(-self.dead, np.zeros(len(carried.most))),
+            upper=np.append(-self.dead, carried.most),
+        )
+        solution = solve_lp(program)
+        forces, multiplier = columns @ solution.x[:n], float(solution.x[n]) * with_live
+        unbalanced = np.abs(self.matrix @ forces + self.dead + multiplier * self.live)
+        falls = float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * float(np.abs(self.dead).sum())
+        return _State(forces.reshape(-1, 2), multiplier, -solution.row_dual[:rows], unbalanced, solution.gap, falls)
+
+    def associative(self, balanced: _State) -> _State:
+        """The program of the limit load; what the dead load leaves unbalanced by rounding it may leave too."""
+        carried, rows = self.admissible, len(self.dead)
+        columns = carried.columns
+        balance = [self.matrix @ columns, sp.csc_array(self.live[:, None])]
+        program = LinearProgram(
+            cost=np.append(columns.T @ np.stack([self.price, np.zeros_like(self.price)], axis=1).ravel(), -1.0),
+            matrix=sp.csc_array(sp.block_array([balance, [carried.limits, None]], format="csc")),
+            lower=np.append(-self.dead - balanced.unbalanced, np.zeros(len(carried.most))),
+            upper=np.append(-self.dead + balanced.unbalanced, carried.most),
+        )
+        solution = solve_lp(program)
+        forces = (columns @ solution.x[:-1]).reshape(-1, 2)
+        return _State(forces, float(solution.x[-1]), -solution.row_dual[:rows], balanced.unbalanced, solution.gap)
+
+    def non_associative(self, start: _State, found: LimitStatus) -> LimitLoad:
+        """The sequence of programs with normal forces carried over and dilatancy taken away."""
+        normal, dilatancy, before = start.forces[:, 0], self.friction.copy(), start
+        state, converged = start, False
+        lowest = (np.inf, normal)
+        for number in range(WANDERING + SETTLING):
+            wandering = number < WANDERING
+            dilatancy = np.where(dilatancy > 1e-3, DILATANCY_KEPT * dilatancy, 0.0)
+            if number == WANDERING:
+                normal = lowest[1]
+            state = self._without_dilatancy(normal, dilatancy, start.unbalanced, 0.0 if wandering else CHANGE_COST)
+            largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
+            excess = np.abs(state.forces[:, 1]) - self.friction * state.forces[:, 0] - self.cohesion
+            change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
+            if (
+                not (wandering or state.falls)
+                and float(excess.max(initial=0.0)) <= FRICTION_EXCESS * largest
+                and change <= MULTIPLIER_CHANGE
+            ):
+                converged = True
+                break
+            kept = 1.0 - (RELAXATION if wandering else SETTLING_RELAXATION)
+            normal = kept * normal + (1.0 - kept) * state.forces[:, 0]
+            if wandering and not state.falls and not dilatancy.any() and state.multiplier < lowest[0]:
+                lowest = (state.multiplier, normal)
+            before = state
+        status = found if converged else LimitStatus.NOT_CONVERGED
+        return self.result(state, status, "non-associative", 3 + number)
+
+    def _without_dilatancy(
+        self, normal: np.ndarray, dilatancy: np.ndarray, unbalanced: np.ndarray, change_cost: float
+    ) -> _State:
+        """Maximises α with |T| ≤ c + μ N⁰ + ψ (N - N⁰); where changes cost, takes of equal α the forces nearest to N⁰.
+
+        Columns N, u, v, then p, m, α and unbalanced forces: T = (u - v) / 2, u + v = 2 (k + ψ N) with the constant
+        k = c + (μ - ψ) N⁰, N - N⁰ = p - m, and a row N for each point that may crush.
+        """
+        n, rows = len(normal), len(self.dead)
+        a_normal, a_shear = self.matrix[:, 0::2], self.matrix[:, 1::2]
+        constant = self.cohesion + (self.friction - dilatancy) * normal
+        brittle = np.flatnonzero(np.isfinite(self.crushing))
+        identity, eye = sp.identity(rows, format="csr"), sp.identity(n, format="csr")
+        live = sp.csr_array(self.live[:, None])
+        balance = [a_normal, a_shear / 2.0, -a_shear / 2.0, None, None, live, identity, -identity]
+        cone = [sp.diags_array(-2.0 * dilatancy), eye, eye, None, None, None, None, None]
+        change = [eye, None, None, -eye, eye, None, None, None]
+        crush = [sp.csr_array(eye)[brittle], None, None, None, None, None, None, None]
+        program = LinearProgram(
+            cost=np.concatenate(
+                [self.price, np.zeros(2 * n), np.full(2 * n, change_cost), [-1.0], np.full(2 * rows, UNBALANCED_COST)]
+            ),
+            matrix=sp.csc_array(sp.block_array([balance, cone, change, crush], format="csc")),
+            lower=np.concatenate([-self.dead - unbalanced, 2.0 * constant, normal, np.zeros(len(brittle))]),
+            upper=np.concatenate([-self.dead + unbalanced, 2.0 * constant, normal, self.crushing[brittle]]),
+        )
+        solution = solve_lp(program)
+        x = solution.x
+        forces = np.stack([x[:n], (x[n : 2 * n] - x[2 * n : 3 * n]) / 2.0], axis=1)
+        left = float(x[5 * n + 1 :].max(initial=0.0))
+        return _State(
+            forces,
+            float(x[5 * n]),
+            -solution.row_dual[:rows],
+            unbalanced,
+            solution.gap,
+            left > FALLING_FRACTION * float(np.abs(self.dead).sum()),
+            constant,
+        )
+
+    def result(self, state: _State, status: LimitStatus, flow: str, programs: int) -> LimitLoad:
+        """The state in metres and newtons, its bounds and its certificate recomputed from it."""
+        velocity, multiplier = state.velocity, state.multiplier
+        if status is LimitStatus.UNBOUNDED:
+            velocity = np.zeros_like(velocity)
+        relative = (self.matrix.T @ velocity).reshape(-1, 2)
+        live_power = float(self.live @ velocity)
+        # Points that are open may close by their gap in a motion whose live power is 1.
+        relative[:, 0] += self.price * max(live_power, 0.0)
+        drag = self.cohesion if state.drag is None else state.drag
+        slope = self.friction if state.drag is None else np.zeros(len(relative))
+        slip, brittle = np.abs(relative[:, 1]), np.isfinite(self.crushing)
+        # What crushes may come closer than what is rigid, at the price of its strength.
+        closer = np.where(brittle, np.maximum(slope * slip - relative[:, 0], 0.0), 0.0)
+        crushed = np.where(brittle, self.crushing, 0.0) * closer
+        taken = float(drag @ slip + crushed.sum())
+        kinematic = (taken - float(self.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
+        kinematic += float(self.price @ state.forces[:, 0])
+        room = relative[:, 0] + closer - slope * slip
+        normal, shear = state.forces.T
+        lost = normal * relative[:, 0] + shear * relative[:, 1] + drag * slip + crushed
+        balance = self.matrix @ state.forces.ravel() + self.dead + multiplier * self.live
+        total = float(np.abs(self.dead).sum()) or 1.0
+        mechanism = np.zeros((self.assembly.n_blocks, 3))
+        size = float(np.abs(velocity).max(initial=0.0)) or 1.0
+        mechanism[self.assembly.free] = velocity.reshape(-1, 3) / size * [1.0, 1.0, 1.0 / self.length]
+        found = status not in (LimitStatus.UNBOUNDED, LimitStatus.NO_EQUILIBRIUM)
+        static = multiplier / self.live_size
+        nothing = np.inf if status is LimitStatus.UNBOUNDED else np.nan
+        return LimitLoad(
+            multiplier=static if found else nothing,
+            bounds=(static, kinematic / self.live_size) if found else (nothing, nothing),
+            mechanism=mechanism,
+            contacts=self.contacts,
+            forces=state.forces * self.force,
+            certificate=Certificate(
+                equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / total,
+                largest_penetration=float(np.maximum(-self.contacts.gaps, 0.0).max(initial=0.0)),
+                duality_gap=abs(kinematic - multiplier) / (1.0 + abs(multiplier)) if found else state.gap,
+                complementarity=float(np.abs(lost).sum()) / (1.0 + abs(multiplier)) if found else 0.0,
+                kinematic_violation=float(np.maximum(-room, 0.0).max(initial=0.0)) / size,
+            ),
+            status=status,
+            flow=flow,
+            pose=self.pose,
+            friction=self.friction,
+            live_force=self.live_force,
+            programs=programs,
+        )
+
+
+def limit_load_envelope(
+    assembly: Assembly,
+    positions: Sequence[float] | np.ndarray,
+    live: Callable[[float], np.ndarray],
+    *,
+    dead: np.ndarray,
+    friction_coefficient: float = 0.6,
+    interfaces: Interfaces | None = None,
+    pose: Pose | None = None,
+    flow: str = "associative",
+) -> Envelope:
+    """Limit loads of a live load that moves over the structure.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    positions : (n,) sequence
+    live : callable
+        From a position to the live loads there, an (n_blocks, 3) array [N, N, N·m].
+    dead : (n_blocks, 3) array [N, N, N·m]
+    friction_coefficient, interfaces, pose, flow
+        As in :func:`limit_load`.
+    """
+    positions = np.asarray(positions, dtype=float)
+    if positions.ndim != 1 or len(positions) == 0:
+        raise ValueError(f"positions have shape {positions.shape}; give at least one number")
+    limits = tuple(
+        limit_load(
+            assembly,
+            loads=Loads(dead, live(float(x))),
+            friction_coefficient=friction_coefficient,
+            interfaces=interfaces,
+            pose=pose,
+            flow=flow,
+        )
+        for x in positions
+    )
+    return Envelope(positions, limits)
+
+
+def checked_live(assembly: Assembly, loads: Loads) -> Loads:
+    """The loads, checked, with live loads on at least one free block; those on supports are taken off."""
+    loads = checked_loads(assembly, loads)
+    live = np.where(assembly.free[:, None], loads.live, 0.0)
+    if not live.any():
+        raise ValueError("no live load acts on any free block; give Loads whose 'live' is not zero")
+    return replace(loads, live=live)

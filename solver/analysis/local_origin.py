@@ -1,0 +1,62 @@
+"""A local origin: structures drawn far from the origin, as on a national grid, are followed where they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from solver.assembly import Assembly
+from solver.kinematics import Pose
+from solver.loads import Settlement
+from solver.results.increment import Increment
+
+Ended = TypeVar("Ended")
+
+#: Distance from the origin in block sizes beyond which rounding of the coordinates, half a nanometre at five thousand
+#: kilometres, would come near what the geometry is corrected to.
+FAR = 1e3
+
+
+def at_origin(assembly: Assembly) -> np.ndarray:
+    """(2,) array [m]: what to take off the coordinates; zero where the structure is near the origin.
+
+    A multiple of a power of two that is large against the structure, so that taking it off rounds nothing.
+    """
+    low, high = assembly.vertices.min(axis=0), assembly.vertices.max(axis=0)
+    middle = (low + high) / 2.0
+    if float(np.abs(middle).max()) <= FAR * assembly.block_size:
+        return np.zeros(2)
+    unit = 2.0 ** np.ceil(np.log2(max(float((high - low).max()), assembly.block_size)))
+    return np.asarray(np.round(middle / unit) * unit)
+
+
+def without_origin(
+    origin: np.ndarray, assembly: Assembly, settlements: Sequence[Settlement]
+) -> tuple[Assembly, tuple[Settlement, ...]]:
+    """The blocks and what moves their supports in coordinates that count from a local origin."""
+    local = tuple(
+        phase
+        if phase.rotation_centre is None
+        else replace(phase, rotation_centre=tuple((np.asarray(phase.rotation_centre) - origin).tolist()))
+        for phase in settlements
+    )
+    return replace(assembly, vertices=assembly.vertices - origin), local
+
+
+def told_from(steps: Generator[Increment, None, Ended], origin: np.ndarray) -> Generator[Increment, None, Ended]:
+    """The increments with their places where the drawing has them; checkpoints stay in local coordinates."""
+    while True:
+        try:
+            increment = next(steps)
+        except StopIteration as stop:
+            ended: Ended = stop.value
+            return ended
+        pose, contacts = increment.pose, increment.contacts
+        yield replace(
+            increment,
+            pose=Pose(pose.positions + origin, pose.rotations),
+            contacts=replace(contacts, points=contacts.points + origin),
+        )

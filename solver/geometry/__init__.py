@@ -1,0 +1,1 @@
+"""Geometry: outlines of blocks, and the points at which they touch."""

@@ -1,0 +1,49 @@
+"""Broad phase: which boxes come near each other, without looking at every pair."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def expand_ranges(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For counts (3, 0, 2): owners (0, 0, 0, 2, 2) and positions within each owner (0, 1, 2, 0, 1)."""
+    owner = np.repeat(np.arange(len(counts)), counts)
+    first = np.cumsum(counts) - counts
+    return owner, np.arange(len(owner)) - first[owner]
+
+
+def box_pairs(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All pairs i < j of axis-parallel boxes that touch or overlap.
+
+    Parameters
+    ----------
+    low, high : (n, 2) arrays [m]
+        Corners of the boxes.
+
+    Returns
+    -------
+    i, j : (n_pairs,) int arrays
+
+    Notes
+    -----
+    Sort and sweep along the axis on which fewer pairs survive; one long block (the ground) costs n pairs, not n².
+    """
+    best = None
+    for axis in (0, 1):
+        order = np.argsort(low[:, axis], kind="stable")
+        ends = np.searchsorted(low[order, axis], high[order, axis], side="right")
+        counts = np.maximum(ends - np.arange(1, len(order) + 1), 0)
+        if best is None or counts.sum() < best[1].sum():
+            best = (order, counts, 1 - axis)
+    assert best is not None
+    order, counts, other = best
+    owner, position = expand_ranges(counts)
+    i, j = order[owner], order[owner + 1 + position]
+    touching = (low[i, other] <= high[j, other]) & (low[j, other] <= high[i, other])
+    i, j = i[touching], j[touching]
+    return np.minimum(i, j), np.maximum(i, j)
+
+
+def boxes(vertices: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest coordinates of each polygon, two (n, 2) arrays."""
+    return np.minimum.reduceat(vertices, offsets[:-1]), np.maximum.reduceat(vertices, offsets[:-1])

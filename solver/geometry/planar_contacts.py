@@ -1,0 +1,312 @@
+"""Contact points in the plane: which corners face which edges, with their frames and gaps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.assembly import Assembly
+
+from .broad_phase import box_pairs, boxes, expand_ranges
+from .contacts import Contacts
+
+#: A corner this close to the end of an edge, as a fraction of the shortest edge involved, stands on the corner
+#: there. Correctors take drift along a hinge back, so that it need not cover the error of an increment, only of
+#: drawings; a bearing shorter than this is none.
+CORNER_TOLERANCE = 1e-5
+
+#: The flank of a corner may lean into the edge it faces by this much (sine of the angle) before the corner no
+#: longer counts as facing it: an open joint that may close again leans by its opening angle.
+LARGEST_LEAN = 0.5
+
+#: A corner over the end of an edge, its face leading away, may touch the edge in this increment if its gap is at most
+#: this multiple of its overlap.
+STEEPEST_LANDING = 0.25
+
+#: Cosine up to which two faces that leave a corner count as perpendicular, as those of diagonal neighbours are.
+PERPENDICULAR = 1e-6
+
+#: Difference of cosines up to which two pairs of faces at a corner are open alike.
+SAME_OPENING = 1e-9
+
+#: Penetration up to this fraction of the width of the thinner block is a contact to be corrected; beyond, the
+#: corner belongs to another face behind.
+PENETRATION_FRACTION = 0.1
+
+
+def measure_contacts(
+    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
+) -> Contacts:
+    """Frames and gaps of given pairs of features where the corners now are.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    vertices : (n_vertices, 2) array [m]
+        Current corners of all blocks.
+    vertex, edge, corner : (n,) int arrays
+        As in :class:`Contacts`.
+
+    Notes
+    -----
+    A corner on an edge has the normal of the edge. A corner on a corner has the normal that halves the angle
+    between the two faces that meet there, so that neither block is preferred, and the point half-way.
+    """
+    following = assembly.next_vertex
+    v = vertices[vertex]
+    tangent = _unit(vertices[following[edge]] - vertices[edge])
+    on_corner = corner >= 0
+    if on_corner.any():
+        facing = _facing_edge(assembly, vertex[on_corner], edge[on_corner], corner[on_corner])
+        other = _unit(vertices[following[facing]] - vertices[facing])
+        tangent[on_corner] = _unit(tangent[on_corner] - other)
+    base = vertices[np.where(on_corner, corner, edge)]
+    # The edge runs counter-clockwise around block b: its outward normal is a quarter turn clockwise, and
+    # the tangent a quarter turn counter-clockwise from that normal is the edge's own direction.
+    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    rest = v - base
+    points = np.where(on_corner[:, None], (v + base) / 2.0, v)
+    return Contacts(
+        vertex=vertex,
+        edge=edge,
+        corner=corner,
+        block_a=assembly.block_of_vertex[vertex],
+        block_b=assembly.block_of_vertex[edge],
+        points=points,
+        frames=np.stack([normal, tangent], axis=1),
+        gaps=_dot(rest, normal),
+        along=_dot(rest, tangent),
+    )
+
+
+def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Contacts:
+    """Finds the points at which blocks touch or may touch within one increment.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    vertices : (n_vertices, 2) array [m]
+        Current corners of all blocks.
+    reach : float [m]
+        Largest gap of a contact point that is kept.
+
+    Returns
+    -------
+    Contacts
+        Sorted by their features, so that the same geometry gives the same order.
+
+    Notes
+    -----
+    Candidates are all pairs of a convex corner and an edge of another block, not both of supports, with the
+    corner in front of the edge (gap at most ``reach``), its block on the outward side and above the edge over
+    some length. Near an end of the edge the corner there and the face that leaves it decide: where the two
+    faces run the same way the pair is a corner on a corner, kept once; where they part, the blocks are
+    diagonal neighbours and do not touch.
+    """
+    pair_a, pair_b = _near_blocks(assembly, vertices, reach)
+    vertex, edge = _vertex_edge_candidates(assembly, vertices, pair_a, pair_b, reach)
+    vertex, edge, corner = _settle_ends(assembly, vertices, vertex, edge, reach)
+    kept = _closest_faces(assembly, vertices, vertex, edge, corner)
+    vertex, edge, corner = vertex[kept], edge[kept], corner[kept]
+    order = np.lexsort((edge, vertex))
+    return measure_contacts(assembly, vertices, vertex[order], edge[order], corner[order])
+
+
+def _near_blocks(assembly: Assembly, vertices: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Ordered pairs of blocks whose boxes come within reach, not both supports."""
+    low, high = boxes(vertices, assembly.offsets)
+    i, j = box_pairs(low - reach / 2.0, high + reach / 2.0)
+    useful = assembly.free[i] | assembly.free[j]
+    i, j = i[useful], j[useful]
+    return np.concatenate([i, j]), np.concatenate([j, i])
+
+
+def _vertex_edge_candidates(
+    assembly: Assembly, vertices: np.ndarray, pair_a: np.ndarray, pair_b: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of block a in front of edges of block b, by distance and direction alone."""
+    offsets, following, previous = assembly.offsets, assembly.next_vertex, assembly.previous_vertex
+    counts = np.diff(offsets)
+    low, high = boxes(vertices, offsets)
+    owner, position = expand_ranges(counts[pair_a])
+    vertex, b = offsets[pair_a][owner] + position, pair_b[owner]
+    near = assembly.convex_vertex[vertex]
+    for axis in (0, 1):
+        place = vertices[vertex, axis]
+        near &= (place >= (low[:, axis] - reach)[b]) & (place <= (high[:, axis] + reach)[b])
+    vertex, b = vertex[near], b[near]
+
+    owner, position = expand_ranges(counts[b])
+    edge, vertex = offsets[b][owner] + position, vertex[owner]
+    # Most pairs are far from each other: the distance comes first, and nothing else is worked out for them.
+    length, width = assembly.edge_lengths, assembly.widths
+    tangents = (vertices[following] - vertices) / length[:, None]
+    normals = np.stack([tangents[:, 1], -tangents[:, 0]], axis=1)
+    gap = _dot(vertices[vertex] - vertices[edge], normals[edge])
+    near = np.flatnonzero((gap >= -PENETRATION_FRACTION * width.max()) & (gap <= reach))
+    vertex, edge, gap = vertex[near], edge[near], gap[near]
+    along = _dot(vertices[vertex] - vertices[edge], tangents[edge])
+    a_block, b_block = assembly.block_of_vertex[vertex], assembly.block_of_vertex[edge]
+    deepest = PENETRATION_FRACTION * np.minimum(width[a_block], width[b_block])
+    end = end_zone(assembly, vertex, edge)
+    keep = (gap >= -deepest) & (along >= -end) & (along <= length[edge] + end)
+    keep[keep] = _through_this_face(assembly, vertices, vertex[keep], edge[keep], gap[keep], end[keep])
+    vertex, edge = vertex[keep], edge[keep]
+
+    directions = _unit(vertices[following] - vertices)
+    to_next, to_previous = directions, -directions[previous]
+    inward = np.stack([to_previous[:, 1] - to_next[:, 1], to_next[:, 0] - to_previous[:, 0]], axis=1)
+    normal = normals[edge]
+    outside = (
+        (_dot(to_next[vertex], normal) >= -LARGEST_LEAN)
+        & (_dot(to_previous[vertex], normal) >= -LARGEST_LEAN)
+        & (_dot(inward[vertex], normal) > 0.0)
+    )
+    return vertex[outside], edge[outside]
+
+
+def _through_this_face(
+    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, gap: np.ndarray, end: np.ndarray
+) -> np.ndarray:
+    """Whether a corner behind an edge got there through it: not where a neighbouring face is nearer, or in front of it.
+
+    Without it a corner that bears on the last bit of a pier's top counts as deep inside the pier's flank.
+    """
+    through = np.ones(len(vertex), dtype=bool)
+    k = np.flatnonzero(gap < -end)
+    following, previous = assembly.next_vertex, assembly.previous_vertex
+    for neighbour, shared in ((following[edge[k]], following[edge[k]]), (previous[edge[k]], edge[k])):
+        tangent = _unit(vertices[following[neighbour]] - vertices[neighbour])
+        rest = vertices[vertex[k]] - vertices[neighbour]
+        beside = rest[:, 0] * tangent[:, 1] - rest[:, 1] * tangent[:, 0]
+        # The block of a corner that came through the neighbouring face lies on that face's side.
+        inward = _inward(assembly, vertices, vertex[k])
+        from_there = inward[:, 0] * tangent[:, 1] - inward[:, 1] * tangent[:, 0] > 0.0
+        through[k] &= ~(assembly.convex_vertex[shared] & from_there & (beside > gap[k] + end[k]))
+    return through
+
+
+def _inward(assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray) -> np.ndarray:
+    """(n, 2) array: from each corner into its block, half-way between the flanks."""
+    p = vertices[vertex]
+    to_next = _unit(vertices[assembly.next_vertex[vertex]] - p)
+    to_previous = _unit(vertices[assembly.previous_vertex[vertex]] - p)
+    return np.stack([to_previous[:, 1] - to_next[:, 1], to_next[:, 0] - to_previous[:, 0]], axis=1)
+
+
+def _settle_ends(
+    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sorts out the corners near the end of their edge: on the corner there, or past it."""
+    following = assembly.next_vertex
+    start, stop = edge, following[edge]
+    tangent = _unit(vertices[stop] - vertices[start])
+    rest = vertices[vertex] - vertices[start]
+    along = _dot(rest, tangent)
+    gap = rest[:, 0] * tangent[:, 1] - rest[:, 1] * tangent[:, 0]
+    far = assembly.edge_lengths[edge] - along
+    at_start = along <= far
+    other = np.where(at_start, start, stop)
+    overlap = np.minimum(along, far)
+    end = end_zone(assembly, vertex, edge)
+    # Seen from the nearer end: the way the edge leaves it, and the way the face over the edge leaves the corner.
+    sense = np.where(at_start, 1.0, -1.0)[:, None]
+    facing = _facing_edge(assembly, vertex, edge, other)
+    along_edge = sense * tangent
+    along_facing = -sense * _unit(vertices[following[facing]] - vertices[facing])
+    same_way = _dot(along_edge, along_facing) > PERPENDICULAR
+    # At a re-entrant corner the edge ends at a wall: a corner that gets there is simply on the edge.
+    near_end = (overlap <= end) & assembly.convex_vertex[other]
+    # Faces that overlap on a bit at an angle touch at the corner below alone: the one above slides past the end
+    # before it comes down, and held up by the line of the edge it could not.
+    past = ~same_way & assembly.convex_vertex[other] & ((overlap <= end) | (gap > STEEPEST_LANDING * overlap))
+    # Both corners lie within the end zone of the other's face, seen along the half-way direction.
+    halfway = _unit(along_edge + along_facing + 1e-300)
+    offset = np.abs(_dot(vertices[vertex] - vertices[other], halfway))
+    corner = np.where(near_end & same_way & (offset <= end), other, -1)
+    keep = ~past
+    vertex, edge, corner = vertex[keep], edge[keep], corner[keep]
+    return _once(assembly, vertex, edge, corner)
+
+
+def _closest_faces(
+    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
+) -> np.ndarray:
+    """Whether to keep each pair: of two corners that meet along two pairs of faces, only where these are closest.
+
+    Where three blocks meet, the faces that two of them turn to the third also face each other across its corner. Two
+    corners are held apart by one pair of faces or the other; held by both they could not slide along the closed one.
+    """
+    kept = np.ones(len(vertex), dtype=bool)
+    k = np.flatnonzero(corner >= 0)
+    if len(k) < 2:
+        return kept
+    facing = _facing_edge(assembly, vertex[k], edge[k], corner[k])
+    following = assembly.next_vertex
+    along = _unit(vertices[following[edge[k]]] - vertices[edge[k]])
+    back = -_unit(vertices[following[facing]] - vertices[facing])
+    closeness = _dot(along, back)
+    _, pair = np.unique(np.stack([vertex[k], corner[k]], axis=1), axis=0, return_inverse=True)
+    best = np.full(int(pair.max()) + 1, -np.inf)
+    np.maximum.at(best, pair.ravel(), closeness)
+    kept[k] = closeness >= best[pair.ravel()] - SAME_OPENING
+    return kept
+
+
+def _once(
+    assembly: Assembly, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Keeps each pair of corners once, seen from the lower numbered vertex."""
+    k = np.flatnonzero(corner >= 0)
+    facing = _facing_edge(assembly, vertex[k], edge[k], corner[k])
+    turn = vertex[k] > corner[k]
+    v, e, c = vertex[k], edge[k], corner[k]
+    vertex, edge, corner = vertex.copy(), edge.copy(), corner.copy()
+    vertex[k], edge[k], corner[k] = np.where(turn, c, v), np.where(turn, facing, e), np.where(turn, v, c)
+    # The pair may have been found from both sides, and two corners may meet along two pairs of faces.
+    low = np.minimum(edge, assembly.next_vertex[edge])
+    end = np.where(corner < 0, 0, np.where(corner == low, 1, 2))
+    _, first = np.unique((vertex.astype(np.int64) * len(assembly.vertices) + edge) * 3 + end, return_index=True)
+    return vertex[first], edge[first], corner[first]
+
+
+def feature_pairs(assembly: Assembly, contacts: Contacts) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the corner-edge pairs that each contact stands for.
+
+    Returns
+    -------
+    own : (n,) int array
+        The corner on the edge.
+    reverse : (n,) int array
+        Where a corner stands on a corner, the other corner on the other face; -1 elsewhere.
+    """
+    n = len(assembly.vertices)
+    own = contacts.vertex.astype(np.int64) * n + contacts.edge
+    reverse = np.full(len(contacts), -1, dtype=np.int64)
+    k = np.flatnonzero(contacts.corner >= 0)
+    facing = _facing_edge(assembly, contacts.vertex[k], contacts.edge[k], contacts.corner[k])
+    reverse[k] = contacts.corner[k].astype(np.int64) * n + facing
+    return own, reverse
+
+
+def _facing_edge(assembly: Assembly, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
+    """The edge of the corner's block that lies over ``edge`` where ``vertex`` stands on ``corner``.
+
+    Both outlines run counter-clockwise, so facing edges run against each other: where one starts the other ends.
+    """
+    return np.where(corner == edge, assembly.previous_vertex[vertex], vertex)
+
+
+def end_zone(assembly: Assembly, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    """(n,) array [m]: how near the end of the edge the corner counts as standing on the corner there."""
+    length = assembly.edge_lengths
+    shortest = np.minimum(length[vertex], length[assembly.previous_vertex[vertex]])
+    return CORNER_TOLERANCE * np.minimum(shortest, length[edge])
+
+
+def _dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(n,) array: dot products of two (n, 2) arrays; a sum over an axis of two takes ten times as long."""
+    return first[:, 0] * second[:, 0] + first[:, 1] * second[:, 1]
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.hypot(vectors[:, 0], vectors[:, 1])[:, None]

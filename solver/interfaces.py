@@ -1,0 +1,136 @@
+"""Interfaces: the friction and strength between blocks, by material and from joint to joint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .assembly import Assembly
+
+
+@dataclass(frozen=True)
+class InterfaceLaw:
+    """What an interface resists.
+
+    Attributes
+    ----------
+    friction_coefficient : float
+        Ratio of shear to normal force at sliding, from 0 to anything finite.
+    cohesion : float [Pa]
+        Shear strength without compression, in limit loads only; none by default.
+    compressive_strength : float [Pa]
+        In limit loads only; infinite by default.
+    """
+
+    friction_coefficient: float = 0.6
+    cohesion: float = 0.0
+    compressive_strength: float = np.inf
+
+    def __post_init__(self) -> None:
+        mu = self.friction_coefficient
+        if not (np.isfinite(mu) and mu >= 0):
+            raise ValueError(f"friction_coefficient is {mu:g}; it must be a finite number of at least 0")
+        if not (np.isfinite(self.cohesion) and self.cohesion >= 0.0):
+            raise ValueError(f"cohesion is {self.cohesion:g} Pa; it must be a finite number of at least 0")
+        if not self.compressive_strength > 0.0:
+            raise ValueError(f"compressive_strength is {self.compressive_strength:g} Pa; it must be positive")
+
+    @property
+    def dry(self) -> bool:
+        """Whether there is neither cohesion nor crushing."""
+        return self.cohesion == 0.0 and self.compressive_strength == np.inf
+
+
+@dataclass(frozen=True)
+class JointScatter:
+    """Friction that differs from joint to joint: a random factor for each pair of blocks.
+
+    The factor of a pair depends on the seed and the two blocks alone, so that it is the same whenever the two touch:
+    contact points come and go, joints keep their friction.
+
+    Attributes
+    ----------
+    seed : int
+        Of at least 0; the same seed gives the same factors.
+    quantile : callable
+        From an (n,) array of probabilities, inside 0 to 1, to the factors, finite and at least 0.
+    """
+
+    seed: int
+    quantile: Callable[[np.ndarray], np.ndarray]
+
+    def factors(self, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
+        """(n,) array: factor of each pair of blocks, in either order."""
+        low, high = np.minimum(block_a, block_b), np.maximum(block_a, block_b)
+        number = _mixed(_mixed(_mixed(np.array([self.seed])) ^ low.astype(np.uint64)) ^ high.astype(np.uint64))
+        # The 53 bits that a float holds, half a step off both ends.
+        return np.asarray(self.quantile(((number >> np.uint64(11)) + 0.5) * 2.0**-53), dtype=float)
+
+
+def _mixed(number: np.ndarray) -> np.ndarray:
+    """(n,) uint64 array: numbers that pass for random, each a function of the one it comes from.
+
+    Notes
+    -----
+    The finalizer of SplitMix64: G. L. Steele, D. Lea and C. H. Flood, Fast splittable pseudorandom number generators,
+    OOPSLA 2014, https://doi.org/10.1145/2660193.2660195.
+    """
+    z = number.astype(np.uint64) + np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
+
+
+@dataclass(frozen=True)
+class Interfaces:
+    """The law of every interface: a default, and others for pairs of materials.
+
+    Attributes
+    ----------
+    default : InterfaceLaw
+    pairs : mapping from (material, material) to InterfaceLaw
+        Either order.
+    scatter : JointScatter, optional
+        Factors on the friction of each pair of blocks; without it joints of the same materials are alike.
+    """
+
+    default: InterfaceLaw = field(default_factory=InterfaceLaw)
+    pairs: Mapping[tuple[str, str], InterfaceLaw] = field(default_factory=dict)
+    scatter: JointScatter | None = None
+
+    def friction(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
+        """(n,) array: friction coefficient between the blocks of each pair."""
+        alike = self._by_material("friction_coefficient", assembly, block_a, block_b)
+        return alike if self.scatter is None else alike * self.scatter.factors(block_a, block_b)
+
+    def strength(self, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Two (n,) arrays [Pa]: cohesion and compressive strength between the blocks of each pair."""
+        cohesion, compressive = (
+            self._by_material(name, assembly, block_a, block_b) for name in ("cohesion", "compressive_strength")
+        )
+        return cohesion, compressive
+
+    @property
+    def dry(self) -> bool:
+        """Whether no interface has cohesion or crushes."""
+        return self.default.dry and all(law.dry for law in self.pairs.values())
+
+    def refuse_strength(self, analysis: str) -> None:
+        """Raises ``ValueError`` for cohesion or compressive strength in an analysis that follows dry joints."""
+        if not self.dry:
+            raise ValueError(
+                f"{analysis} follows dry joints; leave cohesion and compressive_strength out, which limit loads take"
+            )
+
+    def _by_material(self, name: str, assembly: Assembly, block_a: np.ndarray, block_b: np.ndarray) -> np.ndarray:
+        if not self.pairs:
+            return np.full(len(block_a), getattr(self.default, name))
+        kinds = sorted({*assembly.materials, *(m for pair in self.pairs for m in pair)})
+        number = {kind: k for k, kind in enumerate(kinds)}
+        table = np.full((len(kinds), len(kinds)), getattr(self.default, name))
+        for (first, second), law in self.pairs.items():
+            table[number[first], number[second]] = table[number[second], number[first]] = getattr(law, name)
+        material = np.array([number[m] for m in assembly.materials])
+        return table[material[block_a], material[block_b]]

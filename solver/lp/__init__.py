@@ -1,0 +1,1 @@
+"""Linear programs: stated, solved and checked. Knows no masonry."""

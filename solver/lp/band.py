@@ -1,0 +1,383 @@
+"""An interior point method for programs whose rows form a narrow band: the blocks of a wall, one beside the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import lapack
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from .threads import NotLimited, one_thread
+
+#: Violation of rows and reduced costs, absolute, and relative difference of the objectives at which a point is optimal.
+TOLERANCE = 1e-8
+
+#: Iterations after which it is given up; walls of 1,500 blocks take 40, of 10,000 blocks 80.
+ITERATIONS = 200
+
+#: So many steps in a row that are shorter than this lead nowhere.
+SHORT_STEPS, SHORT = 20, 1e-3
+
+#: Largest number of operations of one factorisation, rows times the square of the band's width; walls of 10,000 blocks
+#: need 2e9, a tenth of a second. They grow with the square of the blocks: larger programs are left to others.
+OPERATIONS = 1e10
+
+#: Weight of the proximal term. Without it the multipliers that carry force weigh 1e16 at the end, and the balance of
+#: the blocks is lost in rounding at 1e-6; with it the point strays from dual feasibility by this times the last step.
+PROXIMAL = 1e-11
+
+#: Where the method starts: multipliers, slack beyond what balances them, and least reduced cost.
+START, START_SLACK, START_COST = 1.0, 0.1, 0.03
+
+#: Part of the way to the boundary that a step takes.
+TO_BOUNDARY = 0.9995
+
+#: Corrections per iteration that pull the products of a longer step back towards the central path, the length they
+#: aim for beyond what is possible, the spread of products they leave alone, and the lengthening that makes one worth
+#: its while.
+CORRECTIONS, LONGER, SPREAD, WORTHWHILE = 2, 0.3, 0.05, 0.01
+
+#: Weights that are tried for a correction, as fractions of the way from the least to 1.
+WEIGHTS = np.linspace(1.0, 0.0, 7)
+
+#: Refinements of a solution, until its residual is below this or this part of what it is to remove.
+REFINEMENTS, RESIDUAL, RESIDUAL_PART = 2, 1e-9, 1e-2
+
+#: Multipliers of this size that cost less than nothing by this, in units of the program, are looked at for a ray along
+#: which the objective falls for ever, at every so manieth iteration; passes that remove what is left of its balance,
+#: with either number on the diagonal: the large one leaves something of it, with the small one it may be singular.
+RAY_SIZE, RAY_COST, RAY_EVERY, RAY_PASSES, RAY_DIAGONALS = 1e3, 1e-8, 5, 3, (1e-16, 1e-20)
+
+#: Out of balance by less than this, a ray is shown to the caller.
+PROVES = 1e-9
+
+
+class Diverges(Exception):
+    """The multipliers grow along what looks like a ray.
+
+    Attributes
+    ----------
+    ray : (n,) array
+        A x near 0, x ≥ 0, cost · x < 0, its largest entry 1; for the caller to judge.
+    """
+
+    def __init__(self, ray: np.ndarray) -> None:
+        super().__init__("the multipliers grow without limit")
+        self.ray = ray
+
+
+class NoProgress(Exception):
+    """The method does not apply, or came to no solution."""
+
+
+@dataclass
+class _Point:
+    """Iterate: ``primal`` is x, then how far rows are from their lower and upper bounds; ``dual`` what prices them."""
+
+    primal: np.ndarray
+    dual: np.ndarray
+    row_dual: np.ndarray
+
+
+class _Band:
+    """A D Aᵀ for a fixed A, its rows reordered so that what is not zero lies near the diagonal; and its factor."""
+
+    def __init__(self, matrix: sp.csc_array, along: np.ndarray | None) -> None:
+        self.rows = rows = matrix.shape[0]
+        counts = np.diff(matrix.indptr)
+        # Each column is as wide as it has entries, at least: a load on every block fills the matrix.
+        self._refuse_wide(int(counts.max(initial=0)))
+        self.order, place = _narrowest(matrix, along)
+        row, column, weight, entry = [], [], [], []
+        for count in np.unique(counts[counts > 0]):
+            members = np.flatnonzero(counts == count)
+            entries = matrix.indptr[members][:, None] + np.arange(count)
+            at, value = place[matrix.indices[entries]], matrix.data[entries]
+            first, second = (index.ravel() for index in np.indices((count, count)))
+            lower = at[:, first] >= at[:, second]
+            row.append(at[:, first][lower])
+            column.append(at[:, second][lower])
+            weight.append((value[:, first] * value[:, second])[lower])
+            entry.append(np.broadcast_to(members[:, None], lower.shape)[lower])
+        i, j = np.concatenate(row), np.concatenate(column)
+        self.width = int((i - j).max(initial=0)) + 1
+        self._refuse_wide(self.width)
+        shape = (rows * self.width, matrix.shape[1])
+        sums = sp.csr_array(
+            sp.coo_array((np.concatenate(weight), (j * self.width + i - j, np.concatenate(entry))), shape=shape)
+        )
+        self.filled = np.flatnonzero(np.diff(sums.indptr))
+        indptr = np.append(sums.indptr[self.filled], sums.nnz)
+        self.sums = sp.csr_array((sums.data, sums.indices, indptr), shape=(len(self.filled), shape[1]))
+        self.values = np.empty(shape[0])
+        self.factor = np.empty((0, 0))
+
+    def _refuse_wide(self, width: int) -> None:
+        if self.rows * float(width) ** 2 > OPERATIONS:
+            raise NoProgress(f"{self.rows} rows in a band {width} wide")
+
+    def factorise(self, diagonal: np.ndarray) -> None:
+        self.values[:] = 0.0
+        self.values[self.filled] = self.sums @ diagonal
+        self.factor, failed = lapack.dpbtrf(self.values.reshape(self.rows, self.width).T, lower=1, overwrite_ab=1)
+        if failed:
+            raise NoProgress("the normal equations are singular")
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        solution = np.empty(self.rows)
+        solution[self.order] = lapack.dpbtrs(self.factor, right[self.order], lower=1)[0]
+        return solution
+
+
+class _Method:
+    """The program with its rows as unknowns of their own: A x - w = 0, x ≥ 0, lower ≤ w ≤ upper."""
+
+    def __init__(
+        self,
+        cost: np.ndarray,
+        matrix: sp.csc_array,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        along: np.ndarray | None,
+    ) -> None:
+        rows, columns = matrix.shape
+        if not (np.isfinite(lower).all() and np.isfinite(upper).all() and (upper > lower).all()):
+            raise NoProgress("a row is an equation or has no bound")
+        self.cost, self.lower, self.upper = cost, lower, upper
+        self.matrix, self.transposed = sp.csr_array(matrix), sp.csr_array(matrix.T)
+        self.x = slice(0, columns)
+        self.below, self.above = slice(columns, columns + rows), slice(columns + rows, columns + 2 * rows)
+        self.band = _Band(sp.csc_array(sp.hstack([matrix, sp.eye_array(rows)])), along)
+        self.point = self._start(matrix)
+        self.tried = 0
+
+    def _start(self, matrix: sp.csc_array) -> _Point:
+        """Equal multipliers, the rows balanced by the unit columns that every row has."""
+        middle = (self.lower + self.upper) / 2.0
+        single = np.flatnonzero(np.diff(matrix.indptr) == 1)
+        row, value = matrix.indices[matrix.indptr[single]], matrix.data[matrix.indptr[single]]
+        x = np.full(matrix.shape[1], START)
+        x[single] = 0.0
+        missing = middle - matrix @ x
+        for sign in (1.0, -1.0):
+            of_sign = value * sign > 0.0
+            # The last one of a row where there are several.
+            unit = np.full(len(middle), -1)
+            unit[row[of_sign]] = single[of_sign]
+            if unit.min(initial=0) < 0:
+                raise NoProgress("a row has no slack of either sign")
+            x[unit] = np.maximum(sign * missing, 0.0) / np.abs(matrix.data[matrix.indptr[unit]])
+        x[single] += START_SLACK
+        reduced = np.maximum(self.cost, START_COST)
+        price = np.minimum(float(x @ reduced) / len(x) / (middle - self.lower), reduced.max())
+        return _Point(
+            np.concatenate([x, middle - self.lower, self.upper - middle]),
+            np.concatenate([reduced, price, price]),
+            np.zeros(len(middle)),
+        )
+
+    def residuals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of the rows, of the reduced costs, and of the rows' prices."""
+        primal, dual, row_dual = self.point.primal, self.point.dual, self.point.row_dual
+        return (
+            self.lower + primal[self.below] - self.matrix @ primal[self.x],
+            self.cost - self.transposed @ row_dual - dual[self.x],
+            dual[self.below] - dual[self.above] - row_dual,
+        )
+
+    def optimal(self, residuals: tuple[np.ndarray, np.ndarray, np.ndarray]) -> bool:
+        primal = self.point.primal
+        objective = float(self.cost @ primal[self.x])
+        row_dual = self.point.row_dual
+        bound = float(np.maximum(row_dual, 0.0) @ self.lower + np.minimum(row_dual, 0.0) @ self.upper)
+        gap = abs(objective - bound) / (1.0 + abs(objective))
+        return max(gap, *(float(np.abs(part).max(initial=0.0)) for part in residuals)) < TOLERANCE
+
+    def iterate(self, residuals: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+        """One factorisation: predictor, corrector and what lengthens the step (Mehrotra 1992, Gondzio 1996)."""
+        primal, dual = self.point.primal, self.point.dual
+        self.pivot = dual[self.x] + PROXIMAL * primal[self.x]
+        self.room = 1.0 / (dual[self.below] / primal[self.below] + dual[self.above] / primal[self.above])
+        self.band.factorise(np.concatenate([primal[self.x] / self.pivot, self.room]))
+        step = self._direction(residuals, -primal * dual)
+        lengths = _longest(primal, step.primal), _longest(dual, step.dual)
+        mean = float(primal @ dual) / len(primal)
+        predicted = float((primal + lengths[0] * step.primal) @ (dual + lengths[1] * step.dual)) / len(primal)
+        target = (predicted / mean) ** 3 * mean
+        nothing = tuple(np.zeros_like(part) for part in residuals)
+        second = self._direction(nothing, target - step.primal * step.dual)
+        step, lengths = self._weighted(step, second, lengths)
+        for _ in range(CORRECTIONS):
+            if min(lengths) > 0.9:
+                break
+            aimed = [min(1.0, length + LONGER) for length in lengths]
+            products = (primal + aimed[0] * step.primal) * (dual + aimed[1] * step.dual)
+            off = np.where(products < SPREAD * target, SPREAD * target - products, 0.0)
+            off += np.where(products > target / SPREAD, np.maximum(target / SPREAD - products, -target / SPREAD), 0.0)
+            corrected, longer = self._weighted(step, self._direction(nothing, off), lengths)
+            if longer[0] < lengths[0] + WORTHWHILE and longer[1] < lengths[1] + WORTHWHILE:
+                break
+            step, lengths = corrected, longer
+        by_primal = TO_BOUNDARY * _longest(primal, step.primal, 1.0 / TO_BOUNDARY)
+        by_dual = TO_BOUNDARY * _longest(dual, step.dual, 1.0 / TO_BOUNDARY)
+        self.point = _Point(
+            primal + by_primal * step.primal, dual + by_dual * step.dual, self.point.row_dual + by_dual * step.row_dual
+        )
+        self.tried = self.tried + 1 if min(by_primal, by_dual) < SHORT else 0
+
+    def refuse_ray(self) -> None:
+        """Raises ``Diverges`` where the multipliers point along a ray: their balance is mended, each by its size."""
+        x = self.point.primal[self.x]
+        size = float(x.max())
+        if size < RAY_SIZE or self.cost @ x > -RAY_COST * size:
+            return
+        weight = (x / size) ** 2
+        for diagonal in RAY_DIAGONALS:
+            try:
+                self.band.factorise(np.concatenate([weight, np.full(self.matrix.shape[0], diagonal)]))
+            except NoProgress:
+                # Blocks that the ray leaves alone have nothing else on their diagonal.
+                return
+            ray = x / size
+            for _ in range(RAY_PASSES):
+                ray = np.maximum(ray - weight * (self.transposed @ self.band.solve(self.matrix @ ray)), 0.0)
+            if np.abs(self.matrix @ ray).max() < PROVES * ray.max() and self.cost @ ray < 0.0:
+                raise Diverges(ray / ray.max())
+
+    def _direction(self, residuals: tuple[np.ndarray, ...], products: np.ndarray) -> _Point:
+        """Newton's direction that removes the residuals and changes the products primal · dual by those given."""
+        primal, dual = self.point.primal, self.point.dual
+        rows, costs, prices = residuals
+        below, above = products[self.below] / primal[self.below], products[self.above] / primal[self.above]
+        free, moved = prices + below - above, products[self.x] / self.pivot
+        weight = primal[self.x] / self.pivot
+        row_dual = self.band.solve(rows - self.matrix @ (moved - weight * costs) + free * self.room)
+        for attempt in range(REFINEMENTS + 1):
+            reduced = costs - self.transposed @ row_dual
+            x, w = moved - weight * reduced, (free - row_dual) * self.room
+            left = rows - (self.matrix @ x - w)
+            enough = max(RESIDUAL, RESIDUAL_PART * float(np.abs(rows).max(initial=0.0)))
+            if attempt == REFINEMENTS or np.abs(left).max(initial=0.0) <= enough:
+                break
+            row_dual = row_dual + self.band.solve(left)
+        return _Point(
+            np.concatenate([x, w, -w]),
+            np.concatenate(
+                [
+                    reduced + PROXIMAL * x,
+                    below - dual[self.below] / primal[self.below] * w,
+                    above + dual[self.above] / primal[self.above] * w,
+                ]
+            ),
+            row_dual,
+        )
+
+    def _weighted(
+        self, step: _Point, correction: _Point, lengths: tuple[float, float]
+    ) -> tuple[_Point, tuple[float, float]]:
+        """The step with as much of a correction as makes it longest (Colombo & Gondzio 2008)."""
+        primal, dual = self.point.primal, self.point.dual
+        weights = max(lengths[0] * lengths[1], 0.05) * (1.0 - WEIGHTS) + WEIGHTS
+        by_primal = _lengths(step.primal / primal, correction.primal / primal, weights)
+        by_dual = _lengths(step.dual / dual, correction.dual / dual, weights)
+        p, d = int(np.argmax(by_primal)), int(np.argmax(by_dual))
+        corrected = _Point(
+            step.primal + weights[p] * correction.primal,
+            step.dual + weights[d] * correction.dual,
+            step.row_dual + weights[d] * correction.row_dual,
+        )
+        return corrected, (by_primal[p], by_dual[d])
+
+
+def _narrowest(matrix: sp.csc_array, along: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """The order of the rows that makes the narrower band, and the place of each row in it."""
+    rows = matrix.shape[0]
+    pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape[::-1])
+    orders = [reverse_cuthill_mckee(sp.csr_matrix(pattern.T @ pattern), symmetric_mode=True)]
+    if along is not None:
+        orders.append(np.argsort(along, kind="stable"))
+    starts = matrix.indptr[:-1][np.diff(matrix.indptr) > 0]
+    found = []
+    for order in orders:
+        place = np.empty(rows, dtype=np.int64)
+        place[order] = np.arange(rows)
+        of_entries = place[matrix.indices]
+        widths = np.maximum.reduceat(of_entries, starts) - np.minimum.reduceat(of_entries, starts)
+        found.append((int(widths.max(initial=0)), order, place))
+    _, order, place = min(found, key=lambda one: one[0])
+    return order, place
+
+
+def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float:
+    """Largest multiple of a change, up to ``most``, that leaves no positive value negative."""
+    fastest = float((change / values).min())
+    return min(most, -1.0 / fastest) if fastest < 0.0 else most
+
+
+def _lengths(rates: np.ndarray, corrections: np.ndarray, weights: np.ndarray) -> list[float]:
+    """The longest steps, up to 1, at relative changes corrected with each of the weights."""
+    return [1.0 / max(1.0, -float((rates + weight * corrections).min())) for weight in weights]
+
+
+def interior_point(
+    cost: np.ndarray,
+    matrix: sp.csc_array,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    along: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Minimises cost · x subject to lower ≤ A x ≤ upper and x ≥ 0.
+
+    Parameters
+    ----------
+    cost : (n,) array
+    matrix : (m, n) sparse array, by columns
+        With a unit column of either sign for every row.
+    lower, upper : (m,) arrays
+        Finite, and different from each other.
+    along : (m,) array, optional
+        Where each row lies along the structure: an order of the rows to try beside that of Cuthill & McKee. Along the
+        longer side of a wall it makes a band two thirds as wide.
+
+    Returns
+    -------
+    x : (n,) array
+        In the interior of the optimal face.
+    row_dual : (m,) array
+    iterations : int
+
+    Raises
+    ------
+    Diverges
+        If the multipliers grow along a ray.
+    NoProgress
+        If the rows do not form a narrow band, or the steps become too short.
+
+    Notes
+    -----
+    A primal-dual method: every iteration factorises A D Aᵀ, whose blocks of 3 × 3 are the blocks of the structure and
+    their neighbours, as a band in the order given or that of Cuthill & McKee (1969). After Mehrotra
+    (1992), https://doi.org/10.1137/0802028, with Gondzio's (1996) correctors, https://doi.org/10.1007/BF00249643, their
+    weights after Colombo & Gondzio (2008), https://doi.org/10.1007/s10589-007-9106-0, and a proximal term (Friedlander
+    & Orban 2012, https://doi.org/10.1007/s12532-012-0035-2).
+    """
+    try:
+        with one_thread(), np.errstate(divide="raise", over="raise", invalid="raise"):
+            return _solved(_Method(cost, matrix, lower, upper, along))
+    except (NotLimited, FloatingPointError) as error:
+        raise NoProgress(str(error)) from None
+
+
+def _solved(method: _Method) -> tuple[np.ndarray, np.ndarray, int]:
+    for iteration in range(ITERATIONS):
+        residuals = method.residuals()
+        if method.optimal(residuals):
+            return method.point.primal[method.x], method.point.row_dual, iteration
+        method.iterate(residuals)
+        if iteration % RAY_EVERY == 0:
+            method.refuse_ray()
+        if method.tried >= SHORT_STEPS:
+            raise NoProgress(f"the steps became too short after {iteration + 1} iterations")
+    raise NoProgress(f"no solution after {ITERATIONS} iterations")

@@ -1,0 +1,71 @@
+"""Which ways to a solution are tried, and in which order."""
+
+from __future__ import annotations
+
+import time
+
+from .band import Diverges, NoProgress, interior_point
+from .highs import run_highs
+from .problem import LinearProgram, LPSolution, SolveError, checked, raise_if_proved
+
+#: Up to this many rows the simplex method is the fastest; up to the second number crossover from an interior solution
+#: to a vertex costs little, beyond it twenty times the program itself (measured on running-bond walls).
+SIMPLEX_ROWS, CROSSOVER_ROWS = 250, 1500
+
+#: Our own way, for programs whose rows form a band.
+BAND = "band"
+
+#: The order for large programs, and for small ones that need no vertex.
+INTERIOR_ROUTES = (BAND, "hipo", "hipo without presolve", "ipx", "ipx with crossover", "simplex")
+
+
+def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> LPSolution:
+    """Solves a linear program, trying one route after another until a solution passes its check.
+
+    Parameters
+    ----------
+    program : LinearProgram
+    routes : tuple of str, optional
+        ``BAND`` or names out of ``ROUTES``, in the order to try; chosen by size by default.
+
+    Raises
+    ------
+    Unbounded
+        If the program has no minimum, proved by a ray.
+    SolveError
+        If no route gives a solution that passes; the message lists what each of them ended with.
+    """
+    if routes is None:
+        rows = program.matrix.shape[0]
+        if rows <= SIMPLEX_ROWS:
+            routes = ("simplex", "simplex without presolve", "ipx with crossover", "hipo")
+        elif rows <= CROSSOVER_ROWS:
+            routes = ("hipo with crossover", "ipx with crossover", "simplex", "simplex without presolve")
+        else:
+            routes = INTERIOR_ROUTES
+    outcomes = []
+    for route in routes:
+        solution, status = _in_band(program) if route == BAND else run_highs(program, route)
+        if solution is not None and solution.accepted:
+            return solution
+        if solution is not None:
+            status += (
+                f", violation {max(solution.primal_violation, solution.dual_violation):.1e}, gap {solution.gap:.1e}"
+            )
+        outcomes.append(f"{route}: {status}")
+    raise SolveError(
+        f"no solution of the linear program with {program.matrix.shape[0]} rows and {program.matrix.shape[1]} "
+        f"columns passed its check ({'; '.join(outcomes)})"
+    )
+
+
+def _in_band(program: LinearProgram) -> tuple[LPSolution | None, str]:
+    started = time.perf_counter()
+    try:
+        x, y, iterations = interior_point(program.cost, program.matrix, program.lower, program.upper, program.along)
+    except Diverges as found:
+        raise_if_proved(program, found.ray)
+        return None, str(found)
+    except NoProgress as reason:
+        return None, str(reason)
+    return checked(program, x, y, BAND, iterations, time.perf_counter() - started), "solved"

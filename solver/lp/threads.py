@@ -1,0 +1,68 @@
+"""One thread for the linear algebra of many small pieces."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+
+import numpy as np
+from scipy.linalg import lapack
+
+#: Names of the functions in the builds of OpenBLAS that the wheels of scipy and numpy come with, and in others.
+NAMES = ("scipy_openblas_{}_num_threads", "scipy_openblas_{}_num_threads64_", "openblas_{}_num_threads")
+
+Function = Callable[..., int]
+
+
+class NotLimited(RuntimeError):
+    """A library below scipy or numpy cannot be kept to one thread from here."""
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Keeps OpenBLAS to one thread, and gives it back what it had.
+
+    A band is factorised in hundreds of products of small matrices. Shared among threads, each takes as long as it takes
+    to wake them: four hundred times as long where other processes work on the same cores. And the last bits of a
+    result depend on how many threads there were.
+
+    Raises
+    ------
+    NotLimited
+        If scipy or numpy use another library, or one that hides these functions. The environment variable
+        OPENBLAS_NUM_THREADS=1, set before Python starts, makes up for it.
+    """
+    if os.environ.get("OPENBLAS_NUM_THREADS") == "1":
+        yield
+        return
+    libraries = _libraries()
+    before = [get() for get, _ in libraries]
+    for _, put in libraries:
+        put(1)
+    try:
+        yield
+    finally:
+        for (_, put), threads in zip(libraries, before, strict=True):
+            put(threads)
+
+
+@cache
+def _libraries() -> list[tuple[Function, Function]]:
+    """The functions that tell and set the threads of scipy's library and of numpy's."""
+    core = "numpy._core" if hasattr(np, "_core") else "numpy.core"
+    return [_functions(sys.modules[name].__file__) for name in (lapack._flapack.__name__, f"{core}._multiarray_umath")]
+
+
+def _functions(extension: str | None) -> tuple[Function, Function]:
+    # Those of a library are found through the extension module that is linked to it.
+    library = ctypes.CDLL(extension)
+    for name in NAMES:
+        try:
+            return library[name.format("get")], library[name.format("set")]
+        except AttributeError:
+            continue
+    raise NotLimited(f"the threads of the linear algebra in {extension} cannot be limited")

@@ -1,0 +1,90 @@
+"""The model: what stays the same over all increments, the units of the programs, and what they share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from solver.assembly import Assembly
+from solver.interfaces import Interfaces
+from solver.lp.solve import CROSSOVER_ROWS
+
+
+@dataclass
+class Tally:
+    """Programs solved since the last increment."""
+
+    programs: int = 0
+
+    def take(self) -> int:
+        """What has been counted; starts again from zero."""
+        counted, self.programs = self.programs, 0
+        return counted
+
+
+@dataclass(frozen=True)
+class Model:
+    """What stays the same over all increments.
+
+    Attributes
+    ----------
+    assembly : Assembly
+    interfaces : Interfaces
+    load : (n_blocks, 3) array [N, N, N·m]
+    length : float [m]
+    force : float [N]
+        Block size and mean load of a free block: the program is written in these units.
+    trust : float [m]
+        Largest movement of a block in one program.
+    reach : float [m]
+        Largest gap of a contact point that is kept.
+    tally : Tally
+    live : (n_blocks, 3) array [N, N, N·m], optional
+        Where given, loads whose multiplier is an unknown of every program: it takes the value that lets the program
+        do its work.
+    """
+
+    assembly: Assembly
+    interfaces: Interfaces
+    load: np.ndarray
+    length: float
+    force: float
+    trust: float
+    reach: float
+    tally: Tally = field(default_factory=Tally)
+    live: np.ndarray | None = None
+
+    @property
+    def large(self) -> bool:
+        """Whether programs are too large for vertex solutions, and corrections therefore stop before they are exact."""
+        return 3 * int(self.assembly.free.sum()) > CROSSOVER_ROWS
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """(3,) array: divide movements by it, multiply moments' rows by it, to get to the units of the program."""
+        return np.array([self.length, self.length, 1.0])
+
+    @property
+    def scaled_load(self) -> np.ndarray:
+        """(n_blocks, 3) array: the load in units of the program."""
+        return self.load / (self.force * np.array([1.0, 1.0, self.length]))
+
+    @property
+    def scaled_live(self) -> tuple[np.ndarray, float]:
+        """(n_blocks, 3) array: the live load on the free blocks, its largest component 1; what it was divided by."""
+        free = self.assembly.free
+        live = np.zeros((len(free), 3))
+        if self.live is not None:
+            live[free] = self.live[free] / (self.force * np.array([1.0, 1.0, self.length]))
+        size = float(np.abs(live).max(initial=0.0))
+        return live / (size or 1.0), size
+
+    @property
+    def total_load(self) -> float:
+        """Sum of the loads on the free blocks in units of the program."""
+        return float(np.abs(self.scaled_load[self.assembly.free, :2]).sum())
+
+
+def motion_size(model: Model, motion: np.ndarray) -> float:
+    return float(np.abs(motion * np.array([1.0, 1.0, model.length])).max(initial=0.0))

@@ -1,0 +1,30 @@
+"""Certificate: the measures by which an increment proves itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Measures by which an increment proves itself.
+
+    Attributes
+    ----------
+    equilibrium_residual : float
+        Largest unbalanced force on a free block (moments over the block size), relative to the total weight.
+    largest_penetration : float [m]
+        Deepest overlap at a contact point after the geometry has been updated.
+    duality_gap : float
+        Difference between the static (lower bound) and the kinematic (upper bound) objective, relative.
+    complementarity : float
+        Σ force · distance from sliding or opening over all contact points, relative like the gap.
+    kinematic_violation : float
+        Largest violation of N + g ≥ μ|T|, relative to the block size.
+    """
+
+    equilibrium_residual: float
+    largest_penetration: float
+    duality_gap: float
+    complementarity: float
+    kinematic_violation: float

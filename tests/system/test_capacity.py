@@ -1,0 +1,336 @@
+"""Limit loads and pushovers from their case files to their results folders, and back."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import blockvis
+import solver
+from blockvis.cases.build import case_assembly
+from blockvis.cases.case import parse_case
+from blockvis.cli import _in_words, main
+from blockvis.pictures.captions import parameter_label, state_text, value_label
+from blockvis.pictures.render import draw_still
+from blockvis.results.quantities import governing
+from blockvis.results.tables import capacity_summary
+from blockvis.runs.plan import planned
+from solver.analysis.settlement import drained
+
+COLUMN = """
+[geometry]
+layout = "column"
+[geometry.parameters]
+blocks = 1
+width = 0.2
+block_height = 1.0
+[material]
+friction_coefficient = 0.7
+"""
+
+SIDEWAYS = """
+[[loads]]
+kind = "live"
+weight_fraction = [1.0, 0.0]
+"""
+
+ARCH = """
+[geometry]
+layout = "arch"
+[material]
+friction_coefficient = 2.0
+[analysis]
+kind = "limit load"
+[[loads]]
+kind = "live"
+force = [0.0, -1000.0]
+positions = [-0.8, 0.8, 5]
+[output]
+animation = false
+"""
+
+
+def ran(text, tmp_path, *more, code=0):
+    path = tmp_path / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    assert main(["run", str(path), "-o", str(tmp_path / "out"), *more]) == code
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    return tmp_path / "out", summary
+
+
+def solved(text, tmp_path):
+    """The response of a case and what its summary says of its capacity, nothing written or drawn."""
+    case = parse_case(text, tmp_path / "case.toml")
+    plan = planned(case, case_assembly(case))
+    response = plan.response(*drained(plan.steps))
+    return response, capacity_summary(response)
+
+
+def table(path):
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def test_limit_load_of_a_block_from_its_case_file(tmp_path, capsys):
+    text = COLUMN + '[analysis]\nkind = "limit load"\n[output]\nanimation = "swing.gif"\n' + SIDEWAYS
+    folder, summary = ran(text, tmp_path)
+    assert summary["status"] == "collapsed"
+    assert summary["analysis"] == "limit load"
+    assert summary["limit_load_multiplier"] == pytest.approx(0.2, rel=1e-9)
+    assert summary["limit_load_bounds"] == pytest.approx([0.2, 0.2], rel=1e-9)
+    assert summary["limit_load_flow"] == "associative"
+    assert summary["limit_load_status"] == "limit load"
+    assert summary["live_load"] == pytest.approx(summary["total_weight"])
+    assert "1 macro-block; hinge at" in summary["mechanism"]
+    assert summary["collapse_displacement"] is None
+    printed = capsys.readouterr().out
+    assert "load multiplier               0.2     associative friction, static and kinematic bounds" in printed
+    for name in ("curve.png", "mechanism.png", "report.html", "swing.gif", "blocks.pvd"):
+        assert (folder / name).stat().st_size > 500
+    response = blockvis.open_results(folder)
+    assert response.analysis == "limit load"
+    assert response.settlements == ()
+    assert response.limits[0].multiplier == summary["limit_load_multiplier"]
+    assert response.limits[0].gap == pytest.approx(0.0, abs=1e-12)
+    # The frames after the limit state swing the mechanism; they are no equilibrium.
+    swung = [i for i in response.increments if i.status == solver.Status.FALLING]
+    assert len(swung) == summary["n_falling_frames"] > 10
+    turns = [i.pose.rotations[0] for i in swung]
+    assert all(np.diff(turns) < 0.0)
+    assert main(["render", str(folder), "--animation", "none"]) == 0
+
+
+def test_flow_without_dilatancy_reaches_the_solver(tmp_path):
+    text = COLUMN + '[analysis]\nkind = "limit load"\nflow = "non-associative"\n' + SIDEWAYS
+    response, summary = solved(text, tmp_path)
+    assert summary["limit_load_flow"] == "non-associative"
+    assert summary["limit_load_multiplier"] == pytest.approx(0.2, rel=1e-6)
+    assert "values, no bounds, differ by" in _in_words(response, tmp_path)
+
+
+def test_envelope_of_a_load_that_moves_over_an_arch(tmp_path, capsys):
+    folder, summary = ran(ARCH, tmp_path)
+    rows = table(folder / "envelope.csv")
+    assert [float(row["position"]) for row in rows] == pytest.approx([-0.8, -0.4, 0.0, 0.4, 0.8])
+    multipliers = [float(row["load_multiplier"]) for row in rows]
+    assert multipliers == pytest.approx(multipliers[::-1], rel=1e-6)
+    arch = blockvis.open_results(folder).assembly
+    loads = solver.Loads(solver.self_weight(arch).dead, solver.load_on_top(arch, -0.4, (0.0, -1000.0)))
+    assert multipliers[1] == pytest.approx(solver.limit_load(arch, loads=loads, friction_coefficient=2.0).multiplier)
+    for row in rows:
+        assert float(row["static"]) == pytest.approx(float(row["kinematic"]), rel=1e-9)
+        assert "macro-block" in row["mechanism"]
+    assert summary["limit_load_multiplier"] == min(multipliers)
+    assert summary["governing_position"] == float(rows[int(np.argmin(multipliers))]["position"])
+    path = table(folder / "response.csv")
+    assert [float(row["load_position"]) for row in path] == [float(row["position"]) for row in rows]
+    assert {row["settlement"] for row in path} == {"0.0"}
+    assert f"the lowest of 5 positions: load at x = {summary['governing_position']:g} m" in capsys.readouterr().out
+    response = blockvis.open_results(folder)
+    assert governing(response).load_multiplier == min(multipliers)
+    place = summary["governing_position"]
+    assert np.array_equal(response.loads.live, solver.load_on_top(arch, place, (0.0, -1000.0)))
+    assert parameter_label(response) == "load position x [m]"
+    assert value_label(response) == "load multiplier α"
+
+
+def test_live_load_is_drawn_where_it_acts_at_each_position(tmp_path):
+    """The arrow stands over the place of the load, whichever position is drawn."""
+    from PIL import Image
+
+    from blockvis.pictures import palette
+
+    folder, _ = ran(ARCH, tmp_path)
+    response = blockvis.open_results(folder)
+    places = []
+    for number in (1, 3):
+        path = draw_still(response, number, tmp_path / f"{number}.png", size=(800, 600))
+        picture = np.asarray(Image.open(path).convert("RGB")).astype(int)[:520]
+        _, columns = np.nonzero((np.abs(picture - np.array(palette.LIVE)) < 30).all(axis=2))
+        places.append(columns.mean())
+    assert places[1] - places[0] > 100
+
+
+def test_capacity_after_a_tilt_follows_the_closed_form(tmp_path, capsys):
+    """On a support tilted by θ a block overturns downhill at tan(atan(b/h) - θ)."""
+    text = (
+        COLUMN
+        + """
+[roles]
+"ground" = "moving"
+[settlement]
+rotation_centre = [0.0, 0.0]
+rotation = -1.0
+increment = 0.03
+limit = 0.1
+[analysis]
+kind = "limit load"
+capacity_at = [0.0, 0.04, 0.05, 0.1]
+[output]
+animation = false
+"""
+    )
+    folder, summary = ran(text + SIDEWAYS, tmp_path)
+    rows = table(folder / "capacity.csv")
+    tilts = np.array([float(row["settlement"]) for row in rows])
+    assert tilts == pytest.approx([0.0, 0.04, 0.05, 0.1], abs=1e-12)
+    expected = np.tan(np.arctan(0.2) - tilts)
+    assert [float(row["load_multiplier"]) for row in rows] == pytest.approx(expected, rel=1e-6)
+    assert summary["limit_load_multiplier"] == pytest.approx(expected[-1], rel=1e-6)
+    assert summary["last_settlement"] == pytest.approx(0.1)
+    assert "after a settlement of         0.1 rad   before it 0.2" in capsys.readouterr().out
+    response, _ = solved(text.replace("capacity_at", "# ") + SIDEWAYS, tmp_path)
+    assert len(response.path) > 4
+    assert response.load_multiplier == pytest.approx(np.tan(np.arctan(0.2) - response.settlement), rel=1e-6)
+
+
+def test_capacity_up_to_where_the_settlement_alone_collapses(tmp_path, capsys):
+    text = """
+[geometry]
+layout = "arch"
+[material]
+friction_coefficient = 2.0
+[settlement]
+direction = [1.0, 0.0]
+increment = 0.04
+limit = 0.5
+[analysis]
+kind = "limit load"
+falling_frames = 3
+[output]
+animation = false
+"""
+    folder, summary = ran(text + SIDEWAYS, tmp_path)
+    assert summary["collapse_displacement"] == pytest.approx(0.14104982, rel=2e-3)
+    alpha = [float(row["load_multiplier"]) for row in table(folder / "capacity.csv")]
+    assert alpha[0] == pytest.approx(0.157332, abs=1e-6)
+    assert 0.0 < alpha[-1] < 1e-3
+    assert "the settlement alone brings it down" in capsys.readouterr().out
+
+
+PUSHED = (
+    COLUMN
+    + SIDEWAYS
+    + """
+[analysis]
+kind = "pushover"
+[control]
+block = "block 1"
+direction = [1.0, 0.0]
+point = [0.1, 1.0]
+increment = 0.01
+"""
+)
+
+
+def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
+    folder, summary = ran(PUSHED + "[output]\nanimation = false\n", tmp_path)
+    rows = table(folder / "response.csv")
+    d = np.array([float(row["control_displacement"]) for row in rows])
+    alpha = np.array([float(row["load_multiplier"]) for row in rows])
+    assert alpha == pytest.approx(np.tan(np.arctan(0.2) - np.arcsin(d)), abs=1e-7)
+    assert summary["status"] == "collapsed"
+    assert summary["limit_load_multiplier"] == pytest.approx(0.2, abs=1e-7)
+    assert summary["collapse_displacement"] == pytest.approx(np.sin(np.arctan(0.2)), rel=1e-5)
+    assert summary["mechanism"].startswith("1 macro-block; hinge at")
+    printed = capsys.readouterr().out
+    assert "zero capacity at" in printed
+    assert "first multiplier" in printed
+    response = blockvis.open_results(folder)
+    assert isinstance(response.settlements[0], solver.ControlDisplacement)
+    assert response.load_multiplier == pytest.approx(alpha)
+    assert state_text(response.path[2], response).startswith("Control displacement 0.0200 m   ·   Load multiplier α =")
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "No capacity left at a control displacement of 0.1961" in page
+    assert "control displacement [m]" in page
+
+
+def test_pushover_written_from_python_comes_back(tmp_path):
+    case = parse_case(PUSHED, tmp_path / "case.toml")
+    run = blockvis.run_case(replace(case, animation=None), tmp_path / "out")
+    again = blockvis.open_results(blockvis.write(run.response, tmp_path / "python"))
+    assert again.settlements == run.response.settlements
+    assert again.analysis == "pushover"
+    assert again.collapse.bracket == run.response.collapse.bracket
+
+
+def test_pushover_after_a_tilt_starts_at_what_is_left(tmp_path):
+    tilt = '[roles]\n"ground" = "moving"\n[settlement]\nrotation_centre = [0.0, 0.0]\nrotation = -1.0\nlimit = 0.1\n'
+    _, summary = solved(PUSHED + tilt, tmp_path)
+    assert summary["limit_load_multiplier"] == pytest.approx(np.tan(np.arctan(0.2) - 0.1), rel=1e-6)
+    nothing = PUSHED + tilt.replace("limit = 0.1", "limit = 0.5") + "[output]\nanimation = false\n"
+    _, summary = ran(nothing, tmp_path)
+    assert summary["status"] == "no initial equilibrium"
+    assert "the settlement alone: collapse at 0.197" in summary["message"]
+    assert "nothing is left to push over" in summary["message"]
+
+
+def test_pressure_on_the_top_and_on_an_edge(tmp_path):
+    """Pressure p on the flank of b × h overturns it at p h²/2 = W b/2; pressure on the top holds it."""
+    push = '[[loads]]\nkind = "live"\npressure = 1000.0\ndirection = [1.0, 0.0]\n'
+    text = COLUMN + '[analysis]\nkind = "limit load"\n'
+    response, summary = solved(text + push, tmp_path)
+    weight, thickness = response.total_weight, summary["live_load"] / 1000.0
+    assert summary["limit_load_multiplier"] == pytest.approx(weight * 0.2 / (1000.0 * thickness), rel=1e-9)
+    top = "[[loads]]\npressure = 5000.0\n"
+    _, held = solved(text + push + top, tmp_path)
+    more = (weight + 5000.0 * 0.2 * thickness) / weight
+    assert held["limit_load_multiplier"] == pytest.approx(more * summary["limit_load_multiplier"], rel=1e-9)
+    edge = '[[loads]]\nkind = "live"\npressure = 1000.0\nblocks = "block 1"\nedge = 4\n'
+    _, flank = solved(text + edge, tmp_path)
+    assert flank["limit_load_multiplier"] == pytest.approx(summary["limit_load_multiplier"], rel=1e-9)
+
+
+def test_a_load_without_limit_says_so(tmp_path, capsys):
+    down = '[[loads]]\nkind = "live"\nforce = [0.0, -1.0]\n'
+    folder, summary = ran(COLUMN + '[analysis]\nkind = "limit load"\n[output]\nanimation = false\n' + down, tmp_path)
+    assert summary["status"] == "limit reached"
+    assert summary["limit_load_multiplier"] is None
+    assert summary["limit_load_status"] == "unbounded"
+    assert "unbounded: no live load of this pattern" in capsys.readouterr().out
+    assert blockvis.open_results(folder).limits[0].multiplier == np.inf
+
+
+def test_live_loads_in_a_settlement_are_told_to_be_left_out(tmp_path, capsys):
+    text = COLUMN + '[roles]\n"ground" = "moving"\n[settlement]\ndirection = [0.0, -1.0]\nlimit = 0.02\n'
+    ran(text + "[output]\nanimation = false\n" + SIDEWAYS, tmp_path)
+    assert 'a settlement analysis leaves the live loads out; give loads that act during it kind = "dead"' in (
+        capsys.readouterr().err
+    )
+
+
+LIMIT = COLUMN + '[analysis]\nkind = "limit load"\n'
+MOVING = '[[loads]]\nkind = "live"\nforce = [0.0, -1.0]\npositions = {}\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (LIMIT, ['kind is "limit load", but no load is live', 'kind = "live"']),
+        (LIMIT + MOVING.format("[-1.0, 5.0, 4]"), ["[loads 1] positions: ", "reaches from"]),
+        (LIMIT + MOVING.format("[0.0, 1.0]"), ["give [first x, last x, number of places]"]),
+        (LIMIT + MOVING.format("[0.05, 0.15, 2]") + 'blocks = "x"\n', ["blocks does not go with positions"]),
+        (LIMIT + MOVING.format("[0.05, 0.15, 2]") * 2, ["only one load may move, and loads 1 does"]),
+        (LIMIT + SIDEWAYS + '[control]\nblock = "block 1"\n', ['[control] belongs to [analysis] kind = "pushover"']),
+        (LIMIT + "capacity_at = [0.1]\n" + SIDEWAYS, ["capacity_at asks for limit loads", "along a [settlement]"]),
+        (LIMIT + "displacement = 0.1\n" + SIDEWAYS, ["displacement is that of a limit load after a settlement"]),
+        (LIMIT + 'flow = "asociative"\n' + SIDEWAYS, ["did you mean 'associative'"]),
+        (LIMIT + '[[loads]]\nkind = "live"\n', ["[loads] force is missing or zero"]),
+        (LIMIT + '[[loads]]\nkind = "live"\npressure = 1.0\nedge = 9\n', ["edge is 9", "has edges 1 to 4"]),
+        (LIMIT + '[[loads]]\nkind = "live"\nforce = [1.0, 0.0]\nedge = 2\n', ["edge is that of a pressure"]),
+        (PUSHED.replace('"block 1"', '"blok 1"'), ["[control] block 'blok 1' is no block", "did you mean 'block 1'"]),
+        (PUSHED.replace('"block 1"', '"ground"'), ["[control] block 'ground' is a support", "block 1"]),
+        (PUSHED.replace("[1.0, 0.0]\npoint", "[-1.0, 0.0]\npoint"), ["the mechanism does not move block 'block 1'"]),
+        (PUSHED[: PUSHED.index("[control]")], ["[control] is missing"]),
+        (PUSHED + MOVING.format("[0.05, 0.15, 2]"), ["[loads 2] positions belong to"]),
+    ],
+)
+def test_what_cannot_be_analysed_is_refused_before_anything_is_written(tmp_path, capsys, text, words):
+    path = tmp_path / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    assert main(["run", str(path), "-o", str(tmp_path / "out")]) == 2
+    message = capsys.readouterr().err
+    for word in words:
+        assert word in message, message
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,204 @@
+"""Memory does not grow with the number of increments: what is written is forgotten, and read back one at a time."""
+
+import pickle
+import shutil
+import weakref
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import blockvis
+import solver
+from blockvis import generators
+from blockvis.cases.case import parse_case
+from blockvis.pictures.curves import draw_curve
+from blockvis.pictures.drawer import Look, Studio
+from blockvis.pictures.opengl import rendering_available
+from blockvis.pictures.video import write_film
+from blockvis.report.page import report_html
+from blockvis.results import increments
+from blockvis.results.folder import ResultsFolder
+from blockvis.results.increments import AT_LEAST, StoredIncrements
+
+ARCH = """
+[geometry]
+layout = "arch"
+[material]
+friction_coefficient = 0.7
+[output]
+animation = false
+"""
+
+SPREAD = """
+[settlement]
+direction = [1.0, 0.0]
+increment = 0.006
+limit = 0.5
+"""
+
+SIDEWAYS = """
+[[loads]]
+kind = "live"
+weight_fraction = [1.0, 0.0]
+"""
+
+MOVING = """
+[analysis]
+kind = "limit load"
+[[loads]]
+kind = "live"
+force = [0.0, -1000.0]
+positions = [-0.9, 0.9, 11]
+"""
+
+ANALYSES = {
+    "settlement": SPREAD + "[analysis]\nfalling_frames = 8\n",
+    "capacity": SPREAD + SIDEWAYS + '[analysis]\nkind = "limit load"\n',
+    "load that moves": MOVING,
+    "pushover": SIDEWAYS + '[analysis]\nkind = "pushover"\n[control]\nblock = "voussoir 4"\nincrement = 0.03\n',
+}
+
+#: Increments alive at once while a run goes on: the one just told, the one before, and those that a pause holds back.
+FEW = 5
+
+
+def ran(text, folder):
+    """The run of a case, nothing drawn."""
+    return blockvis.run_case(parse_case(ARCH + text, folder / "case.toml"), folder / "out")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def undrawn():
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("blockvis.runs.run.draw_results", lambda *_, **__: ())
+        yield
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Results with more increments than are ever kept."""
+    run = ran(ANALYSES["settlement"], tmp_path_factory.mktemp("memory"))
+    assert len(run.response.increments) > 4 * FEW
+    return run.folder
+
+
+@pytest.mark.parametrize("kind", ANALYSES)
+def test_a_run_forgets_what_it_has_written(kind, tmp_path, monkeypatch):
+    seen, most = [], []
+    add = ResultsFolder.add
+
+    def watched(self, increment):
+        add(self, increment)
+        seen.append(weakref.ref(increment.contacts))
+        most.append(sum(ref() is not None for ref in seen))
+
+    monkeypatch.setattr(ResultsFolder, "add", watched)
+    ran(ANALYSES[kind], tmp_path)
+    assert len(seen) > 2 * FEW
+    assert max(most) <= FEW, most
+
+
+@pytest.mark.parametrize("use", ["summary", "curve", "report", "film"])
+def test_results_are_read_one_at_a_time(use, folder, tmp_path, monkeypatch):
+    if use == "film" and rendering_available() is not None:
+        pytest.skip(rendering_available())
+    seen, most = [], []
+    read = StoredIncrements._read
+
+    def watched(self, number):
+        increment = read(self, number)
+        seen.append(weakref.ref(increment))
+        most.append(sum(ref() is not None for ref in seen))
+        return increment
+
+    monkeypatch.setattr(increments, "CACHED", 0)
+    monkeypatch.setattr(StoredIncrements, "_read", watched)
+    response = blockvis.open_results(folder)
+    n = len(response.increments)
+    assert n <= len(seen) <= n + 1
+    assert n > 4 * AT_LEAST
+    if use == "summary":
+        blockvis.write(response, tmp_path / "again")
+    elif use == "curve":
+        draw_curve(response, tmp_path / "curve.png")
+    elif use == "report":
+        assert f"{response.collapse.displacement:.6g} m" in report_html(response)
+    else:
+        with Studio(response, Look(), (320, 180), response.increments, curve=True) as studio:
+            write_film(studio.frames(4.0, 2.0), tmp_path / "film.gif", size=(320, 180), fps=4.0)
+    # Each is read, and no more than a few times.
+    assert n < len(seen) < 6 * n
+    assert max(most) <= AT_LEAST + 1, most
+
+
+def test_a_few_small_increments_are_read_once(folder, monkeypatch):
+    response = blockvis.open_results(folder)
+    numbers = []
+    read = StoredIncrements._read
+    monkeypatch.setattr(StoredIncrements, "_read", lambda self, number: numbers.append(number) or read(self, number))
+    for _ in range(3):
+        for increment in response.increments:
+            assert increment.pose.positions.shape == (response.assembly.n_blocks, 2)
+            assert len(increment.forces) == len(increment.contacts)
+    assert len(numbers) == len(set(numbers)) >= len(response.increments) - 1
+
+
+def test_stored_increments_are_what_was_told(tmp_path):
+    assembly = generators.arch()
+    spread = solver.Settlement(direction=(1, 0), increment=0.04, limit=0.5)
+    told = solver.settle(assembly, spread, controls=solver.Controls(falling_frames=2))
+    stored = blockvis.open_results(blockvis.write(told, tmp_path / "out"))
+    for one, other in zip(told.increments, stored.increments, strict=True):
+        assert isinstance(other, solver.Increment)
+        for name in ("forces", "displacements", "friction", "velocity", "support_forces", "states"):
+            assert getattr(one, name).tobytes() == getattr(other, name).tobytes(), name
+        assert one.contacts.points.tobytes() == other.contacts.points.tobytes()
+        assert (one.settlement, one.reaction, one.status) == (other.settlement, other.reaction, other.status)
+        assert one.certificate == other.certificate
+        assert other.checkpoint is None
+        assert not hasattr(other, "nonsense")
+    # Once more from what was read, to the same files; a changed one is in memory, and a copy reads the same file.
+    again = blockvis.write(stored, tmp_path / "again")
+    for file in sorted((tmp_path / "out" / "increments").iterdir()):
+        assert file.read_bytes() == (again / "increments" / file.name).read_bytes()
+    moved = replace(stored.increments[0], settlement=9.0)
+    copied = pickle.loads(pickle.dumps(stored.increments[1]))
+    assert copied.forces.tobytes() == told.increments[1].forces.tobytes()
+    shutil.rmtree(tmp_path / "out")
+    assert moved.settlement == 9.0
+    assert moved.forces.tobytes() == told.increments[0].forces.tobytes()
+
+
+def test_results_that_change_below_the_reader_are_named(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(increments, "CACHED", 0)
+    shutil.copytree(folder, tmp_path / "out")
+    response = blockvis.open_results(tmp_path / "out")
+    files = sorted((tmp_path / "out" / "increments").glob("state_*.npz"))
+    shutil.copy(files[1], files[0])
+    with pytest.raises(ValueError, match=r"state_00000.npz' is not what it was when it was opened; open the results"):
+        response.increments[0].pose  # noqa: B018 - it is read here
+    files[2].write_bytes(files[2].read_bytes()[:-200])
+    with pytest.raises(ValueError, match=r"state_00002.npz' cannot be read"):
+        response.increments[2].forces  # noqa: B018 - it is read here
+    files[3].unlink()
+    with pytest.raises(ValueError, match=r"state_00003.npz' cannot be read"):
+        response.increments[3].contacts  # noqa: B018 - it is read here
+
+
+def test_results_are_not_written_over_what_they_are_read_from(folder):
+    response = blockvis.open_results(folder)
+    with pytest.raises(ValueError, match=r"is read from '.*' itself; write it to another folder"):
+        blockvis.write(response, folder, overwrite=True)
+    assert len(blockvis.open_results(folder).increments) == len(response.increments)
+
+
+def test_limit_loads_of_a_run_have_the_arrays_of_their_increments(tmp_path):
+    run = ran(ANALYSES["capacity"], tmp_path)
+    assert len(run.response.limits) == run.summary["n_increments"] > 4
+    for limit, state in zip(run.response.limits, run.response.increments, strict=False):
+        assert limit.multiplier == state.load_multiplier
+        assert np.array_equal(limit.mechanism, state.velocity)
+        assert np.array_equal(limit.forces, state.forces)
+        assert limit.increment.pose.positions.shape == state.pose.positions.shape
+        assert str(limit).startswith("load multiplier")

@@ -1,0 +1,85 @@
+"""The results opened with ParaView's own Python, where it is installed."""
+
+import json
+import os
+import shutil
+import subprocess
+
+import pytest
+from structures import arch_response
+
+from blockvis.pictures.paraview import write_paraview_macro
+from blockvis.results.datasets import block_dataset, contact_dataset, output_times
+from blockvis.vtk_files import write_pvd, write_vtu
+
+PVPYTHON, XVFB = shutil.which("pvpython"), shutil.which("xvfb-run")
+
+READ = """
+import json, sys
+from paraview.simple import OpenDataFile, UpdatePipeline
+from paraview import servermanager
+told = {}
+for part in ("blocks", "contacts"):
+    reader = OpenDataFile(f"{sys.argv[1]}/{part}.pvd")
+    told[part] = []
+    for time in reader.TimestepValues:
+        UpdatePipeline(time, reader)
+        data = servermanager.Fetch(reader)
+        names = {}
+        for kind in ("Cell", "Point", "Field"):
+            arrays = getattr(data, f"Get{kind}Data")()
+            found = [arrays.GetAbstractArray(i) for i in range(arrays.GetNumberOfArrays())]
+            names[kind] = {a.GetName(): a.GetVariantValue(a.GetNumberOfValues() - 1).ToString() for a in found}
+        told[part].append([time, data.GetNumberOfCells(), names])
+print("TOLD" + json.dumps(told))
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    response, path = arch_response(), tmp_path_factory.mktemp("results")
+    times = output_times(response.increments)
+    for part, dataset in (("blocks", block_dataset), ("contacts", contact_dataset)):
+        files = [f"increments/{part}_{k}.vtu" for k in range(len(times))]
+        for file, increment in zip(files, response.increments, strict=True):
+            write_vtu(dataset(response.assembly, increment), path / file)
+        write_pvd(path / f"{part}.pvd", zip(times, files, strict=True))
+    write_paraview_macro(path)
+    return path
+
+
+@pytest.mark.skipif(PVPYTHON is None, reason="pvpython is not installed (Debian: python3-paraview)")
+def test_paraview_reads_every_increment_and_every_array(folder, tmp_path):
+    script = tmp_path / "read.py"
+    script.write_text(READ)
+    done = subprocess.run([PVPYTHON, script, folder], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    told = json.loads(done.stdout.split("TOLD")[1])
+    response = arch_response()
+    for part, dataset in (("blocks", block_dataset), ("contacts", contact_dataset)):
+        assert len(told[part]) == len(response.increments)
+        for (_, cells, names), increment in zip(told[part], response.increments, strict=True):
+            ours = dataset(response.assembly, increment)
+            assert cells == ours.n_cells
+            for kind, arrays in (("Cell", ours.cell_data), ("Point", ours.point_data), ("Field", ours.field_data)):
+                assert set(names[kind]) == set(arrays.keys())
+            assert names["Field"]["status"] == str(increment.status)
+    assert told["blocks"][0][2]["Cell"]["name"] == response.assembly.names[-1]
+
+
+@pytest.mark.skipif(PVPYTHON is None or XVFB is None, reason="pvpython or xvfb-run is not installed")
+def test_paraview_script_runs(folder, tmp_path):
+    command = [XVFB, "-a", "-s", "-screen 0 800x600x24", PVPYTHON, folder / "paraview_colours.py"]
+    environment = os.environ | {"LIBGL_ALWAYS_SOFTWARE": "1"}
+    for _ in range(3):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=environment)
+        # On a busy machine the display may not be there yet: ParaView gives up while it opens its window.
+        if "vtkXOpenGLRenderWindow::CreateAWindow" not in done.stderr:
+            break
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert "ERR|" not in done.stderr, done.stderr[-2000:]
+    assert "Traceback" not in done.stderr, done.stderr[-2000:]
+
+
+def test_paraview_script_is_python(folder):
+    compile((folder / "paraview_colours.py").read_text(), "paraview_colours.py", "exec")

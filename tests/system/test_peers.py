@@ -1,0 +1,36 @@
+"""The comparison with other tools runs without them: our own rows, and a word for each that is missing."""
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).parents[2] / "benchmarks" / "peers.py"
+
+
+def _printed(*options):
+    done = subprocess.run([sys.executable, str(SCRIPT), *options], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    table = [[cell.strip() for cell in line.strip("|").split("|")] for line in done.stdout.splitlines() if "|" in line]
+    return done.stdout, [cells for cells in table if cells[0] == "blockvis"]
+
+
+def test_our_rows_agree_with_the_references():
+    _, rows = _printed("--quick")
+    numbers = [(float(cells[3]), float(cells[4])) for cells in rows if cells[2] != "equilibrium"]
+    assert len(numbers) == 4
+    for reference, found in numbers:
+        assert found == pytest.approx(reference, rel=1e-3)
+    verdicts = [cells[5] for cells in rows if cells[2] == "equilibrium"]
+    assert verdicts == ["right", "right", "right"]
+
+
+def test_a_peer_that_is_missing_is_named():
+    missing = [n for n in ("pymunk", "mujoco", "compas_lmgc90", "compas_cra") if importlib.util.find_spec(n) is None]
+    if not missing:
+        pytest.skip("every peer is installed")
+    printed, rows = _printed("--questions", "2")
+    assert [f"{name}: not installed" for name in missing] == [x for x in printed.splitlines() if "not installed" in x]
+    assert len(rows) == 4

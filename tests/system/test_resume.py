@@ -1,0 +1,427 @@
+"""A run that is killed goes on to the result it would have had, bit for bit."""
+
+import csv
+import io
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import blockvis
+import solver
+from blockvis import generators
+from blockvis.cli import main
+from blockvis.results.folder import ResultsExist, ResultsFolder
+from blockvis.results.npz import packed, unpacked
+
+#: Two phases, and a hinge that jumps: the path goes back, halves its steps, proves places.
+CASE = """
+[geometry]
+layout = "arch"
+[geometry.parameters]
+voussoirs = 13
+[material]
+friction_coefficient = 0.7
+[[settlement]]
+direction = [1.0, 0.0]
+increment = 0.02
+limit = 0.05
+[[settlement]]
+direction = [0.0, -1.0]
+increment = 0.03
+limit = 0.5
+[analysis]
+falling_frames = 3
+[output]
+animation = false
+"""
+
+
+#: Analyses of an arch whose right springer spreads first, or as it spreads; each ends in a collapse.
+ARCH = """
+[geometry]
+layout = "arch"
+[material]
+friction_coefficient = 0.7
+[[settlement]]
+direction = [1.0, 0.0]
+increment = 0.02
+limit = 0.02
+[[settlement]]
+direction = [1.0, 0.0]
+increment = 0.01
+limit = 0.03
+[output]
+animation = false
+"""
+SIDEWAYS = '[[loads]]\nkind = "live"\nweight_fraction = [1.0, 0.0]\n'
+OTHERS = {
+    "pushover": SIDEWAYS + '[analysis]\nkind = "pushover"\nfalling_frames = 2\n'
+    '[control]\nblock = "voussoir 4"\nincrement = 0.03\n',
+    "limit load": SIDEWAYS + '[analysis]\nkind = "limit load"\ncapacity_at = [0.0, 0.015, 0.03]\n',
+    "load that moves": '[analysis]\nkind = "limit load"\n[[loads]]\nkind = "live"\nforce = [0.0, -1000.0]\n'
+    "positions = [-0.8, 0.8, 5]\n",
+}
+
+
+def _command(folder, *arguments, code=""):
+    """The command line in a process of its own; ``code`` runs before it."""
+    script = f"{code}\nimport sys; from blockvis.cli import main; sys.exit(main({[str(a) for a in arguments]!r}))"
+    return subprocess.Popen(
+        [sys.executable, "-c", script], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def _killed_at(number):
+    """Code that has the process killed, by the real signal, when it replaces a file for the n-th time, or before it."""
+    return (
+        "import os, signal, itertools\n"
+        "replace, count = os.replace, itertools.count(1)\n"
+        "def lethal(*names):\n"
+        f"    if next(count) == {number}: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "    replace(*names)\n"
+        "os.replace = lethal"
+    )
+
+
+def _killed_writing(name):
+    """Code that has the process killed, by the real signal, before it puts a file of this name in its place."""
+    return (
+        "import os, signal\n"
+        "replace = os.replace\n"
+        "def lethal(partial, target):\n"
+        f"    if os.path.basename(target) == {name!r}: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "    replace(partial, target)\n"
+        "os.replace = lethal"
+    )
+
+
+def _same_result(one: Path, other: Path) -> None:
+    """Every file of the two folders but the pictures, timings apart."""
+    names = sorted(str(p.relative_to(one)) for p in one.rglob("*") if p.is_file())
+    assert names == sorted(str(p.relative_to(other)) for p in other.rglob("*") if p.is_file())
+    tables = []
+    for folder in (one, other):
+        rows = list(csv.DictReader((folder / "response.csv").read_text(encoding="utf-8").splitlines()))
+        tables.append([{key: value for key, value in row.items() if key != "seconds"} for row in rows])
+    assert tables[0] == tables[1]
+    for name in names:
+        if name.endswith(".npz"):
+            with np.load(one / name) as a, np.load(other / name) as b:
+                for key in a.files:
+                    assert key == "seconds" or a[key].tobytes() == b[key].tobytes(), (name, key)
+        elif name.endswith((".vtu", ".pvd")):
+            assert (one / name).read_bytes() == (other / name).read_bytes(), name
+    summaries = [json.loads((folder / "summary.json").read_text(encoding="utf-8")) for folder in (one, other)]
+    for summary in summaries:
+        del summary["seconds"], summary["finished"]
+    assert summaries[0] == summaries[1]
+
+
+def _readable(folder: Path) -> None:
+    """What is in the folder can be read: reopened as a response, tables and lists whole, nothing named is absent."""
+    for name in ("blocks.pvd", "contacts.pvd"):
+        if (folder / name).exists():
+            text = (folder / name).read_text(encoding="utf-8")
+            assert text.endswith("</VTKFile>\n")
+            for file in re.findall(r'file="([^"]*)"', text):
+                assert (folder / file).read_bytes().rstrip().endswith(b"</VTKFile>")
+    if (folder / "response.csv").exists():
+        rows = list(csv.reader((folder / "response.csv").read_text(encoding="utf-8").splitlines()))
+        assert len({len(row) for row in rows}) == 1
+    if (folder / "assembly.npz").exists():
+        assert blockvis.open_results(folder).stop is solver.Status.INTERRUPTED
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A case and the folder of its run that nobody disturbed."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "case.toml").write_text(CASE, encoding="utf-8")
+    assert main(["run", str(folder / "case.toml"), "-o", str(folder / "out")]) == 0
+    summary = json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["status"] == "collapsed"
+    assert blockvis.open_results(folder / "out").path[-1].phase == 1
+    return folder
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
+@pytest.mark.parametrize("moments", [(2,), (30, 40), (74,), (200,)])
+def test_killed_run_goes_on(whole, tmp_path, moments):
+    out = tmp_path / "out"
+    arguments = ["run", whole / "case.toml", "-o", out]
+    for moment in moments:
+        process = _command(tmp_path, *arguments, code=_killed_at(moment))
+        _, said = process.communicate(timeout=120)
+        assert process.returncode == -signal.SIGKILL, said
+        _readable(out)
+        arguments = ["run", "--resume", out]
+    if moments == (2,):
+        # Killed between the assembly and the record of the case: nothing has begun.
+        assert main(["run", "--resume", str(out)]) == 2
+        assert main(["run", str(whole / "case.toml"), "-o", str(out), "--force"]) == 0
+    else:
+        assert main(["run", "--resume", str(out)]) == 0
+    _same_result(whole / "out", out)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
+@pytest.mark.parametrize(
+    ("kind", "moment", "kept"),
+    [
+        ("pushover", "state_00002.npz", 2),
+        ("limit load", "blocks_00002.vtu", 2),
+        ("limit load", "contacts_00010.vtu", 3),
+        ("load that moves", "state_00003.npz", 3),
+        ("load that moves", "summary.json", 5),
+    ],
+)
+def test_killed_limit_loads_and_pushovers_go_on(tmp_path, monkeypatch, kind, moment, kept):
+    case = tmp_path / "case.toml"
+    case.write_text(ARCH + OTHERS[kind], encoding="utf-8")
+    monkeypatch.setattr("blockvis.runs.run.draw_results", lambda *_, **__: ())
+    assert main(["run", str(case), "-o", str(tmp_path / "whole")]) == 0
+    process = _command(tmp_path, "run", case, "-o", tmp_path / "out", code=_killed_writing(moment))
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == -signal.SIGKILL, said
+    _readable(tmp_path / "out")
+    before = [file.stat().st_mtime_ns for file in sorted((tmp_path / "out" / "increments").glob("state_*"))][:kept]
+    assert len(before) == kept
+    found = []
+    for name in ("limit_load", "settlement_increments"):
+        function = getattr(solver, name)
+        monkeypatch.setattr(
+            solver, name, lambda *a, name=name, function=function, **k: found.append(name) or function(*a, **k)
+        )
+    assert main(["run", "--resume", str(tmp_path / "out")]) == 0
+    _same_result(tmp_path / "whole", tmp_path / "out")
+    # What had been found was neither solved nor written again.
+    after = [file.stat().st_mtime_ns for file in sorted((tmp_path / "out" / "increments").glob("state_*"))][:kept]
+    assert after == before
+    limits = {"pushover": 0, "limit load": 3 - kept, "load that moves": 5 - kept}[kind]
+    assert found == ["settlement_increments"] * (kind == "limit load") + ["limit_load"] * limits
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
+def test_killed_from_outside_while_it_runs(whole, tmp_path):
+    out = tmp_path / "out"
+    process = _command(tmp_path, "run", whole / "case.toml", "-o", out)
+    deadline = time.monotonic() + 120
+    while not (out / "increments" / "state_00004.npz").exists() and time.monotonic() < deadline:
+        time.sleep(0.001)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate(timeout=60)
+    if process.returncode == 0:
+        pytest.skip("the run was over before the signal came")
+    _readable(out)
+    assert main(["run", "--resume", str(out)]) == 0
+    _same_result(whole / "out", out)
+
+
+def test_ctrl_c_ends_cleanly_and_the_run_goes_on(whole, tmp_path, monkeypatch, capsys):
+    added = ResultsFolder.add
+
+    def stopped(self, increment):
+        if len(self.increments) == 5:
+            raise KeyboardInterrupt
+        added(self, increment)
+
+    out = tmp_path / "out"
+    monkeypatch.setattr(ResultsFolder, "add", stopped)
+    assert main(["run", str(whole / "case.toml"), "-o", str(out)]) == 130
+    assert "--resume" in capsys.readouterr().err
+    assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["status"] == "interrupted"
+    _readable(out)
+    monkeypatch.undo()
+    assert main(["run", "--resume", str(out)]) == 0
+    _same_result(whole / "out", out)
+
+
+def test_finished_run_says_so_and_draws_what_is_missing(whole, capsys):
+    before = (whole / "out" / "response.csv").read_bytes()
+    (whole / "out" / "mechanism.png").unlink()
+    assert main(["run", "--resume", str(whole / "out")]) == 0
+    assert "had finished (collapsed)" in capsys.readouterr().err
+    assert (whole / "out" / "mechanism.png").stat().st_size > 500
+    assert (whole / "out" / "response.csv").read_bytes() == before
+
+
+def test_files_that_changed_are_named_and_not_read_again(whole, tmp_path, monkeypatch, capsys):
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(CASE, encoding="utf-8")
+    process = _command(tmp_path, "run", case, "-o", out, code=_killed_at(30))
+    process.communicate(timeout=120)
+    case.write_text(CASE.replace("0.7", "0.3"), encoding="utf-8")
+    assert main(["run", "--resume", str(out)]) == 0
+    assert "case.toml' has changed" in capsys.readouterr().err
+    rows = [(f / "response.csv").read_text(encoding="utf-8").splitlines() for f in (out, whole / "out")]
+    assert [row.rsplit(",", 1)[0] for row in rows[0]] == [row.rsplit(",", 1)[0] for row in rows[1]]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--resume", "nowhere"], "holds no run"),
+        (["--resume", "nowhere", "-o", "out"], "takes the results folder alone"),
+        (["case.toml", "--resume", "nowhere"], "takes the results folder alone"),
+        ([], "name a case file"),
+    ],
+)
+def test_what_cannot_go_on(tmp_path, monkeypatch, capsys, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", *arguments]) == 2
+    assert words in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_damaged_checkpoint_is_refused(whole, tmp_path, capsys):
+    out = tmp_path / "out"
+    shutil.copytree(whole / "out", out)
+    (out / "summary.json").unlink()
+    data = (out / "checkpoint.npz").read_bytes()
+    for damaged in (b"", data[:200], data[: len(data) // 2], b"PK" + bytes(500)):
+        (out / "checkpoint.npz").write_bytes(damaged)
+        assert main(["run", "--resume", str(out)]) == 2
+        assert "cannot go on" in capsys.readouterr().err
+
+
+def test_two_runs_cannot_write_to_one_folder(whole, tmp_path):
+    pytest.importorskip("fcntl", reason="the system has no file locks")
+    assembly = generators.arch()
+    first = ResultsFolder(tmp_path / "out", assembly)
+    for overwrite in (False, True):
+        with pytest.raises(ResultsExist, match=r"results already|another run is writing"):
+            ResultsFolder(tmp_path / "out", assembly, overwrite=overwrite)
+    del first
+    ResultsFolder(tmp_path / "out", assembly, overwrite=True)
+
+
+def _equal(one, other):
+    if is_dataclass(one):
+        return type(one) is type(other) and all(
+            _equal(getattr(one, f.name), getattr(other, f.name)) for f in fields(one)
+        )
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(_equal, one, other))
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
+    if isinstance(one, float) and np.isnan(one):
+        return isinstance(other, float) and np.isnan(other)
+    return type(one) is type(other) and one == other
+
+
+def test_every_checkpoint_leads_to_the_same_end():
+    arch = generators.arch(voussoirs=13)
+    phases = (
+        solver.Settlement(direction=(1, 0), increment=0.03, limit=0.06),
+        solver.Settlement(direction=(0, -1), increment=0.04, limit=0.5),
+    )
+    setting = {
+        "interfaces": solver.Interfaces(solver.InterfaceLaw(0.7)),
+        "loads": solver.self_weight(arch),
+        "controls": solver.Controls(falling_frames=2),
+    }
+    told = list(solver.settlement_increments(arch, phases, **setting))
+    assert {i.phase for i in told} == {0, 1}
+    for k in range(0, len(told), 3):
+        if told[k].checkpoint is None:
+            continue
+        checkpoint, extra = unpacked(packed(told[k].checkpoint, increments=k + 1), solver.Checkpoint)
+        assert extra == {"increments": k + 1}
+        assert _equal(checkpoint, told[k].checkpoint)
+        again = list(solver.settlement_increments(arch, phases, resume=checkpoint, **setting))
+        assert len(again) == len(told) - k - 1
+        for one, other in zip(again, told[k + 1 :], strict=True):
+            for name in (
+                "settlement",
+                "pose",
+                "forces",
+                "velocity",
+                "reaction",
+                "certificate",
+                "programs",
+                "checkpoint",
+            ):
+                assert _equal(getattr(one, name), getattr(other, name)), (k, name)
+
+
+def test_every_checkpoint_of_a_pushover_leads_to_the_same_end():
+    arch = generators.arch(voussoirs=13)
+    live = solver.weight_fraction(arch, (1.0, 0.0), np.flatnonzero(arch.free))
+    control = solver.ControlDisplacement("voussoir 4", increment=0.03, limit=0.6)
+    setting = {
+        "interfaces": solver.Interfaces(solver.InterfaceLaw(0.45)),
+        "loads": solver.Loads(solver.self_weight(arch).dead, live),
+        "controls": solver.Controls(falling_frames=2),
+    }
+    told = list(solver.pushover_increments(arch, control, **setting))
+    kept = [k for k, increment in enumerate(told) if increment.checkpoint is not None]
+    assert len(kept) > 5
+    for k in kept:
+        checkpoint, _ = unpacked(packed(told[k].checkpoint), solver.PushoverCheckpoint)
+        assert _equal(checkpoint, told[k].checkpoint)
+        again = list(solver.pushover_increments(arch, control, resume=checkpoint, **setting))
+        assert len(again) == len(told) - k - 1
+        for one, other in zip(again, told[k + 1 :], strict=True):
+            for name in ("settlement", "load_multiplier", "pose", "forces", "velocity", "programs", "checkpoint"):
+                assert _equal(getattr(one, name), getattr(other, name)), (k, name)
+    other = generators.arch(voussoirs=12)
+    setting["loads"] = solver.Loads(solver.self_weight(other).dead, solver.weight_fraction(other, (1.0, 0.0), [3]))
+    with pytest.raises(ValueError, match=r"has 15 blocks, the assembly 14: it belongs to another run"):
+        next(solver.pushover_increments(other, control, resume=checkpoint, **setting))
+
+
+def test_checkpoint_behind_the_last_increment_has_nothing_left_to_do():
+    arch = generators.arch()
+    phases = [solver.Settlement(direction=(1, 0), increment=0.01, limit=limit) for limit in (0.02, 0.01)]
+    setting = {"interfaces": solver.Interfaces(), "loads": solver.self_weight(arch)}
+    told = list(solver.settlement_increments(arch, phases, **setting))
+    ends = [k for k, i in enumerate(told) if i.checkpoint.told == -np.inf]
+    assert [(told[k].phase, told[k].checkpoint.phase) for k in ends] == [(0, 1), (1, 2)]
+    assert ends[-1] == len(told) - 1
+    steps = solver.settlement_increments(arch, phases, resume=told[-1].checkpoint, **setting)
+    with pytest.raises(StopIteration) as end:
+        next(steps)
+    assert end.value.value.stop is solver.Status.LIMIT_REACHED
+    assert end.value.value.message == "the settlement reached its limit of 0.01 m"
+    first = next(solver.settlement_increments(arch, phases, resume=told[ends[0]].checkpoint, **setting))
+    assert _equal(first.pose, told[ends[0] + 1].pose)
+    assert first.programs == told[ends[0] + 1].programs
+
+
+def test_checkpoint_of_another_run_is_refused():
+    arch, other = generators.arch(voussoirs=13), generators.arch(voussoirs=12)
+    spread = solver.Settlement(direction=(1, 0), increment=0.03, limit=0.06)
+    setting = {"interfaces": solver.Interfaces(), "controls": solver.Controls()}
+    checkpoint = next(
+        solver.settlement_increments(arch, (spread,), loads=solver.self_weight(arch), **setting)
+    ).checkpoint
+    steps = solver.settlement_increments(
+        other, (spread,), loads=solver.self_weight(other), resume=checkpoint, **setting
+    )
+    with pytest.raises(ValueError, match="belongs to another run"):
+        next(steps)
+
+
+def test_a_response_keeps_no_checkpoints():
+    arch = generators.arch()
+    spread = solver.Settlement(direction=(1, 0), increment=0.05, limit=0.1)
+    assert all(i.checkpoint is None for i in solver.settle(arch, spread).increments)
+
+
+def test_stored_values_refuse_what_they_cannot_hold():
+    with pytest.raises(TypeError, match="cannot be stored"):
+        packed(solver.Ending(solver.Status.LOCKED, {"a": 1}))
+    buffer = io.BytesIO()
+    np.savez(buffer, tree=np.array('{"value": {"phase": 1}, "extra": {}}'))
+    with pytest.raises(ValueError, match="it has the fields"):
+        unpacked(buffer.getvalue(), solver.Checkpoint)

@@ -1,0 +1,295 @@
+"""Studies on Dask: known distributions, failures, interruptions, and workers that die."""
+
+import asyncio
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import blockvis
+from blockvis.cli import main
+from blockvis.studies import campaign
+from blockvis.studies.fragility import fragility_of
+from blockvis.studies.run_one import run_once
+from blockvis.studies.study_file import read_study
+from blockvis.studies.study_folder import Ledger, finished_runs
+
+#: A block 0.5 × 1 on a ground that tilts: it overturns at atan(0.5) or slides at atan(μ), whichever is first.
+TILT = {
+    "geometry": {"layout": "column", "parameters": {"blocks": 1, "width": 0.5, "block_height": 1.0}},
+    "settlement": {
+        "rotation_centre": [0.0, 0.0],
+        "rotation": -1.0,
+        "increment": 0.05,
+        "limit": 0.44,
+        "tolerance": 1e-4,
+    },
+    "output": {"animation": False},
+}
+
+ARCH = """
+[geometry]
+layout = "arch"
+[geometry.parameters]
+voussoirs = 8
+[material]
+friction_coefficient = 0.6
+[settlement]
+direction = [1, 0]
+increment = 0.02
+limit = 0.3
+[output]
+animation = false
+"""
+
+STUDY = """
+[study]
+case = "case.toml"
+runs = 24
+seed = 3
+[parameters]
+"material.friction_coefficient" = { name = "friction", distribution = "uniform", lower = 0.4, upper = 0.8 }
+[[imperfections]]
+kind = "vertices"
+distribution = "normal"
+deviation = 0.002
+"""
+
+
+@pytest.fixture
+def arches(tmp_path):
+    (tmp_path / "case.toml").write_text(ARCH, encoding="utf-8")
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    return path
+
+
+def _made_here(study, folder, runs):
+    """Some runs of a study, without any cluster."""
+    ledger = Ledger(folder, study)
+    for run in runs:
+        ledger.add([run_once(study.values, str(study.case_source), study.order(run), study.n_seeded)])
+    return ledger
+
+
+def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path):
+    """As in a notebook, where a loop is running; runs that stood up to the limit are no collapse."""
+    study = {
+        "study": {"case": TILT, "method": "latin hypercube", "runs": 25, "seed": 5},
+        "parameters": {
+            "material.friction_coefficient": {"name": "mu", "distribution": "uniform", "lower": 0.2, "upper": 0.7}
+        },
+    }
+
+    async def cell():
+        return blockvis.study(study, tmp_path / "out", workers=2)
+
+    table = asyncio.run(cell())
+    assert len(table) == 25
+    limit, mu = 0.44, table["mu"].to_numpy(dtype=float)
+    exact = np.arctan(np.minimum(mu, 0.5))
+    falls = exact < limit
+    assert (table["status"][falls] == "collapsed").all()
+    assert (table["status"][~falls] == "limit reached").all()
+    assert 5 < falls.sum() < 20
+    np.testing.assert_allclose(table["collapse_displacement"][falls].astype(float), exact[falls], atol=1.1e-4)
+    assert (table["bracket_high"] - table["bracket_low"])[falls].max() <= 1.001e-4
+    assert table["collapse_displacement"][~falls].isna().all()
+    np.testing.assert_allclose(table["last_settlement"][~falls].astype(float), limit)
+    assert table["mechanism_class"][falls].unique().tolist() == ["sliding ground|block 1"]
+    curve = fragility_of(table)
+    assert curve.n_stood == (~falls).sum()
+    # A run in each of 25 strata: at most one step off the distribution of atan(μ).
+    at = np.linspace(0.21, 0.43, 12)
+    found = [curve.probability[curve.settlement <= x].max(initial=0.0) for x in at]
+    np.testing.assert_allclose(found, (np.tan(at) - 0.2) / 0.5, atol=1.001 / 25)
+    out = tmp_path / "out"
+    stored = pd.read_parquet(out / "table.parquet")
+    pd.testing.assert_frame_equal(stored, table, check_dtype=False)
+    assert len(pd.read_csv(out / "table.csv")) == 25
+    for name in ("fragility.png", "sensitivity.png", "scatter.png", "mechanisms.png", "summary.json"):
+        assert (out / name).stat().st_size > 400
+
+
+def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
+    """On a grid, in one process: a column of no block, and a time too short for any run."""
+    given = {
+        "study": {"case": TILT, "method": "grid"},
+        "parameters": {"geometry.parameters.blocks": [1, 0], "material.friction_coefficient": [0.3, 0.4]},
+    }
+    ledger = _made_here(read_study(given), tmp_path / "out", range(4))
+    table = ledger.write_table()
+    assert table["status"].tolist() == ["collapsed", "collapsed", "failed", "failed"]
+    assert table["message"].str.contains("blocks is 0").tolist() == [False, False, True, True]
+    assert ledger.missing() == []
+    assert ledger.missing(retry_failed=True) == [2, 3]
+    impatient = {**given, "study": {**given["study"], "seconds": 1e-9}}
+    plan = read_study(impatient)
+    row, shape = run_once(plan.values, "case", plan.order(0), 0, plan.seconds)
+    assert row["status"] == "failed"
+    assert "took longer than 1e-09 s" in row["message"]
+    assert shape == b""
+
+
+def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tmp_path, capsys):
+    """Killed without warning by SIGKILL, then by Ctrl-C; a run kept as a folder is a run of the table."""
+    out, command = tmp_path / "out", [sys.executable, "-m", "blockvis", "sweep", "study.toml", "-o", "out"]
+
+    def stopped(by, after):
+        process = subprocess.Popen(
+            [*command, "--workers", "1"], cwd=tmp_path, start_new_session=True, stderr=subprocess.PIPE, text=True
+        )
+        deadline = time.monotonic() + 120
+        while finished_runs(out) < after and process.poll() is None:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        # As a terminal does: Ctrl-C reaches the workers too.
+        (os.killpg if by == signal.SIGINT else os.kill)(process.pid, by)
+        return process.wait(timeout=60), process.stderr.read()
+
+    code, _ = stopped(signal.SIGKILL, 3)
+    assert code == -signal.SIGKILL
+    code, message = stopped(signal.SIGINT, 6)
+    assert code == 130
+    assert re.fullmatch(r"blockvis: interrupted; \d+ of 24 runs are kept, .* goes on with the others\n", message)
+    done = (out / "runs.jsonl").read_bytes()
+    assert 6 <= done.count(b"\n") < 24
+    assert len(pd.read_csv(out / "table.csv")) == done.count(b"\n"), "the table is there too"
+
+    assert main(["sweep", str(arches), "-o", str(out), "--workers", "2", "--keep", "5"]) == 0
+    printed = capsys.readouterr().out
+    assert "24 of 24 runs" in printed
+    assert "probability of collapse: 5 %" in printed
+    rows = (out / "runs.jsonl").read_bytes()
+    assert rows.startswith(done)
+    assert rows.count(b"\n") == 24, "finished runs are not made again"
+    table = pd.read_parquet(out / "table.parquet")
+    assert table["run"].tolist() == list(range(24))
+    assert (table["status"] == "collapsed").all()
+    again = _made_here(read_study(arches), tmp_path / "one go", [0, 11, 23]).table()
+    columns = ["friction", "collapse_displacement", "mechanism_class", "seed"]
+    pd.testing.assert_frame_equal(
+        again[columns].reset_index(drop=True), table.loc[[0, 11, 23], columns].reset_index(drop=True), check_dtype=False
+    )
+    kept = json.loads((out / "results" / "run_000005" / "summary.json").read_text(encoding="utf-8"))
+    assert kept["collapse_displacement"] == pytest.approx(table.loc[5, "collapse_displacement"], abs=1e-12)
+    response = blockvis.open_results(out / "results" / "run_000005")
+    assert response.interfaces.default.friction_coefficient == pytest.approx(table.loc[5, "friction"])
+
+    # Another study in the same folder is refused, and nothing is touched.
+    arches.write_text(STUDY.replace("upper = 0.8", "upper = 0.9"), encoding="utf-8")
+    assert main(["sweep", str(arches), "-o", str(out)]) == 2
+    message = capsys.readouterr().err
+    assert "24 finished runs of another study: parameters has changed" in message
+    assert "--force" in message
+    assert finished_runs(out) == 24
+    assert Ledger(out, read_study(arches), force=True).missing() == list(range(24))
+
+
+def test_a_folder_that_is_no_study_is_refused(arches, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.tex").write_text("precious")
+    assert main(["sweep", str(arches), "-o", str(tmp_path / "out")]) == 2
+    assert "holds something that is no study" in capsys.readouterr().err
+    assert (tmp_path / "out" / "thesis.tex").read_text() == "precious"
+
+
+def test_a_row_half_written_is_made_again(arches, tmp_path):
+    study = read_study(arches)
+    _made_here(study, tmp_path / "out", [0, 1])
+    file = tmp_path / "out" / "runs.jsonl"
+    file.write_bytes(file.read_bytes()[:-40])
+    ledger = Ledger(tmp_path / "out", study)
+    assert ledger.missing() == list(range(1, 24))
+    ledger.add([run_once(study.values, str(study.case_source), study.order(1), study.n_seeded)])
+    assert Ledger(tmp_path / "out", study).missing() == list(range(2, 24)), "half a line spoils none after it"
+
+
+def _deadly(values, source, order, n_seeded, seconds):
+    """Run 3 kills every worker that takes it."""
+    if order["run"] == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return run_once(values, source, order, n_seeded, seconds)
+
+
+def test_a_run_that_kills_its_workers_is_recorded_and_the_others_are_made(arches, tmp_path, monkeypatch):
+    monkeypatch.setattr(campaign, "run_once", _deadly)
+    arches.write_text(STUDY.replace("runs = 24", "runs = 8"), encoding="utf-8")
+    table = blockvis.study(arches, tmp_path / "out", workers=2)
+    assert table["run"].tolist() == list(range(8))
+    assert table["status"].tolist() == ["collapsed"] * 3 + ["failed"] + ["collapsed"] * 4
+    assert "every worker that took this run died" in table.loc[3, "message"]
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """A scheduler and two workers as a user starts them, without anybody who restarts what dies."""
+    file = tmp_path / "scheduler.json"
+    path = os.pathsep.join(
+        [str(Path(__file__).parents[2]), str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")]
+    )
+    common = {
+        "env": {**os.environ, "PYTHONPATH": path},
+        "cwd": tmp_path,
+        "stdout": subprocess.DEVNULL,
+        "stderr": subprocess.DEVNULL,
+    }
+    dask = [sys.executable, "-m", "dask"]
+    here = ["--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file), "--no-dashboard"]
+    scheduler = subprocess.Popen([*dask, "scheduler", *here], **common)
+    join = ["worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    workers = [subprocess.Popen([*dask, *join], **common) for _ in range(2)]
+    deadline = time.monotonic() + 60
+    while not file.exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    yield json.loads(file.read_text(encoding="utf-8"))["address"], scheduler, workers
+    for process in [*workers, scheduler]:
+        process.kill()
+        process.wait(timeout=20)
+
+
+def test_a_worker_killed_during_the_study_costs_nothing(arches, tmp_path, cluster):
+    address, _, workers = cluster
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "blockvis", "sweep", str(arches), "-o", str(out), "--scheduler", address]
+    study = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 120
+    while finished_runs(out) < 4 and study.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    workers[0].kill()
+    at_the_kill = finished_runs(out)
+    printed, complaint = study.communicate(timeout=120)
+    assert study.returncode == 0, complaint
+    assert at_the_kill < 24, "it was killed during the study"
+    table = pd.read_parquet(out / "table.parquet")
+    assert table["run"].tolist() == list(range(24))
+    assert (table["status"] == "collapsed").all()
+    assert "24 of 24 runs" in printed
+    assert workers[1].poll() is None
+
+
+def test_a_scheduler_that_goes_away_leaves_the_finished_runs(arches, tmp_path, cluster):
+    address, scheduler, _ = cluster
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "blockvis", "sweep", str(arches), "-o", str(out), "--scheduler", address]
+    study = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 120
+    while finished_runs(out) < 3 and study.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    scheduler.kill()
+    _, complaint = study.communicate(timeout=120)
+    assert study.returncode == 2
+    last = complaint.strip().splitlines()[-1]
+    assert re.match(r"blockvis: the scheduler .*finished runs are kept, the same command goes on", last), complaint
+    assert len(pd.read_csv(out / "table.csv")) == finished_runs(out) >= 3

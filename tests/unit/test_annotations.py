@@ -1,0 +1,192 @@
+"""Joints, cracks, hinges, resultants and the parts of a mechanism."""
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from structures import BENT, arch_response, parted, wall
+
+import solver
+from blockvis.numbers import rounded_length
+from blockvis.pictures import annotations as marks
+from blockvis.pictures.annotations import part_outlines
+from blockvis.pictures.hatching import cut_into_triangles, hatch_lines, triangles
+
+
+def stacked(shift=(0.0, 0.0), turn=0.0):
+    """A block on another, 1 m wide, and the pose with the upper one moved."""
+    assembly = solver.Assembly.from_outlines(
+        [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 1], [1, 2], [0, 2]]], roles=["fixed", "free"]
+    )
+    pose = solver.Pose(assembly.centroids + np.array([(0.0, 0.0), shift]), np.array([0.0, turn]))
+    return assembly, pose
+
+
+def cracks(assembly, pose, falling=False):
+    return marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose, falling)[0]
+
+
+def area(polygon):
+    x, y = polygon.T
+    return abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) / 2.0
+
+
+def test_one_joint_between_two_full_faces():
+    assembly, _ = stacked()
+    joints = marks.drawn_joints(assembly)
+    assert len(joints.block_a) == 1
+    assert {int(joints.block_a[0]), int(joints.block_b[0])} == {0, 1}
+    assert np.sort(joints.ends[0, :, 0]).tolist() == [0.0, 1.0]
+    assert joints.ends[0, :, 1].tolist() == [1.0, 1.0]
+
+
+def test_joints_of_a_running_bond_wall_are_counted():
+    assembly = wall(4, 2)
+    joints = marks.drawn_joints(assembly)
+    # Lower course of 4: three heads; upper course of 5 (halves at the ends): four heads; 8 beds between them,
+    # since joints alternate; the 4 lower bricks stand on a footing each, the split falls on a head joint.
+    assert len(joints.block_a) == 3 + 4 + 8 + 4
+
+
+def test_a_lifted_block_leaves_a_crack_of_its_size():
+    found = cracks(*stacked(shift=(0.0, 0.05)))
+    assert len(found) == 1
+    np.testing.assert_allclose(area(found[0]), 0.05, rtol=1e-9)
+
+
+def test_sliding_and_pressing_leave_none():
+    assert len(cracks(*stacked(shift=(0.2, 0.0)))) == 0
+    assert len(cracks(*stacked(shift=(0.0, -0.05)))) == 0
+
+
+def test_blocks_that_have_parted_have_no_joint():
+    assert len(cracks(*stacked(shift=(0.0, 1.6)))) == 0
+    assert len(cracks(*stacked(shift=(0.0, 0.7)))) == 1
+    assert len(cracks(*stacked(shift=(0.0, 0.7)), falling=True)) == 0
+    assert len(cracks(*stacked(shift=(0.1, 0.3), turn=1.2))) == 1
+    assert len(cracks(*stacked(shift=(0.1, 0.3), turn=1.2), falling=True)) == 0
+
+
+def four_blocks(apart):
+    """Four blocks of 1 m × 1 m around a point, each moved away from it along the diagonal."""
+    corners = [(0, 0), (1, 0), (0, 1), (1, 1)]
+    assembly = solver.Assembly.from_outlines(
+        [[[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]] for x, y in corners], roles=["free"] * 3 + ["fixed"]
+    )
+    away = apart * (2.0 * np.array(corners) - 1.0)
+    return assembly, solver.Pose(assembly.centroids + away, np.zeros(4))
+
+
+@given(st.floats(0.01, 0.3))
+def test_where_four_cracks_meet_nothing_stays_white(apart):
+    assembly, pose = four_blocks(apart)
+    found, openings, beside = marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose, False)
+    pockets = marks._pockets(assembly, found, beside, pose)
+    assert len(found) == 4
+    np.testing.assert_allclose(openings, 2.0 * apart, rtol=1e-9)
+    assert len(pockets) == 1
+    # The square in the middle, less the hair by which cracks are taken wider.
+    np.testing.assert_allclose(np.sqrt(area(pockets[0])), 2.0 * apart, atol=0.003)
+    np.testing.assert_allclose(pockets[0].mean(axis=0), [1.0, 1.0], atol=1e-9)
+    cut = cut_into_triangles(pockets)
+    np.testing.assert_allclose(sum(area(t) for t in cut), area(pockets[0]), rtol=1e-9)
+
+
+def test_an_opening_of_the_drawing_is_no_pocket():
+    ring = [((0, 0), (2, 1)), ((2, 0), (3, 2)), ((1, 2), (3, 3)), ((0, 1), (1, 3))]
+    assembly = solver.Assembly.from_outlines([[low, (high[0], low[1]), high, (low[0], high[1])] for low, high in ring])
+    away = 0.05 * np.sign(np.round(assembly.centroids - 1.5, 9))
+    pose = solver.Pose(assembly.centroids + away, np.zeros(4))
+    found, _, beside = marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose, False)
+    assert len(found) == 4
+    assert marks._pockets(assembly, found, beside, pose) == ()
+
+
+def test_joints_that_hardly_slide_are_not_marked():
+    response = arch_response()
+    last, joints = response.path[-1], marks.drawn_joints(response.assembly)
+    used_up = np.stack([last.forces[:, 0], last.friction * last.forces[:, 0]], axis=1)
+    fastest = np.abs(last.velocity[:, :2]).max()
+    for slip, drawn in ((0.5, True), (1e-4, False)):
+        sliding = replace(last, forces=used_up, displacements=np.full_like(last.displacements, slip * fastest))
+        assert (sliding.states == solver.ContactState.SLIDING).any()
+        assert (len(marks.marks_of(response.assembly, joints, sliding, last.pose).sliding) > 0) is drawn
+
+
+def test_resultants_balance_every_voussoir():
+    response = arch_response()
+    increment, assembly = response.path[-1], response.assembly
+    _, forces, blocks = marks.resultants(increment)
+    total = np.zeros((assembly.n_blocks, 2))
+    np.add.at(total, blocks[:, 0], forces)
+    np.subtract.at(total, blocks[:, 1], forces)
+    weight = assembly.masses * solver.GRAVITY
+    np.testing.assert_allclose(total[assembly.free, 1], weight[assembly.free], rtol=1e-6)
+    assert len(forces) == 13
+
+
+def test_arch_spreads_on_three_hinges_and_falls_on_five():
+    response = arch_response()
+    last, joints = response.path[-1], marks.drawn_joints(response.assembly)
+    spreading = marks.marks_of(response.assembly, joints, last, last.pose)
+    assert len(spreading.hinges) == 3
+    falling = solver.with_motion(last, response.collapse.mechanism)
+    assert len(marks.marks_of(response.assembly, joints, falling, last.pose).hinges) == 5
+    parts = solver.rigid_parts(response.assembly, falling)
+    assert sorted(np.bincount(parts[parts >= 0]).tolist()) == [2, 2, 4, 4]
+    assert (parts[~response.assembly.free] == -1).all()
+
+
+def test_parts_swing_as_one_body():
+    response = arch_response()
+    falling = solver.with_motion(response.path[-1], response.collapse.mechanism)
+    parts = solver.rigid_parts(response.assembly, falling)
+    displaced = solver.swung(falling.pose, 0.1 * response.collapse.mechanism)
+    outlines = part_outlines(response.assembly, solver.moved_vertices(response.assembly, displaced), parts)
+    length = np.hypot(*(outlines[:, 1] - outlines[:, 0]).T).sum()
+    before = part_outlines(response.assembly, solver.moved_vertices(response.assembly, falling.pose), parts)
+    np.testing.assert_allclose(length, np.hypot(*(before[:, 1] - before[:, 0]).T).sum(), rtol=1e-2)
+
+
+def test_a_sinking_wall_is_one_part():
+    response = parted(wall(8, 6), 2, 0)
+    parts = solver.rigid_parts(response.assembly, response.increments[-1])
+    assert set(parts) == {-1, 0}
+
+
+def test_bent_outlines_are_cut_into_triangles_of_the_same_area():
+    assembly = solver.Assembly.from_outlines([*BENT.values(), [[20, 0], [23, 0], [22, 4]]])
+    cells = triangles(assembly)
+    a, b, c = (assembly.vertices[cells[:, k]] for k in (1, 2, 3))
+    twice = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    assert (twice >= 0).all()
+    areas = np.bincount(assembly.block_of_vertex[cells[:, 1]], weights=twice / 2.0)
+    np.testing.assert_allclose(areas, assembly.areas, rtol=1e-12)
+
+
+def test_hatch_stays_inside_the_support():
+    assembly = solver.Assembly.from_outlines([BENT["U"]], roles=["fixed"])
+    points, blocks = hatch_lines(assembly, np.array([0]), np.array([-100.0, -100.0]), np.array([100.0, 100.0]), 0.1)
+    assert len(points) == len(blocks) > 20
+    middles = (points[::2] + points[1::2]) / 2.0
+    notch = (middles[:, 0] > 5.001) & (middles[:, 0] < 5.999) & (middles[:, 1] > 1.001)
+    assert not notch.any()
+    assert points.min() >= -1e-9
+
+
+@given(st.floats(1e-9, 1e9))
+def test_round_lengths_are_round_and_not_longer(length):
+    round_length = rounded_length(length)
+    assert round_length <= length * (1 + 1e-6)
+    assert round_length > 0.39 * length
+    assert f"{round_length:.0e}"[0] in "125"
+
+
+@given(st.floats(-3, 3), st.floats(-10, 10), st.floats(-10, 10))
+def test_carried_there_and_back(turn, x, y):
+    before = solver.Pose(np.array([[1.0, 2.0]]), np.array([0.3]))
+    after = solver.Pose(np.array([[x, y]]), np.array([turn]))
+    point = np.array([[0.7, -0.4]])
+    there = solver.carried(point, np.array([0]), before, after)
+    np.testing.assert_allclose(solver.carried(there, np.array([0]), after, before), point, atol=1e-9)

@@ -1,0 +1,154 @@
+"""Layout to assembly: roles, supports, duplicates, overlaps, units; and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+
+import blockvis
+import solver
+from blockvis.formats.read import read, read_layout, save_layout
+from blockvis.layout.assemble import assemble
+from blockvis.layout.layout import Layout, layout_of
+
+UNIT = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
+
+
+def row(n, **more):
+    return Layout(
+        outlines=tuple(UNIT + np.array([k, 0]) for k in range(n)),
+        names=tuple(f"brick {k + 1}" for k in range(n)),
+        **more,
+    )
+
+
+def test_roles_by_name_group_material_and_pattern():
+    drawing = row(4, groups=("wall", "wall", "base", "base"), materials=("brick", "brick", "stone", "brick"))
+    roles = assemble(drawing, roles={"b*": "free", "base": "fixed", "brick 4": "moving"}).roles
+    assert roles.tolist() == ["free", "free", "fixed", "moving"]
+    assert assemble(drawing, roles={"stone": "fixed"}).roles.tolist() == ["free", "free", "fixed", "free"]
+
+
+def test_a_group_or_block_called_fixed_or_moving_is_that():
+    drawing = row(3, groups=("Fixed", "", ""), roles=("", "", "moving"))
+    assert assemble(drawing).roles.tolist() == ["fixed", "free", "moving"]
+    assert assemble(drawing, roles={"Fixed": "free"}).roles.tolist() == ["free", "free", "moving"]
+
+
+def test_a_role_that_matches_nothing_lists_the_names_nearest_first():
+    drawing = row(2, groups=("left springer", "voussoirs"))
+    with pytest.raises(ValueError, match=r"roles: 'left sprnger' matches no block.*it has 'left springer', "):
+        assemble(drawing, roles={"left sprnger": "fixed"})
+    with pytest.raises(ValueError, match="roles: 'voussoirs' has role 'fxed'; roles are free, fixed, moving"):
+        assemble(drawing, roles={"voussoirs": "fxed"})
+
+
+def test_supports_are_added_and_checked():
+    ground = {"name": "ground", "role": "moving", "outline": [[0, -1], [2, -1], [2, 0], [0, 0]]}
+    assembly = assemble(row(2), supports=[ground])
+    assert assembly.names[-1] == "ground"
+    assert assembly.roles[-1] == "moving"
+    with pytest.raises(ValueError, match="support 'ground' has the key 'outlin'"):
+        assemble(row(1), supports=[{"name": "ground", "outlin": []}])
+    with pytest.raises(ValueError, match="support 'support 0' has no outline"):
+        assemble(row(1), supports=[{"role": "fixed"}])
+
+
+def test_duplicates_are_dropped_with_one_warning_that_names_them():
+    drawing = row(3)
+    twice = Layout(outlines=(*drawing.outlines, drawing.outlines[1][[2, 1, 0, 3]]), names=(*drawing.names, "again"))
+    with pytest.warns(UserWarning, match="1 of 4 blocks are drawn twice and were dropped: 'again' = 'brick 2'") as seen:
+        assembly = assemble(twice)
+    assert len(seen) == 1
+    assert assembly.n_blocks == 3
+
+
+def test_small_overlaps_are_resolved_and_large_ones_name_both_blocks():
+    def pair(depth):
+        return Layout(outlines=(UNIT, UNIT + np.array([1 - depth, 0])), names=("left", "right"))
+
+    closed = assemble(pair(0.01))
+    assert closed.outline(0)[:, 0].max() == pytest.approx(0.995, abs=1e-12)
+    assert closed.outline(1)[:, 0].min() == pytest.approx(0.995, abs=1e-12)
+    with pytest.raises(ValueError, match=r"'left'\) overlaps block 1 \('right'\) by 0.1 m .*raise overlap_tolerance"):
+        assemble(pair(0.1))
+    assert assemble(pair(0.1), overlap_tolerance=0.2).outline(0)[:, 0].max() == pytest.approx(0.95)
+
+
+@pytest.mark.parametrize("wrong", ["automatic", -1.0, float("nan")])
+def test_joint_thickness_is_checked(wrong):
+    with pytest.raises(ValueError, match="joint_thickness is"):
+        assemble(row(2), joint_thickness=wrong)
+
+
+def test_exact_layouts_keep_their_coordinates():
+    assembly = assemble(row(5))
+    assert (assembly.outline(3) == UNIT + np.array([3, 0])).all()
+
+
+def test_density_and_thickness_of_the_file_hold_where_it_has_them():
+    drawing = row(2, density=np.array([1800.0, np.nan]), thickness=np.array([np.nan, 0.3]))
+    assembly = assemble(drawing, density=2500.0, thickness=0.5)
+    assert assembly.density.tolist() == [1800.0, 2500.0]
+    assert assembly.thickness.tolist() == [0.5, 0.3]
+
+
+def test_a_deformed_pose_is_written(tmp_path):
+    assembly = assemble(row(2))
+    pose = solver.Pose(assembly.centroids + np.array([0, -0.25]), np.array([0.0, np.pi / 2]))
+    save_layout(assembly, tmp_path / "moved.json", pose=pose)
+    moved = read(tmp_path / "moved.json")
+    assert np.allclose(moved.centroids, assembly.centroids + np.array([0, -0.25]))
+    assert (layout_of(assembly).outlines[1] == assembly.outline(1)).all()
+
+
+def test_units(tmp_path):
+    path = tmp_path / "a.json"
+    blocks = [{"outline": (UNIT * 250).tolist()}]
+    path.write_text(json.dumps({"unit": "mm", "blocks": blocks}))
+    assert read(path).areas[0] == pytest.approx(0.0625)
+    assert read(path, unit="cm").areas[0] == pytest.approx(6.25)
+    assert "it was read in cm because that was asked for" in read_layout(path, unit="cm").notes[0]
+    path.write_text(json.dumps({"blocks": [{"outline": UNIT.tolist()}]}))
+    assert read_layout(path).notes == ("the file does not say its unit; m was assumed",)
+    path.write_text(json.dumps({"unit": "in", "blocks": [{"outline": (UNIT * 0.2).tolist()}]}))
+    clash = read_layout(path)
+    assert clash.unit == "m"
+    assert "unit clash: the file says its unit is in" in clash.notes[0]
+    with pytest.warns(UserWarning, match="unit clash: the file says its unit is in"):
+        read(path)
+    with pytest.raises(ValueError, match="unit 'furlong' is not known"):
+        read(path, unit="furlong")
+
+
+def test_missing_and_empty_files(tmp_path):
+    (tmp_path / "arch.msh").write_text("")
+    with pytest.raises(ValueError, match=r"there is no file .*arc.msh'; did you mean arch.msh"):
+        read(tmp_path / "arc.msh")
+    with pytest.raises(FileNotFoundError):
+        read(tmp_path / "arc.msh")
+    with pytest.raises(ValueError, match=r"is empty \(0 bytes\)"):
+        read(tmp_path / "arch.msh")
+    (tmp_path / "arch.xyz").write_text("x")
+    with pytest.raises(ValueError, match=r"cannot read '.xyz'; use one of .*\.dxf"):
+        read(tmp_path / "arch.xyz")
+
+
+def test_halves_of_characters_are_replaced_and_noted(tmp_path):
+    """A name that no file can hold ended the process in VTK."""
+    blocks = [
+        {"name": "a\ud800b", "material": "m\udfff", "outline": [[0, 0], [1, 0], [1, 1], [0, 1]]},
+        {"name": "c\u0000d \U0001f9f1", "outline": [[0, 1], [1, 1], [1, 2], [0, 2]]},
+    ]
+    path = tmp_path / "halves.json"
+    path.write_text(json.dumps({"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}))
+    drawing = read_layout(path)
+    assert drawing.names == ("a\ufffdb", "c\u0000d \U0001f9f1")
+    assert drawing.materials == ("m\ufffd", "")
+    assert [note for note in drawing.notes if "encoding" in note] == [
+        "characters that are none in the file's encoding are shown as \ufffd"
+    ]
+    assembly = assemble(drawing, roles={"a*": "moving"})
+    spread = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.01)
+    folder = blockvis.write(solver.settle(assembly, spread), tmp_path / "out")
+    assert blockvis.open_results(folder).assembly.names == drawing.names

@@ -1,0 +1,206 @@
+"""The interior point method for bands: the optimum that scipy finds, at every size, or a reason why not."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, reject, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+from structures import wall
+
+import solver
+from solver.lp import problem
+from solver.lp.band import Diverges, NoProgress, _Band, interior_point
+from solver.lp.solve import BAND, solve_lp
+from solver.lp.threads import one_thread
+from solver.program import increment, light_blocks
+
+
+def chain(seed, blocks, degenerate=False):
+    """A program like a wall's: columns that join neighbours, slack of either sign in every row, a small tolerance."""
+    random = np.random.default_rng(seed)
+    rows, columns = 3 * blocks, 12 * blocks
+    first = random.integers(0, blocks - 1, columns)
+    row = 3 * first[:, None] + np.arange(6)
+    values = random.standard_normal((columns, 6))
+    if degenerate:
+        # Contact points twice over.
+        row, values = np.vstack([row, row]), np.vstack([values, values])
+        columns *= 2
+    joints = sp.csc_array((values.ravel(), row.ravel(), np.arange(0, 6 * columns + 1, 6)), shape=(rows, columns))
+    carried = random.uniform(0.0, 1.0, columns) * (random.uniform(size=columns) < 0.3)
+    middle = joints @ carried + np.where(random.uniform(size=rows) < 0.1, 1.0, 0.0)
+    cost = random.uniform(0.0, 0.1, columns) * (random.uniform(size=columns) < 0.7)
+    matrix = sp.csc_array(sp.hstack([joints, sp.eye_array(rows), -sp.eye_array(rows)]))
+    return problem.LinearProgram(np.concatenate([cost, np.ones(2 * rows)]), matrix, middle - 1e-6, middle + 1e-6)
+
+
+def solved(program):
+    x, y, iterations = interior_point(program.cost, program.matrix, program.lower, program.upper)
+    return problem.checked(program, x, y, BAND, iterations, 0.0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.integers(2, 40), st.booleans())
+def test_finds_the_optimum_that_scipy_finds(seed, blocks, degenerate):
+    program = chain(seed, blocks, degenerate)
+    try:
+        found = solved(program)
+    except NoProgress:
+        # One in a thousand: forces that cost next to nothing and grow to 1e5 loads.
+        reject()
+    assert found.accepted
+    both = sp.vstack([program.matrix, -program.matrix])
+    known = linprog(program.cost, A_ub=both, b_ub=np.concatenate([program.upper, -program.lower]), method="highs-ds")
+    assert found.objective == pytest.approx(known.fun, abs=2e-7 * (1 + abs(known.fun)))
+
+
+def test_hardly_ever_gives_up():
+    """Of 200 programs, half of them with every contact point twice over, all are solved, in 10 to 20 iterations."""
+    found = [solved(chain(seed, 2 + seed % 40, seed % 2 == 1)) for seed in range(200)]
+    assert all(solution.accepted for solution in found)
+    assert np.mean([solution.iterations for solution in found]) < 20
+
+
+def programs_of(monkeypatch, assembly, **settlement):
+    """The programs of a run, with the solutions it went on with."""
+    kept = []
+
+    def keeping(program, routes=None):
+        kept.append((program, solve_lp(program, routes)))
+        return kept[-1][1]
+
+    for module in (increment, light_blocks):
+        monkeypatch.setattr(module, "solve_lp", keeping)
+    solver.settle(assembly, solver.Settlement(**settlement), friction_coefficient=0.6)
+    return kept
+
+
+def test_walls_take_it_and_it_agrees_with_highs(monkeypatch):
+    """Every program of a wall of 520 bricks, those over its macro-blocks included, is solved in half the iterations."""
+    kept = programs_of(monkeypatch, wall(30, 17), direction=(0.0, -1.0), increment=2e-3, limit=4e-3)
+    assert len(kept) > 4
+    assert {solution.route for _, solution in kept} == {BAND}
+    assert min(program.matrix.shape[0] for program, _ in kept) < 1000
+    for program, solution in kept[1:]:
+        known = solve_lp(program, ("hipo",))
+        assert solution.objective == pytest.approx(known.objective, abs=1e-7 * (1 + abs(known.objective)))
+        assert solution.iterations < 0.8 * known.iterations
+
+
+def refusal(**change):
+    program = chain(1, 10)
+    given = {name: getattr(program, name) for name in ("cost", "matrix", "lower", "upper")}
+    with pytest.raises(NoProgress) as refused:
+        interior_point(**given | {name: new(program) for name, new in change.items()})
+    return str(refused.value)
+
+
+def test_refuses_what_it_was_not_made_for():
+    assert "equation" in refusal(upper=lambda program: program.lower)
+    assert "bound" in refusal(lower=lambda program: np.full(30, -np.inf))
+    assert "slack" in refusal(matrix=lambda program: program.matrix[:, :-1], cost=lambda program: program.cost[:-1])
+
+
+def test_refuses_a_load_on_every_block_before_it_fills_the_memory():
+    """A column with an entry in each of 30,000 rows would make 900 million entries of the normal equations."""
+    rows = 30_000
+    unit = sp.eye_array(rows)
+    matrix = sp.csc_array(sp.hstack([sp.csc_array(np.ones((rows, 1))), unit, -unit]))
+    with pytest.raises(NoProgress, match="30000 rows in a band 30000 wide"):
+        interior_point(np.ones(2 * rows + 1), matrix, np.zeros(rows), np.ones(rows))
+
+
+def test_an_objective_that_falls_without_limit_is_proved_by_its_ray():
+    """Two columns against each other that cost less than nothing."""
+    program = chain(2, 10)
+    ray = sp.csc_array(([1.0, -1.0], [0, 0], [0, 1, 2]), shape=(30, 2))
+    program = problem.LinearProgram(
+        np.concatenate([[-1.0, -1.0], program.cost]),
+        sp.csc_array(sp.hstack([ray, program.matrix])),
+        program.lower,
+        program.upper,
+    )
+    with pytest.raises(Diverges) as found:
+        interior_point(program.cost, program.matrix, program.lower, program.upper)
+    assert found.value.ray.max() == 1.0
+    with pytest.raises(problem.Unbounded) as proved:
+        solve_lp(program, (BAND,))
+    assert np.abs(program.matrix @ proved.value.x).max() < 1e-9
+    assert program.cost @ proved.value.x < -0.1
+    assert (proved.value.x >= 0.0).all()
+
+
+def test_a_ray_that_does_not_prove_it_counts_for_nothing():
+    program = chain(2, 10)
+    problem.raise_if_proved(program, np.ones(program.matrix.shape[1]))
+    problem.raise_if_proved(program, np.zeros(program.matrix.shape[1]))
+
+
+def test_a_wall_squeezed_between_its_supports_is_locked():
+    """520 bricks that cannot give way: proved by our own ray, for which HiGHS takes ten times as long."""
+    standing = wall(30, 17)
+    width, height = 30 * 0.25, 17 * 0.1
+    rings = np.split(standing.vertices, standing.offsets[1:-1])[:-2]
+    press = [[[x, 0.0], [x + 1.0, 0.0], [x + 1.0, height], [x, height]] for x in (-1.0, width)]
+    ground = [[-1.0, -1.0], [width + 1.0, -1.0], [width + 1.0, 0.0], [-1.0, 0.0]]
+    roles = ["free"] * len(rings) + ["fixed", "moving", "fixed"]
+    squeezed = solver.Assembly.from_outlines([*rings, *press, ground], roles=roles)
+    inwards = solver.Settlement(direction=(-1.0, 0.0), increment=1e-3, limit=1e-2)
+    response = solver.settle(squeezed, inwards, friction_coefficient=0.6)
+    assert response.stop is solver.Status.LOCKED
+
+
+WHILE_LIMITED = """
+import hashlib, sys
+from solver.lp.threads import _libraries, one_thread
+before = [get() for get, _ in _libraries()]
+with one_thread():
+    during = [get() for get, _ in _libraries()]
+try:
+    with one_thread():
+        raise KeyError
+except KeyError:
+    pass
+after = [get() for get, _ in _libraries()]
+print(before == after, during)
+"""
+
+
+def test_threads_are_limited_and_given_back():
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("NUM_THREADS")}
+    told = subprocess.run(
+        [sys.executable, "-c", WHILE_LIMITED],
+        env=environment | {"OPENBLAS_NUM_THREADS": "2"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert told.stdout.split() == ["True", "[1,", "1]"]
+
+
+def test_same_bits_with_any_number_of_threads():
+    program = chain(5, 200)
+    first = solved(program)
+    with one_thread():
+        second = solved(program)
+    assert first.x.tobytes() == second.x.tobytes()
+    assert first.row_dual.tobytes() == second.row_dual.tobytes()
+
+
+def test_an_order_of_the_rows_makes_no_difference_but_the_width():
+    """Rows in any order, told where they lie: the same optimum, in a band as narrow as in order."""
+    program = chain(7, 40)
+    order = np.random.default_rng(0).permutation(40)
+    rows = (3 * order[:, None] + np.arange(3)).ravel()
+    shuffled = problem.LinearProgram(
+        program.cost, sp.csc_array(program.matrix[rows]), program.lower[rows], program.upper[rows], np.repeat(order, 3)
+    )
+    first, second = solved(program), solve_lp(shuffled, (BAND,))
+    assert second.objective == pytest.approx(first.objective, abs=1e-7 * (1 + abs(first.objective)))
+    whole = sp.csc_array(sp.hstack([shuffled.matrix, sp.eye_array(120)]))
+    assert _Band(whole, shuffled.along).width == 6

@@ -1,0 +1,67 @@
+"""The reaction curve."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+from structures import arch_response, parted, wall
+
+from blockvis.pictures import palette
+from blockvis.pictures.captions import parameter_text
+from blockvis.pictures.curves import CurvePanel, draw_curve, events_of
+
+
+def test_png_has_a_curve_and_the_collapse(tmp_path):
+    path = draw_curve(arch_response(), tmp_path / "new" / "curve.png")
+    picture = np.asarray(Image.open(path).convert("RGB")).astype(int)
+    assert picture.shape == (1000, 1600, 3)
+    for colour in (palette.FORCE, palette.WARNING):
+        assert ((np.abs(picture - np.array(colour)) < 20).all(axis=2)).sum() > 300
+    assert [p.name for p in path.parent.iterdir()] == ["curve.png"]
+
+
+def test_svg_says_what_it_shows(tmp_path):
+    text = draw_curve(arch_response(), tmp_path / "curve.svg").read_text()
+    said = re.findall(r"<!-- (.*?) -->", text)
+    assert "settlement [m]" in said
+    assert "reaction [kN]" in said
+    assert "reaction / weight W" in said
+    assert any(line.startswith("collapse at 0.141") for line in said)
+
+
+def test_other_files_are_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"curve\.bmp.*\.png, \.svg, \.pdf"):
+        draw_curve(arch_response(), tmp_path / "curve.bmp")
+
+
+def test_a_structure_without_any_equilibrium_has_an_empty_curve(tmp_path):
+    response = arch_response()
+    falling = tuple(i for i in response.increments if i not in response.path)
+    nothing = replace(response, increments=falling, collapse=None)
+    assert draw_curve(nothing, tmp_path / "curve.png").stat().st_size > 1000
+
+
+def test_hinges_of_the_arch_stay_the_same_on_its_path():
+    assert events_of(arch_response()) == []
+
+
+def test_small_settlements_are_told_in_millimetres():
+    response = parted(wall(4, 3), 3, 0, settlement=0.005)
+    assert parameter_text(0.0025, response) == "2.50 mm"
+    assert parameter_text(0.0025, arch_response()) == "0.0025 m"
+
+
+def test_the_dot_moves_along_the_panel():
+    response = arch_response()
+    panel = CurvePanel(response, (300, 200), 14)
+
+    def dot(increment):
+        picture = np.asarray(panel.image(increment)).astype(int)
+        rows, columns = np.nonzero((np.abs(picture - np.array(palette.SETTLEMENT)) < 20).all(axis=2))
+        return columns.mean(), rows.mean()
+
+    start, end = dot(response.path[0]), dot(response.path[-1])
+    assert end[0] > start[0] + 100
+    assert end[1] < start[1]

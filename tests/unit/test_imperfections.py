@@ -1,0 +1,167 @@
+"""Imperfections: joints stay closed, faces plane, and the same seed gives the same structure."""
+
+import numpy as np
+import pytest
+import shapely
+
+import solver
+from blockvis import generators
+from blockvis.cases.build import case_assembly, case_interfaces
+from blockvis.cases.case import parse_case
+from blockvis.cases.imperfections import Imperfection, imperfect, moved_corners, read_imperfection
+
+WINDOW = {"x": 1.0, "y": 0.6, "width": 1.0, "height": 0.6, "head": "segmental arch", "voussoirs": 9}
+
+STRUCTURES = {
+    "arch": (generators.arch, {}, 0.005),
+    "running bond": (generators.panel, {"nb": 20, "nc": 6}, 0.02),
+    "english bond": (generators.wall, {"bond": "english", "settling": [1.0, 2.0]}, 0.002),
+    "cut bricks round an arch": (generators.wall, {"openings": [WINDOW], "settling": [1.5, 3.0]}, 0.003),
+    "battered buttresses": (generators.buttressed_arch, {}, 0.01),
+}
+
+
+def _vertices(deviation, seed=1):
+    table = {"kind": "vertices", "distribution": "normal", "deviation": deviation, "seed": seed}
+    return read_imperfection(table, "[imperfections]")
+
+
+def _touching(assembly):
+    """Length over which each pair of blocks touches, to within a hair."""
+    low = shapely.polygons([shapely.linearrings(assembly.outline(i)) for i in range(assembly.n_blocks)])
+    i, j = shapely.STRtree(low).query(low, predicate="dwithin", distance=1e-9)
+    i, j = i[i < j], j[i < j]
+    # The part of one outline within a hair of the other.
+    shared = shapely.intersection(shapely.boundary(low[i]), shapely.buffer(low[j], 1e-9, quad_segs=1))
+    length = shapely.length(shared)
+    return {(a, b): x for a, b, x in zip(i.tolist(), j.tolist(), length.tolist(), strict=True) if x > 1e-6}
+
+
+@pytest.mark.parametrize("name", STRUCTURES)
+def test_joints_stay_closed_and_nothing_overlaps(name):
+    layout, parameters, deviation = STRUCTURES[name]
+    drawn = layout(**parameters)
+    moved = imperfect(drawn, [_vertices(deviation)])
+    assert solver.overlap_depths(moved.vertices, moved.offsets, 0.0)[2].max(initial=0.0) < 1e-12
+    before, after = _touching(drawn), _touching(moved)
+    assert before.keys() == after.keys(), "the same blocks touch"
+    for pair, length in before.items():
+        assert after[pair] == pytest.approx(length, abs=12 * deviation), [drawn.names[k] for k in pair]
+    assert len(moved.vertices) == len(drawn.vertices), "faces stay plane"
+    steps = np.hypot(*(moved.vertices - drawn.vertices)[drawn.free[drawn.block_of_vertex]].T)
+    assert 0.3 * deviation < np.sqrt((steps**2).mean() / 2.0) < 1.5 * deviation
+
+
+def test_a_whole_wall_covers_the_same_ground_without_a_gap():
+    drawn = generators.panel(nb=6, nc=5)
+    moved = imperfect(drawn, [_vertices(0.03)])
+    blocks = [shapely.Polygon(moved.outline(i)).buffer(1e-9) for i in range(moved.n_blocks)]
+    union = shapely.unary_union(blocks)
+    assert union.geom_type == "Polygon"
+    assert len(union.interiors) == 0
+
+
+def test_outer_corners_of_supports_stay():
+    drawn = generators.arch()
+    moved = imperfect(drawn, [_vertices(0.01)])
+    for block in np.flatnonzero(~drawn.free).tolist():
+        np.testing.assert_allclose(moved.outline(block), drawn.outline(block), atol=1e-15)
+
+
+def test_too_large_displacements_are_refused():
+    with pytest.raises(ValueError, match=r"by more than a quarter of what lies beside them.*smaller"):
+        moved_corners(generators.arch(), _vertices(0.5))
+
+
+def test_the_seed_decides():
+    drawn = generators.arch()
+    first, again, other = (moved_corners(drawn, _vertices(0.005, seed)).vertices for seed in (4, 4, 5))
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(first - other).max() > 1e-4
+
+
+CASE = """
+[geometry]
+layout = "arch"
+[material]
+friction_coefficient = 0.7
+[settlement]
+direction = [1, 0]
+[[imperfections]]
+kind = "friction"
+distribution = "lognormal"
+deviation = 0.2
+seed = 3
+[[imperfections]]
+kind = "density"
+distribution = "uniform"
+lower = 0.8
+upper = 1.2
+seed = 3
+"""
+
+
+def test_a_case_scatters_friction_per_joint_and_density_per_block(tmp_path):
+    case = parse_case(CASE, tmp_path / "case.toml")
+    plain = parse_case(CASE[: CASE.index("[[imperfections]]")], tmp_path / "case.toml")
+    assembly, interfaces = case_assembly(case), case_interfaces(case)
+    ratio = assembly.density / case_assembly(plain).density
+    assert ((ratio >= 0.8) & (ratio <= 1.2)).all()
+    assert ratio[assembly.free].std() > 0.05
+    assert (ratio[~assembly.free] == 1.0).all(), "supports carry no weight"
+    a, b = np.arange(11), np.arange(1, 12)
+    friction = interfaces.friction(assembly, a, b)
+    assert len(np.unique(friction)) == 11
+    np.testing.assert_array_equal(friction, interfaces.friction(assembly, b, a))
+    np.testing.assert_array_equal(friction[3:5], interfaces.friction(assembly, a[3:5], b[3:5]))
+
+
+def test_factors_of_joints_follow_their_distribution():
+    scatter = solver.JointScatter(11, lambda p: p)
+    a, b = (x.ravel() for x in np.meshgrid(np.arange(200), np.arange(200, 400)))
+    factors = np.sort(scatter.factors(a, b))
+    # Kolmogorov-Smirnov at one in a million.
+    assert np.abs(factors - (np.arange(len(factors)) + 0.5) / len(factors)).max() < 2.7 / np.sqrt(len(factors))
+    other = solver.JointScatter(12, lambda p: p).factors(a, b)
+    assert abs(np.corrcoef(scatter.factors(a, b), other)[0, 1]) < 0.025
+
+
+def test_friction_of_a_joint_is_kept_while_contact_points_come_and_go():
+    """A block on a tilting support slides when the angle reaches the friction of its own joint."""
+    block, ground = [[0, 0], [2, 0], [2, 1], [0, 1]], [[-5, -1], [7, -1], [7, 0], [-5, 0]]
+    assembly = solver.Assembly.from_outlines([block, ground], roles=["free", "moving"])
+    scatter = solver.JointScatter(5, lambda p: 0.5 + p)
+    interfaces = solver.Interfaces(solver.InterfaceLaw(0.4), scatter=scatter)
+    mu = interfaces.friction(assembly, np.array([0]), np.array([1]))[0]
+    assert mu != pytest.approx(0.4, rel=0.02)
+    tilt = solver.Settlement(rotation_centre=(0, 0), rotation=-1.0, increment=0.02, limit=1.0, tolerance=1e-5)
+    response = solver.settle(assembly, tilt, interfaces=interfaces)
+    assert response.collapse.displacement == pytest.approx(np.arctan(mu), abs=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"kind": "vertex"}, ("vertex", "did you mean 'vertices'")),
+        ({"kind": "friction", "distribution": "normal", "deviation": 0.1}, ("may become negative", "lower")),
+        ({"kind": "density", "distribution": "uniform", "lower": 0, "upper": 1}, ("blocks have a weight",)),
+        ({"kind": "vertices", "distribution": "normal", "deviation": 0.1, "seed": -1}, ("seed is -1",)),
+    ],
+)
+def test_bad_imperfections_are_refused(table, words):
+    with pytest.raises(ValueError) as error:
+        read_imperfection(table, "case.toml: [imperfections]")
+    for word in ("case.toml: [imperfections]", *words):
+        assert word in str(error.value)
+
+
+def test_an_imperfection_given_twice_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"imperfections 3\] kind 'friction' is there twice"):
+        parse_case(
+            CASE + '[[imperfections]]\nkind = "friction"\ndistribution = "lognormal"\ndeviation = 0.1\n',
+            tmp_path / "c.toml",
+        )
+
+
+def test_an_imperfection_is_a_value():
+    assert _vertices(0.1) == Imperfection("vertices", _vertices(0.1).distribution, 1)

@@ -1,0 +1,143 @@
+"""The import graph: which module may know which, lazy imports inside functions included."""
+
+import ast
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+from blockvis.formats import FORMATS
+
+ROOT = Path(__file__).parents[2]
+
+#: The rooms of both packages, highest first: a room imports itself and rooms below it. A module belongs to the longest
+#: name that it starts with. Outlines lie below the assembly, the search for contact points above it; what plans and
+#: solves a case lies below the pictures, the run that draws what came out above them.
+ORDER = (
+    "blockvis.__main__",
+    "blockvis.cli",
+    "blockvis.studies",
+    "blockvis.runs.run",
+    "blockvis.report",
+    "blockvis.pyvista_plugin",
+    "blockvis.pictures",
+    "blockvis.runs",
+    "blockvis.results",
+    "blockvis.cases",
+    "blockvis.generators",
+    "blockvis.formats",
+    "blockvis.layout",
+    "blockvis.suggestions",
+    "blockvis.numbers",
+    "blockvis.vtk_files",
+    "blockvis.atomic_files",
+    "solver",
+    "solver.analysis",
+    "solver.program",
+    "solver.lp",
+    "solver.results",
+    "solver.surface_loads",
+    "solver.loads",
+    "solver.equilibrium",
+    "solver.kinematics",
+    "solver.geometry",
+    "solver.interfaces",
+    "solver.assembly",
+    "solver.geometry.polygons",
+    "solver.geometry.broad_phase",
+)
+
+#: Beyond the order: rooms that must not know each other although one lies above the other.
+APART = (
+    ("blockvis.results", "blockvis.cases"),
+    ("blockvis.results", "blockvis.formats"),
+    ("blockvis.results", "blockvis.generators"),
+    ("blockvis.pictures", "blockvis.cases"),
+    ("blockvis.pictures", "blockvis.formats"),
+    ("blockvis.pictures", "blockvis.runs"),
+    ("blockvis.report", "blockvis.cases"),
+    ("solver.lp", "solver.results"),
+    ("solver.lp", "solver.assembly"),
+)
+
+
+def _name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+FILES = {_name(path): path for top in ("solver", "blockvis") for path in sorted((ROOT / top).rglob("*.py"))}
+
+
+def _imported(module: str) -> set[str]:
+    """Modules of the two packages, and other packages, that a module imports anywhere."""
+    path, found = FILES[module], set()
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - (node.level - 1)] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            found |= {f"{base}.{a.name}" if f"{base}.{a.name}" in FILES else base for a in node.names}
+    return found - {module}
+
+
+#: The public faces say where things live and import them when they are asked for: they are no part of the graph.
+GRAPH = {module: _imported(module) & set(FILES) - {"blockvis"} for module in FILES if module != "blockvis"}
+# The readers and writers that the table of formats names are imported by name.
+GRAPH["blockvis.formats.read"] |= {f"blockvis.formats.{known.module}" for known in FORMATS.values()}
+
+
+def _room(module: str) -> str:
+    return max((room for room in ORDER if f"{module}.".startswith(f"{room}.")), key=len)
+
+
+def _circle(graph: dict[str, set[str]]) -> list[str]:
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    assert _circle(GRAPH) == []
+
+
+def test_no_rooms_import_each_other_in_a_circle():
+    rooms: dict[str, set[str]] = {}
+    for module, others in GRAPH.items():
+        rooms.setdefault(_room(module), set()).update({_room(other) for other in others} - {_room(module)})
+    assert _circle(rooms) == []
+
+
+@pytest.mark.parametrize("room", ORDER)
+def test_a_room_imports_only_rooms_below_it(room):
+    modules = [module for module in GRAPH if _room(module) == room]
+    assert modules, f"{room} is no room"
+    allowed = ORDER[ORDER.index(room) :]
+    wrong = [(module, other) for module in modules for other in GRAPH[module] if _room(other) not in allowed]
+    assert wrong == []
+
+
+@pytest.mark.parametrize(("room", "other"), APART)
+def test_rooms_that_must_not_know_each_other(room, other):
+    links = [
+        (module, to) for module in GRAPH if module.startswith(room) for to in GRAPH[module] if to.startswith(other)
+    ]
+    assert links == []
+
+
+def test_one_module_imports_highspy():
+    users = [module for module in FILES if any(name.split(".")[0] == "highspy" for name in _imported(module))]
+    assert users == ["solver.lp.highs"]
+
+
+def test_solver_never_imports_blockvis_and_blockvis_takes_public_names_of_solver():
+    for module in FILES:
+        names = _imported(module)
+        if module.startswith("solver"):
+            assert not [name for name in names if name.startswith("blockvis")], module
+        else:
+            assert not [name for name in names if name.startswith("solver.")], module

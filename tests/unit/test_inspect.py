@@ -1,0 +1,63 @@
+"""What ``blockvis info`` says of a file."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis.formats.read import inspect, save_layout
+from blockvis.pictures.inspection import draw_inspection
+
+FACADE = Path(__file__).resolve().parents[3] / "shared" / "data" / "facade" / "facade.dxf"
+
+
+@pytest.fixture
+def layout(tmp_path):
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
+    outlines = [
+        square,
+        square + np.array([1.01, 0]),
+        square + np.array([1.01, 0]),
+        square + np.array([3, 0]),
+        square + np.array([3.9, 0]),
+    ]
+    path = tmp_path / "wall.dxf"
+    save_layout(solver.Assembly.from_outlines(outlines, names=list("abcde"), roles=["fixed", *["free"] * 4]), path)
+    return path
+
+
+def test_numbers(layout):
+    found = inspect(layout)
+    assert found.twins == ((1, 2),)
+    assert [(i, j) for i, j, _ in found.overlapping] == [(3, 4)]
+    assert found.overlapping[0][2] == pytest.approx(0.1)
+    assert found.joint_thickness == pytest.approx(0.01)
+    text = str(found)
+    assert "5, 1 of them duplicates: 4 blocks" in text
+    assert "d and e: 0.1 m, refused" in text
+    assert 'joint_thickness = 0.01   (m, or "auto")' in text
+    assert "c = b" in text
+    assert re.search(r"roles +'free' 3, 'fixed' 1", text)
+
+
+def test_picture(layout, tmp_path):
+    path = draw_inspection(inspect(layout), tmp_path / "found.png")
+    from PIL import Image
+
+    colours = {colour for _, colour in Image.open(path).convert("RGB").getcolors(1 << 24)}
+    # Blocks, the duplicate and the overlap are there in their colours.
+    assert {(0xEF, 0xE6, 0xD4), (0x5B, 0x8F, 0xD6), (0xD6, 0x60, 0x5B)} <= colours
+
+
+@pytest.mark.skipif(not FACADE.exists(), reason="third-party drawing, not part of the project")
+def test_facade():
+    found = inspect(FACADE)
+    assert found.layout.n_blocks == 1568
+    assert len(found.twins) == 6
+    assert found.unit_clash.startswith("unit clash: the file says its unit is in")
+    assert found.high - found.low == pytest.approx([5.97, 5.615])
+    assert found.overlapping == ()
+    assert np.median(found.joints.gaps) == pytest.approx(0.01, abs=1e-4)
+    assert found.joint_thickness == pytest.approx(0.026)

@@ -1,0 +1,200 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis import generators
+from solver.analysis.limit_load import limit_load, limit_load_envelope
+from solver.results.limit import LimitStatus
+from solver.surface_loads import edge_pressure, load_on_top, surface_pressure
+
+GROUND = [[-2, -1], [3, -1], [3, 0], [-2, 0]]
+
+
+def block(width=1.0, height=1.0, scale=1.0, density=2000.0):
+    outline = scale * np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=float)
+    ground = scale * np.array(GROUND, dtype=float)
+    return solver.Assembly.from_outlines(
+        [outline, ground], roles=["free", "fixed"], names=["block", "ground"], density=density
+    )
+
+
+def pushed(assembly, live):
+    return solver.Loads(solver.self_weight(assembly).dead, live)
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+@pytest.mark.parametrize(("friction", "height", "force"), [(0.3, 1.0, 0.3), (0.6, 2.0, 0.25), (0.6, 1.0, 0.5)])
+def test_a_block_pushed_at_its_top_slides_or_overturns(flow, friction, height, force):
+    assembly = block(1.0, height)
+    weight = solver.total_weight(assembly)
+    live = solver.point_load(assembly, 0, (1.0, 0.0), point=(0.0, height))
+    limit = limit_load(assembly, loads=pushed(assembly, live), friction_coefficient=friction, flow=flow)
+    assert limit.status is LimitStatus.FOUND
+    assert limit.multiplier == pytest.approx(min(force, friction) * weight, rel=1e-6)
+    assert limit.bounds[0] == limit.multiplier
+    assert limit.bounds[1] == pytest.approx(limit.multiplier, rel=1e-6)
+    assert limit.increment.reaction == pytest.approx(limit.multiplier)
+    assert "blocks moving" in str(limit)
+    lifts = limit.mechanism[0, 1] / limit.mechanism[0, 0]
+    if friction < force + 1e-9:
+        assert lifts == pytest.approx(friction if flow == "associative" else 0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_units_do_not_matter(scale):
+    assembly = block(1.0, 2.0, scale=scale, density=2000.0 / scale)
+    live = solver.weight_fraction(assembly, (1.0, 0.0), np.array([0]))
+    limit = limit_load(assembly, loads=pushed(assembly, 1e4 * live), friction_coefficient=0.6)
+    assert limit.multiplier == pytest.approx(0.5e-4, rel=1e-9)
+
+
+def test_a_load_that_presses_on_the_ground_has_no_limit():
+    assembly = block()
+    live = solver.point_load(assembly, 0, (0.1, -1.0))
+    limit = limit_load(assembly, loads=pushed(assembly, live), friction_coefficient=0.6)
+    assert limit.status is LimitStatus.UNBOUNDED
+    assert limit.multiplier == np.inf
+    assert str(limit).startswith("unbounded")
+    assert not limit.mechanism.any()
+
+
+def test_what_the_dead_load_brings_down_carries_nothing():
+    assembly = solver.Assembly.from_outlines(
+        [[[2.4, 0], [4.4, 0], [4.4, 1], [2.4, 1]], GROUND], roles=["free", "fixed"]
+    )
+    live = solver.weight_fraction(assembly, (1.0, 0.0), np.array([0]))
+    limit = limit_load(assembly, loads=pushed(assembly, live))
+    assert limit.status is LimitStatus.NO_EQUILIBRIUM
+    assert np.isnan(limit.multiplier)
+    assert limit.mechanism[0, 2] < 0.0
+    assert "1 blocks fall" in str(limit)
+
+
+def test_an_open_joint_carries_nothing():
+    assembly = block(1.0, 2.0)
+    turn = -0.01
+    # Turned about its lower right corner: the left one is 1 cm above the ground.
+    arm = solver.Pose.initial(assembly).positions[0] - [1.0, 0.0]
+    turned = [arm[0] * np.cos(turn) - arm[1] * np.sin(turn), arm[0] * np.sin(turn) + arm[1] * np.cos(turn)]
+    initial = solver.Pose.initial(assembly)
+    pose = solver.Pose(np.array([np.add(turned, [1.0, 0.0]), initial.positions[1]]), np.array([turn, 0.0]))
+    loads = pushed(assembly, solver.weight_fraction(assembly, (1.0, 0.0), np.array([0])))
+    limit = limit_load(assembly, loads=loads, pose=pose)
+    assert limit.multiplier == pytest.approx(np.tan(np.arctan(0.5) - 0.01))
+    # Let go, it would rock back.
+    assert limit.status is LimitStatus.HELD
+    assert "held by the live load" in str(limit)
+    assert limit_load(assembly, loads=loads).status is LimitStatus.FOUND
+    assert len(limit.contacts) == 1
+    assert len(limit_load(assembly, loads=loads, pose=pose, closed_gap=0.05).contacts) == 2
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+def test_a_joint_that_is_open_by_less_than_the_displacement_counts_by_its_gap(flow):
+    """A brick a hair away from a heavy stop: free of it, it slides at μ; with it, it has to push it by part of δ.
+
+    In the program α = μ + Σ g N / w, and the stop slides at μ of its own weight, which the brick then carries too.
+    """
+    mu, gap = 0.5, 1e-3
+    outlines = [[[0, 0], [1, 0], [1, 0.5], [0, 0.5]], [[1 + gap, 0], [3 + gap, 0], [3 + gap, 0.5], [1 + gap, 0.5]]]
+    assembly = solver.Assembly.from_outlines(
+        [*outlines, [[-1, -1], [5, -1], [5, 0], [-1, 0]]], roles=["free", "free", "fixed"]
+    )
+    brick = solver.total_weight(assembly) / 3.0
+    live = solver.point_load(assembly, 0, (brick, 0.0))
+    options = {"loads": pushed(assembly, live), "friction_coefficient": mu, "pose": solver.Pose.initial(assembly)}
+    strict = limit_load(assembly, flow=flow, **options)
+    assert strict.multiplier == pytest.approx(mu, rel=1e-6)
+    # N of the stop costs N · g / (δ · brick); up to 2 μ brick of it gains N / brick: worth it once δ exceeds the gap.
+    short = limit_load(assembly, displacement=0.5 * gap, flow=flow, **options)
+    assert short.multiplier == pytest.approx(mu, rel=1e-6)
+    long = limit_load(assembly, displacement=2.0 * gap, flow=flow, **options)
+    assert long.multiplier == pytest.approx(3.0 * mu, rel=1e-6)
+    if flow == "associative":
+        assert abs(long.gap) < 1e-9
+        assert long.certificate.kinematic_violation < 1e-9
+    with pytest.raises(ValueError, match=r"displacement is -1 m; it must be a finite number of at least 0"):
+        limit_load(assembly, displacement=-1.0, **options)
+
+
+def test_input_is_refused_with_a_remedy():
+    assembly = block()
+    dead = solver.self_weight(assembly)
+    with pytest.raises(ValueError, match="no live load acts on any free block"):
+        limit_load(assembly, loads=dead)
+    on_support = np.zeros((2, 3))
+    on_support[1, 0] = 1.0
+    with pytest.raises(ValueError, match="no live load acts"):
+        limit_load(assembly, loads=dataclasses.replace(dead, live=on_support))
+    loads = pushed(assembly, solver.point_load(assembly, 0, (1.0, 0.0)))
+    with pytest.raises(ValueError, match="'associative' or 'non-associative'"):
+        limit_load(assembly, loads=loads, flow="plastic")
+    with pytest.raises(ValueError, match="at least one must be free"):
+        limit_load(assembly.with_roles(["fixed", "fixed"]), loads=loads)
+    sunk = solver.Assembly.from_outlines(
+        [[[0, -0.1], [1, -0.1], [1, 1], [0, 1]], GROUND], roles=["free", "fixed"], names=["a", "g"]
+    )
+    with pytest.raises(ValueError, match=r"\('a'\) overlaps block 1 \('g'\) by 0.1 m"):
+        limit_load(sunk, loads=loads)
+
+
+def test_envelope_of_a_load_that_moves_over_an_arch():
+    arch = generators.arch()
+    dead = solver.self_weight(arch).dead
+    x = np.linspace(-0.9, 0.9, 13)
+    envelope = limit_load_envelope(
+        arch, x, lambda at: load_on_top(arch, at, (0.0, -1000.0)), dead=dead, friction_coefficient=2.0
+    )
+    assert envelope.multipliers == pytest.approx(envelope.multipliers[::-1], rel=1e-6)
+    assert envelope.multipliers[envelope.worst] == envelope.multipliers.min()
+    assert abs(x[envelope.worst]) < 0.7
+    with pytest.raises(ValueError, match="at least one number"):
+        limit_load_envelope(arch, [], lambda at: dead, dead=dead)
+
+
+def test_pressure_acts_on_what_it_meets_first():
+    wall = solver.Assembly.from_outlines(
+        [
+            [[0, 0], [2, 0], [2, 1], [0, 1]],
+            [[0, 1], [1, 1], [1, 2], [0, 1.5]],
+            GROUND,
+        ],
+        roles=["free", "free", "fixed"],
+        thickness=[0.5, 0.5, 0.5],
+    )
+    down = surface_pressure(wall, 1000.0)
+    # Upper block: 1 m in plan; lower block: what the upper one leaves, a metre on the right, 0.5 m off its centroid.
+    assert down[0] == pytest.approx([0.0, -500.0, -250.0])
+    assert down[1, 1] == pytest.approx(-500.0)
+    assert not down[2].any()
+    wind = surface_pressure(wall, 1000.0, (1.0, 0.0))
+    assert wind[0] == pytest.approx([500.0, 0.0, 0.0])
+    assert wind[1, 0] == pytest.approx(500.0)
+    only = surface_pressure(wall, 1000.0, blocks=np.array([1]))
+    assert not only[0].any()
+    assert only[1] == pytest.approx(down[1])
+    with pytest.raises(ValueError, match="direction is"):
+        surface_pressure(wall, 1.0, (0.0, 0.0))
+
+
+def test_pressure_on_an_edge_pushes_into_the_block():
+    assembly = block(2.0, 1.0)
+    assert edge_pressure(assembly, 0, 2, 1000.0)[0] == pytest.approx([0.0, -2000.0, 0.0])
+    assert edge_pressure(assembly, 0, 1, 1000.0)[0] == pytest.approx([-1000.0, 0.0, 0.0])
+    total = sum(edge_pressure(assembly, 0, edge, 1000.0) for edge in range(4))
+    assert total == pytest.approx(np.zeros((2, 3)))
+    with pytest.raises(ValueError, match="edge 4 is none of them"):
+        edge_pressure(assembly, 0, 4, 1.0)
+
+
+def test_a_load_on_top_stands_on_the_surface():
+    assembly = solver.Assembly.from_outlines([[[0, 0], [2, 0], [2, 2], [0, 1]], GROUND], roles=["free", "fixed"])
+    load = load_on_top(assembly, 1.5, (10.0, -1.0))
+    expected = solver.point_load(assembly, 0, (10.0, -1.0), point=(1.5, 1.75))
+    assert load == pytest.approx(expected)
+    with pytest.raises(ValueError, match="stands on the support"):
+        load_on_top(assembly, 2.5)
+    with pytest.raises(ValueError, match="nothing is below"):
+        load_on_top(assembly, 9.0)

@@ -1,0 +1,151 @@
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis import generators
+from solver.analysis.limit_load import limit_load
+from solver.analysis.pushover import ControlDisplacement, pushover
+
+
+def block():
+    return solver.Assembly.from_outlines(
+        [[[0, 0], [0.2, 0], [0.2, 1], [0, 1]], [[0, -1], [0.2, -1], [0.2, 0], [0, 0]]],
+        roles=["free", "fixed"],
+        names=["block", "ground"],
+    )
+
+
+def sideways(assembly):
+    live = solver.weight_fraction(assembly, (1.0, 0.0), np.flatnonzero(assembly.free))
+    return solver.Loads(solver.self_weight(assembly).dead, live)
+
+
+@cache
+def arch(increment):
+    assembly = generators.arch()
+    control = ControlDisplacement("voussoir 7", (1, 0), increment=increment, limit=0.5)
+    controls = solver.Controls(falling_frames=5)
+    return pushover(assembly, control, loads=sideways(assembly), friction_coefficient=2.0, controls=controls)
+
+
+def test_every_increment_of_an_arch_proves_itself():
+    response = arch(0.005)
+    assert response.stop is solver.Status.COLLAPSED
+    for increment in response.path:
+        certificate = increment.certificate
+        assert certificate.equilibrium_residual < 1e-8
+        assert certificate.largest_penetration < 1e-8
+        assert certificate.duality_gap < 1e-9
+        assert certificate.kinematic_violation < 1e-8
+        assert increment.seconds > 0.0
+    assert np.all(np.diff(response.settlement) > 0.0)
+    assert response.path[-1].load_multiplier < 0.01
+
+
+def test_the_multiplier_on_the_path_is_the_limit_load_of_the_pose():
+    response = arch(0.005)
+    for increment in response.path:
+        limit = limit_load(
+            response.assembly, loads=response.loads, friction_coefficient=2.0, pose=increment.pose, closed_gap=1e-6
+        )
+        assert increment.load_multiplier == pytest.approx(limit.multiplier, abs=1e-5)
+
+
+def test_the_live_load_does_what_the_weight_gains_and_a_jump_takes():
+    """Hinges take no energy: the work of α is the weight's gain, but in the jump of a hinge, where it is more."""
+    response = arch(0.001)
+    free, dead, live = response.assembly.free, response.loads.dead, response.loads.live
+    jumps = 0
+    for one, other in pairwise(response.path):
+        motion = other.pose.displacements(response.assembly) - one.pose.displacements(response.assembly)
+        gained = -float((dead[free] * motion[free]).sum())
+        work = (one.load_multiplier + other.load_multiplier) / 2.0 * float((live * motion).sum())
+        if one.load_multiplier - other.load_multiplier > 0.015:
+            jumps += 1
+            assert work > 1.05 * gained
+        else:
+            # The trapezium rule is what is left.
+            assert work == pytest.approx(gained, rel=5e-4, abs=2e-4)
+    assert jumps == 1
+
+
+def test_zero_capacity_does_not_depend_on_the_increment():
+    coarse, fine = arch(0.02), arch(0.005)
+    assert coarse.collapse.displacement == pytest.approx(fine.collapse.displacement, rel=1e-3)
+
+
+def test_a_wall_that_rocks_does_not_depend_on_the_increment():
+    outlines = []
+    for course in range(4):
+        edges = [0.0, 0.4, 0.8, 1.2] if course % 2 else [0.0, 0.2, 0.6, 1.0, 1.2]
+        low, high = 0.2 * course, 0.2 * course + 0.2
+        outlines += [[[a, low], [b, low], [b, high], [a, high]] for a, b in pairwise(edges)]
+    outlines.append([[0, -0.1], [1.2, -0.1], [1.2, 0], [0, 0]])
+    wall = solver.Assembly.from_outlines(outlines, roles=["free"] * 14 + ["fixed"])
+    curves = []
+    for increment in (0.02, 0.01):
+        control = ControlDisplacement(wall.names[13], (1, 0), increment=increment, limit=0.1)
+        response = pushover(wall, control, loads=sideways(wall), friction_coefficient=5.0)
+        multipliers = [i.load_multiplier for i in response.path]
+        curves.append(np.interp([0.0, 0.03, 0.06, 0.1], response.settlement, multipliers))
+    assert curves[0] == pytest.approx(curves[1], rel=1e-3)
+    assert curves[0][-1] < 0.95 * curves[0][0]
+
+
+def test_pushed_only_so_far_it_keeps_capacity():
+    assembly = block()
+    control = ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.01, limit=0.095)
+    seen = []
+    response = pushover(assembly, control, loads=sideways(assembly), on_increment=seen.append)
+    assert response.stop is solver.Status.LIMIT_REACHED
+    assert response.settlement == pytest.approx([*(0.01 * np.arange(10)), 0.095], abs=1e-9)
+    assert response.path[-1].load_multiplier == pytest.approx(np.tan(np.arctan(0.2) - np.arcsin(0.095)), abs=1e-6)
+    assert len(seen) == len(response.increments)
+    weight = solver.total_weight(assembly)
+    assert response.reaction == pytest.approx([i.load_multiplier * weight for i in response.path])
+    # Going on from there gives the same curve, its displacement counted anew.
+    again = pushover(assembly, control, loads=sideways(assembly), pose=response.path[-1].pose)
+    expected = np.tan(np.arctan(0.2) - np.arcsin(0.095 + again.settlement))
+    assert [i.load_multiplier for i in again.path] == pytest.approx(expected, abs=1e-6)
+
+
+def test_what_has_fallen_is_marked():
+    assembly = block()
+    control = ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.05)
+    controls = solver.Controls(falling_frames=7)
+    response = pushover(assembly, control, loads=sideways(assembly), controls=controls)
+    falling = [i for i in response.increments if i.status is solver.Status.FALLING]
+    assert 0 < len(falling) <= 7
+    assert falling[-1].pose.rotations[0] < falling[0].pose.rotations[0] < -0.19
+    assert response.collapse.mechanism[0, 2] < 0.0
+    assert "no capacity is left" in response.message
+
+
+def test_input_is_refused_with_a_remedy():
+    assembly = block()
+    loads = sideways(assembly)
+    with pytest.raises(ValueError, match="does not move block 'block' along"):
+        pushover(assembly, ControlDisplacement("block", (-1, 0)), loads=loads)
+    with pytest.raises(ValueError, match="'ground' is a support; name a free block"):
+        pushover(assembly, ControlDisplacement("ground", (1, 0)), loads=loads)
+    with pytest.raises(ValueError, match="no block is named 'roof'"):
+        pushover(assembly, ControlDisplacement("roof", (1, 0)), loads=loads)
+    with pytest.raises(ValueError, match="no live load"):
+        pushover(assembly, ControlDisplacement("block", (1, 0)), loads=solver.self_weight(assembly))
+    with pytest.raises(ValueError, match=r"control direction is \[0, 0\]"):
+        ControlDisplacement("block", (0, 0))
+    with pytest.raises(ValueError, match="control increment is -1"):
+        ControlDisplacement("block", (1, 0), increment=-1.0)
+
+
+def test_a_load_without_limit_is_no_collapse():
+    assembly = block()
+    live = solver.point_load(assembly, 0, (0.1, -1.0))
+    loads = solver.Loads(solver.self_weight(assembly).dead, live)
+    response = pushover(assembly, ControlDisplacement("block", (1, 0)), loads=loads)
+    assert response.stop is solver.Status.LOCKED
+    assert response.collapse is None
+    assert "no live load of this pattern" in response.message

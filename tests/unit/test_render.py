@@ -1,0 +1,240 @@
+"""Stills, the mechanism and the film, pixel by pixel; skipped without OpenGL, but for the message about it."""
+
+from dataclasses import replace
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image
+from structures import BENT, arch_response, parted, wall
+
+import solver
+from blockvis.pictures import opengl, palette
+from blockvis.pictures.drawer import Look, Studio
+from blockvis.pictures.flat_scene import Scene, magnified
+from blockvis.pictures.frame import Frame, framed
+from blockvis.pictures.opengl import rendering_available
+from blockvis.pictures.render import animate, draw_mechanism, draw_still
+
+missing = rendering_available()
+drawing = pytest.mark.skipif(missing is not None, reason=str(missing))
+
+SMALL = (640, 360)
+
+
+def pixels(path):
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+def alike(colours, wanted, tolerance=12):
+    return (np.abs(np.asarray(colours, dtype=int) - np.array(wanted)) <= tolerance).all(axis=-1)
+
+
+@drawing
+def test_what_is_where(tmp_path):
+    """Cracks, hinges, blocks and supports stand at their places, in their colours."""
+    response = arch_response()
+    last, assembly = response.path[-1], response.assembly
+    with Studio(response, Look(forces="none"), (1280, 720), (last,)) as studio:
+        picture = np.asarray(studio.picture(last)).astype(int)
+        left, top = studio.sheet.inside[:2]
+
+        def colour_at(point):
+            x, y = studio.scene.at_pixel(np.array([point]))[0].round().astype(int)
+            return picture[top + y, left + x]
+
+    corners = solver.moved_vertices(assembly, last.pose)
+    hinges = last.contacts.points[last.states == solver.ContactState.HINGING]
+    crown = hinges[np.argmax(hinges[:, 1])]
+    assert alike(colour_at(crown), palette.HINGE)
+    assert alike(colour_at(crown - [0.0, 0.12]), palette.OPEN)
+    fills = palette.block_colours(assembly.materials, assembly.free)
+    for block in np.flatnonzero(assembly.free):
+        assert alike(
+            colour_at(corners[assembly.offsets[block] : assembly.offsets[block + 1]].mean(axis=0)), fills[block]
+        )
+    assert alike(colour_at(np.array([0.0, 0.3])), palette.PAPER)
+    assert alike(colour_at(last.pose.positions[assembly.moving][0]), palette.SETTLEMENT)
+
+
+@drawing
+def test_bent_blocks_are_filled_without_triangle_lines():
+    assembly = solver.Assembly.from_outlines(list(BENT.values()))
+    frame = Frame(np.array([-1.0, -1.0]), np.array([15.0, 4.0]))
+    fill = np.full((3, 3), 200, dtype=np.uint8)
+    with Scene(assembly, frame, (800, 250), fill) as scene:
+        picture = np.asarray(scene.image()).astype(int)
+
+        def row(points):
+            return np.array([picture[y, x] for x, y in scene.at_pixel(np.array(points)).round().astype(int)])
+
+    notches = row([[1.5, 2.0], [5.5, 2.0], [10.5, 1.5], [12.5, 1.5]])
+    assert alike(notches, palette.PAPER).all()
+    # Along the body of each shape, away from its outline, one colour: no line of a triangle crosses it.
+    for low, high, y in ((0.2, 1.8, 0.5), (4.2, 6.8, 0.5), (9.2, 13.8, 0.5)):
+        assert alike(row([[x, y] for x in np.linspace(low, high, 60)]), (200, 200, 200), 2).all()
+
+
+@drawing
+def test_nothing_leaves_the_picture_in_any_frame():
+    response = arch_response()
+    with Studio(response, Look(), SMALL, response.increments) as studio:
+        left, top, right, bottom = studio.sheet.inside
+        for increment in response.increments[::4] + response.increments[-1:]:
+            picture = np.asarray(studio.picture(increment)).astype(int)[top:bottom, left:right]
+            for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1]):
+                assert alike(edge, palette.PAPER).all()
+
+
+@drawing
+def test_frames_differ_and_the_fall_is_marked(tmp_path):
+    response = arch_response()
+    first = pixels(draw_still(response, 0, tmp_path / "first.png", size=SMALL))
+    last = pixels(draw_still(response, len(response.path) - 1, tmp_path / "last.png", size=SMALL))
+    fallen = pixels(draw_still(response, -1, tmp_path / "fallen.png", size=SMALL))
+    assert first.shape == (360, 640, 3)
+    assert (np.abs(first - last).max(axis=2) > 30).sum() > 1000
+    assert (alike(fallen[:40], palette.WARNING)).sum() > 500
+    assert not alike(last[:40], palette.WARNING).any()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["fallen.png", "first.png", "last.png"]
+
+
+@drawing
+def test_options_change_the_picture(tmp_path):
+    response = arch_response()
+    number = len(response.path) - 1
+    drawn = {
+        name: pixels(draw_still(response, number, tmp_path / f"{name}.png", size=SMALL, **options))
+        for name, options in {
+            "plain": {"forces": "none", "joints": False},
+            "thrust": {},
+            "points": {"forces": "points"},
+            "displacement": {"colour_by": "displacement"},
+            "curve": {"curve": True},
+            "magnified": {"magnification": 2.0},
+        }.items()
+    }
+    for name, picture in drawn.items():
+        others = [other for key, other in drawn.items() if key != name]
+        assert all((picture != other).any() for other in others), name
+    assert not alike(drawn["plain"], palette.FORCE).any()
+    assert not alike(drawn["plain"], palette.OPEN).any()
+    assert alike(drawn["thrust"], palette.FORCE).sum() > 200
+    scale = drawn["displacement"][:, 560:]
+    assert all(alike(scale, colour).any() for colour in palette.RAMP[1:-1])
+
+
+@drawing
+def test_mechanism_shows_parts_and_motion(tmp_path):
+    picture = pixels(draw_mechanism(arch_response(), tmp_path / "mechanism.png", size=(1280, 720)))
+    body = picture[100:600]
+    tinted = palette.part_colours(palette.block_colours(("",), np.array([True])).repeat(4, 0), np.arange(4))
+    for tint in tinted:
+        assert alike(body, tint, 6).sum() > 2000
+    assert alike(body, palette.SETTLEMENT).sum() > 500
+
+
+@drawing
+def test_one_rattling_brick_does_not_hide_the_motion_of_a_wall(tmp_path):
+    calm = parted(wall(24, 16), 2, 0)
+    calm = replace(calm, collapse=None, stop=solver.Status.LIMIT_REACHED)
+    last = calm.path[-1]
+    velocity = last.velocity.copy()
+    middle = np.argmin(np.hypot(*(calm.assembly.centroids - [4.8, 0.8]).T))
+    assert velocity[middle, 1] < 0.0
+    velocity[middle, 0] = 30.0
+    rattling = replace(calm, increments=(*calm.increments[:-1], replace(last, velocity=velocity)))
+    one, other = (pixels(draw_mechanism(r, tmp_path / "mechanism.png", size=SMALL))[70:300] for r in (calm, rattling))
+    assert alike(one, palette.SETTLEMENT).sum() > 50
+    assert (np.abs(one - other).max(axis=2) > 30).mean() < 0.01
+
+
+@drawing
+def test_mechanism_of_a_structure_that_never_stood(tmp_path):
+    assembly = solver.Assembly.from_outlines(
+        [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0.9, 1], [3, 1], [3, 2], [0.9, 2]], [[-1, -1], [1, -1], [1, 0], [-1, 0]]],
+        roles=["free", "free", "moving"],
+    )
+    response = solver.settle(assembly, solver.Settlement(direction=(0, -1)))
+    assert response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM
+    picture = pixels(draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL))
+    assert alike(picture, palette.SETTLEMENT).sum() > 50
+
+
+@drawing
+@pytest.mark.parametrize("suffix", ["mp4", "gif", "webp"])
+def test_films_have_their_frames(tmp_path, suffix):
+    response = parted(wall(6, 5), 4, 3)
+    path = animate(response, tmp_path / f"film.{suffix}", size=(320, 180), fps=10, seconds=1.0)
+    # 10 on the path, 6 held at the last equilibrium, 3 of the fall, 12 held at the end.
+    if suffix == "mp4":
+        frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
+        assert (frames, seconds) == (31, pytest.approx(3.1, abs=0.05))
+        reader = imageio_ffmpeg.read_frames(str(path))
+        assert next(reader)["size"] == (320, 180)
+        first = np.frombuffer(next(reader), np.uint8).astype(int)
+        *_, last = reader
+        assert (np.abs(first - np.frombuffer(last, np.uint8)) > 30).sum() > 2000
+    else:
+        with Image.open(path) as film:
+            # Pillow joins frames that are alike into one that lasts longer.
+            assert 10 <= film.n_frames <= 31
+            first = np.asarray(film.convert("RGB")).astype(int)
+            film.seek(film.n_frames - 1)
+            assert (np.abs(first - np.asarray(film.convert("RGB"))) > 30).sum() > 2000
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+@drawing
+def test_films_that_cannot_be(tmp_path):
+    with pytest.raises(ValueError, match=r"641 × 360.*even"):
+        animate(arch_response(), tmp_path / "odd.mp4", size=(641, 360))
+    with pytest.raises(ValueError, match=r"film\.avi.*\.mp4, \.gif, \.webp"):
+        animate(arch_response(), tmp_path / "film.avi", size=SMALL)
+    assert not list(tmp_path.iterdir())
+
+
+@drawing
+def test_wrong_options_are_named(tmp_path):
+    with pytest.raises(ValueError, match="colour_by is 'weight'; choose from material, displacement"):
+        draw_still(arch_response(), 0, tmp_path / "a.png", colour_by="weight")
+    with pytest.raises(ValueError, match="magnification is -1"):
+        draw_still(arch_response(), 0, tmp_path / "a.png", magnification=-1.0)
+
+
+def test_huge_supports_do_not_shrink_the_structure():
+    assembly = wall(6, 5)
+    wide = solver.Assembly.from_outlines(
+        [*(assembly.outline(k) for k in range(assembly.n_blocks)), [[-900, -50], [900, -50], [900, -1], [-900, -1]]],
+        roles=[*assembly.roles, "fixed"],
+    )
+    frame = framed(wide, [solver.Pose.initial(wide)])
+    assert frame.size.max() < 3.0
+
+
+def test_magnified_keeps_blocks_rigid():
+    response = arch_response()
+    pose = magnified(response.assembly, response.path[-1].pose, 3.0)
+    corners = solver.moved_vertices(response.assembly, pose)
+    lengths = np.hypot(*(corners[response.assembly.next_vertex] - corners).T)
+    np.testing.assert_allclose(lengths, response.assembly.edge_lengths, rtol=1e-12)
+    moved = pose.displacements(response.assembly)
+    np.testing.assert_allclose(moved, 3.0 * response.path[-1].pose.displacements(response.assembly), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("probe", "told"),
+    [("import os; os.kill(os.getpid(), 11)", "code -11"), ("raise SystemExit('no display')", "no display")],
+)
+def test_without_opengl_one_message_names_the_packages(tmp_path, monkeypatch, probe, told):
+    monkeypatch.setattr(opengl, "_PROBE", probe)
+    opengl._probed.cache_clear()
+    try:
+        with pytest.raises(opengl.RenderingUnavailable, match="libegl1 libgl1-mesa-dri") as caught:
+            draw_still(arch_response(), 0, tmp_path / "still.png")
+        assert told in str(caught.value)
+        with pytest.raises(opengl.RenderingUnavailable):
+            animate(arch_response(), tmp_path / "film.mp4")
+    finally:
+        opengl._probed.cache_clear()
+    assert not list(tmp_path.iterdir())

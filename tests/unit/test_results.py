@@ -1,0 +1,64 @@
+"""The results folder: what is written comes back."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import blockvis
+import solver
+from blockvis import generators
+
+
+@pytest.fixture(scope="module")
+def response():
+    spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
+    return solver.settle(
+        generators.arch(), spread, friction_coefficient=0.6, controls=solver.Controls(falling_frames=3)
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(response, tmp_path_factory):
+    return blockvis.write(response, tmp_path_factory.mktemp("results") / "out")
+
+
+def test_reopens_as_the_same_response(response, folder):
+    again = blockvis.open_results(folder)
+    assert again.stop == response.stop
+    assert again.collapse.bracket == response.collapse.bracket
+    assert again.assembly.names == response.assembly.names
+    assert len(again.increments) == len(response.increments)
+    for one, other in zip(again.increments, response.increments, strict=True):
+        assert one.settlement == other.settlement
+        assert one.reaction == other.reaction
+        assert np.array_equal(one.pose.positions, other.pose.positions)
+        assert np.array_equal(one.forces, other.forces)
+        assert np.array_equal(one.states, other.states)
+        assert one.certificate == other.certificate
+    np.testing.assert_allclose(again.collapse.mechanism, response.collapse.mechanism, rtol=1e-12)
+
+
+def test_csv_counts_every_contact_once(response, folder):
+    rows = list(csv.DictReader((folder / "response.csv").read_text().splitlines()))
+    for row, increment in zip(rows, response.path, strict=True):
+        counted = sum(int(row[f"contacts_{s}"]) for s in ("open", "sticking", "sliding", "hinging"))
+        assert counted == len(increment.contacts)
+
+
+def test_summary_reports_the_worst_residuals(response, folder):
+    summary = json.loads((folder / "summary.json").read_text())
+    worst = max(i.certificate.equilibrium_residual for i in response.path)
+    assert summary["largest_residuals"]["equilibrium_residual"] == worst
+    assert worst < 1e-8
+
+
+def test_no_results(tmp_path):
+    with pytest.raises(ValueError, match="holds no results"):
+        blockvis.open_results(tmp_path)
+
+
+def test_refuses_to_overwrite(response, folder):
+    with pytest.raises(ValueError, match="holds results already"):
+        blockvis.write(response, folder)

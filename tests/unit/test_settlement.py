@@ -1,0 +1,463 @@
+"""The increment loop: how it starts, what it follows, how it ends, and how its results prove themselves."""
+
+from functools import cache
+from itertools import combinations, pairwise
+
+import numpy as np
+import pytest
+import shapely
+from scipy.optimize import linprog
+
+import solver
+from blockvis import generators
+from solver.equilibrium import block_forces
+from solver.lp.highs import run_highs
+
+NO_FALL = solver.Controls(falling_frames=0)
+DOWN = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.02)
+
+
+def rectangle(left, low, right, high):
+    return [[left, low], [right, low], [right, high], [left, high]]
+
+
+def two_bricks(**roles_and_names):
+    return solver.Assembly.from_outlines(
+        [rectangle(0, 0, 2, 1), rectangle(0, 1, 2, 2), rectangle(-1, -1, 3, 0)],
+        names=["lower", "upper", "base"],
+        **{"roles": ["free", "free", "moving"], **roles_and_names},
+    )
+
+
+def random_wall(seed):
+    """Courses of bricks of random lengths on a base in two parts that meet somewhere under the wall."""
+    random = np.random.default_rng(seed)
+    length, outlines, low = 4.0, [], 0.0
+    for _ in range(random.integers(2, 5)):
+        height = random.uniform(0.4, 1.2)
+        inner = np.sort(random.uniform(0.3, length - 0.3, random.integers(1, 4)))
+        for left, right in pairwise([0.0, *inner.tolist(), length]):
+            outlines.append(rectangle(left, low, right, low + height))
+        low += height
+    split = random.uniform(0.3, 0.7) * length
+    outlines += [rectangle(-1, -1, split, 0), rectangle(split, -1, length + 1, 0)]
+    roles = ["free"] * (len(outlines) - 2) + ["fixed", "moving"]
+    return solver.Assembly.from_outlines(outlines, roles=roles, density=random.uniform(1500, 2500, len(outlines)))
+
+
+# --- input that cannot be analysed -------------------------------------------------------------------------------
+
+
+def test_no_moving_support_is_refused():
+    with pytest.raises(ValueError, match="moves no support"):
+        solver.settle(two_bricks(roles=["free", "free", "fixed"]), DOWN)
+
+
+def test_phase_that_moves_nothing_is_refused_by_its_number():
+    still = solver.Settlement(direction=(1, 0), blocks=("lower",))
+    with pytest.raises(ValueError, match="phase 2 moves no support"):
+        solver.settle(two_bricks(), [DOWN, still])
+
+
+def test_no_free_block_is_refused():
+    with pytest.raises(ValueError, match="all 3 blocks are supports"):
+        solver.settle(two_bricks(roles=["fixed", "fixed", "moving"]), DOWN)
+
+
+def test_no_settlement_is_refused():
+    with pytest.raises(ValueError, match="no settlement"):
+        solver.settle(two_bricks(), [])
+
+
+def test_overlapping_blocks_are_named_with_their_depth():
+    outlines = [rectangle(0, 0, 2, 1), rectangle(0, 0.9, 2, 1.9), rectangle(-1, -1, 3, 0)]
+    assembly = solver.Assembly.from_outlines(
+        outlines, names=["lower", "upper", "base"], roles=["free", "free", "moving"]
+    )
+    with pytest.raises(ValueError, match=r"'lower'\) overlaps block 1 \('upper'\) by 0\.1 m"):
+        solver.settle(assembly, DOWN)
+
+
+def test_overlapping_supports_are_accepted():
+    outlines = [rectangle(0, 0, 2, 1), rectangle(-1, -1, 3, 0), rectangle(2, -1, 5, 0)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["free", "moving", "fixed"])
+    assert solver.settle(assembly, DOWN, controls=NO_FALL).stop is solver.Status.LIMIT_REACHED
+
+
+@pytest.mark.parametrize("mu", [-0.1, np.nan])
+def test_impossible_friction_is_refused(mu):
+    with pytest.raises(ValueError, match="friction_coefficient"):
+        solver.settle(two_bricks(), DOWN, friction_coefficient=mu)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("kind", ["dead", "live"])
+def test_loads_that_are_not_finite_are_refused_by_the_block(value, kind):
+    loads = solver.self_weight(two_bricks())
+    getattr(loads, kind)[1, 0] = value
+    with pytest.raises(ValueError, match=f"{kind} load on block 'upper'"):
+        solver.settle(two_bricks(), DOWN, loads=loads)
+
+
+def test_loads_of_the_wrong_shape_are_refused():
+    with pytest.raises(ValueError, match=r"give \(3, 3\)"):
+        solver.settle(two_bricks(), DOWN, loads=solver.Loads(np.zeros((3, 2)), np.zeros((3, 3))))
+
+
+def test_blocks_without_any_load_are_refused():
+    with pytest.raises(ValueError, match="no load"):
+        solver.settle(two_bricks(), DOWN, loads=solver.Loads(np.zeros((3, 3)), np.zeros((3, 3))))
+
+
+# --- how it starts -----------------------------------------------------------------------------------------------
+
+
+def test_no_initial_equilibrium_names_the_blocks_that_fall():
+    assembly = solver.Assembly.from_outlines(
+        [rectangle(0, 0, 1, 1), rectangle(5, 3, 6, 4), rectangle(-1, -1, 9, 0)],
+        names=["seated", "hovering", "base"],
+        roles=["free", "free", "moving"],
+    )
+    response = solver.settle(assembly, DOWN)
+    assert response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM
+    assert "'hovering'" in response.message
+    assert "'seated'" not in response.message
+    assert response.path == ()
+    assert response.collapse is None
+
+
+@pytest.mark.parametrize(("overhang", "stands"), [(0.99, True), (1.01, False)])
+def test_overhanging_brick_stands_while_its_centroid_is_over_its_bearing(overhang, stands):
+    outlines = [rectangle(overhang, 1, 2 + overhang, 2), rectangle(0, 0, 2, 1)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["free", "moving"])
+    response = solver.settle(assembly, DOWN, controls=NO_FALL)
+    assert (response.stop is solver.Status.LIMIT_REACHED) == stands
+    assert (response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM) != stands
+
+
+def test_added_load_shows_in_the_reaction():
+    assembly = two_bricks()
+    loads = solver.self_weight(assembly)
+    extra = solver.point_load(assembly, 1, (0, -5000), point=(1.5, 2))
+    response = solver.settle(assembly, DOWN, loads=solver.Loads(loads.dead + extra, loads.live), controls=NO_FALL)
+    assert response.reaction == pytest.approx(np.full(len(response.path), response.total_weight + 5000), rel=1e-7)
+
+
+# --- the oracle --------------------------------------------------------------------------------------------------
+
+
+def kinematic_reaction(assembly, settlement, friction_coefficient):
+    """Reaction at the onset from the kinematic program, joints from shapely: independent of the solver's contacts.
+
+    minimise -fᵀq subject to N(q) ≥ μ |T(q)| at both ends of every joint, the supports moving by a unit.
+    """
+    rate = settlement.rate(assembly, solver.Pose.initial(assembly), 0.0)
+    force = np.zeros((assembly.n_blocks, 3))
+    force[:, 1] = -assembly.masses * solver.GRAVITY
+    polygons = [shapely.Polygon(assembly.outline(i)) for i in range(assembly.n_blocks)]
+    rows = []
+    for a, b in combinations(range(assembly.n_blocks), 2):
+        joint = polygons[a].intersection(polygons[b])
+        if joint.geom_type != "LineString" or not (assembly.free[a] or assembly.free[b]):
+            continue
+        ends = np.asarray(joint.coords)
+        tangent = (ends[1] - ends[0]) / joint.length
+        normal = np.array([-tangent[1], tangent[0]])
+        if normal @ (assembly.centroids[a] - ends[0]) < 0:
+            normal = -normal
+        for p in ends:
+            relative = np.zeros((2, assembly.n_blocks, 3))
+            for block, sign in ((a, 1.0), (b, -1.0)):
+                arm = p - assembly.centroids[block]
+                for k, axis in enumerate((normal, tangent)):
+                    relative[k, block] = sign * np.array([*axis, arm[0] * axis[1] - arm[1] * axis[0]])
+            rows += [relative[0] + sign * friction_coefficient * relative[1] for sign in (-1, 1)]
+    constraints = np.array(rows)
+    free = assembly.free
+    result = linprog(
+        -force[free].ravel(),
+        A_ub=-constraints[:, free].reshape(len(rows), -1),
+        b_ub=(constraints[:, ~free].reshape(len(rows), -1) @ rate[~free].ravel()),
+        bounds=(None, None),
+    )
+    assert result.status == 0, result.message
+    return -result.fun
+
+
+MOTIONS = {
+    "down": {"direction": (0, -1)},
+    "out": {"direction": (1, 0)},
+    "out and down": {"direction": (0.4, -1)},
+    "turning": {"rotation_centre": (4, -1), "rotation": -1},
+}
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_static_program_meets_the_kinematic_oracle(seed, motion):
+    wall, mu = random_wall(seed), (0.3, 0.5, 0.7, 0.9, 0.0)[seed]
+    settlement = solver.Settlement(**MOTIONS[motion], increment=1e-4, limit=1e-4)
+    response = solver.settle(wall, settlement, friction_coefficient=mu, controls=NO_FALL)
+    weight = response.total_weight
+    assert response.reaction[0] / weight == pytest.approx(kinematic_reaction(wall, settlement, mu) / weight, abs=1e-6)
+
+
+# --- the path ----------------------------------------------------------------------------------------------------
+
+
+def test_limit_reached():
+    settlement = solver.Settlement(direction=(0, -1), increment=0.03, limit=0.1)
+    response = solver.settle(two_bricks(), settlement, controls=NO_FALL)
+    assert response.stop is solver.Status.LIMIT_REACHED
+    assert response.collapse is None
+    assert response.settlement[0] == 0
+    assert response.settlement[-1] == pytest.approx(0.1, rel=1e-12)
+    assert np.diff(response.settlement).max() <= 0.03 * (1 + 1e-12)
+    assert np.diff(response.settlement).min() > 0
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-5])
+def test_bracket_is_as_narrow_as_asked(tolerance):
+    settlement = solver.Settlement(direction=(1, 0), increment=0.02, limit=1, tolerance=tolerance)
+    response = solver.settle(generators.arch(), settlement, friction_coefficient=2.0, controls=NO_FALL)
+    low, high = response.collapse.bracket
+    assert 0 < high - low <= tolerance * (1 + 1e-9)
+    # Table A of the reference values.
+    assert low - 1e-5 <= 0.14104982 <= high + 1e-5
+    assert low <= response.collapse.displacement <= high
+    assert response.settlement[-1] == low
+
+
+def test_rotation_about_a_point_moves_the_support_on_the_arc():
+    centre = np.array([2.0, 7.0])
+    settlement = solver.Settlement(rotation_centre=centre, rotation=1, increment=0.05, limit=0.2)
+    response = solver.settle(two_bricks(), settlement, friction_coefficient=0.6, controls=NO_FALL)
+    assert response.stop is solver.Status.LIMIT_REACHED
+    for increment in response.path:
+        arm = (increment.pose.positions[2] - centre) @ [1, 1j]
+        start = (response.assembly.centroids[2] - centre) @ [1, 1j]
+        assert arm == pytest.approx(start * np.exp(1j * increment.settlement), abs=1e-12)
+        # What stands on it turns with it; its first increment may creep, see the closed forms.
+        assert increment.pose.rotations == pytest.approx(np.full(3, increment.settlement), abs=1e-8)
+        block = increment.pose.positions[0] - increment.pose.positions[2]
+        drawn = response.assembly.centroids[0] - response.assembly.centroids[2]
+        assert np.hypot(*block) == pytest.approx(np.hypot(*drawn), abs=2e-3)
+
+
+def test_several_phases():
+    """20 mm down, then spreading from there until it collapses."""
+    arch = generators.arch()
+    phases = [DOWN, solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)]
+    response = solver.settle(arch, phases, friction_coefficient=2.0, controls=NO_FALL)
+    assert response.stop is solver.Status.COLLAPSED
+    number = np.array([i.phase for i in response.path])
+    assert number.tolist() == sorted(number)
+    assert set(number.tolist()) == {0, 1}
+    assert response.settlement[number == 0][-1] == pytest.approx(0.02)
+    assert response.settlement[number == 1][0] == 0
+    springer = arch.index("right springer")
+    for increment in response.path:
+        moved = increment.pose.displacements(arch)[springer]
+        s = increment.settlement
+        expected = [0, -s, 0] if increment.phase == 0 else [s, -0.02, 0]
+        assert moved == pytest.approx(expected, abs=1e-12)
+    # The reaction is the force along the motion of its own phase: first down, then outwards.
+    for increment in response.path:
+        force = increment.support_forces[springer]
+        along = -force[1] if increment.phase == 0 else force[0]
+        assert increment.reaction == pytest.approx(along, rel=1e-9)
+    # Having sunk, it does not spread as far as from its drawing (table A: 0.14104982).
+    assert response.collapse.displacement < 0.1405
+
+
+def test_direction_and_rotation_together():
+    arch = generators.arch()
+    springer = arch.index("right springer")
+    settlement = solver.Settlement(direction=(0, -1), rotation_centre=(1, 0), rotation=0.3, increment=0.02, limit=0.1)
+    response = solver.settle(arch, settlement, friction_coefficient=2.0, controls=NO_FALL)
+    assert response.stop is solver.Status.LIMIT_REACHED
+    last = response.path[-1]
+    drawn = (arch.centroids[springer] - [1, 0]) @ [1, 1j]
+    here = (last.pose.positions[springer] - [1, -0.1]) @ [1, 1j]
+    assert here == pytest.approx(drawn * np.exp(0.03j), abs=1e-12)
+    # Reaction per unit of s: the force down and 0.3 times the moment about the travelling centre.
+    fx, fy, moment = last.support_forces[springer]
+    arm = np.array([here.real, here.imag])
+    expected = -fy + 0.3 * (moment + arm[0] * fy - arm[1] * fx)
+    assert last.reaction == pytest.approx(expected, rel=1e-9)
+
+
+# --- results that prove themselves -------------------------------------------------------------------------------
+
+
+@cache
+def arch_response():
+    spread = solver.Settlement(direction=(1, 0), increment=0.01, limit=0.5)
+    return solver.settle(generators.arch(), spread, friction_coefficient=2.0)
+
+
+@cache
+def wall_response():
+    sink = solver.Settlement(direction=(0, -1), increment=0.02, limit=0.1)
+    return solver.settle(random_wall(3), sink, friction_coefficient=0.5)
+
+
+@cache
+def sliding_response():
+    """An arch of so little friction that it slides."""
+    spread = solver.Settlement(direction=(1, 0), increment=0.01, limit=0.5)
+    return solver.settle(generators.arch(thickness_ratio=0.3), spread, friction_coefficient=0.35)
+
+
+RESPONSES = {"arch": arch_response, "wall": wall_response, "sliding arch": sliding_response}
+
+
+@pytest.mark.parametrize("name", RESPONSES)
+def test_certificates(name):
+    response = RESPONSES[name]()
+    smallest = response.assembly.widths.min()
+    assert len(response.path) > 3
+    for increment in response.path:
+        proof = increment.certificate
+        assert proof.equilibrium_residual <= 1e-8
+        assert proof.duality_gap <= 1e-7
+        assert proof.complementarity <= 1e-7
+        assert proof.kinematic_violation <= 1e-7
+        assert proof.largest_penetration <= 1e-6 * smallest
+
+
+@pytest.mark.parametrize("name", RESPONSES)
+def test_forces_are_in_equilibrium_and_in_their_cones(name):
+    """Worked out again from the increment alone, not read from its certificate."""
+    response = RESPONSES[name]()
+    assembly, weight = response.assembly, response.total_weight
+    for increment in response.path:
+        resultant = block_forces(increment.contacts, increment.pose, increment.forces) + response.loads.total()
+        unbalanced = resultant[assembly.free] / (weight * np.array([1, 1, assembly.block_size]))
+        assert np.abs(unbalanced).max() < 1e-8
+        normal, shear = increment.forces.T
+        assert normal.min() >= -1e-9 * weight
+        assert (np.abs(shear) - increment.friction * normal).max() <= 1e-9 * weight
+        # What carries force is closed.
+        assert np.abs(increment.contacts.gaps[normal > 1e-3 * weight]).max() < 1e-6 * assembly.block_size
+        assert increment.support_forces[:, :2].sum(axis=0) == pytest.approx([0, -weight], abs=1e-6 * weight)
+
+
+@pytest.mark.parametrize("name", RESPONSES)
+def test_blocks_do_not_overlap(name):
+    """On the path and in the fall, as shapely sees it."""
+    response = RESPONSES[name]()
+    assembly = response.assembly
+    smallest = assembly.widths.min()
+    for increment in response.increments[:: 1 if len(response.increments) < 20 else 3]:
+        corners = solver.moved_vertices(assembly, increment.pose)
+        blocks = [shapely.Polygon(c) for c in np.split(corners, assembly.offsets[1:-1])]
+        for i, j in zip(*shapely.STRtree(blocks).query(blocks), strict=True):
+            if i < j and (assembly.free[i] or assembly.free[j]):
+                shared = blocks[i].intersection(blocks[j])
+                width = 2 * shared.area / shared.length if shared.area > 0 else 0.0
+                assert width < 1e-3 * smallest, (increment.settlement, assembly.names[i], assembly.names[j])
+
+
+def test_brick_that_rises_past_its_neighbour_does_not_turn_into_it():
+    """Two bricks of equal height; one has risen by 5 mm when it starts to lean on the other's corner."""
+    wall = random_wall(108)
+    sink = solver.Settlement(direction=(0, -1), increment=0.05, limit=0.1)
+    response = solver.settle(wall, sink, friction_coefficient=0.9, controls=NO_FALL)
+    for increment in response.path:
+        corners = solver.moved_vertices(wall, increment.pose)
+        _, _, depth = solver.overlap_depths(corners, wall.offsets, 1e-9)
+        assert depth.max(initial=0.0) < 1e-3 * wall.widths.min(), increment.settlement
+
+
+def test_equilibrium_lost_on_the_way_is_not_called_initial():
+    """A wall of five blocks that has been followed for 50 mm."""
+    sink = solver.Settlement(direction=(0, -1), increment=0.05, limit=0.5)
+    response = solver.settle(random_wall(112), sink, friction_coefficient=0.7, controls=NO_FALL)
+    assert len(response.path) > 1
+    assert response.stop is not solver.Status.NO_INITIAL_EQUILIBRIUM
+
+
+def test_reaction_does_the_work_that_gravity_loses():
+    """Hinges dissipate nothing: the reaction over the path adds up to the drop of the potential energy."""
+    response = arch_response()
+    weights = response.assembly.masses * solver.GRAVITY * response.assembly.free
+    energy = np.array([weights @ i.pose.positions[:, 1] for i in response.path])
+    work = np.concatenate(
+        [[0], np.cumsum(np.diff(response.settlement) * (response.reaction[1:] + response.reaction[:-1]) / 2)]
+    )
+    assert np.abs(work - (energy[0] - energy)).max() < 1e-3 * work[-1]
+
+
+def test_sliding_costs_energy():
+    """With friction the reaction does less work than gravity loses."""
+    response = sliding_response()
+    assert any((i.states == solver.ContactState.SLIDING).any() for i in response.path)
+    weights = response.assembly.masses * solver.GRAVITY * response.assembly.free
+    energy = [weights @ i.pose.positions[:, 1] for i in (response.path[0], response.path[-1])]
+    assert np.trapezoid(response.reaction, response.settlement) < 0.99 * (energy[0] - energy[1])
+
+
+def test_falling_frames_follow_the_path_and_go_down():
+    response = arch_response()
+    status = [i.status for i in response.increments]
+    n = len(response.path)
+    assert set(status[:n]) == {solver.Status.EQUILIBRIUM}
+    assert set(status[n:]) == {solver.Status.FALLING}
+    assert 5 < len(status) - n <= solver.Controls().falling_frames
+    weights = response.assembly.masses * response.assembly.free
+    height = [weights @ i.pose.positions[:, 1] for i in response.increments[n:]]
+    assert (np.diff(height) < 1e-9 * weights.sum()).all()
+    assert height[-1] < 0.8 * height[0]
+    assert all(i.settlement == response.increments[n].settlement for i in response.increments[n:])
+
+
+def test_mechanism_at_collapse():
+    response = arch_response()
+    mechanism = response.collapse.mechanism
+    # The supports rest but for the nudge, a ten-millionth of the block size, that proves the place.
+    assert np.abs(mechanism[~response.assembly.free]).max() < 1e-6
+    size = np.abs(mechanism * [1, 1, response.assembly.block_size]).max()
+    assert size == pytest.approx(1.0)
+    assert (response.loads.total() * mechanism).sum() > 0
+
+
+def test_same_input_twice_gives_the_same_arrays():
+    spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
+    first, second = (
+        solver.settle(generators.arch(), spread, friction_coefficient=0.6, controls=solver.Controls(falling_frames=5))
+        for _ in range(2)
+    )
+    assert first.collapse.bracket == second.collapse.bracket
+    assert len(first.increments) == len(second.increments)
+    for a, b in zip(first.increments, second.increments, strict=True):
+        assert (a.pose.positions == b.pose.positions).all()
+        assert (a.pose.rotations == b.pose.rotations).all()
+        assert (a.contacts.keys(first.assembly) == b.contacts.keys(second.assembly)).all()
+        assert (a.forces == b.forces).all()
+        assert (a.reaction, a.certificate, a.programs) == (b.reaction, b.certificate, b.programs)
+
+
+def test_increments_are_told_as_they_are_found():
+    told = []
+    response = solver.settle(two_bricks(), DOWN, controls=NO_FALL, on_increment=told.append)
+    assert tuple(told) == response.increments
+
+
+def test_solver_failure_is_not_collapse(monkeypatch):
+    """HiGHS that gives nothing from some program on is told as such, with what was found before."""
+    from solver.lp import solve
+
+    run, calls = run_highs, []
+
+    def breaks(program, route):
+        calls.append(route)
+        return run(program, route) if len(calls) <= 4 else (None, "kSolveError")
+
+    monkeypatch.setattr(solve, "run_highs", breaks)
+    spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
+    response = solver.settle(generators.arch(), spread, friction_coefficient=2.0)
+    assert response.stop is solver.Status.SOLVER_FAILED
+    assert "kSolveError" in response.message
+    assert response.collapse is None
+    assert len(response.path) > 0

@@ -1,0 +1,167 @@
+"""Joints with cohesion and compressive strength: closed forms of what the point model computes."""
+
+import re
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis import generators
+from blockvis.cases.case import parse_case
+from blockvis.cli import main
+from solver.program.strength import contact_areas
+
+WIDTH, HEIGHT, THICKNESS = 0.8, 0.5, 0.3
+AREA = WIDTH * THICKNESS
+
+
+def block(height=HEIGHT, **law):
+    assembly = solver.Assembly.from_outlines(
+        [[[0, 0], [WIDTH, 0], [WIDTH, height], [0, height]], [[-1, -1], [2, -1], [2, 0], [-1, 0]]],
+        roles=["free", "fixed"],
+        names=["block", "ground"],
+        thickness=THICKNESS,
+    )
+    return assembly, solver.Interfaces(solver.InterfaceLaw(**law)), solver.total_weight(assembly)
+
+
+def limit(assembly, interfaces, live, **options):
+    loads = solver.Loads(solver.self_weight(assembly).dead, live)
+    found = solver.limit_load(assembly, loads=loads, interfaces=interfaces, **options)
+    if options.get("flow", "associative") == "associative":
+        assert found.certificate.duality_gap < 1e-9
+        assert found.certificate.complementarity < 1e-9
+        assert found.certificate.kinematic_violation < 1e-9
+    return found
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+@pytest.mark.parametrize("cohesion", [0.0, 2e3, 5e3])
+def test_a_block_slides_at_friction_and_cohesion(flow, cohesion):
+    """Pushed at its base: α W = μ W + c A."""
+    assembly, interfaces, weight = block(friction_coefficient=0.3, cohesion=cohesion)
+    live = solver.point_load(assembly, 0, (weight, 0.0), point=(0.0, 0.0))
+    found = limit(assembly, interfaces, live, flow=flow)
+    assert found.multiplier == pytest.approx(0.3 + cohesion * AREA / weight, rel=1e-6)
+    lifts = found.mechanism[0, 1] / found.mechanism[0, 0]
+    assert lifts == pytest.approx(0.3 if flow == "associative" else 0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+@pytest.mark.parametrize("strength_over_weight", [1.2, 1.5, 1.9, 2.0, 5.0])
+def test_a_block_overturns_where_its_toe_crushes(flow, strength_over_weight):
+    """Each corner carries P = σ A / 2; the toe has W/2 + α W h/(2 b), so that α = (b/h) (2 min(P, W)/W - 1)."""
+    height = 2.0
+    _, _, weight = block(height)
+    strength = strength_over_weight * weight / AREA
+    assembly, interfaces, weight = block(height, friction_coefficient=2.0, compressive_strength=strength)
+    live = solver.weight_fraction(assembly, (1.0, 0.0), np.array([0]))
+    found = limit(assembly, interfaces, live, flow=flow)
+    toe = min(strength_over_weight / 2.0, 1.0)
+    assert found.multiplier == pytest.approx(WIDTH / height * (2.0 * toe - 1.0), rel=1e-6)
+    assert found.forces[:, 0].max() == pytest.approx(toe * weight, rel=1e-6)
+
+
+def test_a_block_heavier_than_its_joint_is_not_carried():
+    _, _, weight = block()
+    assembly, interfaces, _ = block(compressive_strength=0.9 * weight / AREA)
+    found = limit(assembly, interfaces, solver.weight_fraction(assembly, (1.0, 0.0), np.array([0])))
+    assert found.status is solver.LimitStatus.NO_EQUILIBRIUM
+
+
+def test_a_press_crushes_at_the_strength_of_the_joint():
+    """A downward force, unbounded for rigid joints: W + α F = σ A."""
+    assembly, interfaces, weight = block(compressive_strength=1e6)
+    found = limit(assembly, interfaces, solver.point_load(assembly, 0, (0.0, -1000.0)))
+    assert found.multiplier == pytest.approx((1e6 * AREA - weight) / 1000.0, rel=1e-9)
+    # The block sinks into its joint.
+    assert found.mechanism[0] == pytest.approx([0.0, -1.0, 0.0], abs=1e-9)
+
+
+def test_cohesion_does_not_hold_a_joint_together():
+    """Without tension a tall block overturns at b/h whatever its cohesion."""
+    assembly, interfaces, _ = block(2.0, friction_coefficient=0.2, cohesion=1e6)
+    found = limit(assembly, interfaces, solver.weight_fraction(assembly, (1.0, 0.0), np.array([0])))
+    assert found.multiplier == pytest.approx(WIDTH / 2.0, rel=1e-9)
+
+
+def test_faces_are_shared_out_among_their_contact_points():
+    """A brick on two: each interface has its own length, and the parts of all points make up the whole face."""
+    wall = generators.build("wall", {"bricks": 4, "courses": 3, "depth": 0.2})
+    contacts = solver.find_contacts(wall, wall.vertices, 1e-6)
+    areas = contact_areas(wall, contacts)
+    for course, bearing in ((0, 4 * 0.25), (1, 4 * 0.25), (2, 4 * 0.25)):
+        flat = np.abs(contacts.frames[:, 0, 1]) > 0.5
+        at = flat & (np.abs(contacts.points[:, 1] - 0.1 * course) < 1e-9)
+        assert areas[at].sum() == pytest.approx(bearing * 0.2, rel=1e-9)
+    half = solver.Interfaces(solver.InterfaceLaw(), {("brick", "ground"): solver.InterfaceLaw(0.6, 1e3, 1e6)})
+    cohesion, strength = half.strength(wall, contacts.block_a, contacts.block_b)
+    on_ground = contacts.points[:, 1] < 1e-9
+    assert set(cohesion[on_ground & flat]) == {1e3}
+    assert set(strength[~on_ground]) == {np.inf}
+
+
+def test_a_strong_joint_is_a_dry_joint():
+    wall = generators.build("wall", {"bricks": 4, "courses": 5})
+    live = solver.weight_fraction(wall, (1.0, 0.0), np.flatnonzero(wall.free))
+
+    def multiplier(*law):
+        return limit(wall, solver.Interfaces(solver.InterfaceLaw(*law)), live).multiplier
+
+    # It rocks with much friction and slides with little.
+    rocking, sliding = multiplier(5.0), multiplier(0.3)
+    assert multiplier(5.0, 0.0, 1e7) == pytest.approx(rocking, rel=1e-6)
+    assert multiplier(5.0, 0.0, 3e4) < 0.95 * rocking
+    assert multiplier(0.3, 1e3) > 1.05 * sliding
+
+
+CASE = """
+[geometry]
+layout = "column"
+[geometry.parameters]
+blocks = 1
+width = 0.8
+block_height = 0.5
+[material]
+friction_coefficient = 0.3
+cohesion = 2000.0
+{}
+[analysis]
+kind = "limit load"
+[[loads]]
+kind = "live"
+force = [1000.0, 0.0]
+point = [0.0, 0.0]
+[output]
+animation = false
+"""
+
+
+def test_strength_from_the_case_file(tmp_path, capsys):
+    path = tmp_path / "case.toml"
+    path.write_text(CASE.format(""), encoding="utf-8")
+    assert main(["run", str(path), "-o", str(tmp_path / "out")]) == 0
+    weight = 0.8 * 0.5 * 2000.0 * solver.GRAVITY
+    assert f"{(0.3 * weight + 2000.0 * 0.8) / 1000.0:12.6g}" in capsys.readouterr().out
+    for text, words in (
+        (CASE.format("").replace('"limit load"', '"settlement"') + "[settlement]\ndirection = [0, -1]\n", "dry joints"),
+        (CASE.format("compressive_strength = 0.0"), "[material] compressive_strength is 0; give a positive number"),
+        (CASE.format("").replace("2000.0", "-1.0"), "[material] cohesion is -1; give a stress in Pa of at least 0"),
+    ):
+        with pytest.raises(ValueError, match=re.escape(words)):
+            parse_case(text, path)
+
+
+def test_what_follows_the_geometry_refuses_strength():
+    assembly, interfaces, _ = block(cohesion=1e3)
+    moving = assembly.with_roles(["free", "moving"])
+    with pytest.raises(ValueError, match="a settlement follows dry joints"):
+        solver.settle(moving, solver.Settlement(direction=(0, -1)), interfaces=interfaces)
+    live = solver.weight_fraction(assembly, (1.0, 0.0), np.array([0]))
+    loads = solver.Loads(solver.self_weight(assembly).dead, live)
+    with pytest.raises(ValueError, match="a pushover follows dry joints"):
+        solver.pushover(assembly, solver.ControlDisplacement("block"), loads=loads, interfaces=interfaces)
+    with pytest.raises(ValueError, match="cohesion is -1 Pa"):
+        solver.InterfaceLaw(cohesion=-1.0)
+    with pytest.raises(ValueError, match="compressive_strength is 0 Pa; it must be positive"):
+        solver.InterfaceLaw(compressive_strength=0.0)

@@ -1,0 +1,51 @@
+"""The walls between the two packages, and what `solver` may do."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_solver_alone_loads_no_graphics_and_no_files_library():
+    code = (
+        "import sys, solver; "
+        "print(sorted({m.split('.')[0] for m in sys.modules} & "
+        "{'vtk', 'vtkmodules', 'pyvista', 'meshio', 'trimesh', 'shapely', 'ezdxf', 'matplotlib', 'blockvis'}))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_importing_blockvis_does_not_wait_for_vtk():
+    code = "import sys, blockvis; print('vtkmodules' in sys.modules, 'pyvista' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False"]
+
+
+def _imports(path: Path) -> set[str]:
+    return set(re.findall(r"^\s*(?:from|import) ([\w.]+)", path.read_text(encoding="utf-8"), flags=re.M))
+
+
+def test_solver_imports_nothing_but_its_own_and_three_libraries():
+    allowed = {"numpy", "scipy", "highspy", "solver"}
+    for path in (ROOT / "solver").rglob("*.py"):
+        for name in _imports(path):
+            top = name.split(".")[0]
+            assert name.startswith(".") or top in allowed or top in sys.stdlib_module_names, (path.name, name)
+
+
+def test_solver_opens_no_file_and_prints_nothing():
+    for path in (ROOT / "solver").rglob("*.py"):
+        assert not re.search(r"(?<![\w.])(?:open|print)\(", path.read_text(encoding="utf-8")), path.name
+
+
+def test_blockvis_uses_only_public_names_of_solver():
+    import solver
+
+    for path in (ROOT / "blockvis").rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"(?m)^\s*(from solver\.|import solver\.)", text), path.name
+        for name in set(re.findall(r"(?<![\w.])solver\.([A-Za-z_]\w*)", text)):
+            assert name in solver.__all__, (path.name, name)
