@@ -24,7 +24,7 @@ from .npz import checked_arrays
 #: of a film lie between two.
 CACHED, AT_LEAST = 8 << 20, 2
 
-_CONTACT_ARRAYS = ("vertex", "edge", "corner", "block_a", "block_b", "points", "frames", "gaps", "along")
+_CONTACT_ARRAYS = ("block_a", "block_b", "points", "frames", "gaps", "areas")
 _ARRAYS = ("forces", "displacements", "friction", "velocity", "support_forces")
 _NUMBERS = ("settlement", "phase", "load_multiplier", "reaction", "programs", "seconds")
 _CERTIFICATE = (
@@ -168,9 +168,10 @@ def packed_increment(increment: solver.Increment) -> bytes:
     arrays: dict[str, Any] = {name: getattr(increment.contacts, name) for name in _CONTACT_ARRAYS}
     arrays.update({name: getattr(increment, name) for name in (*_ARRAYS, *_NUMBERS)})
     arrays.update({name: getattr(increment.certificate, name) for name in _CERTIFICATE})
-    arrays.update(
-        positions=increment.pose.positions, rotations=increment.pose.rotations, status=np.array(str(increment.status))
-    )
+    vertex, edge, corner = solver.corners_and_edges(increment.contacts.features)
+    arrays.update(vertex=vertex, edge=edge, corner=corner, along=increment.contacts.slip[:, 0])
+    positions, rotations = increment.pose.positions, increment.pose.rotations[:, 0]
+    arrays.update(positions=positions, rotations=rotations, status=np.array(str(increment.status)))
     arrays["notes"] = np.array(increment.notes, dtype=str)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
@@ -178,11 +179,13 @@ def packed_increment(increment: solver.Increment) -> bytes:
 
 
 def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
+    features = solver.features_of(arrays["vertex"], arrays["edge"], arrays["corner"])
+    contacts = {name: arrays[name] for name in _CONTACT_ARRAYS}
     fields: dict[str, Any] = {name: arrays[name] for name in _ARRAYS}
     fields.update({name: arrays[name].item() for name in _NUMBERS})
     return solver.Increment(
-        pose=solver.Pose(arrays["positions"], arrays["rotations"]),
-        contacts=solver.Contacts(**{name: arrays[name] for name in _CONTACT_ARRAYS}),
+        pose=solver.Pose(arrays["positions"], arrays["rotations"][:, None]),
+        contacts=solver.Contacts(features=features, slip=arrays["along"][:, None], **contacts),
         certificate=solver.Certificate(**{name: arrays[name].item() for name in _CERTIFICATE}),
         status=solver.Status(str(arrays["status"])),
         notes=tuple(map(str, arrays.get("notes", ()))),

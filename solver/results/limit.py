@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from solver.geometry.contacts import Contacts
-from solver.kinematics import Pose, point_velocities
+from solver.kinematics import Pose, relative_velocities
 
 from .certificate import Certificate
 from .increment import Increment, Status
@@ -83,7 +83,6 @@ class LimitLoad:
     def increment(self) -> Increment:
         """The state at the limit as an increment, for pictures and tables; its velocity is the mechanism."""
         contacts, velocity = self.contacts, self.mechanism
-        a, b = (point_velocities(contacts.points, k, self.pose, velocity) for k in (contacts.block_a, contacts.block_b))
         finite = self.multiplier if np.isfinite(self.multiplier) else 0.0
         return Increment(
             settlement=0.0,
@@ -92,7 +91,7 @@ class LimitLoad:
             pose=self.pose,
             contacts=contacts,
             forces=self.forces,
-            displacements=np.einsum("kij,kj->ki", contacts.frames, a - b),
+            displacements=relative_velocities(contacts, self.pose, velocity),
             friction=self.friction,
             velocity=velocity,
             reaction=finite * self.live_force,

@@ -11,7 +11,7 @@ from blockvis.formats import FORMATS
 ROOT = Path(__file__).parents[2]
 
 #: The rooms of both packages, highest first: a room imports itself and rooms below it. A module belongs to the longest
-#: name that it starts with. Outlines lie below the assembly, the search for contact points above it; what plans and
+#: name that it starts with. Shapes and how they touch lie below the assembly; what plans and
 #: solves a case lies below the pictures, the run that draws what came out above them.
 ORDER = (
     "blockvis.__main__",
@@ -40,11 +40,9 @@ ORDER = (
     "solver.loads",
     "solver.equilibrium",
     "solver.kinematics",
-    "solver.geometry",
     "solver.interfaces",
     "solver.assembly",
-    "solver.geometry.polygons",
-    "solver.geometry.broad_phase",
+    "solver.geometry",
 )
 
 #: Beyond the order: rooms that must not know each other although one lies above the other.
