@@ -94,12 +94,11 @@ def events_of(response: solver.Response) -> list[Event]:
     path = response.path
     total, values = path_parameters(path), path_values(response)
     found = []
-    kinds = ((solver.ContactState.HINGING, "hinge"), (solver.ContactState.SLIDING, "sliding joint"))
-    # Each is asked for its contact points once: they may come from a file.
-    pairs = ([_pairs(increment.states, increment.contacts, state) for state, _ in kinds] for increment in path)
+    # Each is asked for its mechanism once: its contact points may come from a file.
+    pairs = (_joints(solver.mechanism_of(response.assembly, increment)) for increment in path)
     for k, (earlier, later) in enumerate(pairwise(pairs), start=1):
         text = []
-        for (_, word), before, after in zip(kinds, earlier, later, strict=True):
+        for word, before, after in zip(("hinge", "sliding joint"), earlier, later, strict=True):
             if before != after:
                 some = f"{len(after) or 'no'} {word}{'s' if len(after) != 1 else ''}"
                 text.append(some if len(before) != len(after) else f"{word}s move")
@@ -294,7 +293,6 @@ def _mark_events(axes: Axes, response: solver.Response, factor: float, text: flo
         axes.legend(loc="upper left", fontsize=0.8 * text, frameon=False)
 
 
-def _pairs(states: np.ndarray, contacts: solver.Contacts, state: solver.ContactState) -> set[tuple[int, int]]:
-    chosen = states == state
-    a, b = contacts.block_a[chosen], contacts.block_b[chosen]
-    return set(zip(np.minimum(a, b).tolist(), np.maximum(a, b).tolist(), strict=True))
+def _joints(mechanism: solver.Mechanism) -> list[set[tuple[int, int]]]:
+    """The pairs of blocks of the hinges, and of the sliding joints."""
+    return [set(map(tuple, pairs.tolist())) for pairs in (mechanism.hinges, mechanism.sliding)]

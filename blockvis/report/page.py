@@ -208,7 +208,7 @@ def _packed_geometry(assembly: solver.Assembly, origin: np.ndarray, unit: float)
 
 
 class _Tables:
-    """What changes from frame to frame, as integers: motion, resultants of the joints, hinges (1), sliding points (2).
+    """What changes from frame to frame, as integers: motion, resultants of the joints, hinges (1), sliding joints (2).
 
     Parameters
     ----------
@@ -240,10 +240,9 @@ class _Tables:
             self.places.append(_rounded(points[kept] - origin, unit * coarse) * coarse)
             self.vectors.append(_rounded(forces[kept], FORCE_FINENESS * largest))
             self.sizes.append(size[kept])
-            hinging, sliding = increment.states == solver.ContactState.HINGING, marks.slipping(increment)
-            places = np.concatenate([increment.contacts.points[hinging], increment.contacts.points[sliding]])
-            self.mark_places.append(_rounded(places - origin, unit))
-            self.mark_kinds.append(np.repeat([1, 2], [hinging.sum(), sliding.sum()]))
+            hinges, sliding = marks.joint_places(assembly, increment)
+            self.mark_places.append(_rounded(np.concatenate([hinges, sliding]) - origin, unit))
+            self.mark_kinds.append(np.repeat([1, 2], [len(hinges), len(sliding)]))
 
     def force_length(self, block_size: float, extent: float) -> float:
         """Length per force [m/N]."""

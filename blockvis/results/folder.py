@@ -190,9 +190,7 @@ class ResultsFolder:
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
-            self._table.writerow(
-                row_of_increment(number, increment, solver.total_weight(self.assembly), self.parameter)
-            )
+            self._table.writerow(row_of_increment(number, increment, self.assembly, self.parameter))
 
     def _write_lists(self) -> None:
         """The table and the lists of files, of everything so far."""

@@ -37,6 +37,8 @@ COLUMNS = (
     "contacts_sticking",
     "contacts_sliding",
     "contacts_hinging",
+    "hinges",
+    "sliding_joints",
     "programs",
     "seconds",
 )
@@ -77,6 +79,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record) -> 
         "initial_reaction": path[0].reaction if path else None,
         "collapse_reaction": collapse.reaction if collapse else None,
         "mechanism": collapse.words if collapse else None,
+        **_joint_counts(response),
         **capacity_summary(response),
         "last_settlement": path[-1].settlement if path else None,
         "last_reaction": path[-1].reaction if path else None,
@@ -95,17 +98,30 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record) -> 
     }
 
 
-def row_of_increment(number: int, increment: solver.Increment, weight: float, parameter: str) -> Sequence[Any]:
+def _joint_counts(response: solver.Response) -> dict[str, int | None]:
+    """How many hinges and sliding joints the collapse mechanism has, as the picture of it shows them."""
+    if response.collapse is None or not response.path:
+        return {"hinges": None, "sliding_joints": None}
+    falling = solver.with_motion(response.path[-1], response.collapse.mechanism)
+    mechanism = solver.mechanism_of(response.assembly, falling)
+    return {"hinges": len(mechanism.hinges), "sliding_joints": len(mechanism.sliding)}
+
+
+def row_of_increment(
+    number: int, increment: solver.Increment, assembly: solver.Assembly, parameter: str
+) -> Sequence[Any]:
+    """The row of response.csv for an increment, in the order of :data:`COLUMNS`."""
     certificate = increment.certificate
     settlement = 0.0 if parameter == POSITION else float(increment.settlement)
     own = () if parameter == "settlement" else (repr(float(increment.settlement)),)
+    mechanism = solver.mechanism_of(assembly, increment)
     counts = np.bincount(increment.states, minlength=len(solver.ContactState))
     return (
         number,
         increment.phase,
         repr(settlement),
         repr(float(increment.reaction)),
-        repr(float(increment.reaction) / weight),
+        repr(float(increment.reaction) / solver.total_weight(assembly)),
         repr(float(increment.load_multiplier)),
         f"{certificate.equilibrium_residual:.3e}",
         f"{certificate.largest_penetration:.3e}",
@@ -113,6 +129,8 @@ def row_of_increment(number: int, increment: solver.Increment, weight: float, pa
         f"{certificate.complementarity:.3e}",
         f"{certificate.kinematic_violation:.3e}",
         *(int(counts[state]) for state in (0, 1, 2, 3)),
+        len(mechanism.hinges),
+        len(mechanism.sliding),
         increment.programs,
         f"{increment.seconds:.4f}",
         *own,

@@ -10,6 +10,7 @@ import numpy as np
 
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
+from solver.tolerances import DILATANCY_SLACK, SMALLEST_FORCE, SMALLEST_RATE, USED_UP
 
 from .certificate import Certificate
 
@@ -36,11 +37,43 @@ class ContactState(IntEnum):
     HINGING = 3
 
 
-#: A contact point carries force from this fraction of the largest normal force on.
-SMALLEST_FORCE = 1e-9
+def carries(forces: np.ndarray, fraction: float = SMALLEST_FORCE) -> np.ndarray:
+    """(n,) bool array: which contact points carry force.
 
-#: A contact point opens or slips where its relative velocity exceeds this fraction of the fastest block.
-SMALLEST_RATE = 1e-6
+    Parameters
+    ----------
+    forces : (n, d) array
+        Normal (compression positive) and shear forces, in any unit.
+    fraction : float
+        Of the largest normal force, from which on it counts.
+    """
+    return np.asarray(forces[:, 0] > fraction * forces[:, 0].max(initial=0.0))
+
+
+def used_up(forces: np.ndarray, friction: np.ndarray) -> np.ndarray:
+    """(n,) bool array: where the shear force is all that friction allows, from (n, d) forces and (n,) coefficients."""
+    return np.linalg.norm(forces[:, 1:], axis=1) >= friction * forces[:, 0] * (1.0 - USED_UP)
+
+
+def slides(slip: np.ndarray, opening: np.ndarray, friction: np.ndarray, slow: float) -> np.ndarray:
+    """(n,) bool array: which points move along their joint, and do not merely come apart.
+
+    Parameters
+    ----------
+    slip, opening : (n,) arrays
+        Relative velocity along the joint, and normal to it: up to friction times slip is the dilatancy of associative
+        friction.
+    friction : (n,) array
+    slow : float
+        Velocity up to which something is at rest.
+    """
+    lift = np.maximum(slow, friction * np.abs(slip) * (1.0 + DILATANCY_SLACK))
+    return ~at_rest(slip, slow) & (opening <= lift)
+
+
+def at_rest(velocity: np.ndarray, slow: float) -> np.ndarray:
+    """Which velocities are none beside a slow one, in the same unit."""
+    return np.abs(velocity) <= slow
 
 
 @dataclass(frozen=True)
@@ -116,10 +149,10 @@ class Increment:
         Open where no force is carried; hinging where it is and the joint opens at another point; sliding where
         the point moves along the joint with the friction used up; sticking otherwise.
         """
-        normal, shear = self.forces[:, 0], np.abs(self.forces[:, 1])
-        carrying = normal > SMALLEST_FORCE * normal.max(initial=0.0)
-        rate = SMALLEST_RATE * np.abs(self.velocity[:, :2]).max(initial=0.0)
-        sliding = carrying & (np.abs(self.displacements[:, 1]) > rate) & (shear >= self.friction * normal * (1 - 1e-6))
+        carrying = carries(self.forces)
+        rate = SMALLEST_RATE * np.abs(self.velocity[:, : self.forces.shape[1]]).max(initial=0.0)
+        slipping = ~at_rest(np.linalg.norm(self.displacements[:, 1:], axis=1), rate)
+        sliding = carrying & slipping & used_up(self.forces, self.friction)
         low, high = (
             np.minimum(self.contacts.block_a, self.contacts.block_b),
             np.maximum(self.contacts.block_a, self.contacts.block_b),
@@ -128,7 +161,7 @@ class Increment:
         _, joint = np.unique(joint, return_inverse=True)
         opens = np.zeros(joint.max(initial=-1) + 1, dtype=bool)
         opens[joint[self.displacements[:, 0] > rate]] = True
-        states = np.full(len(normal), ContactState.OPEN, dtype=np.uint8)
+        states = np.full(len(carrying), ContactState.OPEN, dtype=np.uint8)
         states[carrying] = ContactState.STICKING
         states[carrying & opens[joint] & (self.displacements[:, 0] <= rate)] = ContactState.HINGING
         states[sliding] = ContactState.SLIDING

@@ -44,7 +44,7 @@ def test_what_is_where(tmp_path):
             return picture[top + y, left + x]
 
     corners = solver.moved_vertices(assembly, last.pose)
-    hinges = last.contacts.points[last.states == solver.ContactState.HINGING]
+    hinges = last.contacts.points[solver.mechanism_of(assembly, last).hinge_points]
     crown = hinges[np.argmax(hinges[:, 1])]
     assert alike(colour_at(crown), palette.HINGE)
     assert alike(colour_at(crown - [0.0, 0.12]), palette.OPEN)
