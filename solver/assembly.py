@@ -13,6 +13,7 @@ from .geometry.contacts import Contacts
 from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
 from .geometry.polygons import Polygons
 from .geometry.shapes import Shapes
+from .tolerances import DRAWN_GAP
 
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 
@@ -254,7 +255,7 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
     """
     if not assembly.free.any():
         raise ValueError(f"all {assembly.n_blocks} blocks are supports; at least one must be free")
-    tolerance = 1e-3 * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
+    tolerance = DRAWN_GAP * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
     i, j, depth = assembly.shapes.overlaps(assembly.vertices, tolerance)
     real = np.flatnonzero(assembly.free[i] | assembly.free[j])
     if len(real):

@@ -2,8 +2,8 @@
 
 Each group is relative to one measure, named in its heading, and runs from the finest to the coarsest. Three lengths
 occur: the block size, the width of the thinnest block, and the shortest edge at a corner. How long a method goes on
-(iterations, steps, parts of steps) is no tolerance and stands with the method; so do the constants of the interior method
-for bands, which are of the method, not of masonry.
+(iterations, steps, parts of steps) is no tolerance and stands with the method; so do the constants of the interior
+method for bands, which are of the method, not of masonry.
 """
 
 # Of the linear programs: absolute, in their own units, in which a block has size 1 and weighs about 1.
@@ -44,9 +44,6 @@ FALLING_FRACTION = 5e-9
 #: Blocks whose weight times size is below this are seen badly, or not at all, beside BALANCE_TOLERANCE: a program of
 #: their own has to see to their balance.
 LIGHTEST = 2e-8
-
-#: Residual that the certificate of an equilibrium promises at most.
-CERTIFIED_BALANCE = 1e-6
 
 # Of light blocks, whose rows are written in their own weight and size.
 

@@ -16,15 +16,10 @@ from solver.kinematics import Pose, moved_vertices, unit_lengths
 from solver.loads import Loads, checked_loads
 from solver.lp.problem import LinearProgram, Unbounded
 from solver.lp.solve import solve_lp
-from solver.program.increment import FALLING_FRACTION
 from solver.program.strength import Admissible, point_strength
 from solver.results.certificate import Certificate
 from solver.results.limit import Envelope, LimitLoad, LimitStatus
-
-#: Largest gap of a closed contact point: in the drawing, as a fraction of the width of the thinnest block, the accuracy
-#: also accepted for overlaps; at a computed pose, as a fraction of the block size, a hundred times its accuracy.
-DRAWN_GAP = 1e-3
-COMPUTED_GAP = 1e-6
+from solver.tolerances import COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
 REACH = 0.25

@@ -9,9 +9,11 @@ import numpy as np
 from solver.assembly import FIXED, FREE, Assembly, measure_contacts
 from solver.kinematics import Pose, motion_size, moved, moved_vertices
 from solver.lp.problem import SolveError
-from solver.program.correction import FARTHEST_FALL, STILL, Falls, NotConverged, at_rest, solve_again
+from solver.program.correction import Falls, NotConverged, at_rest, solve_again
 from solver.program.increment import Locked, Solved, solve_program
 from solver.program.model import Model
+from solver.results.increment import carries
+from solver.tolerances import FARTHEST_FALL, HOLDS, STILL
 
 #: Largest weight of what may snap, as a fraction of that of the free blocks. Falling by half a block size at most, it
 #: strikes the rest with an energy that would lift all of it by 5e-3 block sizes at most: a knock that statics may pass
@@ -28,9 +30,8 @@ STEP, STEPS = 0.05, 400
 #: which friction may keep a block that rests.
 CYCLE, CYCLE_WORK = 20, 1e-5
 
-#: Blocks are told to have fallen where they moved by this part of the farthest; contact points hold a piece from this
-#: part of the largest force on; so many blocks are named.
-NOTICED, HOLDS, NAMED = 0.05, 1e-3, 4
+#: Blocks are reported to have fallen where they moved by this part of the farthest; so many blocks are named.
+NOTICED, NAMED = 0.05, 4
 
 #: How often blocks that the fall of others has set free may join them.
 JOINS = 3
@@ -163,8 +164,7 @@ def _told(model: Model, start: Pose, end: Pose, piece: np.ndarray, solved: Solve
     stood = lower <= 0.0 or way.max() <= STILL * model.length
     if stood or not _light(assembly, fell | piece) or farthest > FARTHEST_FALL * model.length:
         return None
-    contacts, force = solved.contacts, solved.forces[:, 0]
-    holds = force > HOLDS * force.max(initial=0.0)
+    contacts, holds = solved.contacts, carries(solved.forces, HOLDS)
     holds &= fell[contacts.block_a] != fell[contacts.block_b]
     before = measure_contacts(assembly, moved_vertices(assembly, start), contacts).gaps
     caught = holds & (before > NOTICED * way.max())

@@ -21,12 +21,13 @@ from solver.kinematics import (
 )
 from solver.loads import Loads, Settlement, checked_loads
 from solver.lp.problem import SolveError
-from solver.program.correction import FARTHEST_FALL, Falls, NotConverged, at_rest, corrected, solve_again
+from solver.program.correction import Falls, NotConverged, at_rest, corrected, solve_again
 from solver.program.increment import Locked, Solved, solve_program
 from solver.program.model import Model
 from solver.results.increment import Increment, Status
 from solver.results.mechanism import mechanism_of
 from solver.results.response import Collapse, Response
+from solver.tolerances import FARTHEST_FALL, JUMP, OVERLAP
 
 from .checkpoint import Checkpoint, Note, Place
 from .local_fall import jump_words, snapped
@@ -36,10 +37,6 @@ from .local_origin import at_origin, told_from, without_origin
 #: size, weighted by mass, times the root of the number of blocks (in a wall a few bricks always change their ways),
 #: up to the second number. Hinges that move change it by more, the slow turning of the geometry by less.
 EVENT_CHANGE, LARGEST_CHANGE = 0.015, 0.5
-
-#: Overlap of two blocks, as a fraction of the width of the thinnest, at which an increment is refused: twice what is
-#: accepted of a drawing.
-OVERLAP = 2e-3
 
 #: Places kept to go back to.
 PLACES = 16
@@ -51,9 +48,6 @@ CLOSING_WORK, CLOSING_WORK_LARGE, CLOSING_WORK_AT_START = 1e-3, 1e-2, 1e-6
 
 #: Snaps of light pieces in one phase after which the structure is said to fall apart.
 SNAPS = 100
-
-#: Movement to the equilibrium of a place, in block sizes, that looks like a fall.
-JUMP = 0.02
 
 #: Step by which a reaction is read off at the last equilibrium, in block sizes.
 PROBE = 1e-6

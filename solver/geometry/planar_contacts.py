@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
+
 from .broad_phase import box_pairs, boxes, expand_ranges
 from .contacts import Contacts
 from .outlines import Outlines
-
-#: A corner this close to the end of an edge, as a fraction of the shortest edge involved, stands on the corner
-#: there. Correctors take drift along a hinge back, so that it need not cover the error of an increment, only of
-#: drawings; a bearing shorter than this is none.
-CORNER_TOLERANCE = 1e-5
 
 #: The flank of a corner may lean into the edge it faces by this much (sine of the angle) before the corner no
 #: longer counts as facing it: an open joint that may close again leans by its opening angle.
@@ -26,11 +23,6 @@ PERPENDICULAR = 1e-6
 
 #: Difference of cosines up to which two pairs of faces at a corner are open alike.
 SAME_OPENING = 1e-9
-
-#: Penetration up to this fraction of the width of the thinner block is a contact to be corrected; beyond, the
-#: corner belongs to another face behind.
-PENETRATION_FRACTION = 0.1
-
 
 #: Kinds of contact in the plane, column 0 of the features. A corner on an edge: the corner (a vertex of ``block_a``),
 #: the edge (of ``block_b``, named by the vertex it starts at), -1. A corner on a corner: both vertices, and the edge of

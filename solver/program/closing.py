@@ -11,29 +11,28 @@ from scipy.sparse.linalg import splu
 from solver.assembly import Assembly, find_contacts, measure_contacts
 from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts, matched_contacts
-from solver.geometry.planar_contacts import CORNER_TOLERANCE, feature_pairs, measured_points, past_the_end
+from solver.geometry.planar_contacts import feature_pairs, measured_points, past_the_end
 from solver.kinematics import Pose, moved, moved_vertices
 from solver.lp.problem import LinearProgram, SolveError, Unbounded
 from solver.lp.solve import INTERIOR_ROUTES
+from solver.results.increment import carries
+from solver.tolerances import (
+    CARRYING_FRACTION,
+    COORDINATE_ROUNDING,
+    CORNER_TOLERANCE,
+    GEOMETRY_TOLERANCE,
+    LARGEST_DRIFT,
+    LEFT_WEDGED,
+    ROUNDING,
+)
 
-from .increment import LEFT_WEDGED, ROUNDING, Solved, along_structure, distances_of, solved_or_left_wedged
+from .increment import Solved, along_structure, distances_of, solved_or_left_wedged
 from .macroblocks import MacroBlocks, free_blocks
 from .model import Model, largest_movement
 
 #: Resistance of every block to being moved by the closing of gaps, in mean block weights: without friction at the
 #: points that slide, blocks could drift along their joints for nothing.
 CLOSING_FRICTION = 1e-2
-
-#: A geometry is exact enough when contact points that carry force are closed, and those that stick have
-#: not moved along the joint, to this fraction of the block size.
-GEOMETRY_TOLERANCE = 1e-8
-
-#: Contact points below this fraction of the largest normal force do not decide whether a geometry is exact.
-CARRYING_FRACTION = 1e-6
-
-#: Drift of a hinge within an increment, as a fraction of the shortest edge, before it is corrected: second order in
-#: the rotation, which an increment keeps below a few hundredths.
-LARGEST_DRIFT = 1e-2
 
 #: Newton's method is given up where it has not converged after so many iterations, or moves blocks by more than so
 #: many times the error it is to correct: then the mechanism itself has to change, which takes a program.
@@ -222,7 +221,7 @@ def _gone_through(assembly: Assembly, vertices: np.ndarray, before: Contacts) ->
     now = measure_contacts(assembly, vertices, before)
     past, _, on_corner = past_the_end(assembly.polygons, now)
     inside = (past <= 0.0) & ~on_corner
-    rounding = 1e-12 * assembly.block_size
+    rounding = COORDINATE_ROUNDING * assembly.block_size
     return np.flatnonzero(inside & (before.gaps >= -rounding) & (now.gaps < -rounding))
 
 
@@ -258,8 +257,7 @@ def drift_and_allowance(assembly: Assembly, contacts: Contacts, solved: Solved) 
 def carrying_and_sticking(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
     """Points that carried force in the last program, and those of them that stuck: (n_contacts,) bool arrays."""
     place, same = matched_contacts(contacts, solved.contacts)
-    normal = solved.forces[place, 0]
-    carrying = same & (normal > CARRYING_FRACTION * normal.max(initial=0.0))
+    carrying = same & carries(solved.forces[place], CARRYING_FRACTION)
     return carrying, carrying & solved.sticking[place]
 
 

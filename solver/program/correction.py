@@ -10,41 +10,28 @@ from solver.assembly import measure_contacts
 from solver.geometry.contacts import matched_contacts
 from solver.kinematics import Pose, moved, moved_vertices
 from solver.lp.problem import SolveError
+from solver.tolerances import FARTHEST_FALL, GEOMETRY_TOLERANCE, PENETRATION_LEFT, STILL, TOGETHER
 
-from .closing import (
-    GEOMETRY_TOLERANCE,
-    carrying_and_sticking,
-    closed_points,
-    closing_program,
-    contacts_after,
-    drift_and_allowance,
-)
+from .closing import carrying_and_sticking, closed_points, closing_program, contacts_after, drift_and_allowance
 from .increment import Solved, solve_program
 from .macroblocks import MacroBlocks, macro_blocks
 from .model import Model, largest_movement
 
-#: A pose is an equilibrium when a program at rest moves no block by more than this, in block sizes: friction leaves
-#: a little freedom at the edge of its cone, a structure that has to find another equilibrium moves much further.
-STILL = 1e-5
-
-#: Step of a descent, and the farthest that blocks may fall in one, in block sizes.
-DESCENT_STEP, FARTHEST_FALL = 0.1, 0.5
+#: Step of a descent, in block sizes.
+DESCENT_STEP = 0.1
 
 #: Programs that close gaps one after another before a full program is solved again.
 CLOSINGS = 4
 
 #: Where friction keeps many points on the edge of sliding, corrections converge slowly. After CLOSINGS programs gaps of
 #: this part of the increment's movement may stay (the next program sees them, so they do not add up), and penetration
-#: of this part of the smallest block. In programs too large for vertex solutions, whose interior solutions say less
-#: clearly what sticks, ten times as much of either.
-GAP_LEFT, GAP_LEFT_LARGE, PENETRATION_LEFT = 1e-2, 1e-1, 5e-7
+#: of PENETRATION_LEFT. In programs too large for vertex solutions, whose interior solutions say less clearly what
+#: sticks, ten times as much of either.
+GAP_LEFT, GAP_LEFT_LARGE = 1e-2, 1e-1
 
 #: Exact geometries from which a program still moves on, before it is followed in small steps: friction at the edge of
 #: its cone may lead it round in a circle.
 RESTLESS = 8
-
-#: Blocks whose joint moves by less than this part of the increment's movement are closed up as one.
-TOGETHER = 1e-3
 
 #: Large models are closed up, in so many programs over their macro-blocks, until the contact forces would do less than
 #: this part of the reaction's work on the gaps that are left; the reaction counts as at least this part of the loads.

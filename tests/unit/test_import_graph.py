@@ -43,6 +43,7 @@ ORDER = (
     "solver.interfaces",
     "solver.assembly",
     "solver.geometry",
+    "solver.tolerances",
 )
 
 #: Beyond the order: rooms that must not know each other although one lies above the other.
