@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 import warnings
@@ -16,6 +15,8 @@ import numpy as np
 import solver
 from blockvis import generators
 from blockvis.formats import FORMATS
+from blockvis.suggestions import files_like
+from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .imperfections import Imperfection, read_imperfection
 from .loads import LoadCase
@@ -25,9 +26,6 @@ ANALYSES = ("settlement", "limit load", "pushover")
 
 #: How sliding joints of a limit load behave.
 FLOWS = ("associative", "non-associative")
-
-#: Endings of animations.
-FILMS = (".mp4", ".gif", ".webp")
 
 #: More increments or frames than this are a slip of the pen.
 MOST_STEPS = 1_000_000
@@ -89,8 +87,7 @@ def read_case(path: str | Path) -> Case:
     """
     path = Path(path)
     if not path.is_file():
-        beside = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
-        near = difflib.get_close_matches(path.name, beside, n=3, cutoff=0.4) or beside[:3]
+        near = files_like(path, "*.toml", or_any=True)
         hint = f"; beside it are {', '.join(near)}" if near else ""
         raise ValueError(f"there is no case file '{path}'{hint}")
     if path.suffix.lower() in FORMATS:
@@ -148,11 +145,11 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     animation = output.take("animation", "collapse.mp4")
     if animation is not False:
         animation = output.text("animation", "collapse.mp4")
-        if not Path(animation).name == animation or "\\" in animation or not animation.lower().endswith(FILMS):
+        if not Path(animation).name == animation or "\\" in animation or not animation.lower().endswith(VIDEO_SUFFIXES):
             raise output.error(
                 "animation",
-                f"is {shortened(animation)}; give a name ending in {', '.join(FILMS)}, without a folder: it is written "
-                "into the results folder",
+                f"is {shortened(animation)}; give a name ending in {', '.join(VIDEO_SUFFIXES)}, without a folder: it is "
+                "written into the results folder",
             )
     case = Case(
         source=source,

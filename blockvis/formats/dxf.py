@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.layout.block_table import rows_of, with_rows
+from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import arc_points
 from blockvis.layout.units import metres_per
@@ -305,13 +305,11 @@ def write(layout: Layout, path: Path) -> None:
     document.header["$INSUNITS"] = 6
     document.appids.add(APPLICATION)
     space = document.modelspace()
-    for i, row in enumerate(rows_of(layout)):
-        role = layout.roles[i] if layout.roles[i] in ("fixed", "moving") else ""
-        layer = layout.groups[i] or role or layout.materials[i] or "0"
+    for row, layer, ring in zip(rows_of(layout), layers_of(layout, "0"), layout.outlines, strict=True):
         layer = "".join("_" if c in '<>/\\":;?*|=`' or ord(c) < 32 else c for c in layer)[:255]
         if layer not in document.layers:
             document.layers.add(layer)
-        outline = space.add_lwpolyline(layout.outlines[i].tolist(), close=True, dxfattribs={"layer": layer})
+        outline = space.add_lwpolyline(ring.tolist(), close=True, dxfattribs={"layer": layer})
         text = json.dumps(row)
         outline.set_xdata(APPLICATION, [(1000, text[k : k + 200]) for k in range(0, len(text), 200)])
     document.saveas(path)

@@ -13,22 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
+from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import flattened, outlines_of_cells
+from blockvis.layout.triangulation import cells_of_ring
 
+from .node_order import GMSH, ring_of_nodes
 from .reading import Reading
-from .triangles import cells_of_ring
-
-#: Points around a surface element, by gmsh's element type: corners with the points of curved sides between them.
-RINGS = {
-    2: (0, 1, 2),
-    3: (0, 1, 2, 3),
-    9: (0, 3, 1, 4, 2, 5),
-    10: (0, 4, 1, 5, 2, 6, 3, 7),
-    16: (0, 4, 1, 5, 2, 6, 3, 7),
-    21: (0, 3, 4, 1, 5, 6, 2, 7, 8),
-    36: (0, 4, 5, 1, 6, 7, 2, 8, 9, 3, 10, 11),
-}
 
 #: Number of nodes of each element type.
 N_NODES = {
@@ -286,7 +277,7 @@ def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
         if follow < 1:
             raise ValueError(f"'{numbers.path}': its section $Elements has a header of {follow} elements; export again")
         left -= follow
-        if kind in RINGS:
+        if kind in GMSH:
             surface = rows[:, 1] if n_tags > 1 else np.zeros(follow, dtype=np.int64)
             for row, tag in zip(rows, surface, strict=True):
                 group = int(row[0]) if n_tags else 0
@@ -309,10 +300,10 @@ def _width(kind: int, numbers: _Numbers) -> int:
 
 
 def _add(mesh: _Mesh, numbers: _Numbers, dimension: int, kind: int, nodes: np.ndarray, tags: np.ndarray) -> None:
-    if dimension != 2 or kind not in RINGS:
+    if dimension != 2 or kind not in GMSH:
         mesh.other_elements += len(nodes)
         return
-    rings = nodes[:, RINGS[kind]]
+    rings = ring_of_nodes(nodes, GMSH[kind])
     try:
         known = [mesh.points[int(node)] for node in rings.ravel()]
     except KeyError as error:
@@ -328,8 +319,6 @@ def _with_table(layout: Layout, table: dict[str, dict[str, object]], tags: np.nd
     rows = [table.get(str(tag)) for tag in tags]
     if not all(isinstance(row, dict) for row in rows):
         return layout
-    from blockvis.layout.block_table import with_rows
-
     return with_rows(layout, rows)
 
 
@@ -339,12 +328,7 @@ def write(layout: Layout, path: Path) -> None:
     A block without a group is put into one named after its role, its material, or "blocks". A section of our own,
     which other programs skip, keeps names, roles, materials, density and thickness.
     """
-    from blockvis.layout.block_table import rows_of
-
-    groups = [
-        group or (role if role in ("fixed", "moving") else "") or material or "blocks"
-        for group, role, material in zip(layout.groups, layout.roles, layout.materials, strict=True)
-    ]
+    groups = layers_of(layout, "blocks")
     number = {group: k + 1 for k, group in enumerate(dict.fromkeys(groups))}
     nodes, elements, entities = [], [], []
     n_nodes = n_elements = n_parts = 0

@@ -13,13 +13,8 @@ import numpy as np
 from blockvis.layout.layout import Layout
 
 from .cells import layout_of_cells
+from .node_order import MESHIO, ring_of_nodes
 from .reading import Reading
-
-#: Points around a surface cell, by meshio's name; None: all of them in order.
-RINGS: dict[str, tuple[int, ...] | None] = {
-    "triangle": None, "quad": None, "polygon": None, "triangle6": (0, 3, 1, 4, 2, 5), "triangle7": (0, 3, 1, 4, 2, 5),
-    "quad8": (0, 4, 1, 5, 2, 6, 3, 7), "quad9": (0, 4, 1, 5, 2, 6, 3, 7),
-}  # fmt: skip
 
 
 def read(path: Path, reading: Reading) -> Layout:
@@ -45,14 +40,10 @@ def read(path: Path, reading: Reading) -> Layout:
     rings: list[np.ndarray] = []
     chosen: list[tuple[int, int]] = []
     for k, block in enumerate(mesh.cells):
-        order = RINGS.get(block.type, ())
-        if order == ():
-            if not block.type.startswith("polygon"):
-                continue
-            order = None
-        for cell in block.data:
-            nodes = np.asarray(cell, dtype=np.int64)
-            rings.append(nodes if order is None else nodes[list(order)])
+        kind = "polygon" if block.type.startswith("polygon") else block.type
+        if kind not in MESHIO:
+            continue
+        rings += [ring_of_nodes(np.asarray(cell, dtype=np.int64), MESHIO[kind]) for cell in block.data]
         chosen.append((k, len(block.data)))
     data: dict[str, np.ndarray] = {}
     for key, arrays in mesh.cell_data.items():

@@ -17,18 +17,14 @@ from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 
 from .cells import layout_of_cells, merged, row_of
+from .node_order import VTK, ring_of_nodes
 from .reading import Reading
 from .vtk_arrays import largest_number
 
 if TYPE_CHECKING:
     import pyvista
 
-#: Points around a surface cell, by VTK's cell type; None: all of them in order.
-RINGS: dict[int, tuple[int, ...] | None] = {
-    5: None, 7: None, 9: None, 8: (0, 1, 3, 2), 22: (0, 3, 1, 4, 2, 5), 34: (0, 3, 1, 4, 2, 5),
-    23: (0, 4, 1, 5, 2, 6, 3, 7), 28: (0, 4, 1, 5, 2, 6, 3, 7),
-}  # fmt: skip
-
+#: VTK's types of cells with a volume.
 SOLID_CELLS = {10, 11, 12, 13, 14, 15, 16, 24, 25, 26, 27, 29, 41, 42, 71, 72}
 
 #: zlib packs no better than 1032 to 1: a file that announces more than this many numbers per byte lies.
@@ -247,16 +243,15 @@ def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
             labels.append("" if re.fullmatch(r"Block-\d+", name) else name)
         return merged(parts, labels, path)
     grid = _as_cells(data, path)
-    flat_types = np.asarray(grid.celltypes)
-    if np.isin(flat_types, list(SOLID_CELLS)).any():
+    types = np.asarray(grid.celltypes)
+    if np.isin(types, list(SOLID_CELLS)).any():
         return _layout_of_solids(grid, path)
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
-    surface = np.flatnonzero(np.isin(flat_types, list(RINGS)))
+    surface = np.flatnonzero(np.isin(types, list(VTK)))
     rings = []
     for cell in surface:
         nodes = connectivity[offset[cell] : offset[cell + 1]].astype(np.int64)
-        order = RINGS[int(flat_types[cell])]
-        rings.append(nodes if order is None else nodes[list(order)])
+        rings.append(ring_of_nodes(nodes, VTK[int(types[cell])]))
     cell_data = {str(key): np.asarray(grid.cell_data[key])[surface] for key in grid.cell_data}
     return layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path)
 

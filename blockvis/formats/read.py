@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,9 +15,10 @@ from blockvis.atomic_files import whole_file
 from blockvis.formats import FORMATS, Format
 from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
-from blockvis.layout.layout import Layout, layout_of, ring_areas
-from blockvis.layout.outlines import without_collinear
+from blockvis.layout.layout import Layout, layout_of
+from blockvis.layout.outlines import ring_area, without_collinear
 from blockvis.layout.units import chosen_unit, metres_per
+from blockvis.suggestions import files_like
 
 from .reading import Reading
 
@@ -52,7 +52,7 @@ def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: f
     """
     path = Path(path)
     if not path.exists():
-        near = difflib.get_close_matches(path.name, _names_in(path.parent), n=3)
+        near = files_like(path)
         hint = f"; did you mean {' or '.join(near)}?" if near else "; check the path"
         raise MissingFile(f"there is no file '{path}'{hint}")
     if path.is_dir():
@@ -71,7 +71,7 @@ def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: f
                 f"'{path}': block '{layout.names[i]}' has a corner at {bad.tolist()}; "
                 "coordinates must be finite numbers: repair the file"
             )
-    sizes = np.sqrt(np.abs(ring_areas(layout.outlines)))
+    sizes = np.sqrt([abs(ring_area(ring)) for ring in layout.outlines])
     chosen, note = chosen_unit(unit, layout.unit, sizes)
     factor = metres_per(chosen)
     outlines = tuple(without_collinear(ring * factor) for ring in layout.outlines)
@@ -138,10 +138,6 @@ def inspect(path: str | Path, *, unit: str | None = None) -> Inspection:
         Unit of the file's lengths; holds over what the file says.
     """
     return inspected(read_layout(path, unit=unit))
-
-
-def _names_in(folder: Path) -> list[str]:
-    return [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
 
 
 def _read_by_suffix(path: Path, reading: Reading) -> Layout:

@@ -13,10 +13,10 @@ import numpy as np
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import FLAT, outlines_of_cells
+from blockvis.layout.triangulation import triangles_of_ring
 
 from .cells import components, layout_of_cells, merged
 from .reading import Reading
-from .triangles import triangles_of_ring
 
 #: Points closer than this fraction of the drawing are one: single precision leaves 6e-8 of a coordinate.
 SAME_POINT = 2e-6

@@ -19,7 +19,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 import solver
-from blockvis.layout.block_table import rows_of, with_rows
+from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import LARGEST_CHORD
 from blockvis.layout.units import UNITS, metres_per
@@ -393,10 +393,7 @@ def write(layout: Layout, path: Path) -> None:
         'data-blockvis-unit="m">',
     ]
     rows = rows_of(layout)
-    labels = [
-        group or (role if role in ("fixed", "moving") else "") or material or "blocks"
-        for group, role, material in zip(layout.groups, layout.roles, layout.materials, strict=True)
-    ]
+    labels = layers_of(layout, "blocks")
     # One group per run of equal labels keeps the order of the blocks.
     for i, row in enumerate(rows):
         if i == 0 or labels[i] != labels[i - 1]:

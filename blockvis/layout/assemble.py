@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import fnmatch
 import warnings
 from collections.abc import Mapping, Sequence
@@ -12,9 +11,10 @@ from typing import Any
 import numpy as np
 
 import solver
+from blockvis.suggestions import by_similarity
 
 from .layout import Layout
-from .repair import duplicates, mended
+from .repair import duplicates, repaired
 
 
 def assemble(
@@ -75,7 +75,7 @@ def assemble(
         thickness=_filled(layout.thickness, thickness, layout.n_blocks),
         materials=layout.materials,
     )
-    outlines, _ = mended(
+    outlines, _ = repaired(
         assembly,
         joint_thickness=joint_thickness,
         overlap_tolerance=overlap_tolerance,
@@ -174,9 +174,7 @@ def _matched_roles(layout: Layout, roles: Mapping[str, str]) -> list[str]:
 
 def _unmatched(key: str, layout: Layout) -> str:
     labels = [*dict.fromkeys(label for label in (*layout.groups, *layout.materials, *layout.names) if label)]
-    closeness = {label: difflib.SequenceMatcher(None, key.lower(), label.lower()).ratio() for label in labels[:2000]}
-    nearest = sorted(closeness, key=lambda label: -closeness[label])
-    listed = ", ".join(f"'{label}'" for label in nearest[:12])
+    listed = ", ".join(f"'{label}'" for label in by_similarity(key, labels[:2000])[:12])
     more = f" and {len(labels) - 12} more" if len(labels) > 12 else ""
     where = layout.source or "the drawing"
     return f"roles: '{key}' matches no block, group or layer of {where}; it has {listed}{more}; correct the name"

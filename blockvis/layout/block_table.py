@@ -58,3 +58,11 @@ def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
         thickness=numbers("thickness"),
         density=numbers("density"),
     )
+
+
+def layers_of(layout: Layout, default: str) -> list[str]:
+    """Name the layer of each block: its group, else its role as a support, else its material, else the default."""
+    return [
+        group or (role if role in (solver.FIXED, solver.MOVING) else "") or material or default
+        for group, role, material in zip(layout.groups, layout.roles, layout.materials, strict=True)
+    ]

@@ -11,7 +11,7 @@ import solver
 
 from .joints.facing_edges import Facing, proposed_thickness
 from .layout import Layout
-from .repair import CARELESS, ROUNDING, block_widths, duplicates, overlaps
+from .repair import DEFAULT_OVERLAP, ROUNDING, duplicates, overlaps
 
 #: Classes of joint thickness in the report.
 CLASSES = 8
@@ -131,7 +131,7 @@ def inspected(layout: Layout) -> Inspection:
     later = {copy for _, copy in twins}
     kept = np.array([i for i in range(layout.n_blocks) if i not in later])
     assembly = solver.Assembly.from_outlines([layout.outlines[i] for i in kept], names=[layout.names[i] for i in kept])
-    width = float(np.median(block_widths(assembly)))
+    width = float(np.median(assembly.widths))
     found = overlaps(assembly, ROUNDING * width)
     thickness, joints = proposed_thickness([assembly.outline(i) for i in range(assembly.n_blocks)])
     return Inspection(
@@ -139,7 +139,7 @@ def inspected(layout: Layout) -> Inspection:
         kept=kept,
         twins=tuple(twins),
         overlapping=tuple((int(kept[i]), int(kept[j]), depth) for i, j, depth in found),
-        overlap_tolerance=CARELESS * width,
+        overlap_tolerance=DEFAULT_OVERLAP * width,
         areas=assembly.areas,
         low=assembly.vertices.min(axis=0),
         high=assembly.vertices.max(axis=0),

@@ -89,15 +89,6 @@ class Layout:
         )
 
 
-def ring_areas(outlines: Sequence[np.ndarray]) -> np.ndarray:
-    """(n,) array: area of each outline, positive counter-clockwise."""
-    areas = np.zeros(len(outlines))
-    for i, ring in enumerate(outlines):
-        x, y = (ring - ring[0]).T
-        areas[i] = (x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0
-    return areas
-
-
 def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> Layout:
     """The drawing of an assembly, as drawn or where a pose has its blocks."""
     vertices = assembly.vertices if pose is None else solver.moved_vertices(assembly, pose)

@@ -24,6 +24,11 @@ def ring_area(ring: np.ndarray) -> float:
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0
 
 
+def ring_width(ring: np.ndarray) -> float:
+    """Twice the area over the perimeter of a (n, 2) ring: near b for a long a × b."""
+    return 2.0 * abs(ring_area(ring)) / float(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).sum())
+
+
 def flattened(points: np.ndarray, where: str) -> tuple[np.ndarray, str]:
     """The two coordinates that a flat drawing uses.
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from blockvis.layout.outlines import ring_width
+
 #: Edges face each other when their outward normals point at each other within acos(0.8) = 37 degrees.
 FACING = -0.8
 
@@ -177,16 +179,11 @@ def proposed_thickness(outlines: Sequence[np.ndarray]) -> tuple[float, Facing]:
 
     Notes
     -----
-    Looks as far as half of the width of the usual block (twice its area over its perimeter): a wider gap is an
-    opening. The thickness is the widest gap found, rounded up to two digits.
+    Edges face each other across at most half the width of a typical block (twice its area over its perimeter): a
+    wider gap is an opening. The thickness is the widest gap found, rounded up to two digits.
     """
-    edges = edges_of(outlines)
-    lengths = np.add.reduceat(np.hypot(*(edges.end - edges.start).T), edges.offsets[:-1])
-    cross = edges.start[:, 0] * edges.end[:, 1] - edges.start[:, 1] * edges.end[:, 0]
-    areas = np.add.reduceat(cross, edges.offsets[:-1]) / 2.0
-    reach = 0.5 * float(np.median(2.0 * np.abs(areas) / lengths))
-    found = facing_edges(outlines, reach)
-    scale = float(np.ptp(edges.start, axis=0).max())
+    found = facing_edges(outlines, 0.5 * float(np.median([ring_width(ring) for ring in outlines])))
+    scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
     widest = found.gaps.max(axis=1)
     found = found.chosen(widest > 10 * CLOSED * scale)
     if len(found) == 0:
