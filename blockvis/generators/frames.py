@@ -1,4 +1,4 @@
-"""Blocks stacked on two feet, or on one: column, portal, arch on piers, buttressed arch."""
+"""Structures on one or two feet: column, portal, arch on piers, buttressed arch."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def column(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """A stack of equal blocks on a ground that moves.
+    """Build a column of equal blocks on a ground that moves.
 
     Parameters
     ----------
@@ -69,14 +69,14 @@ def portal(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """Two columns of blocks that carry a lintel.
+    """Build two columns of blocks that carry a lintel.
 
     Parameters
     ----------
     span, height : float [m]
         Clear width and height of the opening.
     column_width : float [m]
-        The lintel bears on all of it.
+        The lintel bears on the full width.
     column_blocks : int
         In each column.
     lintel_height : float [m]
@@ -117,7 +117,7 @@ def arch_on_piers(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """A segmental or semicircular arch on two piers.
+    """Build a segmental or semicircular arch on two piers.
 
     Parameters
     ----------
@@ -127,11 +127,11 @@ def arch_on_piers(
         Of the arch, radial.
     voussoirs : int
     pier_width : float [m]
-        At least what the springing joint covers.
+        At least the horizontal extent of the springing joint.
     pier_height : float [m]
         From the ground to the springing of the intrados.
     pier_blocks : int
-        In each pier, 1 for a monolith; the top one carries the skewback.
+        In each pier, 1 for a monolith; the top block has the skewback.
     density : float [kg/m³]
     depth : float [m]
         Out of plane.
@@ -167,7 +167,7 @@ def buttressed_arch(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """An arch on piers too slender for its thrust, each with a battered buttress against its outer face.
+    """Build an arch on piers too slender for its thrust, each with a battered buttress against its outer face.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def _on_two_feet(
     density: float,
     depth: float,
 ) -> solver.Assembly:
-    """Parts given for the right and mirrored to the left, what they carry, and a ground under either foot."""
+    """Mirror the parts of the right foot to the left, and add what they carry and a ground under either foot."""
     named = list(above)
     for side, mirror in (("left", MIRROR), ("right", np.ones(2))):
         for part, outlines in parts.items():

@@ -1,4 +1,4 @@
-"""From a layout to an assembly: roles, supports, what the layout leaves open."""
+"""From a layout to an assembly: roles, supports, default density and thickness, repair."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def assemble(
     joint_thickness: float | str = 0.0,
     overlap_tolerance: float | None = None,
 ) -> solver.Assembly:
-    """Makes an assembly of a drawing.
+    """Make an assembly of a layout.
 
     Parameters
     ----------
@@ -39,18 +39,23 @@ def assemble(
         Support blocks that the file does not contain: ``name``, ``role`` and ``outline`` [m] of each, perhaps
         ``density``, ``thickness`` and ``material``.
     density : float [kg/m³]
-        Where the drawing has none.
+        Of blocks for which the layout has none.
     thickness : float [m]
-        Where the drawing has none.
+        Of blocks for which the layout has none.
     joint_thickness : float [m] or "auto"
         Gaps between facing edges up to this width are closed to their midline.
     overlap_tolerance : float, optional [m]
-        Overlaps up to this depth are resolved to their midline, deeper ones are an error.
+        Overlaps up to this depth are resolved to their midline, deeper ones are an error; see
+        :func:`blockvis.layout.repair.repaired` for the default.
+
+    Returns
+    -------
+    solver.Assembly
 
     Raises
     ------
     ValueError
-        For a role that is none, or whose name matches nothing.
+        For an unknown role, a key of ``roles`` that matches no block, and an overlap deeper than the tolerance.
     """
     for note in layout.notes:
         if note.startswith("unit clash"):
@@ -141,7 +146,7 @@ def _checked_role(role: str, whose: str) -> str:
 
 
 def _matched_roles(layout: Layout, roles: Mapping[str, str]) -> list[str]:
-    """Role of every block: what the caller says, then what the file says, then its own name, else free."""
+    """Role of every block: the caller's, else the file's, else its group or name if that is a role, else free."""
     found = []
     for name, group, role in zip(layout.names, layout.groups, layout.roles, strict=True):
         said = (role, group.strip().lower(), name.strip().lower())

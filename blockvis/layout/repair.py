@@ -25,11 +25,16 @@ THICKEST_JOINT = 2.0
 
 
 def duplicates(outlines: Sequence[np.ndarray]) -> list[tuple[int, int]]:
-    """Blocks drawn twice, as pairs (first, later copy).
+    """Find blocks that are drawn twice.
 
     Parameters
     ----------
     outlines : sequence of (n, 2) arrays [m]
+
+    Returns
+    -------
+    list of (int, int)
+        The first outline and its later copy.
     """
     centres = np.array([(ring.min(axis=0) + ring.max(axis=0)) / 2.0 for ring in outlines])
     sizes = np.array([float(np.ptp(ring, axis=0).max()) for ring in outlines])
@@ -58,7 +63,13 @@ def _same(one: np.ndarray, other: np.ndarray, tolerance: float) -> bool:
 
 
 def overlaps(assembly: solver.Assembly, tolerance: float) -> list[tuple[int, int, float]]:
-    """Pairs of blocks that overlap by more than a tolerance [m], with the depth [m], deepest first."""
+    """Find pairs of blocks that overlap by more than a tolerance [m].
+
+    Returns
+    -------
+    list of (int, int, float)
+        Both blocks and the depth [m], the deepest overlap first.
+    """
     i, j, depth = solver.overlap_depths(assembly.vertices, assembly.offsets, tolerance)
     return [(int(i[k]), int(j[k]), float(depth[k])) for k in np.argsort(-depth)]
 
