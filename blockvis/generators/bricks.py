@@ -23,6 +23,10 @@ LOWEST_BRICK = 0.3
 #: joined to a neighbour.
 NARROWEST = 0.25
 
+#: Least length of the joint along which a sliver is joined, as a fraction of the brick height or, if less, of the
+#: sliver's perimeter.
+LEAST_CONTACT = 0.01
+
 
 @dataclass(frozen=True)
 class Bond:
@@ -84,7 +88,7 @@ def lay_bricks(bond: Bond, width: float, courses: int) -> list[Brick]:
 
 
 def cut_bricks(bond: Bond, bricks: Sequence[Brick], rings: Sequence[np.ndarray]) -> list[Brick]:
-    """Cut bricks along rings and drop what is inside.
+    """Cut bricks along rings and drop the parts inside.
 
     Parameters
     ----------
@@ -150,9 +154,10 @@ def _is_sliver(bond: Bond, shape: shapely.Polygon) -> bool:
 def _best_neighbour(bond: Bond, bricks: list[Brick], sliver: int) -> int | None:
     """Find the neighbour with which a sliver makes the block that fills most of its convex hull."""
     shape = bricks[sliver].shape
+    least = LEAST_CONTACT * min(bond.brick_height, shape.length)
     best, fullest = None, 0.0
     for i in np.flatnonzero(shapely.intersects([brick.shape for brick in bricks], shape)).tolist():
-        if i == sliver or shape.boundary.intersection(bricks[i].shape.boundary).length < 0.01 * bond.brick_height:
+        if i == sliver or shape.boundary.intersection(bricks[i].shape.boundary).length < least:
             continue
         whole = _joined(bond, shape, bricks[i].shape)
         if whole.geom_type != "Polygon" or len(whole.interiors):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 import solver
@@ -233,6 +233,21 @@ def _open_area(wall: solver.Assembly, number: int, opening: dict) -> float:
 
 @settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(walls())
+@example(
+    # The arch cuts a sliver whose edges are all shorter than a hundredth of a brick.
+    (
+        {
+            "bricks": 16,
+            "courses": 16,
+            "bond": "english",
+            "openings": [
+                {"x": 0.5115246574125213, "y": 0.0, "width": 0.471495410898593, "height": 0.2, "head": "round arch"}
+            ],
+        },
+        4.0,
+        1.6,
+    )
+)
 def test_bricks_fill_any_wall_around_its_openings_without_overlap(sample):
     parameters, length, height = sample
     wall = generators.build("wall", parameters)
