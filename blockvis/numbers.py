@@ -30,7 +30,7 @@ def force_text(force: float, moment: bool = False) -> str:
 
 
 def rounded_length(largest: float) -> float:
-    """Round down to 1, 2 or 5 times a power of ten; 1 for what is no positive finite number.
+    """Round down to 1, 2 or 5 times a power of ten; 1 unless the length is positive and finite.
 
     Examples
     --------

@@ -40,7 +40,7 @@ def files_like(path: Path, pattern: str = "*", *, or_any: bool = False) -> list[
     pattern : str
         As of ``Path.glob``.
     or_any : bool
-        Whether names that are hardly similar, or not at all, serve where none is.
+        Whether less similar names, or any, are returned if none is similar.
     """
     beside = sorted(entry.name for entry in path.parent.glob(pattern)) if path.parent.is_dir() else []
     near = difflib.get_close_matches(path.name, beside, n=3, cutoff=0.4 if or_any else 0.6)

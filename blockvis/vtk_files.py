@@ -30,8 +30,8 @@ def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, las
 
     Notes
     -----
-    Inline binary with zlib and 64-bit headers: what ParaView from 5.11 on, pyvista and meshio all read. Appended
-    raw data, VTK's default, fails in ParaView 5.11 above some 10 kB.
+    The format is inline binary with zlib and 64-bit headers, which ParaView from 5.11 on, pyvista and meshio read.
+    Appended raw data, VTK's default, fails in ParaView 5.11 above some 10 kB.
     """
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(dataset)

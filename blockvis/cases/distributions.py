@@ -12,6 +12,8 @@ from scipy import special
 
 from blockvis.suggestions import nearest, refuse_unknown
 
+from .toml_table import is_number
+
 #: The numbers that each distribution needs, by its name; "normal" and "lognormal" may be truncated by lower and upper.
 KINDS: dict[str, tuple[str, ...]] = {
     "uniform": ("lower", "upper"),
@@ -113,7 +115,7 @@ def read_distribution(
     where : str
         Beginning of the messages.
     defaults : mapping of str to float, optional
-        Numbers that may be left out.
+        Numbers that may be missing.
 
     Returns
     -------
@@ -144,7 +146,7 @@ def read_distribution(
     )
     numbers = {key: float(value) for key, value in (defaults or {}).items() if key in needed}
     for key, value in values.items():
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        if not is_number(value):
             raise ValueError(f"{where}: {key} is {value!r}; give a number")
         numbers[key] = float(value)
     for key in needed:

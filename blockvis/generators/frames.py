@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 import solver
-from blockvis.layout.outlines import without_collinear
+from blockvis.layout.outlines import rectangle, without_collinear
 
 from .arches import segmental_joints, voussoir_outlines
 from .dimensions import above_zero, whole
@@ -47,8 +47,8 @@ def column(
     n = whole("blocks", blocks, 1)
     width, height = above_zero("width", width), above_zero("block_height", block_height)
     levels = height * np.arange(n + 1)
-    outlines = [_box(-width / 2.0, low, width / 2.0, high) for low, high in pairwise(levels)]
-    outlines.append(_box(-width, -height, width, 0.0))
+    outlines = [rectangle(-width / 2.0, low, width / 2.0, high) for low, high in pairwise(levels)]
+    outlines.append(rectangle(-width, -height, width, 0.0))
     return solver.Assembly.from_outlines(
         outlines,
         names=[*(f"block {i + 1}" for i in range(n)), "ground"],
@@ -100,8 +100,8 @@ def portal(
     n = whole("column_blocks", column_blocks, 1)
     inner, outer = span / 2.0, span / 2.0 + width
     levels = np.linspace(0.0, height, n + 1)
-    right = [_box(inner, low, outer, high) for low, high in pairwise(levels)]
-    lintel = _box(-outer, height, outer, height + lintel_height)
+    right = [rectangle(inner, low, outer, high) for low, high in pairwise(levels)]
+    lintel = rectangle(-outer, height, outer, height + lintel_height)
     return _on_two_feet({"column": right}, [("lintel", lintel)], inner, outer, density, depth)
 
 
@@ -233,7 +233,7 @@ def _arch_and_pier(
         )
     inner, outer = span / 2.0, span / 2.0 + width
     levels = np.linspace(0.0, height, n + 1)
-    pier = [_box(inner, low, outer, high) for low, high in pairwise(levels[:-1])]
+    pier = [rectangle(inner, low, outer, high) for low, high in pairwise(levels[:-1])]
     crown = [[inner, levels[-2]], [outer, levels[-2]], [outer, skewback[1, 1]], skewback[1], skewback[0]]
     ring = np.array(crown)
     kept = np.abs(ring - np.roll(ring, 1, axis=0)).max(axis=1) > 1e-12 * height
@@ -250,13 +250,13 @@ def _on_two_feet(
     density: float,
     depth: float,
 ) -> solver.Assembly:
-    """Mirror the parts of the right foot to the left, and add what they carry and a ground under either foot."""
+    """Mirror the parts of the right foot to the left, and add the blocks above and a ground under either foot."""
     named = list(above)
     for side, mirror in (("left", MIRROR), ("right", np.ones(2))):
         for part, outlines in parts.items():
             named += [(f"{side} {part} {i + 1}", outline * mirror) for i, outline in enumerate(outlines)]
     margin = (outer - inner) / 4.0
-    ground = _box(max(inner - margin, 0.25 * inner), -(outer - inner) / 2.0, outer + margin, 0.0)
+    ground = rectangle(max(inner - margin, 0.25 * inner), -(outer - inner) / 2.0, outer + margin, 0.0)
     n = len(named)
     named += [("ground left", ground * MIRROR), ("ground right", ground)]
     return solver.Assembly.from_outlines(
@@ -267,7 +267,3 @@ def _on_two_feet(
         density=density,
         thickness=depth,
     )
-
-
-def _box(left: float, low: float, right: float, high: float) -> np.ndarray:
-    return np.array([[left, low], [right, low], [right, high], [left, high]])

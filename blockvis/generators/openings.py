@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from blockvis.layout.outlines import rectangle
 from blockvis.suggestions import refuse_unknown
 
 from .arches import segmental_joints, voussoir_outlines
@@ -161,5 +162,4 @@ def opening_ring(opening: Opening, joints: np.ndarray | None) -> np.ndarray:
 
 def _lintel(opening: Opening) -> np.ndarray:
     left, right = opening.x - opening.bearing, opening.x + opening.width + opening.bearing
-    low, high = opening.top, opening.top + opening.depth
-    return np.array([[left, low], [right, low], [right, high], [left, high]])
+    return rectangle(left, opening.top, right, opening.top + opening.depth)

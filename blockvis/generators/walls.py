@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 import solver
+from blockvis.layout.outlines import rectangle
 
 from .bonds import BONDS, SHORTEST_BRICK
 from .bricks import LOWEST_BRICK, Bond, brick_outline, cut_bricks, lay_bricks
@@ -353,7 +354,7 @@ def _ground(width: float, brick_length: float, settling: Sequence[float] | None)
     """Name, role and outline of the parts of the ground, from left to right; it extends a brick beyond the wall."""
     ends = [-brick_length, width + brick_length]
     if settling is None:
-        return [("ground", solver.FIXED, _box(ends[0], -brick_length, ends[1], 0.0))]
+        return [("ground", solver.FIXED, rectangle(ends[0], -brick_length, ends[1], 0.0))]
     first, last = pair("settling", settling)
     if first >= width or last <= 0.0:
         raise ValueError(f"settling is [{first:g}, {last:g}] m, beside the wall; choose a part of 0 to {width:g} m")
@@ -364,9 +365,5 @@ def _ground(width: float, brick_length: float, settling: Sequence[float] | None)
     for name, left, right in zip(names[len(stops) - 1], stops[:-1], stops[1:], strict=True):
         middle = (max(left, 0.0) + min(right, width)) / 2.0
         role = solver.MOVING if first < middle < last else solver.FIXED
-        parts.append((name, role, _box(left, -brick_length, right, 0.0)))
+        parts.append((name, role, rectangle(left, -brick_length, right, 0.0)))
     return parts
-
-
-def _box(left: float, low: float, right: float, high: float) -> np.ndarray:
-    return np.array([[left, low], [right, low], [right, high], [left, high]])

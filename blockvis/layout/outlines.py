@@ -18,6 +18,11 @@ FLAT = 1e-6
 LARGEST_CHORD = math.pi / 6.0
 
 
+def rectangle(left: float, low: float, right: float, high: float) -> np.ndarray:
+    """(4, 2) array: corners of an upright rectangle, counter-clockwise from the lower left."""
+    return np.array([[left, low], [right, low], [right, high], [left, high]])
+
+
 def ring_area(ring: np.ndarray) -> float:
     """Area enclosed by a (n, 2) ring, positive counter-clockwise."""
     x, y = (ring - ring[0]).T

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def cells_of_ring(ring: np.ndarray) -> list[tuple[int, ...]]:
-    """Cells that cover a counter-clockwise ring: itself where it has three corners or four convex ones."""
+    """Cover a counter-clockwise ring with cells: the ring itself if it has three corners or four convex ones."""
     n = len(ring)
     if n == 3 or (n == 4 and (_turns(ring) > 0).all()):
         return [tuple(range(n))]

@@ -44,9 +44,9 @@ def run_once(
     source : str
         The case file; paths in the case are relative to its folder.
     order : mapping
-        Number, seed and values of the run, as :meth:`blockvis.studies.study_file.Study.order` gives them.
+        Number, seed and values of the run, of :meth:`blockvis.studies.study_file.Study.order`.
     n_seeded : int
-        The first so many imperfections get the run's seed.
+        Number of the first imperfections, those of the study, which get the run's seed.
     seconds : float, optional [s]
         Longest time of a run; after it the run fails.
 

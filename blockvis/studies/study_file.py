@@ -17,6 +17,7 @@ from blockvis.cases.build import case_assembly
 from blockvis.cases.case import case_of, read_case
 from blockvis.cases.distributions import Distribution, read_distribution
 from blockvis.cases.imperfections import read_imperfection
+from blockvis.cases.toml_table import is_number
 from blockvis.suggestions import nearest, refuse_unknown
 
 from .sampling import METHODS, Design, designed
@@ -98,7 +99,7 @@ class Study:
     values : dict
         The base case as parsed TOML, with the imperfections of the study before its own.
     n_seeded : int
-        The first so many imperfections get a new seed in every run.
+        Number of the first of these imperfections, those of the study, which get a new seed in every run.
     parameters : tuple of Parameter
     method : str
     runs : int
@@ -181,7 +182,7 @@ def run_values(values: Mapping[str, Any], order: Mapping[str, Any], n_seeded: in
     order : mapping
         Of :meth:`Study.order`.
     n_seeded : int
-        The first so many imperfections get the run's seed.
+        Number of the first imperfections, those of the study, which get the run's seed.
 
     Returns
     -------
@@ -247,7 +248,7 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
         hint = nearest(str(method), list(METHODS))
         raise ValueError(f"{where}[study] method is {method!r}{hint}; choose from {', '.join(METHODS)}")
     seconds = head.get("seconds")
-    if seconds is not None and not (_is_number(seconds) and seconds > 0):
+    if seconds is not None and not (is_number(seconds) and seconds > 0):
         raise ValueError(f"{where}[study] seconds is {seconds!r}; give a positive number, the longest time of one run")
     if method == "grid" and "runs" in head:
         raise ValueError(
@@ -380,7 +381,7 @@ def _parameter(path: str, given: Any, where: str) -> Parameter:
         raise ValueError(f"{where}: values is {values!r}; give a list of at least one")
     share = np.ones(len(values))
     if weights is not None:
-        if not (isinstance(weights, Sequence) and len(weights) == len(values) and all(map(_is_number, weights))):
+        if not (isinstance(weights, Sequence) and len(weights) == len(values) and all(map(is_number, weights))):
             raise ValueError(f"{where}: weights is {weights!r}; give a number for each of the {len(values)} values")
         share = np.array(weights, dtype=float)
         if (share < 0.0).any() or share.sum() <= 0.0:
@@ -405,10 +406,6 @@ def _imperfections(given: Any, where: str) -> list[dict[str, Any]]:
 
 def _as_list(given: Any) -> list[Any]:
     return list(given) if isinstance(given, (list, tuple)) else [given]
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and bool(np.isfinite(value))
 
 
 def _whole(table: Mapping[str, Any], key: str, default: int, least: int, where: str) -> int:
