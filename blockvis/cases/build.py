@@ -76,7 +76,7 @@ def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
         shown = ", ".join(f"'{assembly.names[i]}'" for i in light[:6].tolist()) + (" ..." if len(light) > 6 else "")
         warnings.warn(
             f"{source}: {len(light)} blocks weigh less than {LIGHTEST:g} of the whole ({shown}), less than rounding "
-            "leaves: they may stay in the air; remove them or check their size and density",
+            "errors of the others: they may stay in the air; remove them or check their size and density",
             stacklevel=3,
         )
     largest = float(np.sqrt(assembly.areas[assembly.free].max(initial=0.0)))

@@ -207,8 +207,8 @@ def _fitting(case: Case) -> Case:
     laws = [solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength)]
     if not all(law.dry for law in [*laws, *case.interfaces.values()]) and (kind != "limit load" or case.settlements):
         raise ValueError(
-            f"{source}: cohesion and compressive_strength are for limit loads without a settlement; what follows the "
-            "geometry follows dry joints"
+            f"{source}: cohesion and compressive_strength are for limit loads without a settlement; settlements and "
+            "pushovers follow dry joints"
         )
     _check_keys_of_kind(case)
     _check_moving_load(case)
@@ -400,7 +400,7 @@ def _load(table: Table) -> LoadCase:
             raise table.error("positions", 'are those of a live force; give kind = "live" and force = [fx, fy]')
         for key in ("blocks", "weight_fraction", "point", "moment", "pressure"):
             if key in given:
-                raise table.error(key, "does not go with positions: the force stands on what is topmost at each")
+                raise table.error(key, "does not go with positions: the force acts on the topmost block at each")
     elif load.weight_fraction is None and load.pressure is None and load.force == (0.0, 0.0) and not load.moment:
         raise table.error("force", "is missing or zero; give force, moment, weight_fraction or pressure")
     return load

@@ -179,8 +179,8 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
     if too_far.sum() > MOST_HELD_BACK * max((~held).sum(), 1):
         raise ValueError(
             f"imperfections of kind 'vertices' move {int(too_far.sum())} of {int((~held).sum())} corners by more than "
-            f"a quarter of what lies beside them, typically {np.median(LARGEST_SHARE * share):.3g} m; make them "
-            "smaller"
+            "a quarter of the distance to the next corner or the width of their blocks, typically "
+            f"{np.median(LARGEST_SHARE * share):.3g} m; make them smaller"
         )
     drawn *= np.where(too_far, LARGEST_SHARE * share / np.maximum(size, 1e-300), 1.0)[:, None]
     new = _on_rails(positions, drawn, rails, place, assembly.next_vertex)

@@ -62,7 +62,7 @@ class Layout:
             if len(getattr(self, what)) != n:
                 raise ValueError(f"{n} outlines but {len(getattr(self, what))} {what}; give one per block")
         # A file in another encoding than it states leaves halves of characters, which cannot be written to a file.
-        note = "characters that are none in the file's encoding are shown as \ufffd"
+        note = "characters that the file's encoding does not have are shown as \ufffd"
         for what in ("names", "groups", "roles", "materials"):
             words = getattr(self, what)
             whole = tuple(_HALVES.sub("\ufffd", word) for word in words)
