@@ -19,13 +19,14 @@ GRID = 1e-10
 #: A piece lower than this fraction of a course is joined to a neighbour.
 LOWEST_BRICK = 0.3
 
-#: A piece into which no circle with this fraction of the brick height as diameter fits, such as the end of a wedge, is
-#: joined to a neighbour.
+#: So is a piece into which no circle of this fraction of the brick height in diameter fits: the end of a wedge.
 NARROWEST = 0.25
 
-#: Least length of the joint along which a sliver is joined, as a fraction of the brick height or, if less, of the
-#: sliver's perimeter.
-LEAST_CONTACT = 0.01
+#: Pieces are joined along at least this fraction of the brick height, not where they touch at a corner,
+LEAST_SHARED = 0.01
+
+#: or along this fraction of the sliver's own perimeter: one so small that all its edges are shorter is joined, too.
+LEAST_OF_PERIMETER = 0.05
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ def _is_sliver(bond: Bond, shape: shapely.Polygon) -> bool:
 def _best_neighbour(bond: Bond, bricks: list[Brick], sliver: int) -> int | None:
     """Find the neighbour with which a sliver makes the block that fills most of its convex hull."""
     shape = bricks[sliver].shape
-    least = LEAST_CONTACT * min(bond.brick_height, shape.length)
+    least = min(LEAST_SHARED * bond.brick_height, LEAST_OF_PERIMETER * shape.length)
     best, fullest = None, 0.0
     for i in np.flatnonzero(shapely.intersects([brick.shape for brick in bricks], shape)).tolist():
         if i == sliver or shape.boundary.intersection(bricks[i].shape.boundary).length < least:
