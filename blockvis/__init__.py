@@ -52,13 +52,13 @@ __all__ = sorted(_HOMES)
 
 
 def _plot(response: solver.Response, **options: Any) -> Any:
-    """The response as a player for notebooks; see :func:`blockvis.show`."""
+    """Show the response in a player for notebooks; see :func:`blockvis.show`."""
     from .report.notebook import show
 
     return show(response, **options)
 
 
-# The mechanics draw nothing; who has pictures lends them: `response.plot()` works once blockvis is imported.
+# solver has no plotting; importing blockvis adds `Response.plot()`.
 setattr(solver.Response, "plot", _plot)  # noqa: B010
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 import warnings
@@ -16,6 +15,8 @@ import numpy as np
 import solver
 from blockvis import generators
 from blockvis.formats import FORMATS
+from blockvis.suggestions import files_like
+from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .imperfections import Imperfection, read_imperfection
 from .loads import LoadCase
@@ -23,13 +24,10 @@ from .toml_table import Table, is_number, shortened
 
 ANALYSES = ("settlement", "limit load", "pushover")
 
-#: How sliding joints of a limit load behave.
+#: Flow rules of the sliding joints of a limit load.
 FLOWS = ("associative", "non-associative")
 
-#: Endings of animations.
-FILMS = (".mp4", ".gif", ".webp")
-
-#: More increments or frames than this are a slip of the pen.
+#: More increments or frames than this are taken for a typing error.
 MOST_STEPS = 1_000_000
 
 
@@ -75,22 +73,25 @@ class Case:
 
 
 def read_case(path: str | Path) -> Case:
-    """Reads and checks a case file.
+    """Read and check a case file.
 
     Parameters
     ----------
     path : str or Path
 
+    Returns
+    -------
+    Case
+
     Raises
     ------
     ValueError
-        Names the file, the key and the remedy: a missing file, broken TOML (with its line), an unknown key (with the
-        nearest valid one), a value of the wrong kind.
+        For a missing file, broken TOML, an unknown key, a value of the wrong kind; names the file, the key or line and
+        the remedy.
     """
     path = Path(path)
     if not path.is_file():
-        beside = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
-        near = difflib.get_close_matches(path.name, beside, n=3, cutoff=0.4) or beside[:3]
+        near = files_like(path, "*.toml", or_any=True)
         hint = f"; beside it are {', '.join(near)}" if near else ""
         raise ValueError(f"there is no case file '{path}'{hint}")
     if path.suffix.lower() in FORMATS:
@@ -106,7 +107,7 @@ def read_case(path: str | Path) -> Case:
 
 
 def parse_case(text: str, source: Path) -> Case:
-    """As :func:`read_case`, from the text of a case file; paths in it are relative to the folder of ``source``."""
+    """Read a case from the text of a case file; paths in it are relative to the folder of ``source``."""
     try:
         values = tomllib.loads(text)
     except RecursionError:
@@ -117,7 +118,7 @@ def parse_case(text: str, source: Path) -> Case:
 
 
 def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
-    """As :func:`parse_case`, from the values that TOML makes of a text."""
+    """Make a case of the values of a parsed TOML text; paths in it are relative to the folder of ``source``."""
     top = Table(values, "", source)
     geometry = top.table("geometry")
     file, layout = geometry.text("file"), geometry.text("layout")
@@ -148,11 +149,11 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     animation = output.take("animation", "collapse.mp4")
     if animation is not False:
         animation = output.text("animation", "collapse.mp4")
-        if not Path(animation).name == animation or "\\" in animation or not animation.lower().endswith(FILMS):
+        if not Path(animation).name == animation or "\\" in animation or not animation.lower().endswith(VIDEO_SUFFIXES):
             raise output.error(
                 "animation",
-                f"is {shortened(animation)}; give a name ending in {', '.join(FILMS)}, without a folder: it is written "
-                "into the results folder",
+                f"is {shortened(animation)}; give a name ending in {', '.join(VIDEO_SUFFIXES)}, without a folder: "
+                "it is written into the results folder",
             )
     case = Case(
         source=source,
@@ -188,10 +189,9 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
 
 
 def _fitting(case: Case) -> Case:
-    """The case, once its keys fit the analysis that it asks for."""
+    """Check that the keys of a case fit its analysis, and let its settlement stop where a capacity is asked for."""
     source, kind = case.source, case.analysis
     live = any(load.kind == "live" for load in case.loads)
-    moving = [k + 1 for k, load in enumerate(case.loads) if load.positions]
     if kind == "settlement" and not case.settlements:
         raise ValueError(f"{source}: [settlement] is missing; say how the moving supports move, direction = [1, 0]")
     if kind == "settlement" and live:
@@ -207,9 +207,17 @@ def _fitting(case: Case) -> Case:
     laws = [solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength)]
     if not all(law.dry for law in [*laws, *case.interfaces.values()]) and (kind != "limit load" or case.settlements):
         raise ValueError(
-            f"{source}: cohesion and compressive_strength are for limit loads without a settlement; what follows the "
-            "geometry follows dry joints"
+            f"{source}: cohesion and compressive_strength are for limit loads without a settlement; settlements and "
+            "pushovers follow dry joints"
         )
+    _check_keys_of_kind(case)
+    _check_moving_load(case)
+    return case if case.capacity_at is None else _stopping_at(case, case.capacity_at)
+
+
+def _check_keys_of_kind(case: Case) -> None:
+    """Refuse keys that belong to another kind of analysis."""
+    source, kind = case.source, case.analysis
     if kind == "pushover" and case.control is None:
         raise ValueError(
             f'{source}: [control] is missing; a pushover needs the displacement that grows, block = "..." and '
@@ -227,22 +235,30 @@ def _fitting(case: Case) -> Case:
             f"{source}: [analysis] displacement is that of a limit load after a settlement, in which open joints may "
             "close"
         )
-    if kind == "pushover" and moving:
-        raise ValueError(f'{source}: [loads {moving[0]}] positions belong to [analysis] kind = "limit load"')
+
+
+def _check_moving_load(case: Case) -> None:
+    moving = [k for k, load in enumerate(case.loads, start=1) if load.positions]
+    if case.analysis == "pushover" and moving:
+        raise ValueError(f'{case.source}: [loads {moving[0]}] positions belong to [analysis] kind = "limit load"')
     if len(moving) > 1:
-        raise ValueError(f"{source}: [loads {moving[1]}] positions: only one load may move, and loads {moving[0]} does")
-    if case.capacity_at is None:
-        return case
-    if kind != "limit load" or not case.settlements or moving:
         raise ValueError(
-            f'{source}: [analysis] capacity_at asks for limit loads (kind = "limit load") of loads that stand still, '
-            "along a [settlement]"
+            f"{case.source}: [loads {moving[1]}] positions: only one load may move, and loads {moving[0]} does"
+        )
+
+
+def _stopping_at(case: Case, capacity_at: tuple[float, ...]) -> Case:
+    """Let the last settlement of a case stop at each settlement of ``capacity_at``."""
+    if case.analysis != "limit load" or not case.settlements or any(load.positions for load in case.loads):
+        raise ValueError(
+            f'{case.source}: [analysis] capacity_at asks for limit loads (kind = "limit load") of loads that stand '
+            "still, along a [settlement]"
         )
     last = case.settlements[-1]
     try:
-        stopping = replace(last, stops=case.capacity_at)
+        stopping = replace(last, stops=capacity_at)
     except ValueError as error:
-        raise ValueError(f"{source}: [analysis] capacity_at: {error}") from None
+        raise ValueError(f"{case.source}: [analysis] capacity_at: {error}") from None
     return replace(case, settlements=(*case.settlements[:-1], stopping))
 
 
@@ -274,7 +290,7 @@ def _support(table: Table) -> Mapping[str, Any]:
 
 
 def _strength(table: Table) -> dict[str, float]:
-    """Cohesion and compressive strength [Pa], where they are given."""
+    """Cohesion and compressive strength [Pa]; without a key no cohesion, and infinite strength."""
     cohesion = table.number("cohesion", 0.0)
     if cohesion < 0.0:
         raise table.error("cohesion", f"is {cohesion:g}; give a stress in Pa of at least 0")
@@ -384,7 +400,7 @@ def _load(table: Table) -> LoadCase:
             raise table.error("positions", 'are those of a live force; give kind = "live" and force = [fx, fy]')
         for key in ("blocks", "weight_fraction", "point", "moment", "pressure"):
             if key in given:
-                raise table.error(key, "does not go with positions: the force stands on what is topmost at each")
+                raise table.error(key, "does not go with positions: the force acts on the topmost block at each")
     elif load.weight_fraction is None and load.pressure is None and load.force == (0.0, 0.0) and not load.moment:
         raise table.error("force", "is missing or zero; give force, moment, weight_fraction or pressure")
     return load

@@ -9,8 +9,7 @@ from pathlib import Path
 from PIL import Image
 
 from blockvis.atomic_files import whole_file
-
-FILM_SUFFIXES = (".mp4", ".gif", ".webp")
+from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 #: Quality of x264 (0 lossless, 51 worst): line drawings show ringing from about 22 on.
 CRF = "19"
@@ -38,9 +37,9 @@ def write_film(
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in FILM_SUFFIXES:
+    if suffix not in VIDEO_SUFFIXES:
         raise ValueError(
-            f"'{path.name}' is no animation that blockvis writes; end its name in {', '.join(FILM_SUFFIXES)}"
+            f"'{path.name}' is no animation that blockvis writes; end its name in {', '.join(VIDEO_SUFFIXES)}"
         )
     if size[0] % 2 or size[1] % 2:
         raise ValueError(f"an animation of {size[0]} × {size[1]} pixels cannot be encoded; both must be even")

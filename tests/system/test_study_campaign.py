@@ -20,7 +20,7 @@ from blockvis.studies import campaign
 from blockvis.studies.fragility import fragility_of
 from blockvis.studies.run_one import run_once
 from blockvis.studies.study_file import read_study
-from blockvis.studies.study_folder import Ledger, finished_runs
+from blockvis.studies.study_folder import StudyFolder, finished_runs
 
 #: A block 0.5 × 1 on a ground that tilts: it overturns at atan(0.5) or slides at atan(μ), whichever is first.
 TILT = {
@@ -74,10 +74,10 @@ def arches(tmp_path):
 
 def _made_here(study, folder, runs):
     """Some runs of a study, without any cluster."""
-    ledger = Ledger(folder, study)
+    records = StudyFolder(folder, study)
     for run in runs:
-        ledger.add([run_once(study.values, str(study.case_source), study.order(run), study.n_seeded)])
-    return ledger
+        records.add([run_once(study.values, str(study.case_source), study.order(run), study.n_seeded)])
+    return records
 
 
 def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path):
@@ -125,12 +125,12 @@ def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
         "study": {"case": TILT, "method": "grid"},
         "parameters": {"geometry.parameters.blocks": [1, 0], "material.friction_coefficient": [0.3, 0.4]},
     }
-    ledger = _made_here(read_study(given), tmp_path / "out", range(4))
-    table = ledger.write_table()
+    records = _made_here(read_study(given), tmp_path / "out", range(4))
+    table = records.write_table()
     assert table["status"].tolist() == ["collapsed", "collapsed", "failed", "failed"]
     assert table["message"].str.contains("blocks is 0").tolist() == [False, False, True, True]
-    assert ledger.missing() == []
-    assert ledger.missing(retry_failed=True) == [2, 3]
+    assert records.missing() == []
+    assert records.missing(retry_failed=True) == [2, 3]
     impatient = {**given, "study": {**given["study"], "seconds": 1e-9}}
     plan = read_study(impatient)
     row, shape = run_once(plan.values, "case", plan.order(0), 0, plan.seconds)
@@ -191,7 +191,7 @@ def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tm
     assert "24 finished runs of another study: parameters has changed" in message
     assert "--force" in message
     assert finished_runs(out) == 24
-    assert Ledger(out, read_study(arches), force=True).missing() == list(range(24))
+    assert StudyFolder(out, read_study(arches), force=True).missing() == list(range(24))
 
 
 def test_a_folder_that_is_no_study_is_refused(arches, tmp_path, capsys):
@@ -207,10 +207,10 @@ def test_a_row_half_written_is_made_again(arches, tmp_path):
     _made_here(study, tmp_path / "out", [0, 1])
     file = tmp_path / "out" / "runs.jsonl"
     file.write_bytes(file.read_bytes()[:-40])
-    ledger = Ledger(tmp_path / "out", study)
-    assert ledger.missing() == list(range(1, 24))
-    ledger.add([run_once(study.values, str(study.case_source), study.order(1), study.n_seeded)])
-    assert Ledger(tmp_path / "out", study).missing() == list(range(2, 24)), "half a line spoils none after it"
+    records = StudyFolder(tmp_path / "out", study)
+    assert records.missing() == list(range(1, 24))
+    records.add([run_once(study.values, str(study.case_source), study.order(1), study.n_seeded)])
+    assert StudyFolder(tmp_path / "out", study).missing() == list(range(2, 24)), "half a line spoils none after it"
 
 
 def _deadly(values, source, order, n_seeded, seconds):

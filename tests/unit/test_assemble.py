@@ -146,7 +146,7 @@ def test_halves_of_characters_are_replaced_and_noted(tmp_path):
     assert drawing.names == ("a\ufffdb", "c\u0000d \U0001f9f1")
     assert drawing.materials == ("m\ufffd", "")
     assert [note for note in drawing.notes if "encoding" in note] == [
-        "characters that are none in the file's encoding are shown as \ufffd"
+        "characters that the file's encoding does not have are shown as \ufffd"
     ]
     assembly = assemble(drawing, roles={"a*": "moving"})
     spread = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.01)

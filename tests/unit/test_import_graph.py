@@ -28,6 +28,7 @@ ORDER = (
     "blockvis.formats",
     "blockvis.layout",
     "blockvis.suggestions",
+    "blockvis.video_suffixes",
     "blockvis.numbers",
     "blockvis.vtk_files",
     "blockvis.atomic_files",
