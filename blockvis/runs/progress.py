@@ -8,22 +8,25 @@ from typing import TextIO
 
 import solver
 
+from .kind import Course
+
 #: Seconds between two redrawings of the bar.
 REDRAW = 0.1
 
 
 class Progress:
-    """A bar that follows the settlement of the phase towards its limit.
+    """A bar that follows the parameter of an analysis towards its limit.
 
     Parameters
     ----------
-    settlements : tuple of solver.Settlement
+    course : Course
+        What the increments run over.
     stream : text stream, optional
         stderr by default; nothing is written unless it is a terminal.
     """
 
-    def __init__(self, settlements: tuple[solver.Settlement, ...], stream: TextIO | None = None) -> None:
-        self.settlements = settlements
+    def __init__(self, course: Course, stream: TextIO | None = None) -> None:
+        self.course = course
         self.stream = sys.stderr if stream is None else stream
         self.shown = self.stream.isatty()
         self.started = time.perf_counter()
@@ -34,19 +37,18 @@ class Progress:
         self.count += 1
         if not self.shown or time.perf_counter() - self.last < REDRAW:
             return
-        falls = increment.status == solver.Status.FALLING
-        what = "falls" if falls else f"reaction {increment.reaction:.5g} N"
-        if increment.load_multiplier and not falls:
-            what = f"load multiplier {increment.load_multiplier:.5g}"
-        if not self.settlements:
+        parameter, measured, drivers = self.course.parameter, self.course.measured, self.course.drivers
+        what = f"{measured.name} {increment.measured:.5g} {measured.unit}".rstrip()
+        if increment.status == solver.Status.FALLING:
+            what = "falls"
+        if not drivers:
             self._line(f"{what}, {self.count} increments")
             return
-        settlement = self.settlements[increment.phase]
-        part = min(increment.settlement / settlement.limit, 1.0)
-        word = "settlement" if isinstance(settlement, solver.Settlement) else "control displacement"
+        driver = drivers[min(increment.phase, len(drivers) - 1)]
+        part = min(increment.parameter / driver.limit, 1.0)
         self._line(
-            f"[{'#' * int(24 * part):<24}] {word} {increment.settlement:.4g} of at most {settlement.limit:g} "
-            f"{settlement.unit}, {what}, {self.count} increments"
+            f"[{'#' * int(24 * part):<24}] {parameter.name} {increment.parameter:.4g} of at most {driver.limit:g} "
+            f"{driver.unit}, {what}, {self.count} increments"
         )
 
     def picture(self, done: int, total: int) -> None:

@@ -16,10 +16,13 @@ from blockvis.cases.build import case_assembly
 from blockvis.cases.case import Case, parse_case, read_case
 from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
-from blockvis.runs.reopen import open_results
 
-from .plan import Plan, checkpoint_kind, parameter_of, planned
+from .kind import AnalysisRun
+from .kinds import KINDS
+from .plan import planned
 from .progress import Progress
+from .reopen import open_results
+from .write import finish
 
 #: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
 AS_DRAWN = 0.02
@@ -87,14 +90,14 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
     folder = Path(f"{case.source.stem}-results") if folder is None else Path(folder)
     refuse_results(folder, overwrite)
     assembly = case_assembly(case)
-    plan = planned(case, assembly)
+    run = planned(case, assembly)
     try:
         results = ResultsFolder(
-            folder, assembly, record=record_of(case), overwrite=overwrite, parameter=parameter_of(case)
+            folder, assembly, record=record_of(case), overwrite=overwrite, parameter=run.course.parameter
         )
     except OSError as error:
         raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
-    return _followed(case, results, plan)
+    return _followed(case, results, run)
 
 
 def resume_run(folder: str | Path) -> Run:
@@ -134,7 +137,8 @@ def resume_run(folder: str | Path) -> Run:
         return Run(response, folder, finished, missing, had_finished=True)
     for note in record.changes():
         warnings.warn(note, stacklevel=2)
-    results, checkpoint = ResultsFolder.reopened(folder, parameter_of(case), checkpoint_kind(case))
+    kind = KINDS[case.analysis]
+    results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint)
     return _followed(case, results, planned(case, results.assembly, checkpoint, tuple(results.increments)))
 
 
@@ -150,36 +154,35 @@ def _drawn(case: Case) -> list[str]:
     return ["report.html", "mechanism.png", *([case.animation] if case.animation else [])]
 
 
-def _followed(case: Case, results: ResultsFolder, plan: Plan) -> Run:
+def _followed(case: Case, results: ResultsFolder, run: AnalysisRun) -> Run:
     """Follows the increments to their end or to Ctrl-C, writing each, and draws what came out."""
     folder = results.path
-    progress = Progress(plan.settlements)
+    progress = Progress(run.course)
     ending = solver.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
     try:
         while True:
             try:
-                increment = next(plan.steps)
+                increment = next(run.steps)
             except StopIteration as stop:
                 ending = stop.value
                 break
             results.add(increment)
-            if len(plan.limits) == len(results.increments):
-                plan.told(results.increments[-1])
+            run.recorded(results.increments)
             if len(results.increments) == 1:
                 _note_settled(results.assembly, increment)
             for note in increment.notes:
                 warnings.warn(note, stacklevel=2)
             progress.increment(increment)
     except KeyboardInterrupt:
-        plan.steps.close()
+        run.steps.close()
     except OSError as error:
         raise _given_up(folder, error) from None
     finally:
         progress.done()
-    response = plan.response(results.increments, ending)
+    response = run.response(results.increments, ending)
     missing: tuple[str, ...] = ()
     try:
-        summary = results.finish(response, sum(i.seconds for i in response.increments))
+        summary = finish(results, response)
         if ending.stop is not solver.Status.INTERRUPTED:
             missing = draw_results(response, folder, animation=case.animation, case_text=case.text)
     except OSError as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -132,4 +132,4 @@ def with_motion(increment: Increment, motion: np.ndarray) -> Increment:
     contacts, pose = increment.contacts, increment.pose
 
     a, b = (point_velocities(contacts.points, k, pose, motion) for k in (contacts.block_a, contacts.block_b))
-    return replace(increment, velocity=motion, displacements=np.einsum("kij,kj->ki", contacts.frames, a - b))
+    return increment.with_arrays(velocity=motion, displacements=np.einsum("kij,kj->ki", contacts.frames, a - b))

@@ -1,7 +1,5 @@
 """Joints, cracks, hinges, resultants and the parts of a mechanism."""
 
-from dataclasses import replace
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -109,7 +107,7 @@ def test_joints_that_hardly_slide_are_not_marked():
     used_up = np.stack([last.forces[:, 0], last.friction * last.forces[:, 0]], axis=1)
     fastest = np.abs(last.velocity[:, :2]).max()
     for slip, drawn in ((0.5, True), (1e-4, False)):
-        sliding = replace(last, forces=used_up, displacements=np.full_like(last.displacements, slip * fastest))
+        sliding = last.with_arrays(forces=used_up, displacements=np.full_like(last.displacements, slip * fastest))
         assert (sliding.states == solver.ContactState.SLIDING).any()
         assert (len(marks.marks_of(response.assembly, joints, sliding, last.pose).sliding) > 0) is drawn
 
