@@ -39,7 +39,7 @@ from .results.quantities import (
     reaction_to,
     settlement_in,
 )
-from .results.response import Collapse, Control, Response, total_weight
+from .results.response import Collapse, Control, Response, path_parameters, total_weight
 from .surface_loads import edge_pressure, load_on_top, surface_pressure
 
 __all__ = [
@@ -93,6 +93,7 @@ __all__ = [
     "mechanism_of",
     "moved_vertices",
     "overlap_depths",
+    "path_parameters",
     "point_load",
     "pushover",
     "pushover_increments",

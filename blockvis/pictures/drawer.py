@@ -454,13 +454,7 @@ def _even_motion(
     """``n`` frames at even settlement: the increment before each, the pose in between, and the settlement."""
     if not path:
         return
-    reached, before, last = [], 0.0, 0.0
-    for previous, increment in zip([path[0], *path], path, strict=False):
-        if increment.phase != previous.phase:
-            before = last
-        last = before + increment.settlement
-        reached.append(last)
-    total = np.array(reached)
+    total = solver.path_parameters(path)
     if total[-1] <= total[0]:
         yield path[-1], None, None
         return

@@ -8,7 +8,6 @@ import json
 import os
 import zlib
 from collections.abc import Iterator
-from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -133,7 +132,7 @@ def _model(response: solver.Response) -> dict[str, Any]:
             )
         },
         "frames": _frames(response, shown),
-        "times": _times(response, shown),
+        "times": _times(shown),
         "curve": _curve(response),
         "force_unit": FORCE_FINENESS * largest,
         "force_length": force_length,
@@ -289,10 +288,9 @@ def _frames(response: solver.Response, shown: list[solver.Increment]) -> list[di
     return frames
 
 
-def _times(response: solver.Response, shown: list[solver.Increment]) -> list[float]:
+def _times(shown: list[solver.Increment]) -> list[float]:
     """Seconds at which each frame plays: even settlement, then the fall."""
-    standing = tuple(i for i in shown if i.status != solver.Status.FALLING)
-    path = replace(response, increments=standing).parameters
+    path = solver.path_parameters([i for i in shown if i.status != solver.Status.FALLING])
     path = path - path[:1]
     total = float(path[-1]) if len(path) and path[-1] > 0 else 1.0
     times: list[float] = []

@@ -64,7 +64,7 @@ class AnalysisRun:
     given : RunInput
     course : Course
     steps : generator of solver.Increment
-        Returns a solver.Ending.
+        Returns a solver.Ending. None by default, for steps that fill in the other fields as they go.
     limits : list of solver.LimitLoad
         Filled as the steps go, one per limit state.
     """
@@ -72,7 +72,7 @@ class AnalysisRun:
     analysis: str
     given: RunInput
     course: Course
-    steps: Steps
+    steps: Steps = field(default_factory=lambda: _ended(solver.Ending(solver.Status.LIMIT_REACHED)))
     limits: list[solver.LimitLoad] = field(default_factory=list)
 
     def recorded(self, increments: Sequence[solver.Increment]) -> None:

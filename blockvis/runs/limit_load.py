@@ -127,7 +127,7 @@ class LimitLoadKind(AnalysisKind):
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
         """The settlements of a case, of which only a fall is reported, and limit loads along them or behind them."""
         places, live = moving_loads(given.case.loads, given.assembly, given.case.source)
-        run = AnalysisRun(self.name, given, self.course(given.case), iter(()))  # type: ignore[arg-type]
+        run = AnalysisRun(self.name, given, self.course(given.case))
         if resume is not None:
             pairs = zip(resume.limits, found, strict=True)
             run.limits = [replace(limit, held=increment.held) for limit, increment in pairs]

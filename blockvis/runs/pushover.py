@@ -86,7 +86,7 @@ class PushoverKind(AnalysisKind):
             "control": asdict(control) if isinstance(control, solver.ControlDisplacement) else None,
             "limit_load_multiplier": float(values[0]) if len(values) and math.isfinite(values[0]) else None,
             "largest_load_multiplier": None if largest is None else float(values[largest]),
-            "largest_load_multiplier_at": None if largest is None else float(response.settlement[largest]),
+            "largest_load_multiplier_at": None if largest is None else response.path[largest].parameter,
         }
 
     def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -128,13 +129,7 @@ class Response:
     @property
     def parameters(self) -> np.ndarray:
         """(n,) array: parameter of each increment in equilibrium, phases one after another."""
-        path = self.path
-        total, before, last = np.zeros(len(path)), 0.0, 0.0
-        for k, increment in enumerate(path):
-            if k and increment.phase != path[k - 1].phase:
-                before = last
-            last = total[k] = before + increment.parameter
-        return total
+        return path_parameters(self.path)
 
     @property
     def values(self) -> np.ndarray:
@@ -184,6 +179,16 @@ class Response:
     def total_weight(self) -> float:
         """Weight of the free blocks [N]."""
         return total_weight(self.assembly)
+
+
+def path_parameters(path: Sequence[Increment]) -> np.ndarray:
+    """(n,) array: parameter of each increment, phases one after another."""
+    total, before, last = np.zeros(len(path)), 0.0, 0.0
+    for k, increment in enumerate(path):
+        if k and increment.phase != path[k - 1].phase:
+            before = last
+        last = total[k] = before + increment.parameter
+    return total
 
 
 def total_weight(assembly: Assembly) -> float:

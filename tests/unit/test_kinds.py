@@ -2,6 +2,7 @@
 
 import ast
 import csv
+import io
 import json
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,6 +21,7 @@ from blockvis.pictures.curves import draw_curve
 from blockvis.report.page import report_html
 from blockvis.runs.kind import AnalysisKind, AnalysisRun, RunInput, Steps
 from blockvis.runs.kinds import KINDS
+from blockvis.runs.progress import Progress
 
 ROOT = Path(__file__).parents[2]
 
@@ -140,3 +142,41 @@ def test_keys_of_a_kind_belong_to_it(tmp_path):
     settling = TILT.replace('kind = "tilt"', 'kind = "settlement"') + "[settlement]\ndirection = [0, -1]\n"
     with pytest.raises(ValueError, match="tilt_step is not a key here"):
         parse_case(settling, tmp_path / "tilt.toml")
+
+
+class Terminal(io.StringIO):
+    """A stream that somebody watches."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(
+    ("analysis", "extra", "line"),
+    [
+        ("settlement", "", "settlement 0.05 of at most 0.4 m, reaction 7 N, 1 increments"),
+        (
+            "settlement",
+            "rotation_centre = [0, 0]\n",
+            "settlement 0.05 of at most 0.4 rad, reaction 7 N·m, 1 incr",
+        ),
+        ("limit load", "", "settlement 0.05 of at most 0.4 m, load multiplier 7, 1 increments"),
+        ("pushover", "", "control displacement 0.05 of at most 1 m, load multiplier 7, 1 increments"),
+    ],
+)
+def test_the_bar_shows_the_quantities_of_the_kind(analysis, extra, line, tmp_path, monkeypatch):
+    monkeypatch.setattr("blockvis.runs.progress.REDRAW", -1.0)
+    direction = "" if extra else "direction = [0, -1]\n"
+    text = TILT.replace('"tilt"\ntilt_step = 0.03', f'"{analysis}"') + f"[settlement]\n{direction}limit = 0.4\n{extra}"
+    if analysis != "settlement":
+        text += '[[loads]]\nkind = "live"\nweight_fraction = [1.0, 0.0]\n'
+    if analysis == "pushover":
+        text += '[control]\nblock = "block 1"\n'
+    course = KINDS[analysis].course(parse_case(text, tmp_path / "case.toml"))
+    stream = Terminal()
+    certificate = solver.Certificate(0.0, 0.0, 0.0, 0.0, 0.0)
+    nothing = np.zeros((0, 2))
+    state = solver.State(None, None, nothing, nothing, nothing, nothing, nothing)
+    standing = solver.Increment(0.05, 7.0, 0, 7.0, 7.0, certificate, solver.Status.EQUILIBRIUM, 1, 0.1, state)
+    Progress(course, stream).increment(standing)
+    assert f"] {line}" in stream.getvalue()
