@@ -106,7 +106,7 @@ def drawn_joints(assembly: solver.Assembly) -> DrawnJoints:
     tolerance = TOUCHING * assembly.block_size
     contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * tolerance)
     touching = np.abs(contacts.gaps) <= tolerance
-    vertex, edge_b = contacts.vertex[touching], contacts.edge[touching]
+    vertex, edge_b, _ = solver.corners_and_edges(contacts.features[touching])
     # The corner belongs to two faces of block a; either may lie on the edge of block b.
     edge_a = np.concatenate([vertex, assembly.previous_vertex[vertex]])
     edge_b = np.concatenate([edge_b, edge_b])
@@ -209,18 +209,13 @@ def _cracks(
         return on_a, on_b
 
     on_a, on_b = sides(pose)
-    turn = pose.rotations[joints.block_b]
-    c, s = np.cos(turn), np.sin(turn)
-    normal = np.stack(
-        [c * joints.normals[:, 0] - s * joints.normals[:, 1], s * joints.normals[:, 0] + c * joints.normals[:, 1]],
-        axis=1,
-    )
+    normal = solver.turned(joints.normals, pose.rotations[joints.block_b])
     length = np.hypot(*(joints.ends[:, 1] - joints.ends[:, 0]).T)
     opening = np.einsum("nij,nj->ni", on_a - on_b, normal).max(axis=1)
     apart = np.hypot(*np.moveaxis(on_a - on_b, 2, 0)).min(axis=1)
     # Blocks that have parted altogether have no joint any more: what lies between them is air, not a crack.
     if falling:
-        turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])
+        turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])[:, 0]
         together = (apart < WIDEST_FALLING * length) & (turn < STEEPEST_FALLING)
     else:
         together = apart < np.maximum(length, WIDEST_STANDING * assembly.block_size)

@@ -367,8 +367,7 @@ class Studio:
             # A bent support may have its centroid outside.
             inside = outline.centroid if outline.contains(outline.centroid) else outline.point_on_surface()
             place = np.array(inside.coords[0])
-            arm = place - shown.positions[block]
-            speed = rate[block, :2] + rate[block, 2] * np.array([-arm[1], arm[0]])
+            speed = solver.point_velocities(place[None], np.array([block]), shown, rate)[0]
             if np.hypot(*speed) > 0:
                 along = speed / np.hypot(*speed) * length
                 tails.append(place - along / 2.0)

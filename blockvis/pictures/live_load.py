@@ -43,7 +43,7 @@ class LiveLoad:
     @classmethod
     def none(cls) -> LiveLoad:
         """No load."""
-        nowhere = solver.Pose(np.zeros((0, 2)), np.zeros(0))
+        nowhere = solver.Pose(np.zeros((0, 2)), np.zeros((0, 1)))
         return cls(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, dtype=int), nowhere)
 
     def carried(self, pose: solver.Pose) -> np.ndarray:

@@ -111,8 +111,7 @@ def draw_mechanism(
 def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
     """(n_blocks,) array: speed of the fastest corner of each free block, zero for supports."""
     block = assembly.block_of_vertex
-    arms = solver.moved_vertices(assembly, pose) - pose.positions[block]
-    velocity = motion[block, :2] + motion[block, 2:] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+    velocity = solver.point_velocities(solver.moved_vertices(assembly, pose), block, pose, motion)
     speeds = np.maximum.reduceat(np.hypot(*velocity.T), assembly.offsets[:-1])
     return np.where(assembly.free, speeds, 0.0)
 

@@ -321,7 +321,7 @@ def _collapse_of(
     falling = [i for i in increments if i.status == solver.Status.FALLING]
     if falling:
         motion = falling[0].velocity
-        mechanism = motion / max(np.abs(motion * [1.0, 1.0, assembly.block_size]).max(), 1e-300)
+        mechanism = motion / max(solver.motion_size(motion, assembly.block_size).max(), 1e-300)
     return solver.Collapse(
         displacement=summary["collapse_displacement"],
         bracket=(summary["collapse_bracket"][0], summary["collapse_bracket"][1]),

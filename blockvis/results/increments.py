@@ -145,11 +145,21 @@ def packed_increment(increment: solver.Increment) -> bytes:
     """An increment as the bytes of its file."""
     numbers = flat(increment, without=_APART)
     numbers = {_STORED_AS.get(name, name): number for name, number in numbers.items()}
-    return compressed(flat(increment.state) | numbers)
+    return compressed(_arrays_of(increment.state) | numbers)
+
+
+def _arrays_of(state: solver.State) -> dict[str, np.ndarray]:
+    """The arrays of a file, in whose words contact points have a vertex, an edge and a corner, and slip along it."""
+    arrays = flat(state)
+    vertex, edge, corner = solver.corners_and_edges(arrays.pop("features"))
+    rotations, slip = arrays["rotations"][:, 0], arrays.pop("slip")[:, 0]
+    return arrays | {"vertex": vertex, "edge": edge, "corner": corner, "along": slip, "rotations": rotations}
 
 
 def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
     named = dict(arrays) | {name: arrays[stored] for name, stored in _STORED_AS.items()}
+    named["features"] = solver.features_of(arrays["vertex"], arrays["edge"], arrays["corner"])
+    named["slip"], named["rotations"] = arrays["along"][:, None], arrays["rotations"][:, None]
     return from_flat(named, solver.Increment, held=from_flat(named, solver.State), checkpoint=None)
 
 

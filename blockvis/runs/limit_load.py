@@ -449,8 +449,7 @@ def _swinging(assembly: solver.Assembly, state: solver.Increment) -> Iterator[so
     """Pseudo-motion: the mechanism of a limit state, followed to first order, out of scale."""
     block, free = assembly.block_of_vertex, assembly.free
     corners = solver.moved_vertices(assembly, state.pose)
-    arms = corners - state.pose.positions[block]
-    velocity = state.velocity[block, :2] + state.velocity[block, 2:] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+    velocity = solver.point_velocities(corners, block, state.pose, state.velocity)
     fastest = float(np.hypot(*velocity.T)[free[block]].max(initial=0.0))
     if fastest == 0.0:
         return

@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from solver.assembly import Assembly, check_blocks
-from solver.equilibrium import equilibrium_matrix
+from solver.assembly import Assembly, check_blocks, find_contacts
+from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
-from solver.geometry.planar_contacts import find_contacts
 from solver.interfaces import InterfaceLaw, Interfaces
-from solver.kinematics import Pose, moved_vertices
+from solver.kinematics import Pose, moved_vertices, unit_lengths
 from solver.loads import Loads, checked_loads
 from solver.lp.problem import LinearProgram, Unbounded
 from solver.lp.solve import solve_lp
@@ -211,7 +210,7 @@ class _Problem:
         contacts = find_contacts(assembly, vertices, reach)
         around = contacts if interfaces.dry else find_contacts(assembly, vertices, max(reach, REACH * length))
         cohesion, crushing = point_strength(assembly, interfaces, contacts, around)
-        units = np.array([1.0, 1.0, length])
+        units = unit_lengths(3, length)
         weights = np.abs(loads.dead[free] / units)
         live = loads.live[free] / units
         force = float(weights.sum() / len(weights)) or float(np.abs(live).max())
@@ -228,7 +227,7 @@ class _Problem:
             friction=interfaces.friction(assembly, contacts.block_a, contacts.block_b),
             length=length,
             force=force,
-            matrix=sp.csr_array(equilibrium_matrix(contacts, pose, length))[np.repeat(free, 3)],
+            matrix=sp.csr_array(wrench_matrix(contacts, pose, length))[np.repeat(free, 3)],
             dead=(loads.dead[free] / units / force).ravel(),
             live=(live / size).ravel(),
             live_size=size / force,

@@ -9,7 +9,15 @@ import numpy as np
 
 from solver.assembly import Assembly, check_blocks
 from solver.interfaces import InterfaceLaw, Interfaces
-from solver.kinematics import Pose, moved, point_velocities, rotation_matrices
+from solver.kinematics import (
+    Pose,
+    motion_size,
+    moved,
+    point_velocities,
+    relative_velocities,
+    rotation_matrices,
+    unit_lengths,
+)
 from solver.loads import Loads
 from solver.lp.problem import SolveError
 from solver.program.closing import GEOMETRY_TOLERANCE
@@ -500,7 +508,7 @@ class _Path:
     def _mechanism_changed(self, predictor: Solved) -> bool:
         if self.here.velocity is None:
             return False
-        size = np.sqrt(self.model.assembly.masses)[:, None] * np.array([1.0, 1.0, self.model.length])
+        size = np.sqrt(self.model.assembly.masses)[:, None] * unit_lengths(3, self.model.length)
         new, old = predictor.motion * size, self.here.velocity * size
         new, old = new / (np.linalg.norm(new) or 1.0), old / (np.linalg.norm(old) or 1.0)
         return bool(np.linalg.norm(new - old) > EVENT_CHANGE)
@@ -513,7 +521,7 @@ class _Path:
 
     def _length(self, solved: Solved) -> float:
         """Largest movement of a block in the motion [m]."""
-        return max(float(np.abs(solved.motion * [1.0, 1.0, self.model.length]).max(initial=0.0)), 1e-300)
+        return max(float(motion_size(solved.motion, self.model.length).max(initial=0.0)), 1e-300)
 
     def _tell_last(self) -> Iterator[Increment]:
         if self.here.d > self.told:
@@ -577,7 +585,6 @@ def _scaled(solved: Solved, part: float) -> Solved:
 
 def _increment(model: Model, solved: Solved, d: float, step: float, status: Status) -> Increment:
     contacts, velocity = solved.contacts, solved.motion / step
-    a, b = (point_velocities(contacts.points, k, solved.pose, velocity) for k in (contacts.block_a, contacts.block_b))
     resultant = 0.0 if model.live is None else float(np.hypot(*model.live[:, :2].sum(axis=0)))
     return Increment(
         parameter=d,
@@ -593,7 +600,7 @@ def _increment(model: Model, solved: Solved, d: float, step: float, status: Stat
             pose=solved.pose,
             contacts=contacts,
             forces=solved.forces,
-            displacements=np.einsum("kij,kj->ki", contacts.frames, a - b),
+            displacements=relative_velocities(contacts, solved.pose, velocity),
             friction=solved.friction,
             velocity=velocity,
             support_forces=solved.support_forces,

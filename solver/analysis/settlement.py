@@ -9,9 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.assembly import Assembly, check_blocks
-from solver.geometry.polygons import overlap_depths
 from solver.interfaces import InterfaceLaw, Interfaces
-from solver.kinematics import Pose, moved, moved_vertices, point_velocities
+from solver.kinematics import (
+    Pose,
+    motion_size,
+    moved,
+    moved_vertices,
+    point_velocities,
+    relative_velocities,
+    unit_lengths,
+)
 from solver.loads import Loads, Settlement, checked_loads
 from solver.lp.problem import SolveError
 from solver.program.correction import FARTHEST_FALL, Falls, NotConverged, at_rest, corrected, solve_again
@@ -428,7 +435,7 @@ class _Path:
         here = self.here
         if here.velocity is None:
             return False
-        size = np.sqrt(self.model.assembly.masses)[:, None] * np.array([1.0, 1.0, self.model.length])
+        size = np.sqrt(self.model.assembly.masses)[:, None] * unit_lengths(3, self.model.length)
         new, old = predictor.motion / step * size, here.velocity * size
         many = np.sqrt(self.model.assembly.free.sum())
         return bool(np.linalg.norm(new - old) > min(EVENT_CHANGE * many, LARGEST_CHANGE) * np.linalg.norm(old))
@@ -441,7 +448,7 @@ class _Path:
         """A last look at the blocks as they are, contact points or not: none may have come into another."""
         assembly = self.model.assembly
         deepest = OVERLAP * float(assembly.widths.min())
-        i, j, depth = overlap_depths(moved_vertices(assembly, pose), assembly.offsets, deepest)
+        i, j, depth = assembly.shapes.overlaps(moved_vertices(assembly, pose), deepest)
         worst = np.where(assembly.free[i] | assembly.free[j], depth, 0.0)
         if worst.max(initial=0.0) > deepest:
             k = int(np.argmax(worst))
@@ -569,7 +576,7 @@ class _Path:
 
 
 def _largest_movement(model: Model, motion: np.ndarray) -> float:
-    return max(float(np.abs(motion * [1.0, 1.0, model.length]).max(initial=0.0)), 1e-300)
+    return max(float(motion_size(motion, model.length).max(initial=0.0)), 1e-300)
 
 
 def check_settlement(assembly: Assembly, phases: Sequence[Settlement], controls: Controls | None = None) -> None:
@@ -620,9 +627,6 @@ def _increment(
     model: Model, solved: Solved, rate: np.ndarray, step: float, s: float, phase: int, status: Status
 ) -> Increment:
     contacts, velocity = solved.contacts, solved.motion / step
-    relative = point_velocities(contacts.points, contacts.block_a, solved.pose, velocity) - point_velocities(
-        contacts.points, contacts.block_b, solved.pose, velocity
-    )
     reaction = float((solved.support_forces * rate).sum())
     return Increment(
         parameter=s,
@@ -638,7 +642,7 @@ def _increment(
             pose=solved.pose,
             contacts=contacts,
             forces=solved.forces,
-            displacements=np.einsum("kij,kj->ki", contacts.frames, relative),
+            displacements=relative_velocities(contacts, solved.pose, velocity),
             friction=solved.friction,
             velocity=velocity,
             support_forces=solved.support_forces,

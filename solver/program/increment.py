@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from solver.equilibrium import cone_rays, equilibrium_matrix, with_slack
+from solver.assembly import find_contacts
+from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts
-from solver.geometry.planar_contacts import find_contacts
-from solver.kinematics import Pose, moved_vertices
+from solver.kinematics import Pose, moved_vertices, unit_lengths
 from solver.lp.problem import LinearProgram, LPSolution, SolveError, Unbounded
 from solver.lp.solve import solve_lp
 from solver.results.certificate import Certificate
@@ -144,12 +144,12 @@ def solve_program(
         support_motion = np.zeros((assembly.n_blocks, 3))
     model.tally.programs += 1
     friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-    matrix = equilibrium_matrix(contacts, pose, model.length)
+    matrix = wrench_matrix(contacts, pose, model.length)
     given = matrix.T @ (support_motion / model.lengths).ravel()
     if allowance is not None:
         given[0::2] += allowance / model.length
     distance = given + distances_of(model, contacts, drift, ROUNDING)
-    rays = cone_rays(friction)
+    rays = friction_rays(friction)
     balance = sp.csc_array(sp.csr_array(matrix)[np.repeat(assembly.free, 3)] @ rays)
     rows = balance.shape[0]
     external = model.scaled_load[assembly.free].ravel()
@@ -212,7 +212,7 @@ def solve_program(
         sticking=(forces[:, 0] > 0.0) & ~(used_up & (sliding > 0.0)),
         falling=bool((unbalanced > falls).any()),
         certificate=certificate,
-        support_forces=on_supports * model.force * np.array([1.0, 1.0, model.length]),
+        support_forces=on_supports * model.force * unit_lengths(3, model.length),
         multiplier=level / live_size if live_size > 0.0 else 0.0,
     )
 

@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from solver.geometry.contacts import Contacts
-from solver.kinematics import Pose, point_velocities
+from solver.kinematics import Pose, relative_velocities
 
 from .certificate import Certificate
 from .increment import Increment, State, Status, StoredState
@@ -135,12 +135,11 @@ def limit_state(
     pose: Pose, contacts: Contacts, forces: np.ndarray, friction: np.ndarray, mechanism: np.ndarray
 ) -> State:
     """The arrays of a limit state; parameters as the attributes of :class:`LimitLoad`."""
-    a, b = (point_velocities(contacts.points, k, pose, mechanism) for k in (contacts.block_a, contacts.block_b))
     return State(
         pose=pose,
         contacts=contacts,
         forces=forces,
-        displacements=np.einsum("kij,kj->ki", contacts.frames, a - b),
+        displacements=relative_velocities(contacts, pose, mechanism),
         friction=friction,
         velocity=mechanism,
         support_forces=np.zeros_like(mechanism),

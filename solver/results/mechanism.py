@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.assembly import Assembly
-from solver.kinematics import moving_together, point_velocities
+from solver.kinematics import motion_size, moving_together, relative_velocities
 
 from .increment import ContactState, Increment
 
@@ -62,10 +62,10 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     fastest = float(np.abs(increment.velocity[:, :2]).max(initial=0.0))
     if fastest == 0.0 or len(contacts) == 0:
         return np.full(n, -1)
-    turned = increment.velocity[:, 2] * assembly.block_size
-    part = moving_together(n, contacts, np.abs(increment.displacements).max(axis=1), turned, TOGETHER * fastest)
+    spins = increment.velocity[:, 2:] * assembly.block_size
+    part = moving_together(n, contacts, np.abs(increment.displacements).max(axis=1), spins, TOGETHER * fastest)
     # Corners, not centroids: a block may turn about its own centroid.
-    moves = np.maximum(np.abs(increment.velocity[:, :2]).max(axis=1), np.abs(turned)) > 10.0 * TOGETHER * fastest
+    moves = motion_size(increment.velocity, assembly.block_size) > 10.0 * TOGETHER * fastest
     moves &= assembly.free
     area = np.bincount(part, weights=assembly.areas * moves, minlength=int(part.max()) + 1)
     rank = np.empty(len(area), dtype=int)
@@ -129,7 +129,5 @@ def with_motion(increment: Increment, motion: np.ndarray) -> Increment:
     motion : (n_blocks, 3) array
         Velocity of each centroid and angular velocity, in any scale.
     """
-    contacts, pose = increment.contacts, increment.pose
-
-    a, b = (point_velocities(contacts.points, k, pose, motion) for k in (contacts.block_a, contacts.block_b))
-    return increment.with_arrays(velocity=motion, displacements=np.einsum("kij,kj->ki", contacts.frames, a - b))
+    rates = relative_velocities(increment.contacts, increment.pose, motion)
+    return increment.with_arrays(velocity=motion, displacements=rates)

@@ -17,7 +17,7 @@ def stacked(shift=(0.0, 0.0), turn=0.0):
     assembly = solver.Assembly.from_outlines(
         [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 1], [1, 2], [0, 2]]], roles=["fixed", "free"]
     )
-    pose = solver.Pose(assembly.centroids + np.array([(0.0, 0.0), shift]), np.array([0.0, turn]))
+    pose = solver.Pose(assembly.centroids + np.array([(0.0, 0.0), shift]), np.array([[0.0], [turn]]))
     return assembly, pose
 
 
@@ -73,7 +73,7 @@ def four_blocks(apart):
         [[[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]] for x, y in corners], roles=["free"] * 3 + ["fixed"]
     )
     away = apart * (2.0 * np.array(corners) - 1.0)
-    return assembly, solver.Pose(assembly.centroids + away, np.zeros(4))
+    return assembly, solver.Pose(assembly.centroids + away, np.zeros((4, 1)))
 
 
 @given(st.floats(0.01, 0.3))
@@ -95,7 +95,7 @@ def test_an_opening_of_the_drawing_is_no_pocket():
     ring = [((0, 0), (2, 1)), ((2, 0), (3, 2)), ((1, 2), (3, 3)), ((0, 1), (1, 3))]
     assembly = solver.Assembly.from_outlines([[low, (high[0], low[1]), high, (low[0], high[1])] for low, high in ring])
     away = 0.05 * np.sign(np.round(assembly.centroids - 1.5, 9))
-    pose = solver.Pose(assembly.centroids + away, np.zeros(4))
+    pose = solver.Pose(assembly.centroids + away, np.zeros((4, 1)))
     found, _, beside = marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose, False)
     assert len(found) == 4
     assert marks._pockets(assembly, found, beside, pose) == ()
@@ -183,8 +183,8 @@ def test_round_lengths_are_round_and_not_longer(length):
 
 @given(st.floats(-3, 3), st.floats(-10, 10), st.floats(-10, 10))
 def test_carried_there_and_back(turn, x, y):
-    before = solver.Pose(np.array([[1.0, 2.0]]), np.array([0.3]))
-    after = solver.Pose(np.array([[x, y]]), np.array([turn]))
+    before = solver.Pose(np.array([[1.0, 2.0]]), np.array([[0.3]]))
+    after = solver.Pose(np.array([[x, y]]), np.array([[turn]]))
     point = np.array([[0.7, -0.4]])
     there = solver.carried(point, np.array([0]), before, after)
     np.testing.assert_allclose(solver.carried(there, np.array([0]), after, before), point, atol=1e-9)

@@ -95,7 +95,7 @@ def test_density_and_thickness_of_the_file_hold_where_it_has_them():
 
 def test_a_deformed_pose_is_written(tmp_path):
     assembly = assemble(row(2))
-    pose = solver.Pose(assembly.centroids + np.array([0, -0.25]), np.array([0.0, np.pi / 2]))
+    pose = solver.Pose(assembly.centroids + np.array([0, -0.25]), np.array([[0.0], [np.pi / 2]]))
     save_layout(assembly, tmp_path / "moved.json", pose=pose)
     moved = read(tmp_path / "moved.json")
     assert np.allclose(moved.centroids, assembly.centroids + np.array([0, -0.25]))

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 
 #: The rooms of both packages, highest first: a room imports itself and rooms below it. A module belongs to the longest
 #: name that it starts with. The kinds of analysis read their own keys of a case file and lie below its reader.
-#: Outlines lie below the assembly, the search for contact points above it; what plans and
+#: Shapes and how they touch lie below the assembly; what plans and
 #: solves a case lies below the pictures, the run that draws what came out above them.
 ORDER = (
     "blockvis.__main__",
@@ -47,11 +47,9 @@ ORDER = (
     "solver.loads",
     "solver.equilibrium",
     "solver.kinematics",
-    "solver.geometry",
     "solver.interfaces",
     "solver.assembly",
-    "solver.geometry.polygons",
-    "solver.geometry.broad_phase",
+    "solver.geometry",
 )
 
 #: Beyond the order: rooms that must not know each other although one lies above the other.
