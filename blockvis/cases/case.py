@@ -138,13 +138,27 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     )
     for table in (geometry, material, analysis, output, top):
         table.finish()
-    moving = [k + 1 for k, load in enumerate(case.loads) if load.positions]
+    return _checked(case, settings)
+
+
+def _checked(case: Case, settings: Mapping[str, Any]) -> Case:
+    """Check that the keys of a case fit its kind of analysis.
+
+    Parameters
+    ----------
+    case : Case
+    settings : mapping
+        What each kind has read from its keys, by its name.
+    """
+    moving = [k for k, load in enumerate(case.loads, start=1) if load.positions]
     if len(moving) > 1:
-        raise ValueError(f"{source}: [loads {moving[1]}] positions: only one load may move, and loads {moving[0]} does")
+        raise ValueError(
+            f"{case.source}: [loads {moving[1]}] positions: only one load may move, and loads {moving[0]} does"
+        )
     for name, other in KINDS.items():
-        if other is not kind:
+        if name != case.analysis:
             other.refuse(settings[name], case)
-    return kind.checked(case)
+    return KINDS[case.analysis].checked(case)
 
 
 def _friction(table: Table, default: float | None = 0.6) -> float:

@@ -76,7 +76,7 @@ class AnalysisRun:
     limits: list[solver.LimitLoad] = field(default_factory=list)
 
     def recorded(self, increments: Sequence[solver.Increment]) -> None:
-        """Keeps the arrays of the last limit load no longer: those of the increment that reports it are written.
+        """Let the last limit load share the written arrays of the increment that reports it.
 
         Parameters
         ----------
@@ -87,7 +87,7 @@ class AnalysisRun:
             self.limits[-1] = replace(self.limits[-1], held=increments[-1].held)
 
     def response(self, increments: Sequence[solver.Increment], ending: solver.Ending) -> solver.Response:
-        """The increments so far and how they ended."""
+        """Make a response of the increments so far and how they ended."""
         return solver.Response(
             assembly=self.given.assembly,
             settlements=self.course.settlements,
@@ -130,7 +130,7 @@ class AnalysisKind(ABC):
 
     @abstractmethod
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
-        """The analysis, its input checked.
+        """Prepare the analysis of a case, its input checked.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class AnalysisKind(ABC):
         """
 
     def read(self, top: Table, analysis: Table) -> Any:
-        """Reads the keys of this kind from the case file: a value that compares equal to one of the same keys.
+        """Read the keys of this kind from the case file; the same keys give values that compare equal.
 
         Parameters
         ----------
@@ -159,7 +159,7 @@ class AnalysisKind(ABC):
         return None
 
     def refuse(self, settings: Any, case: Case) -> None:
-        """Raises ValueError where a case of another kind gives keys of this one.
+        """Raise ValueError where a case of another kind gives keys of this one.
 
         Parameters
         ----------
@@ -171,7 +171,7 @@ class AnalysisKind(ABC):
         return
 
     def checked(self, case: Case) -> Case:
-        """A case of this kind, once its keys fit together.
+        """Check that the keys of a case of this kind fit together; returns the case, completed.
 
         Parameters
         ----------
@@ -180,11 +180,11 @@ class AnalysisKind(ABC):
         return case
 
     def course(self, case: Case) -> Course:
-        """What the increments of a case run over."""
+        """Say what the increments of a case run over and measure."""
         return Course(self.parameter, self.measured)
 
     def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:
-        """The response of a results folder, completed by what this kind has put into the summary."""
+        """Complete the response of a results folder by what this kind has put into the summary."""
         collapse = None if response.collapse is None else replace(response.collapse, lost=self.lost)
         return replace(response, parameter=self.parameter, measured=self.measured, collapse=collapse)
 
@@ -244,7 +244,7 @@ def _with_unit(value: float, quantity: solver.Quantity) -> str:
 
 
 def begun(steps: Steps) -> Steps:
-    """The same steps, the first of them taken at once: what it refuses is refused before anything is written."""
+    """Take the first of the steps at once: what it refuses is refused before anything is written."""
     try:
         first = next(steps)
     except StopIteration as stop:
@@ -263,7 +263,7 @@ def _following(first: solver.Increment, steps: Steps) -> Steps:
 
 
 def needs_live_load(case: Case) -> None:
-    """Raises ValueError where no load of a case is live."""
+    """Raise ValueError where no load of a case is live."""
     if not any(load.kind == "live" for load in case.loads):
         raise ValueError(
             f'{case.source}: [analysis] kind is "{case.analysis}", but no load is live; add [[loads]] with kind = '
@@ -272,7 +272,7 @@ def needs_live_load(case: Case) -> None:
 
 
 def needs_dry_joints(case: Case) -> None:
-    """Raises ValueError where a joint of a case has cohesion or finite strength."""
+    """Raise ValueError where a joint of a case has cohesion or finite strength."""
     laws = [solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength)]
     if not all(law.dry for law in [*laws, *case.interfaces.values()]):
         raise ValueError(

@@ -80,7 +80,7 @@ class LimitLoadKind(AnalysisKind):
     checkpoint = LimitLoadCheckpoint
 
     def read(self, top: Table, analysis: Table) -> LimitLoadSettings:
-        """The keys ``flow``, ``capacity_at`` and ``displacement``."""
+        """Read the keys ``flow``, ``capacity_at`` and ``displacement``."""
         flow = analysis.text("flow", "associative", among=FLOWS)
         capacity_at = analysis.numbers("capacity_at")
         displacement = analysis.number("displacement")
@@ -89,7 +89,7 @@ class LimitLoadKind(AnalysisKind):
         return LimitLoadSettings(flow, capacity_at, displacement)
 
     def refuse(self, settings: LimitLoadSettings, case: Case) -> None:
-        """Refuses keys of limit loads."""
+        """Refuse keys of limit loads."""
         if settings.flow != "associative":
             raise ValueError(
                 f'{case.source}: [analysis] flow "{settings.flow}" belongs to kind = "{self.name}"; a {case.analysis} '
@@ -101,7 +101,7 @@ class LimitLoadKind(AnalysisKind):
             raise _capacity_at_without_settlement(case)
 
     def checked(self, case: Case) -> Case:
-        """A case of this kind, once its keys fit together; its last settlement stops where limit loads are wanted."""
+        """Check the keys, and let the last settlement stop where limit loads are wanted."""
         needs_live_load(case)
         if case.settlements:
             needs_dry_joints(case)
@@ -119,13 +119,13 @@ class LimitLoadKind(AnalysisKind):
         return replace(case, settlements=(*case.settlements[:-1], stopping))
 
     def course(self, case: Case) -> Course:
-        """The positions of a load that moves, else the settlements of a case."""
+        """Run over the positions of a load that moves, else over the settlements of a case."""
         if any(load.positions for load in case.loads) or not case.settlements:
             return Course(self.parameter, self.measured)
         return replace(settlement_course(case.settlements), measured=self.measured)
 
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
-        """The settlements of a case, of which only a fall is reported, and limit loads along them or behind them."""
+        """Prepare limit loads along the settlements of a case or after them, and report a fall in these."""
         places, live = moving_loads(given.case.loads, given.assembly, given.case.source)
         run = AnalysisRun(self.name, given, self.course(given.case))
         if resume is not None:
@@ -136,7 +136,7 @@ class LimitLoadKind(AnalysisKind):
         return run
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
-        """The limit loads; of the one that governs its bounds, flow and status, too."""
+        """List the limit loads; of the one that governs its bounds, flow and status, too."""
         chosen, states = response.governing, response.limit_states
         limit = next((limit for limit, state in states if state is chosen), states[0][0] if states else None)
         summary: dict[str, Any] = {
@@ -167,7 +167,7 @@ class LimitLoadKind(AnalysisKind):
         return summary
 
     def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:
-        """The response with the settlements and limit loads of the summary."""
+        """Complete the response by the settlements and limit loads of the summary."""
         response = super().restored(response, summary)
         settlements = stored_settlements(summary)
         if settlements:
@@ -176,7 +176,7 @@ class LimitLoadKind(AnalysisKind):
         return replace(response, limits=_stored_limits(summary, response.increments))
 
     def tables(self, response: solver.Response) -> dict[str, str]:
-        """Either envelope.csv, a row per position, or capacity.csv, a row per settlement."""
+        """Make either envelope.csv, a row per position, or capacity.csv, a row per settlement."""
         over_settlement = response.parameter.is_path
         if not over_settlement and len(response.limits) < 2:
             return {}
@@ -193,7 +193,7 @@ class LimitLoadKind(AnalysisKind):
         return {"capacity.csv" if over_settlement else "envelope.csv": rows.getvalue()}
 
     def headline(self, response: solver.Response) -> str:
-        """How many limit loads were found."""
+        """Count the limit loads."""
         number = len(response.limits)
         return f"{number} limit load{'' if number == 1 else 's'}"
 
@@ -202,7 +202,7 @@ class LimitLoadKind(AnalysisKind):
         return response.collapse is not None or response.stop is solver.Status.COLLAPSED
 
     def lines(self, response: solver.Response) -> list[str]:
-        """The limit load that governs, and where it is."""
+        """Describe the limit load that governs, and where it is."""
         path, state, said = response.path, response.governing, self.summary(response)
         if state is None or said["limit_load_multiplier"] is None:
             return []
@@ -227,7 +227,7 @@ class LimitLoadKind(AnalysisKind):
         return lines
 
     def title(self, response: solver.Response) -> str:
-        """The limit load that governs."""
+        """Name the limit load that governs."""
         state = response.governing
         if state is None or not np.isfinite(state.load_multiplier):
             return response.message or f"Limit load: {response.stop}"
@@ -237,7 +237,7 @@ class LimitLoadKind(AnalysisKind):
         return f"Limit load: α = {state.load_multiplier:.5g}{where}"
 
     def rows(self, response: solver.Response) -> list[tuple[str, str]]:
-        """The limit load that governs: its values, and where it is."""
+        """Describe the limit load that governs: its values, and where it is."""
         rows, path, state, c = [], response.path, response.governing, response.collapse
         if c is not None:
             place = f"{c.displacement:.6g} {c.unit}, between {c.bracket[0]:.6g} and {c.bracket[1]:.6g}"
@@ -378,7 +378,7 @@ def _over_places(
 
 
 def _read_for_multipliers(increment: solver.Increment) -> solver.Increment:
-    """An increment of the settlement among limit states."""
+    """Measure the load multiplier of an increment of the settlement."""
     return replace(increment, measured=increment.load_multiplier)
 
 

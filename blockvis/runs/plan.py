@@ -19,7 +19,7 @@ def planned(
     resume: Any = None,
     found: Sequence[solver.Increment] = (),
 ) -> AnalysisRun:
-    """The analysis of a case, its input checked.
+    """Prepare the analysis of a case, its input checked.
 
     Parameters
     ----------

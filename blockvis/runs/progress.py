@@ -33,7 +33,7 @@ class Progress:
         self.last, self.count = -1.0, 0
 
     def increment(self, increment: solver.Increment) -> None:
-        """Shows an increment."""
+        """Show an increment."""
         self.count += 1
         if not self.shown or time.perf_counter() - self.last < REDRAW:
             return
@@ -52,12 +52,12 @@ class Progress:
         )
 
     def picture(self, done: int, total: int) -> None:
-        """Shows how many frames of the animation are drawn."""
+        """Show how many frames of the animation are drawn."""
         if self.shown and (done == total or time.perf_counter() - self.last >= REDRAW):
             self._line(f"[{'#' * (24 * done // max(total, 1)):<24}] frame {done} of {total}")
 
     def done(self) -> None:
-        """Clears the bar."""
+        """Clear the bar."""
         if self.shown:
             self.stream.write("\r\x1b[K")
             self.stream.flush()
@@ -92,7 +92,7 @@ class StudyProgress:
         self.last = -1.0
 
     def finished(self, *, failed: bool = False) -> None:
-        """Counts a run."""
+        """Count a run."""
         self.count += 1
         self.failed += failed
         now, done = time.perf_counter(), self.before + self.count
@@ -106,7 +106,7 @@ class StudyProgress:
         self.stream.flush()
 
     def done(self) -> None:
-        """Clears the bar."""
+        """Clear the bar."""
         if self.shown:
             self.stream.write("\r\x1b[K")
             self.stream.flush()

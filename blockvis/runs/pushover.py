@@ -28,7 +28,7 @@ class PushoverKind(AnalysisKind):
     lost = "capacity"
 
     def read(self, top: Table, analysis: Table) -> solver.ControlDisplacement | None:
-        """The control displacement, of [control]."""
+        """Read the control displacement, of [control]."""
         table = top.table("control")
         if not table.values:
             return None
@@ -49,14 +49,14 @@ class PushoverKind(AnalysisKind):
             raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 
     def refuse(self, settings: Any, case: Case) -> None:
-        """Refuses a [control] that controls nothing."""
+        """Refuse a [control] that controls nothing."""
         if settings is not None:
             raise ValueError(
                 f'{case.source}: [control] belongs to [analysis] kind = "{self.name}", not "{case.analysis}"'
             )
 
     def checked(self, case: Case) -> Case:
-        """A case of this kind, once its keys fit together."""
+        """Check that the keys of a case fit together."""
         needs_live_load(case)
         needs_dry_joints(case)
         if case.settings is None:
@@ -70,16 +70,16 @@ class PushoverKind(AnalysisKind):
         return case
 
     def course(self, case: Case) -> Course:
-        """The control displacement of a case."""
+        """Run over the control displacement of a case."""
         return Course(self.parameter, self.measured, control=case.settings)
 
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
-        """The settlements of a case, of which only a fall is reported, and the pushover."""
+        """Prepare the settlements of a case, of which only a fall is reported, and the pushover."""
         control = _checked_control(given.case, given.assembly)
         return AnalysisRun(self.name, given, self.course(given.case), begun(_steps(given, control, resume)))
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
-        """The control displacement, and the multiplier at the start and where it is largest."""
+        """Give the control displacement, and the multiplier at the start and where it is largest."""
         values, control = response.values, response.control
         largest = int(np.nanargmax(values)) if np.isfinite(values).any() else None
         return {
@@ -90,12 +90,12 @@ class PushoverKind(AnalysisKind):
         }
 
     def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:
-        """The response with the control displacement of the summary."""
+        """Complete the response by the control displacement of the summary."""
         control = solver.ControlDisplacement(**summary["control"]) if summary.get("control") else None
         return replace(super().restored(response, summary), control=control)
 
     def lines(self, response: solver.Response) -> list[str]:
-        """The first, the largest and the last multiplier, and where the capacity is lost."""
+        """Describe the first, the largest and the last multiplier, and where the capacity is lost."""
         path, weight = response.path, response.total_weight
         lines = []
         if path:
@@ -113,13 +113,13 @@ class PushoverKind(AnalysisKind):
         return lines
 
     def title(self, response: solver.Response) -> str:
-        """How it ended."""
+        """Say how it ended."""
         if response.collapse is not None:
             return f"No capacity left at a control displacement of {response.collapse.displacement:.5g} m"
         return f"Pushover: {response.stop}"
 
     def rows(self, response: solver.Response) -> list[tuple[str, str]]:
-        """Where the capacity is lost, and the multipliers."""
+        """Say where the capacity is lost, and the multipliers."""
         rows, c = [], response.collapse
         if c is not None:
             place = f"{c.displacement:.6g} {c.unit}, between {c.bracket[0]:.6g} and {c.bracket[1]:.6g}"

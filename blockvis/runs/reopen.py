@@ -15,7 +15,7 @@ from .kinds import KINDS
 
 
 def open_results(folder: str | Path) -> solver.Response:
-    """Reopens a results folder as the response it was written from, without solving.
+    """Reopen a results folder as the response it was written from, without solving.
 
     Parameters
     ----------

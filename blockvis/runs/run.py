@@ -29,7 +29,7 @@ AS_DRAWN = 0.02
 
 
 def record_of(case: Case) -> Record:
-    """The record of a case; without its text where the case was changed in Python and is not what the text says."""
+    """Make the record of a case; without its text where it was changed in Python and is not what the text says."""
     return Record(
         case=case.text if case.text and parse_case(case.text, case.source) == case else "",
         case_file=str(case.source.resolve()) if case.source.is_file() else "",
@@ -65,7 +65,7 @@ class Run:
 
 
 def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overwrite: bool = False) -> Run:
-    """Solves a case and writes everything: VTU, PVD, CSV, summary, pictures.
+    """Solve a case and writes everything: VTU, PVD, CSV, summary, pictures.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
 
 
 def resume_run(folder: str | Path) -> Run:
-    """Goes on with a run that was stopped, from its results folder alone, to the result it would have had.
+    """Go on with a run that was stopped, from its results folder alone, to the result it would have had.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def resume_run(folder: str | Path) -> Run:
 
 
 def _finished(folder: Path) -> dict[str, Any] | None:
-    """The summary of a run that came to its end; None where it was stopped."""
+    """Read the summary of a run that came to its end; None where it was stopped."""
     if not (folder / "summary.json").is_file():
         return None
     summary: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
@@ -155,7 +155,7 @@ def _drawn(case: Case) -> list[str]:
 
 
 def _followed(case: Case, results: ResultsFolder, run: AnalysisRun) -> Run:
-    """Follows the increments to their end or to Ctrl-C, writing each, and draws what came out."""
+    """Follow the increments to their end or to Ctrl-C, writing each, and draws what came out."""
     folder = results.path
     progress = Progress(run.course)
     ending = solver.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
@@ -191,7 +191,7 @@ def _followed(case: Case, results: ResultsFolder, run: AnalysisRun) -> Run:
 
 
 def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
-    """Says so where the blocks as drawn were in no equilibrium and found one a little further."""
+    """Say so where the blocks as drawn were in no equilibrium and found one a little further."""
     moved = np.hypot(*first.pose.displacements(assembly)[:, :2].T)
     block = int(np.argmax(moved))
     if first.status == solver.Status.EQUILIBRIUM and moved[block] > AS_DRAWN * assembly.block_size:
@@ -203,7 +203,7 @@ def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
 
 
 def _given_up(folder: Path, error: OSError) -> OSError:
-    """Takes away half a file when the disk is full or gone in the middle of a run; what to say and do about it."""
+    """Remove half a file when the disk is full or gone in the middle of a run; returns what to say and do about it."""
     for half in folder.rglob(PARTIAL):
         half.unlink(missing_ok=True)
     return OSError(
@@ -223,7 +223,7 @@ def draw_results(
     animation: str | None = "collapse.mp4",
     case_text: str = "",
 ) -> tuple[str, ...]:
-    """Draws the pictures of a results folder.
+    """Draw the pictures of a results folder.
 
     Parameters
     ----------

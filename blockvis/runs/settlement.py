@@ -24,7 +24,7 @@ class SettlementKind(AnalysisKind):
     in_studies = True
 
     def checked(self, case: Case) -> Case:
-        """A case of this kind, once its keys fit together."""
+        """Check that the keys of a case fit together."""
         if not case.settlements:
             raise ValueError(
                 f"{case.source}: [settlement] is missing; say how the moving supports move, direction = [1, 0]"
@@ -33,31 +33,31 @@ class SettlementKind(AnalysisKind):
             warnings.warn(
                 f"{case.source}: a settlement analysis leaves the live loads out; give loads that act during it kind = "
                 '"dead"',
-                stacklevel=4,
+                stacklevel=5,
             )
         needs_dry_joints(case)
         return case
 
     def course(self, case: Case) -> Course:
-        """The settlements of a case."""
+        """Run over the settlements of a case."""
         return settlement_course(case.settlements)
 
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
-        """The settlements of a case under its dead loads."""
+        """Prepare the settlements of a case under its dead loads."""
         return AnalysisRun(self.name, given, self.course(given.case), settlement_steps(given, resume))
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
-        """The settlements."""
+        """List the settlements."""
         return {"settlements": [asdict(settlement) for settlement in response.settlements]}
 
     def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:
-        """The response with the settlements of the summary."""
+        """Complete the response by the settlements of the summary."""
         course = settlement_course(stored_settlements(summary))
         response = super().restored(response, summary)
         return replace(response, settlements=course.settlements, parameter=course.parameter, measured=course.measured)
 
     def lines(self, response: solver.Response) -> list[str]:
-        """First and last reaction, and the settlement at collapse."""
+        """Give the first and last reaction, and the settlement at collapse."""
         path, weight, unit = response.path, response.total_weight, response.settlements[-1].unit
         lines = []
         if path:
@@ -76,7 +76,7 @@ class SettlementKind(AnalysisKind):
         return lines
 
     def title(self, response: solver.Response) -> str:
-        """How it ended."""
+        """Say how it ended."""
         if response.collapse is not None:
             return f"Collapse at a settlement of {response.collapse.displacement:.5g} {response.collapse.unit}"
         return {
@@ -86,7 +86,7 @@ class SettlementKind(AnalysisKind):
         }.get(response.stop, "Settling masonry")
 
     def rows(self, response: solver.Response) -> list[tuple[str, str]]:
-        """Settlement at collapse, first and last reaction."""
+        """Give the settlement at collapse, first and last reaction."""
         path, weight, c = response.path, response.total_weight, response.collapse
         moment = response.parameter.unit == "rad"
 
@@ -105,13 +105,13 @@ class SettlementKind(AnalysisKind):
 
 
 def settlement_course(settlements: tuple[solver.Settlement, ...]) -> Course:
-    """Settlements and the reaction to them, in their unit."""
+    """Run over settlements and measure the reaction to them, in their unit."""
     unit = settlements[0].unit if settlements else "m"
     return Course(solver.settlement_in(unit), solver.reaction_to(unit), settlements)
 
 
 def stored_settlements(summary: Mapping[str, Any]) -> tuple[solver.Settlement, ...]:
-    """The settlements of a stored summary."""
+    """Read the settlements of a stored summary."""
     motions = [dict(motion) for motion in summary.get("settlements", [])]
     for motion in motions:
         motion["blocks"] = None if motion["blocks"] is None else tuple(motion["blocks"])
@@ -119,7 +119,7 @@ def stored_settlements(summary: Mapping[str, Any]) -> tuple[solver.Settlement, .
 
 
 def settlement_steps(given: RunInput, resume: solver.Checkpoint | None = None) -> Steps:
-    """The increments of the settlements of a case under the dead load alone; none where there are no settlements.
+    """Follow the settlements of a case under the dead load alone; without settlements there are no increments.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def settlement_steps(given: RunInput, resume: solver.Checkpoint | None = None) -
 
 
 def not_reached(before: solver.Ending, what: str) -> solver.Ending:
-    """How an analysis ends whose settlement did not reach its limit.
+    """Say how an analysis ends whose settlement did not reach its limit.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from .kinds import KINDS
 
 
 def write(response: solver.Response, folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Writes the results folder of a response: VTU per increment, PVD, CSV and summary.json.
+    """Write the results folder of a response: VTU per increment, PVD, CSV and summary.json.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def write(response: solver.Response, folder: str | Path, *, overwrite: bool = Fa
 
 
 def finish(results: ResultsFolder, response: solver.Response) -> dict[str, object]:
-    """Writes and returns the summary of a response whose increments are in the folder, and the tables of its kind.
+    """Write and return the summary of a response whose increments are in the folder, and the tables of its kind.
 
     Parameters
     ----------
