@@ -28,24 +28,40 @@ from .kinematics import Pose, carried, motion_size, moved_vertices, point_veloci
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
 from .lp.problem import SolveError
 from .results.certificate import Certificate
-from .results.increment import ContactState, Increment, Status
+from .results.increment import ContactState, Increment, State, Status, StoredState
 from .results.limit import Envelope, LimitLoad, LimitStatus
 from .results.mechanism import Mechanism, mechanism_of, rigid_parts, with_motion
-from .results.response import Collapse, Response, total_weight
+from .results.quantities import (
+    CONTROL_DISPLACEMENT,
+    LOAD_MULTIPLIER,
+    LOAD_POSITION,
+    REACTION,
+    SETTLEMENT,
+    Quantity,
+    reaction_to,
+    settlement_in,
+)
+from .results.response import Collapse, Control, Response, path_parameters, total_weight
 from .surface_loads import edge_pressure, load_on_top, surface_pressure
 
 __all__ = [
+    "CONTROL_DISPLACEMENT",
     "FIXED",
     "FREE",
     "GRAVITY",
+    "LOAD_MULTIPLIER",
+    "LOAD_POSITION",
     "MOVING",
+    "REACTION",
     "ROLES",
+    "SETTLEMENT",
     "Assembly",
     "Certificate",
     "Checkpoint",
     "Collapse",
     "ContactState",
     "Contacts",
+    "Control",
     "ControlDisplacement",
     "Controls",
     "Ending",
@@ -61,11 +77,14 @@ __all__ = [
     "Polygons",
     "Pose",
     "PushoverCheckpoint",
+    "Quantity",
     "Response",
     "Settlement",
     "Shapes",
     "SolveError",
+    "State",
     "Status",
+    "StoredState",
     "block_forces",
     "carried",
     "check_settlement",
@@ -81,13 +100,16 @@ __all__ = [
     "motion_size",
     "moved_vertices",
     "overlap_depths",
+    "path_parameters",
     "point_load",
     "point_velocities",
     "pushover",
     "pushover_increments",
+    "reaction_to",
     "rigid_parts",
     "self_weight",
     "settle",
+    "settlement_in",
     "settlement_increments",
     "surface_pressure",
     "swung",

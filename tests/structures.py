@@ -72,17 +72,20 @@ def parted(assembly: solver.Assembly, path: int, fall: int, settlement: float = 
         apart = velocity[contacts.block_a, :2] - velocity[contacts.block_b, :2]
         increments.append(
             solver.Increment(
-                settlement=s,
+                parameter=s,
+                measured=2000.0 - 3000.0 * s,
                 phase=0,
                 load_multiplier=0.0,
-                pose=pose,
-                contacts=contacts,
-                forces=forces,
-                displacements=np.einsum("kij,kj->ki", contacts.frames, apart),
-                friction=np.full(len(normal), 0.6),
-                velocity=velocity,
                 reaction=2000.0 - 3000.0 * s,
-                support_forces=np.zeros((assembly.n_blocks, 3)),
+                held=solver.State(
+                    pose=pose,
+                    contacts=contacts,
+                    forces=forces,
+                    displacements=np.einsum("kij,kj->ki", contacts.frames, apart),
+                    friction=np.full(len(normal), 0.6),
+                    velocity=velocity,
+                    support_forces=np.zeros((assembly.n_blocks, 3)),
+                ),
                 certificate=certificate,
                 status=solver.Status.EQUILIBRIUM if k < path else solver.Status.FALLING,
                 programs=1,

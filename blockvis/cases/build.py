@@ -15,7 +15,7 @@ from blockvis.layout import layout
 from blockvis.layout.assemble import assemble
 from blockvis.suggestions import nearest
 
-from .case import Case
+from .contents import Case
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
 

@@ -1,12 +1,10 @@
-"""Case: the TOML case file, read and checked."""
+"""The TOML case file, read and checked."""
 
 from __future__ import annotations
 
 import math
 import tomllib
-import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,61 +13,17 @@ import numpy as np
 import solver
 from blockvis import generators
 from blockvis.formats import FORMATS
+from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import files_like
 from blockvis.video_suffixes import VIDEO_SUFFIXES
 
+from .contents import Case
 from .imperfections import Imperfection, read_imperfection
 from .loads import LoadCase
 from .toml_table import Table, is_number, shortened
 
-ANALYSES = ("settlement", "limit load", "pushover")
-
-#: Flow rules of the sliding joints of a limit load.
-FLOWS = ("associative", "non-associative")
-
 #: More increments or frames than this are taken for a typing error.
 MOST_STEPS = 1_000_000
-
-
-@dataclass(frozen=True)
-class Case:
-    """A checked case file. The keys are those of the file; see the README.
-
-    Attributes
-    ----------
-    source : Path
-        The case file; paths in it are relative to its folder.
-    text : str
-        The case file as it was read.
-    """
-
-    source: Path
-    text: str
-    file: Path | None = None
-    layout: str | None = None
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    unit: str | None = None
-    thickness: float | None = None
-    joint_thickness: float | str = 0.0
-    overlap_tolerance: float | None = None
-    roles: Mapping[str, str] = field(default_factory=dict)
-    supports: tuple[Mapping[str, Any], ...] = ()
-    density: float | None = None
-    densities: Mapping[str, float] = field(default_factory=dict)
-    friction_coefficient: float = 0.6
-    cohesion: float = 0.0
-    compressive_strength: float = math.inf
-    interfaces: Mapping[tuple[str, str], solver.InterfaceLaw] = field(default_factory=dict)
-    imperfections: tuple[Imperfection, ...] = ()
-    settlements: tuple[solver.Settlement, ...] = ()
-    loads: tuple[LoadCase, ...] = ()
-    analysis: str = "settlement"
-    flow: str = "associative"
-    capacity_at: tuple[float, ...] | None = None
-    displacement: float | None = None
-    control: solver.ControlDisplacement | None = None
-    controls: solver.Controls = field(default_factory=solver.Controls)
-    animation: str | None = "collapse.mp4"
 
 
 def read_case(path: str | Path) -> Case:
@@ -145,6 +99,9 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         densities[name] = one.number("density", positive=True)
         one.finish()
     analysis = top.table("analysis")
+    kind = KINDS[analysis.text("kind", next(iter(KINDS)), among=tuple(KINDS))]
+    # Every kind reads its keys: one that is given to another kind is named, not ignored.
+    settings = {name: known.read(top, analysis) for name, known in KINDS.items()}
     output = top.table("output")
     animation = output.take("animation", "collapse.mp4")
     if animation is not False:
@@ -175,91 +132,34 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         imperfections=_imperfections(top),
         settlements=tuple(_settlement(entry) for entry in top.tables("settlement")),
         loads=tuple(_load(entry) for entry in top.tables("loads")),
-        analysis=analysis.text("kind", "settlement", among=ANALYSES),
-        flow=analysis.text("flow", "associative", among=FLOWS),
-        capacity_at=analysis.numbers("capacity_at"),
-        displacement=_displacement(analysis),
-        control=_control(top.table("control")),
+        analysis=kind.name,
+        settings=settings[kind.name],
         controls=_controls(analysis, geometry.number("overlap_tolerance", positive=True)),
         animation=animation or None,
     )
     for table in (geometry, material, analysis, output, top):
         table.finish()
-    return _fitting(case)
+    return _checked(case, settings)
 
 
-def _fitting(case: Case) -> Case:
-    """Check that the keys of a case fit its analysis, and let its settlement stop where a capacity is asked for."""
-    source, kind = case.source, case.analysis
-    live = any(load.kind == "live" for load in case.loads)
-    if kind == "settlement" and not case.settlements:
-        raise ValueError(f"{source}: [settlement] is missing; say how the moving supports move, direction = [1, 0]")
-    if kind == "settlement" and live:
-        warnings.warn(
-            f'{source}: a settlement analysis leaves the live loads out; give loads that act during it kind = "dead"',
-            stacklevel=4,
-        )
-    if kind != "settlement" and not live:
-        raise ValueError(
-            f'{source}: [analysis] kind is "{kind}", but no load is live; add [[loads]] with kind = "live", for '
-            "instance weight_fraction = [1.0, 0.0]"
-        )
-    laws = [solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength)]
-    if not all(law.dry for law in [*laws, *case.interfaces.values()]) and (kind != "limit load" or case.settlements):
-        raise ValueError(
-            f"{source}: cohesion and compressive_strength are for limit loads without a settlement; settlements and "
-            "pushovers follow dry joints"
-        )
-    _check_keys_of_kind(case)
-    _check_moving_load(case)
-    return case if case.capacity_at is None else _stopping_at(case, case.capacity_at)
+def _checked(case: Case, settings: Mapping[str, Any]) -> Case:
+    """Check that the keys of a case fit its kind of analysis.
 
-
-def _check_keys_of_kind(case: Case) -> None:
-    """Refuse keys that belong to another kind of analysis."""
-    source, kind = case.source, case.analysis
-    if kind == "pushover" and case.control is None:
-        raise ValueError(
-            f'{source}: [control] is missing; a pushover needs the displacement that grows, block = "..." and '
-            "direction = [1, 0]"
-        )
-    if kind != "pushover" and case.control is not None:
-        raise ValueError(f'{source}: [control] belongs to [analysis] kind = "pushover", not "{kind}"')
-    if kind != "limit load" and case.flow != "associative":
-        raise ValueError(
-            f'{source}: [analysis] flow "{case.flow}" belongs to kind = "limit load"; a {kind} follows the geometry, '
-            "in which friction never dilates"
-        )
-    if case.displacement is not None and (kind != "limit load" or not case.settlements):
-        raise ValueError(
-            f"{source}: [analysis] displacement is that of a limit load after a settlement, in which open joints may "
-            "close"
-        )
-
-
-def _check_moving_load(case: Case) -> None:
+    Parameters
+    ----------
+    case : Case
+    settings : mapping
+        What each kind has read from its keys, by its name.
+    """
     moving = [k for k, load in enumerate(case.loads, start=1) if load.positions]
-    if case.analysis == "pushover" and moving:
-        raise ValueError(f'{case.source}: [loads {moving[0]}] positions belong to [analysis] kind = "limit load"')
     if len(moving) > 1:
         raise ValueError(
             f"{case.source}: [loads {moving[1]}] positions: only one load may move, and loads {moving[0]} does"
         )
-
-
-def _stopping_at(case: Case, capacity_at: tuple[float, ...]) -> Case:
-    """Let the last settlement of a case stop at each settlement of ``capacity_at``."""
-    if case.analysis != "limit load" or not case.settlements or any(load.positions for load in case.loads):
-        raise ValueError(
-            f'{case.source}: [analysis] capacity_at asks for limit loads (kind = "limit load") of loads that stand '
-            "still, along a [settlement]"
-        )
-    last = case.settlements[-1]
-    try:
-        stopping = replace(last, stops=capacity_at)
-    except ValueError as error:
-        raise ValueError(f"{case.source}: [analysis] capacity_at: {error}") from None
-    return replace(case, settlements=(*case.settlements[:-1], stopping))
+    for name, other in KINDS.items():
+        if name != case.analysis:
+            other.refuse(settings[name], case)
+    return KINDS[case.analysis].checked(case)
 
 
 def _friction(table: Table, default: float | None = 0.6) -> float:
@@ -342,33 +242,6 @@ def _settlement(table: Table) -> solver.Settlement:
         keys["rotation"] = 1.0 if keys["rotation_centre"] is not None else 0.0
     try:
         return solver.Settlement(**keys, blocks=blocks)
-    except ValueError as error:
-        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
-
-
-def _displacement(table: Table) -> float | None:
-    value = table.number("displacement")
-    if value is not None and value < 0.0:
-        raise table.error("displacement", f"is {value:g}; give a length in m of at least 0")
-    return None if value is None else float(value)
-
-
-def _control(table: Table) -> solver.ControlDisplacement | None:
-    if not table.values:
-        return None
-    keys = {
-        "direction": table.pair("direction", (1.0, 0.0)),
-        "point": table.pair("point"),
-        "increment": table.number("increment", 0.01, positive=True),
-        "limit": table.number("limit", 1.0, positive=True),
-        "tolerance": table.number("tolerance", positive=True),
-    }
-    block = table.text("block")
-    table.finish()
-    if block is None:
-        raise table.error("block", "is missing; name the block whose displacement grows")
-    try:
-        return solver.ControlDisplacement(block, **keys)
     except ValueError as error:
         raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 

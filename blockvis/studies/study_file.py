@@ -18,6 +18,7 @@ from blockvis.cases.case import case_of, read_case
 from blockvis.cases.distributions import Distribution, read_distribution
 from blockvis.cases.imperfections import read_imperfection
 from blockvis.cases.toml_table import is_number
+from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import nearest, refuse_unknown
 
 from .sampling import METHODS, Design, designed
@@ -275,7 +276,7 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
 
 def _check(study: Study, where: str) -> None:
     base = case_of(study.values, study.case_source)
-    if base.analysis != "settlement":
+    if not KINDS[base.analysis].in_studies:
         raise ValueError(f"{base.source}: a study follows settlements, but [analysis] kind is '{base.analysis}'")
     if study.method == "grid":
         _check_grid(study, where)

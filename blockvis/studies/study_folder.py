@@ -15,6 +15,7 @@ import numpy as np
 
 import solver
 from blockvis.atomic_files import flush, make_folder, whole_file, write_whole
+from blockvis.results.npz import compressed
 
 from .run_one import FAILED
 from .study_file import RESERVED, Study
@@ -141,7 +142,7 @@ class StudyFolder:
             self._first[file] = row["run"]
             with np.load(_buffer(shape)) as stored:
                 arrays = {name: stored[name] for name in stored.files}
-            write_whole(file, _packed({**arrays, "run": np.array(row["run"])}))
+            write_whole(file, compressed({**arrays, "run": np.array(row["run"])}))
 
     def shape_file(self, mechanism_class: str) -> Path:
         """File of the shape of a class of mechanisms."""
@@ -223,12 +224,6 @@ def _buffer(data: bytes) -> Any:
     from io import BytesIO
 
     return BytesIO(data)
-
-
-def _packed(arrays: Mapping[str, Any]) -> bytes:
-    buffer = _buffer(b"")
-    np.savez_compressed(buffer, **arrays)
-    return bytes(buffer.getvalue())
 
 
 def _json(value: Any) -> bytes:

@@ -18,7 +18,7 @@ from solver.lp.problem import LinearProgram, Unbounded
 from solver.lp.solve import solve_lp
 from solver.program.strength import Admissible, point_strength
 from solver.results.certificate import Certificate
-from solver.results.limit import Envelope, LimitLoad, LimitStatus
+from solver.results.limit import Envelope, LimitLoad, LimitStatus, limit_state
 from solver.tolerances import COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
@@ -373,9 +373,6 @@ class _Problem:
         return LimitLoad(
             multiplier=static if found else nothing,
             bounds=(static, kinematic / self.live_size) if found else (nothing, nothing),
-            mechanism=mechanism,
-            contacts=self.contacts,
-            forces=state.forces * self.force,
             certificate=Certificate(
                 equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / total,
                 largest_penetration=float(np.maximum(-self.contacts.gaps, 0.0).max(initial=0.0)),
@@ -385,10 +382,9 @@ class _Problem:
             ),
             status=status,
             flow=flow,
-            pose=self.pose,
-            friction=self.friction,
             live_force=self.live_force,
             programs=programs,
+            held=limit_state(self.pose, self.contacts, state.forces * self.force, self.friction, mechanism),
         )
 
 

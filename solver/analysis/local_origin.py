@@ -56,8 +56,7 @@ def told_from(steps: Generator[Increment, None, Ended], origin: np.ndarray) -> G
             ended: Ended = stop.value
             return ended
         pose, contacts = increment.pose, increment.contacts
-        yield replace(
-            increment,
+        yield increment.with_arrays(
             pose=Pose(pose.positions + origin, pose.rotations),
             contacts=replace(contacts, points=contacts.points + origin),
         )

@@ -24,8 +24,9 @@ from solver.lp.problem import SolveError
 from solver.program.correction import Falls, NotConverged, at_rest, corrected, solve_again
 from solver.program.increment import Locked, Solved, solve_program
 from solver.program.model import Model
-from solver.results.increment import Increment, Status
+from solver.results.increment import Increment, State, Status
 from solver.results.mechanism import mechanism_of
+from solver.results.quantities import reaction_to, settlement_in
 from solver.results.response import Collapse, Response
 from solver.tolerances import FARTHEST_FALL, JUMP, OVERLAP
 
@@ -148,6 +149,8 @@ def settle(
         stop=ending.stop,
         message=ending.message,
         collapse=ending.collapse,
+        parameter=settlement_in(phases[0].unit),
+        measured=reaction_to(phases[0].unit),
     )
 
 
@@ -618,22 +621,26 @@ def _increment(
     model: Model, solved: Solved, rate: np.ndarray, step: float, s: float, phase: int, status: Status
 ) -> Increment:
     contacts, velocity = solved.contacts, solved.motion / step
+    reaction = float((solved.support_forces * rate).sum())
     return Increment(
-        settlement=s,
+        parameter=s,
+        measured=reaction,
         phase=phase,
         load_multiplier=0.0,
-        pose=solved.pose,
-        contacts=contacts,
-        forces=solved.forces,
-        displacements=relative_velocities(contacts, solved.pose, velocity),
-        friction=solved.friction,
-        velocity=velocity,
-        reaction=float((solved.support_forces * rate).sum()),
-        support_forces=solved.support_forces,
+        reaction=reaction,
         certificate=solved.certificate,
         status=status,
         programs=model.tally.take(),
         seconds=0.0,
+        held=State(
+            pose=solved.pose,
+            contacts=contacts,
+            forces=solved.forces,
+            displacements=relative_velocities(contacts, solved.pose, velocity),
+            friction=solved.friction,
+            velocity=velocity,
+            support_forces=solved.support_forces,
+        ),
     )
 
 

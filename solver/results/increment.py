@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum, StrEnum
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -77,32 +77,60 @@ def at_rest(velocity: np.ndarray, slow: float) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Increment:
-    """One equilibrium on the path, or one frame of the fall after it.
+class State:
+    """The arrays of an increment: where its blocks are, what their joints carry, and how they move next.
 
     Attributes
     ----------
-    settlement : float [m or rad]
-        Parameter s of the moving supports within its phase; see :attr:`Response.analysis` for other analyses.
-    phase : int
-        Which of several settlements, from 0.
-    load_multiplier : float
-        α of the live loads.
     pose : Pose
     contacts : Contacts
     forces : (n_contacts, 2) array [N]
         Normal (compression positive) and shear force on ``block_a`` at each contact point.
-    displacements : (n_contacts, 2) array [m]
-        Opening and slip of each contact point in the increment that follows, per unit of s; in a fall,
+    displacements : (n_contacts, 2) array
+        Opening and slip of each contact point in the increment that follows, per unit of the parameter; in a fall,
         per frame.
     friction : (n_contacts,) array
         Friction coefficient of each contact point.
     velocity : (n_blocks, 3) array
-        Movement of each block in the increment that follows, per unit of s; in a fall, per frame.
-    reaction : float [N]
-        Force of the structure on the moving supports along their motion [N·m for a rotation].
+        Movement of each block in the increment that follows, per unit of the parameter; in a fall, per frame.
     support_forces : (n_blocks, 3) array [N, N, N·m]
         Resultant of the structure on each support about its centroid; zero for free blocks.
+    """
+
+    pose: Pose
+    contacts: Contacts
+    forces: np.ndarray
+    displacements: np.ndarray
+    friction: np.ndarray
+    velocity: np.ndarray
+    support_forces: np.ndarray
+
+
+class StoredState(Protocol):
+    """A state that is kept elsewhere, in a file, and read whenever it is asked for."""
+
+    def read(self) -> State:
+        """The state."""
+
+
+@dataclass(frozen=True)
+class Increment:
+    """One equilibrium on the path, or one frame of the fall after it: a few numbers, and a state.
+
+    Attributes
+    ----------
+    parameter : float
+        What the analysis runs over (:attr:`Response.parameter`): of a settlement, that of the moving supports within
+        its phase [m or rad]; of a pushover the control displacement [m]; of a load that moves its position x [m].
+    measured : float
+        What the analysis measures there (:attr:`Response.measured`): the reaction [N or N·m] or the load multiplier.
+    phase : int
+        Which of several settlements, from 0.
+    load_multiplier : float
+        α of the live loads.
+    reaction : float [N]
+        Force of the structure on the moving supports along their motion [N·m for a rotation]; of live loads, their
+        resultant at this multiplier.
     certificate : Certificate
     status : Status
         ``EQUILIBRIUM``, or ``FALLING`` for pseudo-time frames: no equilibrium, no dynamics.
@@ -110,6 +138,8 @@ class Increment:
         Linear programs solved for this increment.
     seconds : float
         Time spent on this increment.
+    held : State or StoredState
+        The arrays, in memory or in a file; :attr:`state` has them in any case.
     notes : tuple of str
         What happened on the way to it that forces and poses do not tell: blocks that fell and were caught.
     checkpoint : optional
@@ -117,30 +147,80 @@ class Increment:
         :class:`PushoverCheckpoint` of a pushover. A :class:`Response` keeps none.
     """
 
-    settlement: float
+    parameter: float
+    measured: float
     phase: int
     load_multiplier: float
-    pose: Pose
-    contacts: Contacts
-    forces: np.ndarray
-    displacements: np.ndarray
-    friction: np.ndarray
-    velocity: np.ndarray
     reaction: float
-    support_forces: np.ndarray
     certificate: Certificate
     status: Status
     programs: int
     seconds: float
+    held: State | StoredState = field(repr=False, compare=False)
     notes: tuple[str, ...] = ()
     checkpoint: Any = field(default=None, repr=False, compare=False)
 
     def __repr__(self) -> str:
         """One line; the arrays of a wall fill screens."""
         return (
-            f"<Increment {self.status} at {self.settlement:g}, reaction {self.reaction:.6g}, "
+            f"<Increment {self.status} at {self.parameter:g}, reaction {self.reaction:.6g}, "
             f"load multiplier {self.load_multiplier:.6g}>"
         )
+
+    @property
+    def state(self) -> State:
+        """The arrays, read from their file where they are kept in one."""
+        return self.held if isinstance(self.held, State) else self.held.read()
+
+    def with_arrays(self, **arrays: Any) -> Increment:
+        """The increment in memory, some of its arrays replaced.
+
+        Parameters
+        ----------
+        **arrays
+            Fields of :class:`State`.
+        """
+        return replace(self, held=replace(self.state, **arrays))
+
+    @property
+    def settlement(self) -> float:
+        """The parameter, by the name it has in most analyses."""
+        return self.parameter
+
+    @property
+    def pose(self) -> Pose:
+        """Where the blocks are."""
+        return self.state.pose
+
+    @property
+    def contacts(self) -> Contacts:
+        """The contact points."""
+        return self.state.contacts
+
+    @property
+    def forces(self) -> np.ndarray:
+        """(n_contacts, 2) array [N]: normal and shear force on ``block_a``; see :class:`State`."""
+        return self.state.forces
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """(n_contacts, 2) array: opening and slip per unit of the parameter; see :class:`State`."""
+        return self.state.displacements
+
+    @property
+    def friction(self) -> np.ndarray:
+        """(n_contacts,) array: friction coefficients."""
+        return self.state.friction
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(n_blocks, 3) array: movement of each block per unit of the parameter; see :class:`State`."""
+        return self.state.velocity
+
+    @property
+    def support_forces(self) -> np.ndarray:
+        """(n_blocks, 3) array [N, N, N·m]: resultant of the structure on each support; see :class:`State`."""
+        return self.state.support_forces
 
     @property
     def states(self) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -142,4 +142,4 @@ def with_motion(increment: Increment, motion: np.ndarray) -> Increment:
         Velocity of each centroid and angular velocity, in any scale.
     """
     rates = relative_velocities(increment.contacts, increment.pose, motion)
-    return replace(increment, velocity=motion, displacements=rates)
+    return increment.with_arrays(velocity=motion, displacements=rates)

@@ -162,7 +162,7 @@ def test_stored_increments_are_what_was_told(tmp_path):
     again = blockvis.write(stored, tmp_path / "again")
     for file in sorted((tmp_path / "out" / "increments").iterdir()):
         assert file.read_bytes() == (again / "increments" / file.name).read_bytes()
-    moved = replace(stored.increments[0], settlement=9.0)
+    moved = replace(stored.increments[0].with_arrays(), parameter=9.0)
     copied = pickle.loads(pickle.dumps(stored.increments[1]))
     assert copied.forces.tobytes() == told.increments[1].forces.tobytes()
     shutil.rmtree(tmp_path / "out")

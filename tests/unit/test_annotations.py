@@ -1,7 +1,5 @@
 """Joints, cracks, hinges, resultants and the parts of a mechanism."""
 
-from dataclasses import replace
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -110,7 +108,7 @@ def test_joints_that_hardly_slide_are_not_marked():
     fastest = np.abs(last.velocity[:, :2]).max()
     for slip, drawn in ((0.5, True), (1e-4, False)):
         along = np.tile([0.0, slip * fastest], (len(last.contacts), 1))
-        sliding = replace(last, forces=used_up, displacements=along)
+        sliding = last.with_arrays(forces=used_up, displacements=along)
         assert (sliding.states == solver.ContactState.SLIDING).any()
         assert (len(marks.marks_of(response.assembly, joints, sliding, last.pose).sliding) > 0) is drawn
 

@@ -5,7 +5,6 @@ import csv
 import json
 import re
 import zlib
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -116,5 +115,5 @@ def test_creeping_counts_for_nothing():
         motion = np.zeros_like(last.velocity)
         motion[response.assembly.free] = [0.0, fastest, 0.0]
         along = np.tile([0.0, part * fastest], (len(last.contacts), 1))
-        creeping = replace(last, velocity=motion, displacements=along)
+        creeping = last.with_arrays(velocity=motion, displacements=along)
         assert bool(counted(response, creeping)[1]) is slides
