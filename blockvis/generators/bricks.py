@@ -22,6 +22,12 @@ LOWEST_BRICK = 0.3
 #: So is a piece into which no circle of this fraction of the brick height in diameter fits: the end of a wedge.
 NARROWEST = 0.25
 
+#: Pieces are joined along at least this fraction of the brick height, not where they touch at a corner,
+LEAST_SHARED = 0.01
+
+#: or along this fraction of the sliver's own perimeter: one so small that all its edges are shorter is joined, too.
+LEAST_OF_PERIMETER = 0.05
+
 
 @dataclass(frozen=True)
 class Bond:
@@ -137,9 +143,10 @@ def _is_sliver(bond: Bond, shape: shapely.Polygon) -> bool:
 def _best_neighbour(bond: Bond, bricks: list[Brick], sliver: int) -> int | None:
     """The neighbour with which a sliver makes the block that fills most of its convex hull."""
     shape = bricks[sliver].shape
+    least = min(LEAST_SHARED * bond.brick_height, LEAST_OF_PERIMETER * shape.length)
     best, fullest = None, 0.0
     for i in np.flatnonzero(shapely.intersects([brick.shape for brick in bricks], shape)).tolist():
-        if i == sliver or shape.boundary.intersection(bricks[i].shape.boundary).length < 0.01 * bond.brick_height:
+        if i == sliver or shape.boundary.intersection(bricks[i].shape.boundary).length < least:
             continue
         whole = _joined(bond, shape, bricks[i].shape)
         if whole.geom_type != "Polygon" or len(whole.interiors):
