@@ -9,7 +9,9 @@ import os
 
 import numpy as np
 import pytest
-from freeze import CASES, GOLDEN, STUDIES, numbers_of, stored
+from freeze import CASES, GOLDEN, STUDIES, numbers_in, numbers_of, stored
+
+pytestmark = pytest.mark.path
 
 EXACT = os.environ.get("BLOCKVIS_EXACT", "") not in ("", "0")
 
@@ -42,10 +44,14 @@ def test_every_example_is_frozen():
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in (*CASES, *STUDIES)],
+    [
+        pytest.param(name, marks=[pytest.mark.xdist_group(name), *([pytest.mark.slow] if name in SLOW else [])])
+        for name in (*CASES, *STUDIES)
+    ],
 )
-def test_example_gives_what_it_gave(name, tmp_path):
-    found, frozen = numbers_of(name, tmp_path / "out"), stored(name)
+def test_example_gives_what_it_gave(name, example, tmp_path):
+    found = numbers_of(name, tmp_path / "out") if name in STUDIES else numbers_in(example(name))
+    frozen = stored(name)
     if EXACT:
         assert wrong(found, frozen) == []
         return
