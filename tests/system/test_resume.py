@@ -82,7 +82,8 @@ UNDRAWN = "import sys, blockvis; sys.modules[blockvis.run_case.__module__].draw_
 
 def _command(folder, *arguments, code=""):
     """The command line in a process of its own; ``code`` runs before it."""
-    script = f"{UNDRAWN}\n{code}\nimport sys; from blockvis.cli import main; sys.exit(main({[str(a) for a in arguments]!r}))"
+    run = f"import sys; from blockvis.cli import main; sys.exit(main({[str(a) for a in arguments]!r}))"
+    script = f"{UNDRAWN}\n{code}\n{run}"
     return subprocess.Popen(
         [sys.executable, "-c", script], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
