@@ -32,6 +32,7 @@ def test_hostile_files_are_refused_within_bounds(tmp_path):
         assert "outside its folder" in str(outcomes[name]["message"])
 
 
+@pytest.mark.fuzz
 def test_changed_bytes_are_read_or_refused(tmp_path):
     random, paths = np.random.default_rng(2026), []
     for name, data in fixtures(tmp_path).items():

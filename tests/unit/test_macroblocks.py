@@ -7,6 +7,8 @@ from solver.geometry.planar_contacts import find_contacts
 from solver.kinematics import Pose, moved_vertices, moving_together, point_velocities
 from solver.program.macroblocks import free_blocks, macro_blocks
 
+pytestmark = pytest.mark.path
+
 
 @pytest.fixture
 def wall():
