@@ -2,17 +2,14 @@
 
 import shutil
 import sys
-from collections.abc import Callable, Iterator
-from functools import cache
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import structures
-from freeze import ran
 
 import blockvis
 import solver
-from blockvis.runs.run import Run
 
 _RUN = sys.modules[blockvis.run_case.__module__]
 _DRAW_RESULTS = _RUN.draw_results
@@ -50,12 +47,6 @@ def _arch_written(arch: solver.Response, tmp_path_factory: pytest.TempPathFactor
 def arch_results(_arch_written: Path, tmp_path: Path) -> Path:
     """The results folder of the reference arch: a copy that the test may spoil."""
     return shutil.copytree(_arch_written, tmp_path / "out")
-
-
-@pytest.fixture(scope="session")
-def example(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Run]:
-    """The run of an example by its name, solved once; tests of one example share an ``xdist_group``."""
-    return cache(lambda name: ran(name, tmp_path_factory.mktemp(name) / "out"))
 
 
 @pytest.fixture(scope="session")

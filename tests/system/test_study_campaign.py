@@ -80,7 +80,6 @@ def _made_here(study, folder, runs):
     return ledger
 
 
-@pytest.mark.xdist_group("dask")
 def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path, scheduler):
     """As in a notebook, where a loop is running; runs that stood up to the limit are no collapse."""
     study = {
@@ -171,7 +170,6 @@ def test_a_study_that_is_killed_and_interrupted_goes_on(arches, tmp_path):
     assert rows.count(b"\n") == 24, "finished runs are not made again"
 
 
-@pytest.mark.xdist_group("dask")
 def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tmp_path, capsys, scheduler):
     """A run kept as a folder is a run of the table."""
     out = tmp_path / "out"
