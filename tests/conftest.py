@@ -49,8 +49,8 @@ def arch_results(_arch_written: Path, tmp_path: Path) -> Path:
     return shutil.copytree(_arch_written, tmp_path / "out")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Address of a Dask scheduler with two workers, for studies that kill neither."""
+    """Address of a Dask scheduler with two workers, for studies that kill neither; idle ones would cost time, too."""
     with structures.started_cluster(tmp_path_factory.mktemp("dask")) as (address, _, _):
         yield address
