@@ -71,6 +71,7 @@ def table(path):
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
 
 
+@pytest.mark.pictures
 def test_limit_load_of_a_block_from_its_case_file(tmp_path, capsys):
     text = COLUMN + '[analysis]\nkind = "limit load"\n[output]\nanimation = "swing.gif"\n' + SIDEWAYS
     folder, summary = ran(text, tmp_path)
@@ -223,6 +224,7 @@ increment = 0.01
 )
 
 
+@pytest.mark.pictures
 def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
     folder, summary = ran(PUSHED + "[output]\nanimation = false\n", tmp_path)
     rows = table(folder / "response.csv")

@@ -68,13 +68,6 @@ def ran(text, folder):
     return blockvis.run_case(parse_case(ARCH + text, folder / "case.toml"), folder / "out")
 
 
-@pytest.fixture(autouse=True, scope="module")
-def undrawn():
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("blockvis.runs.run.draw_results", lambda *_, **__: ())
-        yield
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Results with more increments than are ever kept."""

@@ -10,6 +10,8 @@ import solver
 from blockvis import generators
 from solver.analysis.settlement import settlement_increments
 
+pytestmark = pytest.mark.path
+
 WIDTH, HEIGHT, SLOT = 0.1, 0.2, 0.02
 
 

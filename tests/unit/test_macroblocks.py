@@ -7,6 +7,8 @@ from solver import find_contacts
 from solver.kinematics import Pose, moved_vertices, moving_together, point_velocities
 from solver.program.macroblocks import free_blocks, macro_blocks
 
+pytestmark = pytest.mark.path
+
 
 @pytest.fixture
 def wall():
@@ -67,6 +69,7 @@ def test_free_blocks_move_for_themselves(wall):
     np.testing.assert_array_equal(found.motions.toarray(), np.eye(3 * wall.n_blocks)[:, np.repeat(wall.free, 3)])
 
 
+@pytest.mark.slow
 def test_a_large_wall_closes_up_like_a_small_one(wall, monkeypatch):
     """The reaction hangs on gaps being closed: left as they are it is 20 % off."""
     sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.004, limit=0.016)

@@ -9,6 +9,8 @@ from blockvis import generators
 from solver.analysis.limit_load import limit_load
 from solver.analysis.pushover import ControlDisplacement, pushover
 
+pytestmark = pytest.mark.path
+
 
 def block():
     return solver.Assembly.from_outlines(

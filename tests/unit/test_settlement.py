@@ -13,6 +13,8 @@ from blockvis import generators
 from solver.equilibrium import block_forces
 from solver.lp.highs import run_highs
 
+pytestmark = pytest.mark.path
+
 NO_FALL = solver.Controls(falling_frames=0)
 DOWN = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.02)
 
