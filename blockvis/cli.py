@@ -1,4 +1,4 @@
-"""The command line: one verb, one public function."""
+"""The command line: a function for each verb, which calls the public ones and prints what came out."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BAD_INPUT, SOLVER_FAILED, NO_PICTURES, INTERRUPTED = 2, 3, 4, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command line and returns its exit code.
+    """Run the command line and return its exit code.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def _number(text: str) -> float:
 
 
 def _parameter(given: str) -> tuple[str, Any]:
-    """A parameter "key=value" of the command line; the value as TOML writes it, or a plain word."""
+    """Read a parameter "key=value" of the command line; the value as TOML writes it, or a plain word."""
     key, equals, value = given.partition("=")
     if not equals:
         raise ValueError(f"'{given}' is not a parameter; write key=value, for instance voussoirs=12")
@@ -279,10 +279,10 @@ def _parameter(given: str) -> tuple[str, Any]:
 
 
 def _in_words(response: solver.Response, folder: Path) -> str:
-    """The summary of a run for a reader."""
+    """Sum up a run in words."""
     from .runs.kinds import KINDS
 
-    path, kind = response.path, KINDS[response.analysis]
+    kind = KINDS[response.analysis]
     width, height = np.ptp(
         response.assembly.vertices[response.assembly.free[response.assembly.block_of_vertex]], axis=0
     )
@@ -296,13 +296,11 @@ def _in_words(response: solver.Response, folder: Path) -> str:
     if response.message and not kind.tells_message(response):
         lines.append(response.message)
     lines += kind.lines(response)
-    if path:
-        residual = max(i.certificate.equilibrium_residual for i in path)
-        gap = max(i.certificate.duality_gap for i in path)
-        penetration = max(i.certificate.largest_penetration for i in path)
+    worst = solver.worst_of(i.certificate for i in response.path)
+    if worst is not None:
         lines.append(
-            f"certificate: equilibrium residual {residual:.1e} W, duality gap {gap:.1e}, "
-            f"penetration {penetration:.1e} m"
+            f"certificate: equilibrium residual {worst.equilibrium_residual:.1e} W, "
+            f"duality gap {worst.duality_gap:.1e}, penetration {worst.largest_penetration:.1e} m"
         )
     lines.append(f"results in {folder}/")
     return "\n".join(lines)

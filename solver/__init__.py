@@ -24,10 +24,10 @@ from .geometry.planar_contacts import corners_and_edges, features_of
 from .geometry.polygons import Polygons
 from .geometry.shapes import Shapes
 from .interfaces import InterfaceLaw, Interfaces, JointScatter
-from .kinematics import Pose, carried, motion_size, moved_vertices, point_velocities, swung, turned
+from .kinematics import Pose, carried, carried_between, motion_size, moved_vertices, point_velocities, swung, turned
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
 from .lp.problem import SolveError
-from .results.certificate import Certificate
+from .results.certificate import Certificate, worst_of
 from .results.increment import ContactState, Increment, State, Status, StoredState
 from .results.limit import Envelope, LimitLoad, LimitStatus
 from .results.mechanism import Mechanism, mechanism_of, rigid_parts, with_motion
@@ -87,6 +87,7 @@ __all__ = [
     "StoredState",
     "block_forces",
     "carried",
+    "carried_between",
     "check_settlement",
     "corners_and_edges",
     "edge_pressure",
@@ -117,4 +118,5 @@ __all__ = [
     "turned",
     "weight_fraction",
     "with_motion",
+    "worst_of",
 ]

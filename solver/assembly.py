@@ -223,14 +223,14 @@ class Assembly:
         return self.vertices[self.offsets[block] : self.offsets[block + 1]]
 
     def index(self, name: str) -> int:
-        """Number of the block with this name; raises ``ValueError`` where there is none."""
+        """Find the number of the block with this name; raises ``ValueError`` where there is none."""
         try:
             return self.names.index(name)
         except ValueError:
             raise ValueError(f"no block is named '{name}'; the assembly has {self.n_blocks} blocks") from None
 
     def with_roles(self, roles: Sequence[str] | np.ndarray) -> Assembly:
-        """The same blocks with other roles, (n_blocks,) of "free", "fixed" and "moving"."""
+        """Give the blocks other roles, (n_blocks,) of "free", "fixed" and "moving"."""
         unknown = set(map(str, roles)) - set(ROLES)
         if unknown or len(roles) != self.n_blocks:
             raise ValueError(
@@ -240,7 +240,7 @@ class Assembly:
 
 
 def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> None:
-    """Refuses an assembly without free blocks, or with blocks that overlap, before anything is solved.
+    """Refuse an assembly without free blocks, or with blocks that overlap, before anything is solved.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
 
 
 def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Contacts:
-    """The points at which blocks touch or may touch within one increment.
+    """Find the points at which blocks touch or may touch within one increment.
 
     Parameters
     ----------
@@ -282,13 +282,13 @@ def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Con
     Returns
     -------
     Contacts
-        None between two supports; sorted, so that the same geometry gives the same order.
+        Pairs of supports have none; sorted, so that the same geometry gives the same order.
     """
     return assembly.shapes.find(vertices, reach, assembly.free)
 
 
 def measure_contacts(assembly: Assembly, vertices: np.ndarray, contacts: Contacts) -> Contacts:
-    """The same contact points where the corners now are.
+    """Measure the same contact points where the corners now are.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ FACETS = 16
 
 
 def wrench_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc_array:
-    """Forces and moments on every block from unit normal and shear forces at the contact points.
+    """Make the matrix of forces and moments on every block from unit forces at the contact points.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def wrench_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc
 
 
 def friction_rays(friction: np.ndarray, d: int = 2, facets: int = FACETS) -> sp.csc_array:
-    """The rays of each friction cone as combinations of normal and shear forces.
+    """Combine normal and shear forces to the rays of each friction cone.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def friction_rays(friction: np.ndarray, d: int = 2, facets: int = FACETS) -> sp.
 
 
 def with_slack(*columns: sp.csc_array) -> sp.csc_array:
-    """The columns of a program side by side, a unit column of either sign per row after the first block.
+    """Put the columns of a program side by side, after the first block a unit column of either sign per row.
 
     Parameters
     ----------

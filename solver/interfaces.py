@@ -29,6 +29,7 @@ class InterfaceLaw:
     compressive_strength: float = np.inf
 
     def __post_init__(self) -> None:
+        """Check the values."""
         mu = self.friction_coefficient
         if not (np.isfinite(mu) and mu >= 0):
             raise ValueError(f"friction_coefficient is {mu:g}; it must be a finite number of at least 0")
@@ -118,7 +119,7 @@ class Interfaces:
         return self.default.dry and all(law.dry for law in self.pairs.values())
 
     def refuse_strength(self, analysis: str) -> None:
-        """Raises ``ValueError`` for cohesion or compressive strength in an analysis that follows dry joints."""
+        """Raise ``ValueError`` for cohesion or compressive strength in an analysis that follows dry joints."""
         if not self.dry:
             raise ValueError(
                 f"{analysis} follows dry joints; leave cohesion and compressive_strength out, which limit loads take"

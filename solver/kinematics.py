@@ -30,7 +30,7 @@ class Pose:
 
     @classmethod
     def initial(cls, assembly: Assembly) -> Pose:
-        """The blocks where the drawing has them."""
+        """Put the blocks where the drawing has them."""
         n, d = assembly.centroids.shape
         return cls(assembly.centroids.copy(), np.zeros((n, rotation_count(d))))
 
@@ -111,7 +111,7 @@ def _quaternions(rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def moved(pose: Pose, q: np.ndarray) -> Pose:
-    """The pose after each block moved by q: translation of the centroid, exact rotation about it.
+    """Move each block by q: translation of the centroid, exact rotation about it.
 
     Parameters
     ----------
@@ -151,8 +151,23 @@ def carried(points: np.ndarray, blocks: np.ndarray, before: Pose, after: Pose) -
     return after.positions[blocks] + turned(points - before.positions[blocks], turn)
 
 
+def carried_between(
+    points: np.ndarray, block_a: np.ndarray, block_b: np.ndarray, before: Pose, after: Pose
+) -> np.ndarray:
+    """(n, d) array [m]: half-way between where both of their blocks carry points.
+
+    Parameters
+    ----------
+    points : (n, d) array [m]
+        Contact points when the blocks are at ``before``. At another pose the blocks carry them to different places.
+    block_a, block_b : (n,) int arrays
+    before, after : Pose
+    """
+    return (carried(points, block_a, before, after) + carried(points, block_b, before, after)) / 2.0
+
+
 def swung(pose: Pose, motion: np.ndarray) -> Pose:
-    """The pose after each block turned about its own pole, so that blocks that move together stay together.
+    """Turn each block about its own pole, so that blocks that move together stay together.
 
     Parameters
     ----------
@@ -254,12 +269,10 @@ def moving_together(
         Two blocks belong together where all their contact points move apart by less than this, and their rotations too:
         a single point cannot tell that blocks turn about it.
     """
-    low = np.minimum(contacts.block_a, contacts.block_b)
-    high = np.maximum(contacts.block_a, contacts.block_b)
-    pair, which = np.unique(low.astype(np.int64) * n_blocks + high, return_inverse=True)
-    most = np.zeros(len(pair))
-    np.maximum.at(most, which.ravel(), apart)
-    a, b = pair // n_blocks, pair % n_blocks
+    pairs, which = contacts.joints()
+    most = np.zeros(len(pairs))
+    np.maximum.at(most, which, apart)
+    a, b = pairs.T
     stay = (most < together) & (np.abs(spins[a] - spins[b]).max(axis=1) < together)
     links = sp.coo_array((np.ones(np.count_nonzero(stay)), (a[stay], b[stay])), shape=(n_blocks, n_blocks))
     return connected_components(links, directed=False)[1]

@@ -84,15 +84,12 @@ class Settlement:
     stops: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        """Check the values; make the direction a unit vector, and the rotation without one a sign."""
         if self.direction is None and self.rotation_centre is None:
             raise ValueError("a settlement needs a direction, or a rotation_centre and rotation")
         for name in ("direction", "rotation_centre"):
-            value = getattr(self, name)
-            if value is not None:
-                pair = np.asarray(value, dtype=float)
-                if pair.shape != (2,) or not np.isfinite(pair).all():
-                    raise ValueError(f"settlement {name} is {value!r}; give two finite numbers [x, y]")
-                object.__setattr__(self, name, (float(pair[0]), float(pair[1])))
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, _pair(getattr(self, name), name))
         if self.direction is not None:
             length = float(np.hypot(self.direction[0], self.direction[1]))
             if length == 0.0:
@@ -102,21 +99,24 @@ class Settlement:
             raise ValueError(f"settlement rotation is {self.rotation:g}; with a rotation_centre it must not be zero")
         if self.rotation_centre is None and self.rotation != 0.0:
             raise ValueError("settlement has a rotation but no rotation_centre")
+        if self.rotation_centre is not None and self.direction is None:
+            object.__setattr__(self, "rotation", float(np.sign(self.rotation)))
+        self._check_steps()
+
+    def _check_steps(self) -> None:
         if self.tolerance is None:
             object.__setattr__(self, "tolerance", self.increment / 100.0)
         for name in ("increment", "limit", "tolerance"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise ValueError(f"settlement {name} is {value:g}; it must be a positive number")
-        if self.rotation_centre is not None and self.direction is None:
-            object.__setattr__(self, "rotation", float(np.sign(self.rotation)))
         for stop in self.stops:
             if not 0.0 <= stop <= self.limit:
                 raise ValueError(f"settlement stop {stop:g} is not between 0 and the limit of {self.limit:g}")
         object.__setattr__(self, "stops", tuple(sorted(float(stop) for stop in self.stops)))
 
     def step_to_stop(self, s: float) -> float:
-        """From s to the next stop; infinite where none is ahead. A hair before a stop counts as on it."""
+        """Distance from s to the next stop, infinite after the last; 1e-9 increments before a stop count as on it."""
         return min((stop - s for stop in self.stops if stop - s > 1e-9 * self.increment), default=np.inf)
 
     @property
@@ -133,7 +133,7 @@ class Settlement:
         return chosen & assembly.moving
 
     def displaced(self, assembly: Assembly, start: Pose, s: float) -> Pose:
-        """The pose with the moving supports displaced by s from where they are in ``start``.
+        """Displace the moving supports by s from where they are in ``start``.
 
         Rotations follow the true arc about the (travelling) centre.
         """
@@ -167,8 +167,15 @@ class Settlement:
         return travel, self.rotation * s, np.asarray(self.rotation_centre)
 
 
+def _pair(value: Sequence[float], name: str) -> tuple[float, float]:
+    pair = np.asarray(value, dtype=float)
+    if pair.shape != (2,) or not np.isfinite(pair).all():
+        raise ValueError(f"settlement {name} is {value!r}; give two finite numbers [x, y]")
+    return float(pair[0]), float(pair[1])
+
+
 def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.ndarray | None = None) -> np.ndarray:
-    """Forces that are a fraction of each block's weight, as an earthquake's static stand-in.
+    """Load each block with a fraction of its weight, as an earthquake's static stand-in.
 
     Parameters
     ----------
@@ -196,7 +203,7 @@ def point_load(
     point: Sequence[float] | None = None,
     moment: float = 0.0,
 ) -> np.ndarray:
-    """A force on one block at a point, and a moment.
+    """Load one block with a force at a point, and a moment.
 
     Parameters
     ----------
@@ -220,7 +227,7 @@ def point_load(
 
 
 def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
-    """Self-weight where no loads are given; otherwise the given ones, checked for shape and finite numbers."""
+    """Check loads for shape and finite numbers; self-weight where none are given."""
     if loads is None:
         return self_weight(assembly)
     for name, given in (("dead", loads.dead), ("live", loads.live)):

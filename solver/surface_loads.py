@@ -14,7 +14,7 @@ NARROWEST = 1e-12
 
 
 def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) -> np.ndarray:
-    """Uniform pressure perpendicular to one edge of a block.
+    """Load one edge of a block with a uniform pressure perpendicular to it.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def surface_pressure(
     *,
     blocks: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Uniform pressure along a direction on the faces it meets first: snow on a wall's top, wind on its flank.
+    """Load the faces that a direction meets first with a uniform pressure: snow on a wall's top, wind on its flank.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def surface_pressure(
 
 
 def load_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.0)) -> np.ndarray:
-    """A force on the topmost surface at a place: one position of a load that moves along an arch or a wall.
+    """Load the topmost surface at a place with a force: one position of a load that moves along an arch or a wall.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def load_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.
 
 
 def _first_met(assembly: Assembly, pushed: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Strips along a direction, between all corners, and what each meets first.
+    """Divide the structure into strips along a direction, between all corners, and find what each meets first.
 
     Returns
     -------

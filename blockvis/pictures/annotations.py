@@ -1,4 +1,4 @@
-"""What a picture marks on the blocks: open and sliding joints, hinges, resultants, parts. Geometry only, no drawing."""
+"""What a picture marks on the blocks: open and sliding joints, hinges, resultants, parts. Geometry, no rendering."""
 
 from __future__ import annotations
 
@@ -29,6 +29,10 @@ PARALLEL = 0.05
 #: Resultants below this fraction of the largest are not drawn.
 SMALLEST_RESULTANT = 2e-3
 
+#: Blocks of one part are grown by this fraction of the block size, merged and shrunk back: between faces that touch,
+#: the last digit leaves slivers otherwise.
+SLIVER = 1e-3
+
 
 def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndarray) -> np.ndarray:
     """(n, 2, 2) array [m]: edges of the outline around each part, its blocks merged.
@@ -41,13 +45,12 @@ def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndar
         As ``solver.rigid_parts`` gives them.
     """
     edges = [np.zeros((0, 2, 2))]
-    # Faces that touch leave slivers where the last digit differs: grown together, then shrunk back.
-    seam = 1e-3 * assembly.block_size
+    margin = SLIVER * assembly.block_size
     for part in range(int(parts.max(initial=-1)) + 1):
         blocks = np.flatnonzero(parts == part)
         outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in blocks]
-        merged = shapely.union_all(shapely.buffer(outlines, seam, join_style="mitre"))
-        merged = shapely.buffer(merged, -seam, join_style="mitre").simplify(0.1 * seam)
+        merged = shapely.union_all(shapely.buffer(outlines, margin, join_style="mitre"))
+        merged = shapely.buffer(merged, -margin, join_style="mitre").simplify(0.1 * margin)
         for polygon in shapely.get_parts(merged):
             for ring in shapely.get_rings(polygon):
                 points = shapely.get_coordinates(ring)
@@ -99,7 +102,7 @@ class Marks:
 
 
 def drawn_joints(assembly: solver.Assembly) -> DrawnJoints:
-    """Finds the faces that touch in the drawing; where they part later there is a crack."""
+    """Find the faces that touch in the drawing; where they part later there is a crack."""
     tolerance = TOUCHING * assembly.block_size
     contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * tolerance)
     touching = np.abs(contacts.gaps) <= tolerance
@@ -139,7 +142,7 @@ def marks_of(assembly: solver.Assembly, joints: DrawnJoints, increment: solver.I
         Where the blocks are drawn: the increment's own pose, or a magnified one.
     """
     contacts, mechanism = increment.contacts, solver.mechanism_of(assembly, increment)
-    points = _middle(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
+    points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
     falling = increment.status == solver.Status.FALLING
     cracks, openings, cracked = _cracks(assembly, joints, increment.pose, shown, falling)
     return Marks(
@@ -162,16 +165,10 @@ def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.
         On ``blocks[:, 0]``.
     blocks : (n, 2) int array
     """
-    contacts = increment.contacts
-    turned = contacts.block_a > contacts.block_b
-    low, high = (
-        np.where(turned, contacts.block_b, contacts.block_a),
-        np.where(turned, contacts.block_a, contacts.block_b),
-    )
-    force = np.einsum("ki,kij->kj", increment.forces, contacts.frames) * np.where(turned, -1.0, 1.0)[:, None]
-    carrying = increment.forces[:, 0] > 0.0
-    pairs, which = np.unique(np.stack([low, high], axis=1)[carrying], axis=0, return_inverse=True)
-    which = which.ravel()
+    contacts, carrying = increment.contacts, increment.forces[:, 0] > 0.0
+    sense = np.where(contacts.block_a > contacts.block_b, -1.0, 1.0)
+    force = np.einsum("ki,kij->kj", increment.forces, contacts.frames) * sense[:, None]
+    pairs, which = contacts[carrying].joints()
     forces, points = np.zeros((len(pairs), 2)), np.zeros((len(pairs), 2))
     normal = increment.forces[carrying, 0]
     np.add.at(forces, which, force[carrying])
@@ -180,11 +177,23 @@ def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.
     return points / weight[:, None], forces, pairs
 
 
-def _middle(
-    points: np.ndarray, block_a: np.ndarray, block_b: np.ndarray, before: solver.Pose, after: solver.Pose
-) -> np.ndarray:
-    """Points carried by both of their blocks, half-way: magnified, the two are no longer in the same place."""
-    return (solver.carried(points, block_a, before, after) + solver.carried(points, block_b, before, after)) / 2.0
+def length_per_force(sizes: np.ndarray, largest: float, usual_length: float, extent: float) -> float:
+    """Length per force [m/N] of resultants in a picture.
+
+    Most are drawn up to the usual length: by the 0.9 quantile, not the largest, or one corner that carries everything
+    would make all others too short to see. None is longer than 0.12 of the picture.
+
+    Parameters
+    ----------
+    sizes : (n,) array [N]
+        Of the resultants that are drawn.
+    largest : float [N]
+    usual_length : float [m]
+    extent : float [m]
+        Of the picture.
+    """
+    usual = float(np.quantile(sizes, 0.9)) if len(sizes) else largest
+    return min(max(usual_length, 0.015 * extent) / usual, 0.12 * extent / largest)
 
 
 def _cracks(
@@ -218,13 +227,14 @@ def _cracks(
 def _pockets(
     assembly: solver.Assembly, cracks: np.ndarray, cracked: np.ndarray, shown: solver.Pose
 ) -> tuple[np.ndarray, ...]:
-    """What lies between several cracks and belongs to no pair of faces: where a brick has left its corner."""
+    """Find what several cracks enclose that lies between no two faces: the corner that a brick has moved out of."""
     if len(cracks) < 2:
         return ()
     size = assembly.block_size
     corners = solver.moved_vertices(assembly, shown)
     blocks = [corners[assembly.offsets[b] : assembly.offsets[b + 1]] for b in range(assembly.n_blocks)]
-    # Crossed where one end has closed up, so the hull; a hair wider, or a joint just not open would let the pocket out.
+    # A crack crosses itself where one end has closed up: its hull is taken. It is widened by the smallest opening, or a
+    # joint that is not quite open would leave the pocket without a wall on that side.
     filled = shapely.buffer(
         shapely.convex_hull(shapely.multipoints(cracks)), SMALLEST_OPENING * size, join_style="mitre", quad_segs=1
     )
@@ -238,7 +248,7 @@ def _pockets(
     ]
     if not holes:
         return ()
-    # Not what has been open from the start, nor where blocks without a crack stand.
+    # Openings of the drawing are no pockets, nor are places where blocks without a crack stand.
     tree = shapely.STRtree([shapely.Polygon(outline) for outline in blocks])
     drawn = shapely.STRtree([shapely.Polygon(assembly.outline(b)) for b in range(assembly.n_blocks)])
     pockets = []
@@ -257,14 +267,20 @@ def joint_places(assembly: solver.Assembly, increment: solver.Increment) -> tupl
 
 
 def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The stretch of each sliding joint between the outermost of its contact points that slide, (k,) numbers."""
+    """(n, 2, 2) array [m]: ends of the part of each sliding joint that slides.
+
+    Parameters
+    ----------
+    contacts : Contacts
+    k : (k,) int array
+        Numbers of the contact points that slide.
+    points : (n_contacts, 2) array [m]
+        Where the contact points are drawn.
+    """
     if len(k) == 0:
         return np.zeros((0, 2, 2))
-    low = np.minimum(contacts.block_a[k], contacts.block_b[k])
-    high = np.maximum(contacts.block_a[k], contacts.block_b[k])
-    _, which = np.unique(np.stack([low, high], axis=1), axis=0, return_inverse=True)
-    which = which.ravel()
-    n = int(which.max()) + 1
+    pairs, which = contacts[k].joints()
+    n = len(pairs)
     first = np.zeros(n, dtype=int)
     first[which[::-1]] = k[::-1]
     tangent = contacts.frames[first, 1]

@@ -1,4 +1,4 @@
-"""Captions: what the path runs over and what is read along it, in words and units."""
+"""Captions: the parameter of an analysis and what is measured along it, in words and units."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def parameter_unit(response: solver.Response) -> tuple[float, str]:
 
 
 def parameter_text(value: float, response: solver.Response) -> str:
-    """A parameter with its unit, in mm where the whole response stays below a decimetre.
+    """Write a parameter with its unit, in mm where the whole response stays below a decimetre.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def parameter_text(value: float, response: solver.Response) -> str:
 
 
 def parameter_label(response: solver.Response) -> str:
-    """For the axis of a diagram; empty for a single state that follows no path."""
+    """Label of the axis of the parameter; empty for a single state, which has no path."""
     parameter = response.parameter
     if parameter.is_path:
         return f"{parameter.name} [{parameter_unit(response)[1]}]"
@@ -41,7 +41,7 @@ def parameter_label(response: solver.Response) -> str:
 
 
 def force_unit(response: solver.Response) -> tuple[float, str]:
-    """What to divide the measured values by, and the unit; a multiplier has none."""
+    """Divisor and unit in which the measured values read well; a multiplier has no unit."""
     unit = response.measured.unit
     if not response.measured.is_force:
         return 1.0, unit
@@ -53,9 +53,38 @@ def force_unit(response: solver.Response) -> tuple[float, str]:
 
 
 def value_label(response: solver.Response) -> str:
-    """For the axis of a diagram."""
+    """Label of the axis of the measured value."""
     unit = force_unit(response)[1]
     return f"{response.measured.name} [{unit}]" if unit else f"{response.measured.name} {response.measured.symbol}"
+
+
+def shown_range(values: np.ndarray, response: solver.Response) -> tuple[float, float]:
+    """Range of the axis of the measured value: 0, and the values but those far above the lowest of an envelope.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Of the path, in the unit of the axis; nan where they are not finite.
+    response : solver.Response
+    """
+    known = values[np.isfinite(values)]
+    low, high = min(0.0, float(known.min(initial=0.0))), max(0.0, float(known.max(initial=0.0)))
+    if not response.parameter.is_path and len(known):
+        high = min(high, MOST_OVER_LOWEST * max(float(known.min()), 0.0) or high)
+    return low, high
+
+
+def collapse_places(response: solver.Response) -> np.ndarray | None:
+    """(3,) array: lower end, middle and upper end of the bracket of a collapse on the axis of the parameter.
+
+    In the unit of the axis, behind the phases before the last; None without a collapse or an equilibrium before it.
+    """
+    collapse, path = response.collapse, response.path
+    if collapse is None or not path:
+        return None
+    per_length, _ = parameter_unit(response)
+    start = response.parameters[-1] * per_length - per_length * path[-1].parameter
+    return start + per_length * np.array([collapse.bracket[0], collapse.displacement, collapse.bracket[1]])
 
 
 def matters(increment: solver.Increment, response: solver.Response) -> bool:
@@ -69,7 +98,7 @@ def matters(increment: solver.Increment, response: solver.Response) -> bool:
 
 
 def state_text(increment: solver.Increment, response: solver.Response, at: float | None = None) -> str:
-    """The first line of a caption: the parameter and what is measured there.
+    """Write the first line of a caption: the parameter and what is measured there.
 
     Parameters
     ----------
@@ -105,5 +134,5 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
 
 
 def badge_of(response: solver.Response) -> str:
-    """The warning on frames that are no equilibrium."""
+    """Warning on frames that are no equilibrium."""
     return "MECHANISM · pseudo-motion" if response.swings else "FALLING · pseudo-time"

@@ -18,7 +18,7 @@ import solver
 from blockvis.atomic_files import whole_file
 
 from . import palette
-from .captions import MOST_OVER_LOWEST, force_unit, parameter_label, parameter_unit, value_label
+from .captions import collapse_places, force_unit, parameter_label, parameter_unit, shown_range, value_label
 
 #: Suffixes of the files that draw_curve writes.
 CURVE_SUFFIXES = (".png", ".svg", ".pdf")
@@ -48,10 +48,10 @@ class Event:
 def draw_curve(
     response: solver.Response, path: str | os.PathLike[str], *, size: tuple[float, float] = (8.0, 5.0)
 ) -> Path:
-    """Draws the reaction against the settlement, absolute and over the weight, with the events on the way.
+    """Draw the reaction over the settlement, absolute and divided by the weight, and mark changes of the mechanism.
 
-    For limit loads and pushovers the load multiplier against what they run over: settlement, position of the load or
-    control displacement; a single limit load as a rigid-plastic diagram.
+    Limit loads and pushovers have the load multiplier over their parameter: settlement, position of the load or control
+    displacement; a single limit load is drawn as a rigid-plastic diagram.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def events_of(response: solver.Response) -> list[Event]:
     path = response.path
     total, values = response.parameters, response.values
     found = []
-    # Each is asked for its mechanism once: its contact points may come from a file.
+    # One mechanism per increment: its contact points may come from a file.
     pairs = (_joints(solver.mechanism_of(response.assembly, increment)) for increment in path)
     for k, (earlier, later) in enumerate(pairwise(pairs), start=1):
         text = []
@@ -131,7 +131,7 @@ class CurvePanel:
         self._offsets = {i.phase: float(t - i.parameter) for t, i in zip(total[::-1], response.path[::-1], strict=True)}
 
     def image(self, increment: solver.Increment) -> Image.Image:
-        """The curve with the dot at an increment; at the end of the curve during the fall."""
+        """Return the curve with the dot at an increment; at the end of the curve during the fall."""
         picture = self._picture.copy()
         if len(self._total) == 0:
             return picture
@@ -160,9 +160,7 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.02, y=0.12)
     if len(known):
-        low, high = min(0.0, known.min()), max(0.0, known.max())
-        if not response.parameter.is_path:
-            high = min(high, MOST_OVER_LOWEST * max(known.min(), 0.0) or high)
+        low, high = shown_range(values, response)
         axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
     if not response.parameter.is_path and len(path) == 1:
         _draw_single(axes, known, text)
@@ -189,7 +187,7 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
 
 
 def _draw_single(axes: Axes, known: np.ndarray, text: float) -> None:
-    """One limit load has no curve: rigid up to it, then a mechanism whose size is open."""
+    """Draw one limit load: rigid up to it, then a mechanism of any size."""
     axes.set_xlim(0.0, 1.0)
     axes.set_xticks([])
     axes.set_xlabel("displacement of the mechanism (first order, any size)", fontsize=text)
@@ -236,18 +234,17 @@ def _mark_collapse(
     # A capacity that is lost ends at the foot of the diagram.
     above = collapse.lost == "capacity"
     what = "no capacity" if above else "collapse"
-    # Phases before the last shift the curve.
-    per_length, _ = parameter_unit(response)
-    low, middle, high = per_length * np.array([collapse.bracket[0], collapse.displacement, collapse.bracket[1]])
-    start = total[-1] - per_length * response.path[-1].parameter
-    axes.axvspan(start + low, start + high, color=red, alpha=0.25, linewidth=0)
-    axes.axvline(start + middle, color=red, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
+    places = collapse_places(response)
+    assert places is not None
+    low, middle, high = places.tolist()
+    axes.axvspan(low, high, color=red, alpha=0.25, linewidth=0)
+    axes.axvline(middle, color=red, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
     axes.plot(total[-1:], reactions[-1:], "X", color=red, markersize=9 if words else 6, zorder=4)
     if words:
         axes.annotate(
             f"{what} at {collapse.displacement:.5g} {collapse.unit}\n"
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]",
-            (start + middle, 0.96 if above else 0.04),
+            (middle, 0.96 if above else 0.04),
             xycoords=("data", "axes fraction"),
             xytext=(-6, 0),
             textcoords="offset points",
@@ -287,5 +284,5 @@ def _mark_events(axes: Axes, response: solver.Response, factor: float, text: flo
 
 
 def _joints(mechanism: solver.Mechanism) -> list[set[tuple[int, int]]]:
-    """The pairs of blocks of the hinges, and of the sliding joints."""
+    """Pairs of blocks of the hinges, and of the sliding joints."""
     return [set(map(tuple, pairs.tolist())) for pairs in (mechanism.hinges, mechanism.sliding)]

@@ -1,4 +1,4 @@
-"""One set-up for all pictures of a response: scene, sheet, legend, caption, and the frames of the film."""
+"""Drawer: one set-up for all pictures of a response: scene, sheet, legend, caption, and the frames of the film."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from PIL import Image
 import solver
 from blockvis.numbers import force_text, rounded_length
 
-from . import annotations as marks
 from . import palette
-from .annotations import part_outlines
+from .annotations import SMALLEST_RESULTANT, Marks, drawn_joints, length_per_force, marks_of, part_outlines, resultants
 from .captions import badge_of, matters, state_text
 from .curves import CurvePanel
 from .flat_scene import Scene, magnified
@@ -23,10 +22,10 @@ from .frame import ColourBar, Key, Sheet, framed
 from .hatching import cut_into_triangles
 from .live_load import LiveLoads
 
-#: Resultants and hinges of more blocks than this hide what they stand on.
+#: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
 
-#: Joints open by less than this fraction of the block size are drawn half as wide: not every hair is a crack.
+#: Joints open by less than this fraction of the block size are drawn half as wide.
 FINE_CRACK = 0.01
 
 #: Joints open by more than this fraction need no line: the middle of a wide crack may lie on a third block.
@@ -35,10 +34,10 @@ WIDE_CRACK = 0.2
 #: Up to this many parts of a mechanism are tinted one by one.
 MOST_PARTS = 16
 
-#: The forces of this many increments tell what is usual.
+#: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
 
-#: Single pictures up to this size [pixels] are drawn at four times their size, so that flat slopes show no steps.
+#: Single pictures up to this size [pixels] are drawn at four times their size, against steps in flat slopes.
 FINE_UP_TO = 2600
 
 
@@ -52,8 +51,8 @@ class Look:
         Of displacements and rotations; 1 is true scale.
     colour_by : {"material", "displacement"}
     forces : {"auto", "thrust", "points", "none"}
-        Resultant of each joint, forces at the contact points, or neither; resultants of structures with few blocks
-        where it is left to the picture.
+        Resultant of each joint, forces at the contact points, or neither; "auto" draws the resultants of structures
+        with up to ``FEW_BLOCKS`` blocks.
     joints : bool
         Mark open and sliding joints and hinges.
     """
@@ -64,6 +63,7 @@ class Look:
     joints: bool = True
 
     def __post_init__(self) -> None:
+        """Check the values."""
         if not (np.isfinite(self.magnification) and self.magnification > 0.0):
             raise ValueError(f"magnification is {self.magnification:g}; it must be a positive number, 1 is true scale")
         for name, allowed in (
@@ -76,12 +76,12 @@ class Look:
 
 @dataclass
 class _Seen:
-    """What all pictures of some increments have to agree on.
+    """What must be the same in all pictures of some increments.
 
     Attributes
     ----------
     sampled : frozenset of int
-        Numbers of the increments whose forces tell what is usual.
+        Numbers of the increments whose forces set the scale.
     largest : float [m]
         Displacement of any free block.
     cracks, sliding, hinges : bool
@@ -100,8 +100,27 @@ class _Seen:
     forces: list[np.ndarray] = field(default_factory=list)
 
 
-class Studio:
-    """A scene and its sheet, set up for some increments of one response."""
+class Drawer:
+    """A scene and its sheet, set up for some increments of one response.
+
+    Parameters
+    ----------
+    response : solver.Response
+    look : Look
+    size : (int, int)
+        Width and height of the pictures in pixels.
+    increments : tuple of solver.Increment
+        All that will be drawn: they share frame, scales and legend.
+    curve : bool
+        Whether the curve stands beside the blocks.
+    extra : tuple of solver.Pose
+        Poses that the frame has to hold, too.
+
+    Raises
+    ------
+    RenderingUnavailable
+        Where there is no usable OpenGL.
+    """
 
     def __init__(
         self,
@@ -118,7 +137,7 @@ class Studio:
             look = replace(look, forces="thrust" if few else "none")
         self.response, self.look, self.increments = response, look, increments
         assembly = self.assembly = response.assembly
-        self.joints = marks.drawn_joints(assembly)
+        self.joints = drawn_joints(assembly)
         self._seen = _Seen(sampled=_sampled([k for k, i in enumerate(increments) if matters(i, response)]))
         frame = framed(assembly, chain([solver.Pose.initial(assembly)], self._surveyed(), extra))
         self.largest = self._seen.largest
@@ -137,22 +156,24 @@ class Studio:
         self._show_start()
         self._keys: list[Key] | None = None
 
-    def __enter__(self) -> Studio:
+    def __enter__(self) -> Drawer:
+        """Open the scene."""
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Close the scene."""
         self.scene.close()
 
     def _surveyed(self) -> Iterator[solver.Pose]:
-        """The poses as shown, one after another; notes what else all pictures have to agree on.
+        """Yield the poses as shown, and note what must be the same in all pictures.
 
-        Increments may come from files: each is looked at once, and nothing of its size is kept.
+        Increments may come from files: each is read once, and none of its arrays is kept.
         """
         seen, look = self._seen, self.look
         for number, increment in enumerate(self.increments):
             seen.largest = max(seen.largest, _largest_displacement(self.assembly, increment))
             if look.joints:
-                found = marks.marks_of(self.assembly, self.joints, increment, increment.pose)
+                found = marks_of(self.assembly, self.joints, increment, increment.pose)
                 seen.cracks |= len(found.cracks) > 0
                 seen.sliding |= len(found.sliding) > 0
                 seen.hinges |= len(self._hinges(found)) > 0
@@ -166,7 +187,18 @@ class Studio:
     def picture(
         self, increment: solver.Increment, pose: solver.Pose | None = None, s: float | None = None, note: str = ""
     ) -> Image.Image:
-        """The sheet of one increment; with its blocks at another pose and settlement for frames in between."""
+        """Draw one increment; for frames in between, with its blocks at another pose.
+
+        Parameters
+        ----------
+        increment : solver.Increment
+        pose : solver.Pose, optional
+            Where the blocks are in a frame between two increments.
+        s : float, optional [m or rad]
+            The parameter there.
+        note : str
+            Second line of the caption, instead of that of the increment.
+        """
         true = increment.pose if pose is None else pose
         shown = magnified(self.assembly, true, self.look.magnification)
         at = increment.with_arrays(pose=true, contacts=_contacts_at(increment, true)) if pose is not None else increment
@@ -189,7 +221,7 @@ class Studio:
         )
 
     def frames(self, fps: float, seconds: float) -> Iterator[Image.Image]:
-        """The frames of the film."""
+        """Yield the frames of the film: even motion along the path, a pause, then the fall."""
         path = [i for i in self.increments if matters(i, self.response)]
         fall = [i for i in self.increments if i.status == solver.Status.FALLING]
         picture = None
@@ -205,9 +237,16 @@ class Studio:
             yield from (picture for _ in range(round(1.2 * fps)))
 
     def show_motion(self, pose: solver.Pose, displaced: solver.Pose, parts: np.ndarray) -> None:
-        """Tints, outlines and arrows of where a mechanism takes the parts that move as one.
+        """Show by tints, outlines and arrows where a mechanism takes the parts that move as one.
 
-        Where there are many parts the speed is tinted instead, and arrows stand on a grid.
+        Of more than ``MOST_PARTS`` parts the speed is tinted instead, and arrows stand on a grid.
+
+        Parameters
+        ----------
+        pose, displaced : solver.Pose
+            Before and after the motion, which is out of scale.
+        parts : (n_blocks,) int array
+            As ``solver.rigid_parts`` gives them.
         """
         assembly, scene, block = self.assembly, self.scene, self.assembly.block_of_vertex
         before, after = solver.moved_vertices(assembly, pose), solver.moved_vertices(assembly, displaced)
@@ -235,7 +274,7 @@ class Studio:
         self._arrows("motion", tails, tips, 0.6)
 
     def keys(self) -> list[Key]:
-        """The legend: what is marked anywhere in the increments shown, so that it stands still."""
+        """Return the legend: what is marked in any of the increments, so that it is the same in all pictures."""
         if self._keys is None:
             keys = []
             if self.look.joints:
@@ -256,8 +295,8 @@ class Studio:
             self._keys = keys
         return self._keys
 
-    def _hinges(self, found: marks.Marks) -> np.ndarray:
-        """Hinges worth a dot: in a wall of many blocks nearly every brick turns a little about some corner."""
+    def _hinges(self, found: Marks) -> np.ndarray:
+        """Hinges that get a dot: in a wall of many blocks nearly every brick turns a little about some corner."""
         return found.hinges if self.assembly.n_blocks <= FEW_BLOCKS else found.hinges[:0]
 
     def _vertex_colours(self, pose: solver.Pose) -> np.ndarray | None:
@@ -272,7 +311,7 @@ class Studio:
         if not self.look.joints:
             return
         scene, thin = self.scene, self.scene.size[1] / 1080.0
-        found = marks.marks_of(self.assembly, self.joints, increment, shown)
+        found = marks_of(self.assembly, self.joints, increment, shown)
         scene.polygons("crack", found.cracks, palette.OPEN)
         scene.polygons("crack/pocket", cut_into_triangles(found.pockets), palette.OPEN)
         middle = (found.cracks[:, [0, 1]] + found.cracks[:, [3, 2]]) / 2.0 if len(found.cracks) else found.cracks
@@ -293,16 +332,15 @@ class Studio:
             return
         scene = self.scene
         if increment.status == solver.Status.FALLING:
-            # There is no equilibrium, and so no forces that would mean anything.
+            # Without equilibrium the forces have no meaning.
             scene.polygons("force", np.zeros((0, 4, 2)), palette.FORCE)
             scene.lines("force line", np.zeros((0, 2, 2)), palette.FORCE, 1.0)
             return
         points, forces, blocks = _joint_forces(increment, self.look.forces)
         size = np.hypot(*forces.T)
-        kept = size > marks.SMALLEST_RESULTANT * size.max(initial=0.0)
+        kept = size > SMALLEST_RESULTANT * size.max(initial=0.0)
         points, forces, blocks, size = points[kept], forces[kept], blocks[kept], size[kept]
-        first, second = (solver.carried(points, blocks[:, k], increment.pose, shown) for k in (0, 1))
-        points = (first + second) / 2.0
+        points = solver.carried_between(points, blocks[:, 0], blocks[:, 1], increment.pose, shown)
         unit = forces / size[:, None]
         half = unit * (0.5 * self.force_scale * size)[:, None]
         thick = 0.5 * max(2.0, scene.size[1] / 320.0) * scene.pixel
@@ -319,21 +357,18 @@ class Studio:
             return 0.0, 0.0
         every = np.concatenate(self._seen.forces)
         every = every if every.max(initial=0.0) > 0.0 else np.full(1, largest)
-        # What most joints carry is a block long: one corner that carries everything shall not make the rest vanish.
-        usual = float(np.quantile(every[every > marks.SMALLEST_RESULTANT * largest], 0.9))
-        extent = float(self.scene.frame.size.max())
-        scale = max(1.3 * self.assembly.block_size, 0.015 * extent) / usual
-        scale = min(scale, 0.12 * extent / largest)
+        drawn, extent = every[every > SMALLEST_RESULTANT * largest], float(self.scene.frame.size.max())
+        scale = length_per_force(drawn, largest, 1.3 * self.assembly.block_size, extent)
         return scale, rounded_length(min(largest, 0.12 * extent / scale))
 
     def _show_start(self) -> None:
-        """The first position of the moving supports, behind everything."""
+        """Draw the first position of the moving supports, behind everything."""
         moving = self.assembly.moving[self.assembly.block_of_vertex]
         start = _edges(self.assembly, self.assembly.vertices)[moving]
         self.scene.lines("ghost", start, palette.GHOST, self.scene.size[1] / 800.0)
 
     def _draw_ground(self, shown: solver.Pose) -> None:
-        """A heavy line where supports carry the structure."""
+        """Draw a heavy line where supports carry the structure."""
         joints, free = self.joints, self.assembly.free
         drawn = solver.Pose.initial(self.assembly)
         lines = []
@@ -344,7 +379,7 @@ class Studio:
         self.scene.lines("ground", np.concatenate(lines), palette.INK, max(1.2, self.scene.size[1] / 320.0))
 
     def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose) -> None:
-        """The live load times its multiplier, arrows to scale that end where it acts."""
+        """Draw the live load times its multiplier as arrows to scale that end where it acts."""
         if self.live.largest > 0.0:
             self._arrows("live", *self.live.arrows(increment, shown), 0.55, palette.LIVE)
 
@@ -391,7 +426,7 @@ class Studio:
 
 
 def _sampled(numbers: list[int]) -> frozenset[int]:
-    """As many of the numbers as are enough to tell a usual force, evenly chosen."""
+    """Up to ``FORCES_OF`` of the numbers, evenly chosen."""
     chosen = np.linspace(0, len(numbers) - 1, min(len(numbers), FORCES_OF)).round().astype(int)
     return frozenset(numbers[k] for k in chosen)
 
@@ -417,7 +452,7 @@ def _arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: floa
 
 def _joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     if kind == "thrust":
-        return marks.resultants(increment)
+        return resultants(increment)
     contacts = increment.contacts
     carrying = increment.forces[:, 0] > 0.0
     force = np.einsum("ki,kij->kj", increment.forces, contacts.frames)
@@ -439,18 +474,16 @@ def _thrust_line(points: np.ndarray, blocks: np.ndarray, assembly: solver.Assemb
 
 
 def _contacts_at(increment: solver.Increment, pose: solver.Pose) -> solver.Contacts:
-    """The increment's contact points carried to a pose nearby."""
+    """Contact points of an increment, carried to a pose nearby."""
     contacts = increment.contacts
-    first, second = (
-        solver.carried(contacts.points, block, increment.pose, pose) for block in (contacts.block_a, contacts.block_b)
-    )
-    return replace(contacts, points=(first + second) / 2.0)
+    points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
+    return replace(contacts, points=points)
 
 
 def _even_motion(
     path: list[solver.Increment], n: int
 ) -> Iterator[tuple[solver.Increment, solver.Pose | None, float | None]]:
-    """``n`` frames at even settlement: the increment before each, the pose in between, and the settlement."""
+    """``n`` frames at even steps of the parameter: the increment before each, its pose, and its parameter."""
     if not path:
         return
     total = solver.path_parameters(path)

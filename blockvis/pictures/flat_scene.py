@@ -26,7 +26,7 @@ DEPTHS = {
 
 
 def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:
-    """The pose with displacements and rotations since the drawing multiplied."""
+    """Multiply the displacements and rotations of a pose since the drawing."""
     if magnification == 1.0:
         return pose
     start = assembly.centroids
@@ -46,7 +46,8 @@ class Scene:
     block_fill : (n_blocks, 3) uint8 array
         Colours of the blocks.
     supersampling : int
-        Drawn at this many times the size and averaged down: cheaper in software OpenGL than its own anti-aliasing.
+        Factor by which the picture is rendered larger and averaged down: cheaper in software OpenGL than its own
+        anti-aliasing.
 
     Raises
     ------
@@ -84,13 +85,15 @@ class Scene:
         self._fix_camera()
 
     def __enter__(self) -> Scene:
+        """Open the scene."""
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Free the window."""
         self.close()
 
     def close(self) -> None:
-        """Frees the window."""
+        """Free the window."""
         self._plotter.close()
 
     @property
@@ -99,7 +102,7 @@ class Scene:
         return tuple(self._layers)
 
     def pose(self, shown: solver.Pose, vertex_colours: np.ndarray | None = None) -> None:
-        """Puts the blocks where they are to be drawn.
+        """Put the blocks where they are drawn.
 
         Parameters
         ----------
@@ -118,13 +121,13 @@ class Scene:
             self._layers["hatch"].move(solver.carried(points, blocks, solver.Pose.initial(self.assembly), shown))
 
     def polygons(self, layer: str, corners: np.ndarray, colour: tuple[int, int, int]) -> None:
-        """Fills convex polygons, (n, k, 2) [m], in one layer; they replace what it held."""
+        """Fill convex polygons, (n, k, 2) [m], in one layer, instead of those before."""
         n, k = corners.shape[:2] if corners.size else (0, 4)
         faces = np.column_stack([np.full(n, k), np.arange(n * k).reshape(n, k)]) if n else None
         self._layer(layer, colour).replace(corners.reshape(-1, 2), faces=faces)
 
     def lines(self, layer: str, points: np.ndarray, colour: tuple[int, int, int], width: float) -> None:
-        """Draws polylines, (n, k, 2) [m], ``width`` pixels wide; they replace what the layer held."""
+        """Draw polylines, (n, k, 2) [m], ``width`` pixels wide, in one layer, instead of those before."""
         n, k = points.shape[:2] if points.size else (0, 2)
         cells = np.column_stack([np.full(n, k), np.arange(n * k).reshape(n, k)]) if n else None
         target = self._layer(layer, colour)
@@ -132,13 +135,13 @@ class Scene:
         target.replace(points.reshape(-1, 2), lines=cells)
 
     def discs(self, layer: str, centres: np.ndarray, radius: float, colour: tuple[int, int, int]) -> None:
-        """Draws discs, centres (n, 2) [m], ``radius`` in pixels."""
+        """Draw discs, centres (n, 2) [m], ``radius`` in pixels, in one layer, instead of those before."""
         angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
         rim = radius * self.pixel * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         self.polygons(layer, centres[:, None, :] + rim[None, :, :], colour)
 
     def image(self) -> Image.Image:
-        """The picture as it stands."""
+        """Render the picture."""
         self._plotter.render()
         pixels = self._plotter.screenshot(return_img=True)
         return Image.fromarray(np.ascontiguousarray(pixels[..., :3])).reduce(self._fine)

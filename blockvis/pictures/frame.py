@@ -51,15 +51,15 @@ class ColourBar:
 
 
 class Sheet:
-    """Where the picture of the blocks and the words around it go.
+    """Where the picture of the blocks goes, and the words around it.
 
     Parameters
     ----------
     size : (int, int)
         Width and height in pixels.
     colour_bar : ColourBar, optional
-    beside : PIL.Image.Image, optional
-        A picture to the right of the blocks, as high as they are.
+    beside_width : int
+        Pixels of a picture to the right of the blocks, as high as theirs.
     """
 
     def __init__(self, size: tuple[int, int], colour_bar: ColourBar | None = None, beside_width: int = 0) -> None:
@@ -92,7 +92,7 @@ class Sheet:
         pixel: float,
         beside: Image.Image | None = None,
     ) -> Image.Image:
-        """The whole sheet.
+        """Put the picture of the blocks on the sheet, with caption, scale bar and legend.
 
         Parameters
         ----------
@@ -106,6 +106,7 @@ class Sheet:
         pixel : float [m]
             Size of a pixel, for the scale bar.
         beside : PIL.Image.Image, optional
+            The picture to the right, as large as :attr:`beside`.
         """
         page = Image.new("RGB", self.size, palette.PAPER)
         page.paste(picture, self.inside[:2])
@@ -135,7 +136,7 @@ class Sheet:
         draw.text((self.pad, self.pad + 2.15 * self.text), detail, palette.FAINT, font, anchor="lm")
 
     def _scale_bar(self, draw: ImageDraw.ImageDraw, pixel: float) -> int:
-        """Draws it; its right end in pixels."""
+        """Draw the scale bar; returns its right end in pixels."""
         length = rounded_length(0.2 * self.inside_size[0] * pixel)
         pixels = round(length / pixel)
         thick = max(2, round(self.text / 9))
@@ -214,7 +215,7 @@ def _swatch(draw: ImageDraw.ImageDraw, key: Key, x: float, y: float, wide: float
 
 
 def _fitting(text: str, size: int, room: float, bold: bool = False) -> ImageFont.FreeTypeFont:
-    """The largest font up to ``size`` in which the text fits."""
+    """Largest font up to ``size`` in which the text fits."""
     font = _font(size, bold)
     while size > 7 and font.getlength(text) > room:
         size -= 1
@@ -250,7 +251,7 @@ class Frame:
         return self.high - self.low
 
     def holding(self, points: np.ndarray) -> Frame:
-        """This frame, grown where points (n, 2) [m] lie beyond it, with a margin."""
+        """Grow the frame where points (n, 2) [m] lie beyond it, with a margin."""
         margin = 0.02 * float(self.size.max())
         if len(points) == 0:
             return self
@@ -259,7 +260,7 @@ class Frame:
         )
 
     def fitted(self, width: int, height: int) -> Frame:
-        """The smallest frame around this one with the proportions of a picture of ``width`` × ``height`` pixels."""
+        """Grow the frame to the proportions of a picture of ``width`` × ``height`` pixels."""
         centre = (self.low + self.high) / 2.0
         scale = max(self.size[0] / width, self.size[1] / height)
         half = np.array([width, height]) * scale / 2.0
@@ -267,7 +268,7 @@ class Frame:
 
 
 class _Box:
-    """Bounds of points that come bit by bit."""
+    """Bounds of all points so far."""
 
     def __init__(self) -> None:
         self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
@@ -279,7 +280,7 @@ class _Box:
 def framed(
     assembly: solver.Assembly, poses: Iterable[solver.Pose], margin: float = 0.04, supports: float = 0.13
 ) -> Frame:
-    """The frame in which every free block stays over all poses.
+    """Frame in which every free block stays over all poses.
 
     Parameters
     ----------

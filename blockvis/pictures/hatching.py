@@ -39,7 +39,24 @@ def cut_into_triangles(outlines: Sequence[np.ndarray]) -> np.ndarray:
 def hatch_lines(
     assembly: solver.Assembly, supports: np.ndarray, low: np.ndarray, high: np.ndarray, spacing: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the hatch lines inside the supports, (2 n, 2) [m] in the drawing, and the block of each end."""
+    """Hatch the supports.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    supports : (n_supports,) int array
+    low, high : (2,) arrays [m]
+        Corners of the box beyond which nothing is hatched.
+    spacing : float [m]
+        Between two lines.
+
+    Returns
+    -------
+    ends : (2 n, 2) array [m]
+        Both ends of each line, in the drawing.
+    blocks : (2 n,) int array
+        The support of each end.
+    """
     box = shapely.box(*low, *high)
     points, blocks = [np.zeros((0, 2))], [np.zeros(0, dtype=int)]
     for block in supports:

@@ -10,13 +10,17 @@ from blockvis.layout.inspect import Inspection
 
 
 def draw_inspection(inspection: Inspection, path: str | Path) -> Path:
-    """Draws what was found: outlines, supports, duplicates, overlaps, joints by their thickness.
+    """Draw what was found: outlines, supports, duplicates, overlaps, joints by their thickness.
 
     Parameters
     ----------
     inspection : Inspection
     path : str or Path
         .png, .svg or .pdf.
+
+    Returns
+    -------
+    pathlib.Path
     """
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.figure import Figure

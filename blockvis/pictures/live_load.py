@@ -50,17 +50,16 @@ class LiveLoad:
         """(n, 2) array [m]: where the points are when all blocks are at another pose."""
         if len(self.points) == 0:
             return self.points
-        there = solver.Pose(pose.positions[self.blocks], pose.rotations[self.blocks])
-        return solver.carried(self.points, np.arange(len(self.blocks)), self.pose, there)
+        return solver.carried(self.points, np.arange(len(self.blocks)), self.pose, _of(self.blocks, pose))
 
     @property
     def largest(self) -> float:
-        """[N]"""
+        """Size of the largest force [N]."""
         return float(np.hypot(*self.forces.T).max(initial=0.0))
 
 
 def live_load_of(response: solver.Response, increment: solver.Increment, extent: float) -> LiveLoad:
-    """The live load of an increment; none in a settlement, in a fall, or where it is unbounded.
+    """Live load of an increment; none in a settlement, in a fall, or where it is unbounded.
 
     Parameters
     ----------
@@ -71,8 +70,8 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
 
     Notes
     -----
-    It is what the contact forces balance beyond the dead load, so that it is right for every position of a load that
-    moves, whose place is not kept with the increment.
+    It is found as what the contact forces balance beyond the dead load: the increment does not store the position of a
+    load that moves.
     """
     standing = increment.status == solver.Status.EQUILIBRIUM or bool(response.limits)
     finite = np.isfinite(increment.load_multiplier) and increment.load_multiplier != 0.0
@@ -116,7 +115,7 @@ class LiveLoads:
                     self._loads[place] = live_load_of(response, states.get(place, increment), extent)
         self._places = not response.parameter.is_path and len(self._loads) > 1
         if self._places:
-            # From place to place the limit differs a hundredfold; what shall be seen is where the load is.
+            # The limit varies a hundredfold from place to place: all arrows get one length and show the place alone.
             for place, load in self._loads.items():
                 self._loads[place] = replace(load, forces=load.forces / (load.largest or 1.0))
         self.largest = max((load.largest for load in self._loads.values()), default=0.0)
@@ -124,7 +123,7 @@ class LiveLoads:
 
     @property
     def words(self) -> str:
-        """For the legend."""
+        """Entry of the legend."""
         scale = " (not to scale)" if self._places else f", longest arrow {force_text(self.largest)}"
         return f"live load · α{scale}"
 
@@ -155,7 +154,7 @@ def _place(increment: solver.Increment) -> tuple[int, float]:
 
 
 def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.ndarray) -> np.ndarray:
-    """Where the line of a load enters its block; its centroid where the load acts there, as a weight does."""
+    """Where the line of a load enters its block; the centroid, where the load has no moment about it."""
     centre, force, moment = pose.positions[block], load[:2], float(load[2])
     size = float(np.hypot(*force))
     if abs(moment) < 1e-3 * size * assembly.block_size:

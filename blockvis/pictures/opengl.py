@@ -1,4 +1,4 @@
-"""Is there an OpenGL to draw with? Asked in another process, because VTK ends the one that finds none."""
+"""Whether there is an OpenGL to draw with, tried in another process: VTK ends the one that finds none."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def rendering_available() -> str | None:
 
     Notes
     -----
-    VTK ends the whole process where it finds no usable OpenGL, so the question is put to another process.
+    Another process draws a test picture, because VTK ends the whole process where it finds no usable OpenGL.
     """
     _prefer_off_screen()
     return _probed(os.environ.get("VTK_DEFAULT_OPENGL_WINDOW", ""), sys.executable)

@@ -24,7 +24,7 @@ STONES = np.array(
     [(228, 217, 194), (214, 176, 152), (190, 198, 204), (222, 206, 154), (190, 203, 176), (212, 200, 208)], dtype=float
 )
 
-#: Words in the name of a material that choose its stone; languages of the drawings we have met.
+#: Words in the name of a material that choose its stone, in the languages of drawings so far.
 HINTS = {1: ("brick", "mattone", "backstein", "brique", "ladrillo"), 2: ("slate", "granite"), 3: ("tuff", "tufo")}
 
 #: Tints of the parts of a mechanism, so that neighbours differ: blue, green, violet, ochre, rose, teal.
@@ -32,7 +32,7 @@ PARTS = np.array(
     [(151, 190, 224), (172, 208, 160), (196, 178, 222), (236, 206, 136), (231, 178, 186), (150, 208, 204)], dtype=float
 )
 
-#: Blocks of one material differ in lightness by up to this fraction, as stones do; it also tells neighbours apart.
+#: Blocks of one material differ in lightness by up to this fraction, which distinguishes neighbours.
 SHADE = 0.035
 
 #: Pale to deep blue-green, even in lightness, and light enough at its end for outlines to show.
@@ -60,7 +60,7 @@ def block_colours(materials: tuple[str, ...], free: np.ndarray) -> np.ndarray:
         One per block.
     free : (n_blocks,) bool array
     """
-    # Only materials of free blocks take a stone: a support's own material shall not shift the others.
+    # Supports are grey: their materials take no stone.
     kinds = sorted({m for m, is_free in zip(materials, free, strict=True) if is_free})
     hinted = {kind: k for kind in kinds for k, words in HINTS.items() if any(w in kind.lower() for w in words)}
     rest = [k for k in range(len(STONES)) if k not in hinted.values()]
@@ -95,7 +95,7 @@ def displacement_colours(fraction: np.ndarray) -> np.ndarray:
 
 
 def hexadecimal(colour: tuple[int, int, int]) -> str:
-    """The colour as CSS and matplotlib write it.
+    """Write a colour as CSS and matplotlib do.
 
     Examples
     --------

@@ -108,7 +108,7 @@ Render(view)
 
 
 def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
-    """Writes ``paraview_colours.py`` beside ``blocks.pvd`` and ``contacts.pvd``.
+    """Write ``paraview_colours.py`` beside ``blocks.pvd`` and ``contacts.pvd``.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from PIL import Image
 import solver
 from blockvis.atomic_files import whole_file
 
-from .drawer import MOST_PARTS, Look, Studio
+from .drawer import MOST_PARTS, Drawer, Look
 from .frame import framed
 from .video import write_film
 
@@ -31,7 +31,7 @@ def draw_still(
     joints: bool = True,
     curve: bool = False,
 ) -> Path:
-    """Draws one increment.
+    """Draw one increment.
 
     Parameters
     ----------
@@ -65,14 +65,14 @@ def draw_still(
     _check_response(response)
     chosen = response.increments[increment] if isinstance(increment, int) else increment
     look = Look(magnification, colour_by, forces, joints)
-    with Studio(response, look, size, (chosen,), curve=curve) as studio:
-        return _save(studio.picture(chosen), path)
+    with Drawer(response, look, size, (chosen,), curve=curve) as drawer:
+        return _save(drawer.picture(chosen), path)
 
 
 def draw_mechanism(
     response: solver.Response, path: str | os.PathLike[str], *, size: tuple[int, int] = STILL_SIZE
 ) -> Path:
-    """Draws the last equilibrium, its hinges and sliding joints, and the motion that follows.
+    """Draw the last equilibrium, its hinges and sliding joints, and the motion that follows.
 
     Blocks are filled where they stand, those that move together alike; outlines and arrows show, out of scale,
     where the mechanism takes them.
@@ -96,16 +96,16 @@ def draw_mechanism(
     speeds = _speeds(assembly, last.pose, motion)
     fastest = float(speeds.max(initial=0.0))
     if response.collapse is None and fastest > 0.0:
-        # A brick that rattles in its place shall not make the motion of the whole vanish.
+        # Without collapse a single loose brick may be the fastest: it would make the motion of the whole invisible.
         fastest = _exceeded_by(0.01, speeds, assembly.areas) or fastest
         motion = motion * np.minimum(1.0, fastest / np.maximum(speeds, fastest))[:, None]
     reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
     displaced = solver.swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
     parts = solver.rigid_parts(assembly, last)
-    with Studio(response, Look(forces="none"), size, (last,), extra=(displaced,)) as studio:
+    with Drawer(response, Look(forces="none"), size, (last,), extra=(displaced,)) as drawer:
         if fastest > 0:
-            studio.show_motion(last.pose, displaced, parts)
-        return _save(studio.picture(last, note=_mechanism_note(response, parts)), path)
+            drawer.show_motion(last.pose, displaced, parts)
+        return _save(drawer.picture(last, note=_mechanism_note(response, parts)), path)
 
 
 def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
@@ -117,7 +117,7 @@ def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) ->
 
 
 def _exceeded_by(share: float, speeds: np.ndarray, areas: np.ndarray) -> float:
-    """The speed that blocks of this share of the moving area reach or exceed."""
+    """Speed that blocks of this share of the moving area reach or exceed."""
     order = np.argsort(speeds)[::-1]
     moving = np.where(speeds[order] > 0.0, areas[order], 0.0).cumsum()
     return float(speeds[order[np.searchsorted(moving, share * moving[-1])]])
@@ -136,7 +136,7 @@ def animate(
     joints: bool = True,
     curve: bool = False,
 ) -> Path:
-    """Writes the settlement and the fall as a film.
+    """Write the settlement and the fall as a film.
 
     The settlement grows evenly over ``seconds``, the last equilibrium holds for a moment, then the frames of the
     fall follow, marked as pseudo-time.
@@ -161,8 +161,8 @@ def animate(
     """
     _check_response(response)
     look = Look(magnification, colour_by, forces, joints)
-    with Studio(response, look, size, response.increments, curve=curve) as studio:
-        return write_film(studio.frames(fps, seconds), path, size=size, fps=fps)
+    with Drawer(response, look, size, response.increments, curve=curve) as drawer:
+        return write_film(drawer.frames(fps, seconds), path, size=size, fps=fps)
 
 
 def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:

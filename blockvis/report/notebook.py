@@ -32,12 +32,16 @@ class Player:
 
 
 def show(response: solver.Response, *, height: int = 760) -> Player:
-    """The player of a response, for the last line of a notebook cell.
+    """Show a response in a player, for the last line of a notebook cell.
 
     Parameters
     ----------
     response : solver.Response
     height : int
         Pixels.
+
+    Returns
+    -------
+    Player
     """
     return Player(response, height)

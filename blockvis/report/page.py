@@ -1,4 +1,4 @@
-"""The page that plays: one self-contained HTML file with the mechanism, the curve, the numbers and the case."""
+"""Report: one self-contained HTML file that plays the mechanism, with the curve, the numbers and the case."""
 
 from __future__ import annotations
 
@@ -19,14 +19,25 @@ from matplotlib.ticker import MaxNLocator
 import solver
 from blockvis.atomic_files import write_whole
 from blockvis.numbers import force_text, rounded_length
-from blockvis.pictures import annotations as marks
 from blockvis.pictures import palette
+from blockvis.pictures.annotations import (
+    SMALLEST_OPENING,
+    SMALLEST_RESULTANT,
+    STEEPEST_FALLING,
+    WIDEST_FALLING,
+    WIDEST_STANDING,
+    drawn_joints,
+    joint_places,
+    length_per_force,
+    resultants,
+)
 from blockvis.pictures.captions import (
-    MOST_OVER_LOWEST,
     badge_of,
+    collapse_places,
     force_unit,
     parameter_label,
     parameter_unit,
+    shown_range,
     state_text,
     value_label,
 )
@@ -51,7 +62,7 @@ PATH_SECONDS, FALL_SECONDS = 6.0, 0.06
 def write_report(
     response: solver.Response, path: str | os.PathLike[str], case_text: str = "", *, title: str = ""
 ) -> Path:
-    """Writes the page.
+    """Write the report.
 
     Parameters
     ----------
@@ -60,7 +71,7 @@ def write_report(
     case_text : str
         The case file, shown as it is.
     title : str
-        Of the page; what happened, where it is not given.
+        Of the page; says what happened by default.
 
     Returns
     -------
@@ -70,7 +81,7 @@ def write_report(
 
 
 def report_html(response: solver.Response, case_text: str = "", *, title: str = "") -> str:
-    """The page as text; parameters as those of :func:`write_report`.
+    """Make the report as HTML text; parameters as those of :func:`write_report`.
 
     Notes
     -----
@@ -118,8 +129,8 @@ def _model(response: solver.Response) -> dict[str, Any]:
         "origin": origin.tolist(),
         "bounds": [*(frame.low - origin).tolist(), *(frame.high - origin).tolist()],
         "block_size": assembly.block_size,
-        "smallest_opening": marks.SMALLEST_OPENING * assembly.block_size,
-        "widest": [marks.WIDEST_STANDING * assembly.block_size, marks.WIDEST_FALLING, marks.STEEPEST_FALLING],
+        "smallest_opening": SMALLEST_OPENING * assembly.block_size,
+        "widest": [WIDEST_STANDING * assembly.block_size, WIDEST_FALLING, STEEPEST_FALLING],
         "names": list(assembly.names),
         "materials": materials,
         "roles": [roles[str(role)] for role in assembly.roles],
@@ -159,7 +170,7 @@ def _thinned(increments: tuple[solver.Increment, ...], n_blocks: int) -> list[so
 
 
 def _surveyed(assembly: solver.Assembly, shown: list[solver.Increment]) -> tuple[Frame, float]:
-    """The frame that holds all poses, and the largest resultant of a joint in equilibrium [N], or 1."""
+    """Frame that holds all poses, and the largest resultant of a joint in equilibrium [N], or 1."""
     largest = 0.0
 
     def poses() -> Iterator[solver.Pose]:
@@ -168,13 +179,13 @@ def _surveyed(assembly: solver.Assembly, shown: list[solver.Increment]) -> tuple
         for increment in shown:
             yield increment.pose
             if increment.status != solver.Status.FALLING:
-                largest = max(largest, float(np.hypot(*marks.resultants(increment)[1].T).max(initial=0.0)))
+                largest = max(largest, float(np.hypot(*resultants(increment)[1].T).max(initial=0.0)))
 
     frame = framed(assembly, poses())
     return frame, largest or 1.0
 
 
-def _packed(values: np.ndarray, rows: int) -> dict[str, Any]:
+def _deflated(values: np.ndarray, rows: int) -> dict[str, Any]:
     """Integers as differences along the first axis, split in planes of bytes, deflated, in base 64."""
     table = np.asarray(values).astype("<i4").reshape(rows, -1) if rows else np.zeros((0, 1), dtype="<i4")
     steps = np.diff(table, axis=0, prepend=np.zeros((1, table.shape[1]), dtype="<i4"))
@@ -188,14 +199,14 @@ def _rounded(values: np.ndarray, unit: float) -> np.ndarray:
 
 
 def _packed_geometry(assembly: solver.Assembly, origin: np.ndarray, unit: float) -> dict[str, Any]:
-    joints = marks.drawn_joints(assembly)
+    joints = drawn_joints(assembly)
     n = len(joints.block_a)
     return {
-        "vertices": _packed(_rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
-        "offsets": _packed(assembly.offsets, len(assembly.offsets)),
-        "centroids": _packed(_rounded(assembly.centroids - origin, unit), assembly.n_blocks),
-        "joint_blocks": _packed(np.stack([joints.block_a, joints.block_b], axis=1), n),
-        "joint_ends": _packed(_rounded(joints.ends - origin, unit), n),
+        "vertices": _deflated(_rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
+        "offsets": _deflated(assembly.offsets, len(assembly.offsets)),
+        "centroids": _deflated(_rounded(assembly.centroids - origin, unit), assembly.n_blocks),
+        "joint_blocks": _deflated(np.stack([joints.block_a, joints.block_b], axis=1), n),
+        "joint_ends": _deflated(_rounded(joints.ends - origin, unit), n),
     }
 
 
@@ -216,7 +227,7 @@ class _Tables:
     def __init__(
         self, assembly: solver.Assembly, shown: list[solver.Increment], origin: np.ndarray, unit: float, largest: float
     ) -> None:
-        # A thousandth of the picture is where a force sits; finer places would only fill the file.
+        # The place of a force need not be finer than a pixel; more digits would only fill the file.
         coarse = round(FORCE_FINENESS / FINENESS / 4.0)
         self.n, self.largest = len(shown), largest
         self.travel, self.turn = [], []
@@ -226,34 +237,32 @@ class _Tables:
             moved = increment.pose.displacements(assembly)
             self.travel.append(_rounded(moved[:, :2], unit))
             self.turn.append(_rounded(moved[:, 2], TURN_UNIT))
-            points, forces, _ = marks.resultants(increment)
+            points, forces, _ = resultants(increment)
             size = np.hypot(*forces.T) * (increment.status != solver.Status.FALLING)
-            kept = size > marks.SMALLEST_RESULTANT * largest
+            kept = size > SMALLEST_RESULTANT * largest
             self.places.append(_rounded(points[kept] - origin, unit * coarse) * coarse)
             self.vectors.append(_rounded(forces[kept], FORCE_FINENESS * largest))
             self.sizes.append(size[kept])
-            hinges, sliding = marks.joint_places(assembly, increment)
+            hinges, sliding = joint_places(assembly, increment)
             self.mark_places.append(_rounded(np.concatenate([hinges, sliding]) - origin, unit))
             self.mark_kinds.append(np.repeat([1, 2], [len(hinges), len(sliding)]))
 
     def force_length(self, block_size: float, extent: float) -> float:
         """Length per force [m/N]."""
-        sizes, largest = np.concatenate(self.sizes), self.largest
-        usual = float(np.quantile(sizes, 0.9)) if len(sizes) else largest
-        return min(max(1.5 * block_size, 0.015 * extent) / usual, 0.12 * extent / largest)
+        return length_per_force(np.concatenate(self.sizes), self.largest, 1.5 * block_size, extent)
 
     def packed(self) -> dict[str, Any]:
         """As the page unpacks them."""
         forces, found = (np.cumsum([len(k) for k in rows]).tolist() for rows in (self.sizes, self.mark_kinds))
         return {
-            "travel": _packed(np.stack(self.travel), self.n),
-            "turn": _packed(np.stack(self.turn), self.n),
-            "force_first": _packed(forces, len(forces)),
-            "force_place": _packed(np.concatenate(self.places), forces[-1]),
-            "force_vector": _packed(np.concatenate(self.vectors), forces[-1]),
-            "mark_first": _packed(found, len(found)),
-            "mark_place": _packed(np.concatenate(self.mark_places), found[-1]),
-            "mark_kind": _packed(np.concatenate(self.mark_kinds), found[-1]),
+            "travel": _deflated(np.stack(self.travel), self.n),
+            "turn": _deflated(np.stack(self.turn), self.n),
+            "force_first": _deflated(forces, len(forces)),
+            "force_place": _deflated(np.concatenate(self.places), forces[-1]),
+            "force_vector": _deflated(np.concatenate(self.vectors), forces[-1]),
+            "mark_first": _deflated(found, len(found)),
+            "mark_place": _deflated(np.concatenate(self.mark_places), found[-1]),
+            "mark_kind": _deflated(np.concatenate(self.mark_kinds), found[-1]),
         }
 
 
@@ -265,9 +274,9 @@ def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndar
     first = np.cumsum([0, *(len(tips) for _, tips in found)]).tolist()
     tails, tips = (np.concatenate([np.zeros((0, 2)), *ends]) for ends in zip(*found, strict=True))
     return {
-        "live_first": _packed(first, len(first)),
-        "live_tail": _packed(_rounded(tails - origin, unit), first[-1]),
-        "live_tip": _packed(_rounded(tips - origin, unit), first[-1]),
+        "live_first": _deflated(first, len(first)),
+        "live_tail": _deflated(_rounded(tails - origin, unit), first[-1]),
+        "live_tip": _deflated(_rounded(tips - origin, unit), first[-1]),
     }
 
 
@@ -307,15 +316,10 @@ def _curve(response: solver.Response) -> dict[str, Any]:
     factor, _ = force_unit(response)
     x = response.parameters * per_length
     y = response.values / factor
-    known = y[np.isfinite(y)]
-    low, high = min(0.0, float(known.min(initial=0.0))), max(0.0, float(known.max(initial=0.0)))
-    if not response.parameter.is_path and len(known):
-        high = min(high, MOST_OVER_LOWEST * max(float(known.min()), 0.0) or high)
+    low, high = shown_range(y, response)
     high = high + 0.08 * (high - low) if high > low else 1.0
-    collapse = None
-    if response.collapse is not None and len(x):
-        start = float(x[-1]) - per_length * response.path[-1].parameter
-        collapse = start + per_length * response.collapse.displacement
+    bracket = collapse_places(response)
+    collapse = None if bracket is None else float(bracket[1])
     first = min(0.0, float(x.min(initial=0.0))) * 1.02
     widest = max([float(x.max(initial=0.0)), collapse or 0.0]) * 1.02 or 1.0
 
@@ -354,17 +358,15 @@ def _summary(response: solver.Response) -> list[tuple[str, str]]:
 
 
 def _certificate(response: solver.Response) -> list[tuple[str, str]]:
-    checked = [i.certificate for i in response.path] or [i.certificate for i in response.increments]
-
-    def largest(name: str) -> float:
-        return max(abs(getattr(c, name)) for c in checked)
-
+    worst = solver.worst_of(i.certificate for i in response.path or response.increments)
+    if worst is None:
+        return []
     return [
-        ("largest unbalanced force / total load", f"{largest('equilibrium_residual'):.1e}"),
-        ("deepest overlap", f"{largest('largest_penetration'):.1e} m"),
-        ("lower and upper bound differ by", f"{largest('duality_gap'):.1e}"),
-        ("complementarity", f"{largest('complementarity'):.1e}"),
-        ("kinematic violation / block size", f"{largest('kinematic_violation'):.1e}"),
+        ("largest unbalanced force / total load", f"{worst.equilibrium_residual:.1e}"),
+        ("deepest overlap", f"{worst.largest_penetration:.1e} m"),
+        ("lower and upper bound differ by", f"{worst.duality_gap:.1e}"),
+        ("complementarity", f"{worst.complementarity:.1e}"),
+        ("kinematic violation / block size", f"{worst.kinematic_violation:.1e}"),
     ]
 
 

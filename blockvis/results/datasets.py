@@ -16,13 +16,13 @@ ROLE_NUMBERS = {role: number for number, role in enumerate(solver.ROLES)}
 
 
 def block_dataset(assembly: solver.Assembly, increment: solver.Increment | None = None) -> pv.UnstructuredGrid:
-    """The blocks of one increment, one polygon cell per block, non-convex outlines too.
+    """Make a dataset of the blocks of one increment, one polygon cell per block, non-convex outlines too.
 
     Parameters
     ----------
     assembly : solver.Assembly
     increment : solver.Increment, optional
-        The drawing at rest where it is not given.
+        The drawing by default.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def block_dataset(assembly: solver.Assembly, increment: solver.Increment | None 
 
 
 def contact_dataset(assembly: solver.Assembly, increment: solver.Increment) -> pv.UnstructuredGrid:
-    """The contact points of one increment, one vertex cell each.
+    """Make a dataset of the contact points of one increment, one vertex cell each.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def contact_dataset(assembly: solver.Assembly, increment: solver.Increment) -> p
 
 
 def output_times(increments: Sequence[solver.Increment]) -> list[float]:
-    """A time for each increment that never stands still, for readers that sort or merge by time.
+    """Strictly increasing times, one per increment, for readers that sort or merge by time.
 
     Parameters
     ----------
@@ -119,8 +119,8 @@ def output_times(increments: Sequence[solver.Increment]) -> list[float]:
     Returns
     -------
     list of float [m or rad]
-        The parameter in equilibrium, phases one after another; frames of the fall go on by a hundredth of the
-        settlement reached each, since they share one settlement.
+        The parameter in equilibrium, phases one after another. Frames of the fall share one parameter: their times
+        grow by a hundredth of it each.
     """
     times: list[float] = []
     before, phase, last = 0.0, 0, 0.0
@@ -145,7 +145,7 @@ def _describe(grid: pv.UnstructuredGrid, increment: solver.Increment) -> None:
 
 
 def _strings(name: str, words: Iterable[str]) -> vtkStringArray:
-    """A VTK array of strings; pyvista's own conversion refuses anything but ASCII, and names are in any language."""
+    """Make a VTK array of strings; pyvista's own conversion refuses anything but ASCII."""
     array = vtkStringArray()
     array.SetName(name)
     for word in words:

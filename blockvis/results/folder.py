@@ -1,4 +1,4 @@
-"""The results folder: written as the run goes, reopened without solving."""
+"""The results folder: written during the run, reopened without solving."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import numpy as np
 
 import solver
 from blockvis.atomic_files import PARTIAL, make_folder, write_whole
+from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .increments import StoredIncrements, packed_increment
 from .npz import checked_arrays, compressed, flat, packed, unpacked
@@ -30,7 +31,7 @@ _LISTS = ("summary.json", "response.csv", "blocks.pvd", "contacts.pvd", *LIMIT_T
 _STARTED = (RECORD, CHECKPOINT, "assembly.npz")
 _PICTURES = (
     *("report.html", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
-    *(f"collapse{suffix}" for suffix in (".mp4", ".gif", ".webp")),
+    *(f"collapse{suffix}" for suffix in VIDEO_SUFFIXES),
 )
 
 C = TypeVar("C")
@@ -41,7 +42,7 @@ class ResultsExist(ValueError):
 
 
 def refuse_results(path: str | Path, overwrite: bool = False) -> None:
-    """Raises :class:`ResultsExist` if a folder holds results that may not be replaced."""
+    """Raise :class:`ResultsExist` if a folder holds results that may not be replaced."""
     path = Path(path)
     if path.exists() and not path.is_dir():
         raise ResultsExist(f"'{path}' is a file; choose a folder with -o")
@@ -76,8 +77,8 @@ class ResultsFolder:
 
     Notes
     -----
-    The checkpoint is written last of what belongs to an increment: whatever a killed run has left beyond it is taken
-    away when the run goes on.
+    The checkpoint is the last file of an increment to be written: files of later increments, which a killed run may
+    have left, are removed when the run goes on.
     """
 
     def __init__(
@@ -96,7 +97,7 @@ class ResultsFolder:
         refuse_results(self.path, overwrite)
         make_folder(self.path / "increments")
         self._release = _held(self, self.path)
-        # What lists others goes first, so that nothing ever points to a file that is gone.
+        # Lists of files go first, so that none ever names a file that is gone.
         for name in (*_LISTS, *_PICTURES, *_STARTED):
             (self.path / name).unlink(missing_ok=True)
         self._remove_from(0)
@@ -106,7 +107,7 @@ class ResultsFolder:
 
     @classmethod
     def reopened(cls, path: str | Path, parameter: solver.Quantity, kind: type[C]) -> tuple[ResultsFolder, C | None]:
-        """The folder of a run that was stopped, as it was after its last checkpoint, and that checkpoint.
+        """Reopen the folder of a run that was stopped, as it was after its last checkpoint.
 
         Parameters
         ----------
@@ -115,6 +116,12 @@ class ResultsFolder:
             As of the folder.
         kind : type
             Of the checkpoint.
+
+        Returns
+        -------
+        results : ResultsFolder
+        checkpoint : of type ``kind``, optional
+            None where the run had written none.
 
         Raises
         ------
@@ -145,9 +152,10 @@ class ResultsFolder:
         return results, checkpoint
 
     def add(self, increment: solver.Increment) -> None:
-        """Writes one increment: its VTU files, its row, PVD files that list everything so far, and where to go on.
+        """Write one increment: its VTU files, its row, PVD files that list everything so far, and the checkpoint.
 
-        Of what is written the folder keeps the numbers; see :mod:`blockvis.results.increments`.
+        Afterwards the folder keeps the numbers of the increment, not its arrays; see
+        :mod:`blockvis.results.increments`.
         """
         from blockvis.vtk_files import write_vtu
 
@@ -172,7 +180,7 @@ class ResultsFolder:
         own: Mapping[str, Any] | None = None,
         tables: Mapping[str, str] | None = None,
     ) -> dict[str, Any]:
-        """Writes and returns the summary.
+        """Write and return the summary.
 
         Parameters
         ----------
@@ -202,7 +210,7 @@ class ResultsFolder:
             self._table.writerow(row_of_increment(number, increment, self.assembly, self.parameter))
 
     def _write_lists(self) -> None:
-        """The table and the lists of files, of everything so far."""
+        """Write the table and the lists of files, of everything so far."""
         from blockvis.vtk_files import write_pvd
 
         from .datasets import output_times
@@ -214,7 +222,7 @@ class ResultsFolder:
             write_pvd(self.path / f"{kind}.pvd", entries, last=False)
 
     def _remove_from(self, count: int) -> None:
-        """Removes the files of increments from a number on, and what was being written when a run was killed."""
+        """Remove the files of increments from a number on, and files that a killed run has left half written."""
         folder = self.path / "increments"
         for old in [*folder.glob("*.vtu"), *folder.glob("*.npz")]:
             number = old.stem.rpartition("_")[2]
@@ -225,7 +233,7 @@ class ResultsFolder:
 
 
 def _held(owner: ResultsFolder, folder: Path) -> Callable[[], None]:
-    """Holds the folder for one run, until what is returned is called or the process ends, however it ends."""
+    """Lock the folder for one run, until the returned function is called or the process ends, however it ends."""
     try:
         import fcntl
     except ImportError:
@@ -239,7 +247,7 @@ def _held(owner: ResultsFolder, folder: Path) -> Callable[[], None]:
             f"another run is writing to '{folder}'; wait for it, end it, or choose another folder with -o"
         ) from None
     except OSError:
-        # A file system without locks: then the user has to know.
+        # A file system without locks: two runs into one folder are not noticed.
         pass
     return weakref.finalize(owner, os.close, handle)
 
@@ -273,7 +281,7 @@ def stored_case(folder: str | Path) -> str:
 
 
 def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
-    """The response of a results folder without what its kind of analysis adds, and its summary, {} where it has none.
+    """Read the response of a results folder, without what its kind of analysis adds, and its summary.
 
     Parameters
     ----------
@@ -282,9 +290,9 @@ def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
     Returns
     -------
     solver.Response
-        Whose increments read their arrays from the folder when they are asked for; with the loads and interfaces of
-        no case.
+        Its increments read their arrays from the folder when they are asked for; loads and interfaces are defaults.
     dict
+        Empty where the run was stopped.
 
     Raises
     ------

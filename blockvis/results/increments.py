@@ -47,7 +47,7 @@ class StateInFile:
     numbers: tuple[float, ...]
 
     def read(self) -> solver.State:
-        """The state.
+        """Read the state.
 
         Raises
         ------
@@ -62,7 +62,7 @@ class StateInFile:
 
 
 class StoredIncrements:
-    """The files of the increments of one results folder; the few read last are kept.
+    """The files of the increments of one results folder; the few read last are kept in memory.
 
     Parameters
     ----------
@@ -76,14 +76,15 @@ class StoredIncrements:
         self._bytes = 0
 
     def file(self, number: int) -> Path:
-        """The file of an increment."""
+        """Path of the file of an increment."""
         return self.folder / "increments" / f"state_{number:05d}.npz"
 
     def __len__(self) -> int:
+        """Count the files."""
         return len(list((self.folder / "increments").glob("state_*.npz")))
 
     def without_arrays(self, number: int, increment: solver.Increment) -> solver.Increment:
-        """An increment that has been written, its arrays in its file.
+        """Drop the arrays of an increment that has been written: it reads them from its file.
 
         Parameters
         ----------
@@ -93,7 +94,7 @@ class StoredIncrements:
         return replace(increment, held=StateInFile(self, number, _numbers(increment)), checkpoint=None)
 
     def opened(self, number: int) -> solver.Increment:
-        """An increment of which nothing is known yet; its file is read once, whole, so that what is damaged is found.
+        """Open an increment; its file is read once, whole, so that damage is found at once.
 
         Raises
         ------
@@ -103,7 +104,7 @@ class StoredIncrements:
         return self.without_arrays(number, self._read(number))
 
     def read(self, number: int) -> solver.Increment:
-        """The increment with its arrays, from its file or from memory.
+        """Read an increment with its arrays, from its file or from memory.
 
         Parameters
         ----------
@@ -137,19 +138,19 @@ class StoredIncrements:
 
 
 def folder_of(increment: solver.Increment) -> Path | None:
-    """The results folder whose files hold the arrays of an increment; None where they are in memory."""
+    """Find the results folder whose files hold the arrays of an increment; None where they are in memory."""
     return increment.held.files.folder if isinstance(increment.held, StateInFile) else None
 
 
 def packed_increment(increment: solver.Increment) -> bytes:
-    """An increment as the bytes of its file."""
+    """Pack an increment into the bytes of its file."""
     numbers = flat(increment, without=_APART)
     numbers = {_STORED_AS.get(name, name): number for name, number in numbers.items()}
     return compressed(_arrays_of(increment.state) | numbers)
 
 
 def _arrays_of(state: solver.State) -> dict[str, np.ndarray]:
-    """The arrays of a file, in whose words contact points have a vertex, an edge and a corner, and slip along it."""
+    """Name the arrays as the files do: contact points have a vertex, an edge and a corner, and slip along it."""
     arrays = flat(state)
     vertex, edge, corner = solver.corners_and_edges(arrays.pop("features"))
     rotations, slip = arrays["rotations"][:, 0], arrays.pop("slip")[:, 0]

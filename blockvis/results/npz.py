@@ -25,7 +25,7 @@ _TREE = "tree"
 
 
 def packed(value: Any, **extra: int | float | str) -> bytes:
-    """A dataclass as the bytes of an .npz file.
+    """Pack a dataclass into the bytes of an .npz file.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def packed(value: Any, **extra: int | float | str) -> bytes:
 
 
 def unpacked(data: bytes, kind: type[T]) -> tuple[T, dict[str, Any]]:
-    """The dataclass of the given kind that :func:`packed` made the bytes from, and what went with it.
+    """Unpack the bytes that :func:`packed` made of a dataclass of the given kind, and the extra values.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def unpacked(data: bytes, kind: type[T]) -> tuple[T, dict[str, Any]]:
 
 
 def flat(value: Any, without: Collection[str] = ()) -> dict[str, np.ndarray]:
-    """The fields of a dataclass as arrays by their names, those of dataclasses in it among them.
+    """Make arrays of the fields of a dataclass, by their names, and of the fields of dataclasses in it.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def flat(value: Any, without: Collection[str] = ()) -> dict[str, np.ndarray]:
 
 
 def from_flat(arrays: Mapping[str, np.ndarray], kind: type[T], **given: Any) -> T:
-    """The dataclass of the given kind whose fields :func:`flat` made arrays of.
+    """Make the dataclass of the given kind whose fields :func:`flat` made arrays of.
 
     Parameters
     ----------
@@ -112,14 +112,14 @@ def from_flat(arrays: Mapping[str, np.ndarray], kind: type[T], **given: Any) -> 
 
 
 def compressed(arrays: Mapping[str, np.ndarray]) -> bytes:
-    """Arrays as the bytes of an .npz file."""
+    """Pack arrays into the bytes of an .npz file."""
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
     return buffer.getvalue()
 
 
 def checked_arrays(source: str | Path | io.BytesIO) -> dict[str, np.ndarray]:
-    """All arrays of an .npz file, with nothing in it that could run.
+    """Read all arrays of an .npz file; refuse one with anything in it that could run.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def _plain(value: Any, arrays: dict[str, np.ndarray]) -> Any:
 
 
 def _built(stored: Any, kind: Any, arrays: Mapping[str, np.ndarray]) -> Any:
-    """The value of the annotated kind; a kind that does not fit what is stored raises TypeError."""
+    """Build the value of the annotated kind; raises TypeError where the kind does not fit what is stored."""
     if get_origin(kind) in (Union, UnionType):
         if stored is None:
             return None

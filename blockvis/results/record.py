@@ -1,4 +1,4 @@
-"""What a run was made from: kept in its results folder from the start, so that the folder alone is enough to go on."""
+"""Record: what a run was made from, kept in its results folder from the start, which is then enough to go on."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ class Record:
     versions: dict[str, str] = field(default_factory=dict)
 
     def text(self) -> str:
-        """As JSON."""
+        """Write the record as JSON."""
         return json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n"
 
     def inputs(self) -> dict[str, str | None]:
-        """For summary.json: names and checksums of the files that were read."""
+        """Names and checksums of the files that were read, for summary.json."""
         return {
             "case_file": Path(self.case_file).name or None,
             "case_sha256": self.case_sha256 or None,
@@ -52,7 +52,7 @@ class Record:
         }
 
     def changes(self) -> list[str]:
-        """What is no longer as it was when the run began, in words."""
+        """Say which files and versions have changed since the run began."""
         notes = []
         for what, file, checksum in (
             ("case", self.case_file, self.case_sha256),
@@ -76,7 +76,7 @@ class Record:
 
 
 def read_record(folder: Path) -> Record:
-    """The record of a results folder.
+    """Read the record of a results folder.
 
     Raises
     ------
@@ -107,5 +107,6 @@ def versions() -> dict[str, str]:
 
 
 def checksum_of(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

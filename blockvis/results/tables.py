@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,7 @@ LIMIT_TABLES = ("envelope.csv", "capacity.csv")
 
 
 def summary_of(response: solver.Response, *, seconds: float, record: Record, own: Mapping[str, Any]) -> dict[str, Any]:
-    """What summary.json holds; every length in m, force in N, angle in rad.
+    """Make the summary that summary.json holds; every length in m, force in N, angle in rad.
 
     Parameters
     ----------
@@ -53,16 +54,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         What the kind of analysis adds.
     """
     path, collapse = response.path, response.collapse
-    worst = {
-        name: max((getattr(i.certificate, name) for i in path), default=None)
-        for name in (
-            "equilibrium_residual",
-            "largest_penetration",
-            "duality_gap",
-            "complementarity",
-            "kinematic_violation",
-        )
-    }
+    worst = solver.worst_of(i.certificate for i in path)
     return {
         "status": str(response.stop),
         "message": response.message,
@@ -85,7 +77,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "n_increments": len(path),
         "n_falling_frames": len(response.increments) - len(path),
         "n_programs": sum(i.programs for i in response.increments),
-        "largest_residuals": worst,
+        "largest_residuals": {f.name: getattr(worst, f.name, None) for f in fields(solver.Certificate)},
         "seconds": seconds,
         "finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "versions": record.versions,
@@ -104,7 +96,7 @@ def _joint_counts(response: solver.Response) -> dict[str, int | None]:
 
 
 def own_columns(parameter: solver.Quantity) -> tuple[str, ...]:
-    """The column that response.csv has for a parameter beside its own; none for a settlement, which is among them."""
+    """Name the column that response.csv has for a parameter; none for a settlement, which is in :data:`COLUMNS`."""
     name = parameter.name.replace(" ", "_")
     return () if name in COLUMNS else (name,)
 
@@ -112,7 +104,7 @@ def own_columns(parameter: solver.Quantity) -> tuple[str, ...]:
 def row_of_increment(
     number: int, increment: solver.Increment, assembly: solver.Assembly, parameter: solver.Quantity
 ) -> Sequence[Any]:
-    """The row of response.csv for an increment, in the order of :data:`COLUMNS`.
+    """Make the row of response.csv for an increment, in the order of :data:`COLUMNS`.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ class Course:
 
     @property
     def drivers(self) -> tuple[solver.Control, ...]:
-        """How far the parameter goes in each phase; empty where nobody knows."""
+        """How far the parameter goes in each phase; empty where no limit is known."""
         return self.settlements if self.control is None else (self.control,)
 
 

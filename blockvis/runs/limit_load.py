@@ -21,15 +21,15 @@ from blockvis.numbers import force_text
 from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, begun, needs_dry_joints, needs_live_load
 from .settlement import not_reached, settlement_course, settlement_steps, stored_settlements
 
-#: How sliding joints of a limit load behave.
+#: Flow rules of the sliding joints of a limit load.
 FLOWS = ("associative", "non-associative")
 
 #: Frames in which the mechanism of a limit load is swung, and how far its fastest block gets, in extents of the
 #: structure.
 SWINGING_FRAMES, SWING = 30, 0.05
 
-#: Displacement within which joints that a settlement has opened may close, in block sizes. An arch whose hinges have
-#: opened does not notice it; a wall of many bricks needs more, lest its capacity be that of its loosest brick.
+#: Displacement within which joints that a settlement has opened may close, in block sizes. It changes nothing for an
+#: arch whose hinges have opened; without it the capacity of a wall of many bricks is that of its loosest brick.
 CLOSING = 1e-3
 
 
@@ -198,7 +198,7 @@ class LimitLoadKind(AnalysisKind):
         return f"{number} limit load{'' if number == 1 else 's'}"
 
     def tells_message(self, response: solver.Response) -> bool:
-        """Whether there is a limit load, which its own lines tell."""
+        """Whether there is a limit load, which :meth:`lines` describe."""
         return response.collapse is not None or response.stop is solver.Status.COLLAPSED
 
     def lines(self, response: solver.Response) -> list[str]:
@@ -359,7 +359,7 @@ def _over_places(
         if number < len(found):
             state = found[number]
         elif run.limits and run.limits[-1].status is solver.LimitStatus.NO_EQUILIBRIUM:
-            # Nor is there one with the load elsewhere.
+            # The dead load alone has no equilibrium: nor has it with the live load elsewhere.
             break
         else:
             loads = replace(standing, live=standing.live + live(number))
@@ -457,9 +457,9 @@ def _swinging(assembly: solver.Assembly, state: solver.Increment) -> Iterator[so
     contacts = state.contacts
     for part in np.linspace(0.0, 1.0, SWINGING_FRAMES + 1)[1:]:
         pose = solver.swung(state.pose, state.velocity * (part * reach / fastest))
-        sides = [solver.carried(contacts.points, k, state.pose, pose) for k in (contacts.block_a, contacts.block_b)]
+        points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, state.pose, pose)
         yield replace(
-            state.with_arrays(pose=pose, contacts=replace(contacts, points=(sides[0] + sides[1]) / 2.0)),
+            state.with_arrays(pose=pose, contacts=replace(contacts, points=points)),
             status=solver.Status.FALLING,
             programs=0,
             seconds=0.0,

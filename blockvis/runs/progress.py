@@ -1,4 +1,4 @@
-"""Progress of a run on stderr; quiet where nobody watches."""
+"""Progress of a run on stderr; nothing where stderr is no terminal."""
 
 from __future__ import annotations
 

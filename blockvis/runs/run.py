@@ -65,7 +65,7 @@ class Run:
 
 
 def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overwrite: bool = False) -> Run:
-    """Solve a case and writes everything: VTU, PVD, CSV, summary, pictures.
+    """Solve a case and write everything: VTU, PVD, CSV, summary, pictures.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def _drawn(case: Case) -> list[str]:
 
 
 def _followed(case: Case, results: ResultsFolder, run: AnalysisRun) -> Run:
-    """Follow the increments to their end or to Ctrl-C, writing each, and draws what came out."""
+    """Follow the increments to their end or to Ctrl-C, write each, and draw what came out."""
     folder = results.path
     progress = Progress(run.course)
     ending = solver.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
@@ -191,7 +191,7 @@ def _followed(case: Case, results: ResultsFolder, run: AnalysisRun) -> Run:
 
 
 def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
-    """Say so where the blocks as drawn were in no equilibrium and found one a little further."""
+    """Warn where the blocks as drawn were in no equilibrium and found one a little further."""
     moved = np.hypot(*first.pose.displacements(assembly)[:, :2].T)
     block = int(np.argmax(moved))
     if first.status == solver.Status.EQUILIBRIUM and moved[block] > AS_DRAWN * assembly.block_size:
@@ -203,7 +203,7 @@ def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
 
 
 def _given_up(folder: Path, error: OSError) -> OSError:
-    """Remove half a file when the disk is full or gone in the middle of a run; returns what to say and do about it."""
+    """Remove half-written files when the disk is full or gone in the middle of a run; returns the error to raise."""
     for half in folder.rglob(PARTIAL):
         half.unlink(missing_ok=True)
     return OSError(

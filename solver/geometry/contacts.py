@@ -39,15 +39,39 @@ class Contacts:
     areas: np.ndarray
 
     def __len__(self) -> int:
+        """Count the contact points."""
         return len(self.features)
 
     def __getitem__(self, chosen: np.ndarray) -> Contacts:
-        """Some of the contact points, by a mask or their numbers."""
+        """Choose some of the contact points, by a mask or their numbers."""
         return Contacts(**{field.name: getattr(self, field.name)[chosen] for field in fields(self)})
+
+    def joints(self) -> tuple[np.ndarray, np.ndarray]:
+        """Gather the contact points of each pair of blocks.
+
+        Returns
+        -------
+        pairs : (n_joints, 2) int array
+            The blocks, lower number first, in ascending order.
+        joint : (n,) int array
+            The pair of each contact point.
+        """
+        low, high = np.minimum(self.block_a, self.block_b).astype(np.int64), np.maximum(self.block_a, self.block_b)
+        count = int(high.max(initial=0)) + 1
+        keys, joint = np.unique(low * count + high, return_inverse=True)
+        return np.stack([keys // count, keys % count], axis=1), joint.ravel()
 
 
 def matched_contacts(contacts: Contacts, before: Contacts) -> tuple[np.ndarray, np.ndarray]:
-    """For each contact, its number among those before, and whether it was there."""
+    """Find each contact point among those before.
+
+    Returns
+    -------
+    place : (n,) int array
+        Its number before; any number where it was not there.
+    known : (n,) bool array
+        Whether it was there.
+    """
     features, earlier = contacts.features[:, :3].astype(np.int64), before.features[:, :3].astype(np.int64)
     kinds, _, count = np.maximum(features.max(axis=0, initial=0), earlier.max(axis=0, initial=0)) + 1
     keys, known = ((f[:, 1] * kinds + f[:, 0]) * count + f[:, 2] for f in (features, earlier))

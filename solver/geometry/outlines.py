@@ -36,6 +36,7 @@ class Outlines:
     thickness: np.ndarray
 
     def __len__(self) -> int:
+        """Count the polygons."""
         return len(self.offsets) - 1
 
     @cached_property

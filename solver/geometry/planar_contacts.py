@@ -125,7 +125,7 @@ def _areas(
 
 
 def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
-    """Finds the points at which blocks touch or may touch within one increment.
+    """Find the points at which blocks touch or may touch within one increment.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def _inward(shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray) -> np.nd
 def _classified_ends(
     shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sorts out the corners near the end of their edge: on the corner there, or past it."""
+    """Drop corners past the end of their edge, and mark those that stand on the corner there."""
     following = shapes.next_vertex
     start, stop = edge, following[edge]
     tangent = _unit(vertices[stop] - vertices[start])
@@ -305,7 +305,7 @@ def _closest_faces(
 def _once(
     shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Keeps each pair of corners once, seen from the lower numbered vertex."""
+    """Keep each pair of corners once, seen from the lower numbered vertex."""
     k = np.flatnonzero(corner >= 0)
     facing = _facing_edge(shapes, vertex[k], edge[k], corner[k])
     turn = vertex[k] > corner[k]
@@ -356,7 +356,7 @@ def past_the_end(shapes: Outlines, contacts: Contacts) -> tuple[np.ndarray, np.n
 
 
 def _facing_edge(shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
-    """The edge of the corner's block that lies over ``edge`` where ``vertex`` stands on ``corner``.
+    """Find the edge of the corner's block that lies over ``edge`` where ``vertex`` stands on ``corner``.
 
     Both outlines run counter-clockwise, so facing edges run against each other: where one starts the other ends.
     """

@@ -25,11 +25,11 @@ class Polygons(Outlines):
         return float(np.sqrt(self.areas[chosen].mean()))
 
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
-        """Contact points within a gap of ``reach`` [m] between blocks one of which is useful, (n_blocks,) bool."""
+        """Find contact points with a gap up to ``reach`` [m], one of their blocks of the useful, (n_blocks,) bool."""
         return find_points(self, vertices, reach, useful)
 
     def measure(self, vertices: np.ndarray, contacts: Contacts) -> Contacts:
-        """The contact points between the same features, with the corners (n_vertices, 2) [m] elsewhere."""
+        """Measure the contact points between the same features, with the corners (n_vertices, 2) [m] elsewhere."""
         return measured_points(self, vertices, contacts.features)
 
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -44,10 +44,10 @@ class Shapes(Protocol):
         """Edge of the square or cube as large as the mean of the chosen blocks, (n_blocks,) bool, [m]."""
 
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
-        """Contact points with a gap up to ``reach`` [m] between blocks one of which is useful, (n_blocks,) bool."""
+        """Find contact points with a gap up to ``reach`` [m], one of their blocks of the useful, (n_blocks,) bool."""
 
     def measure(self, vertices: np.ndarray, contacts: Contacts) -> Contacts:
-        """The contact points between the same features, with the corners (n_vertices, d) [m] elsewhere."""
+        """Measure the contact points between the same features, with the corners (n_vertices, d) [m] elsewhere."""
 
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pairs of blocks that overlap by more than ``tolerance`` [m]: two (n_pairs,) int arrays, and the depths."""

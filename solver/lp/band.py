@@ -17,11 +17,11 @@ TOLERANCE = 1e-8
 #: Iterations after which it is given up; walls of 1,500 blocks take 40, of 10,000 blocks 80.
 ITERATIONS = 200
 
-#: So many steps in a row that are shorter than this lead nowhere.
+#: After this many steps in a row that are shorter than the second number it is given up.
 SHORT_STEPS, SHORT = 20, 1e-3
 
 #: Largest number of operations of one factorisation, rows times the square of the band's width; walls of 10,000 blocks
-#: need 2e9, a tenth of a second. They grow with the square of the blocks: larger programs are left to others.
+#: need 2e9, a tenth of a second. They grow with the square of the blocks: larger programs go to HiGHS.
 OPERATIONS = 1e10
 
 #: Weight of the proximal term. Without it the multipliers that carry force weigh 1e16 at the end, and the balance of
@@ -46,8 +46,8 @@ WEIGHTS = np.linspace(1.0, 0.0, 7)
 REFINEMENTS, RESIDUAL, RESIDUAL_PART = 2, 1e-9, 1e-2
 
 #: Multipliers of this size that cost less than nothing by this, in units of the program, are looked at for a ray along
-#: which the objective falls for ever, at every so manieth iteration; passes that remove what is left of its balance,
-#: with either number on the diagonal: the large one leaves something of it, with the small one it may be singular.
+#: which the objective falls without limit, every ``RAY_EVERY`` iterations. ``RAY_PASSES`` passes remove its unbalanced
+#: part, with either number on the diagonal: the large one leaves some of it, the small one may be singular.
 RAY_SIZE, RAY_COST, RAY_EVERY, RAY_PASSES, RAY_DIAGONALS = 1e3, 1e-8, 5, 3, (1e-16, 1e-20)
 
 #: Out of balance by less than this, a ray is shown to the caller.
@@ -154,7 +154,7 @@ class _Method:
         self.tried = 0
 
     def _start(self, matrix: sp.csc_array) -> _Point:
-        """Equal multipliers, the rows balanced by the unit columns that every row has."""
+        """Start from equal multipliers, the rows balanced by the unit columns that every row has."""
         middle = (self.lower + self.upper) / 2.0
         single = np.flatnonzero(np.diff(matrix.indptr) == 1)
         row, value = matrix.indices[matrix.indptr[single]], matrix.data[matrix.indptr[single]]
@@ -228,7 +228,7 @@ class _Method:
         self.tried = self.tried + 1 if min(by_primal, by_dual) < SHORT else 0
 
     def refuse_ray(self) -> None:
-        """Raises ``Diverges`` where the multipliers point along a ray: their balance is mended, each by its size."""
+        """Raise ``Diverges`` where the multipliers point along a ray, once they are corrected until they balance."""
         x = self.point.primal[self.x]
         size = float(x.max())
         if size < RAY_SIZE or self.cost @ x > -RAY_COST * size:
@@ -257,11 +257,11 @@ class _Method:
         for attempt in range(REFINEMENTS + 1):
             reduced = costs - self.transposed @ row_dual
             x, w = moved - weight * reduced, (free - row_dual) * self.room
-            left = rows - (self.matrix @ x - w)
+            residual = rows - (self.matrix @ x - w)
             enough = max(RESIDUAL, RESIDUAL_PART * float(np.abs(rows).max(initial=0.0)))
-            if attempt == REFINEMENTS or np.abs(left).max(initial=0.0) <= enough:
+            if attempt == REFINEMENTS or np.abs(residual).max(initial=0.0) <= enough:
                 break
-            row_dual = row_dual + self.band.solve(left)
+            row_dual = row_dual + self.band.solve(residual)
         return _Point(
             np.concatenate([x, w, -w]),
             np.concatenate(
@@ -277,7 +277,7 @@ class _Method:
     def _weighted(
         self, step: _Point, correction: _Point, lengths: tuple[float, float]
     ) -> tuple[_Point, tuple[float, float]]:
-        """The step with as much of a correction as makes it longest (Colombo & Gondzio 2008)."""
+        """Add as much of a correction to a step as makes it longest (Colombo & Gondzio 2008)."""
         primal, dual = self.point.primal, self.point.dual
         weights = max(lengths[0] * lengths[1], 0.05) * (1.0 - WEIGHTS) + WEIGHTS
         by_primal = _lengths(step.primal / primal, correction.primal / primal, weights)
@@ -292,7 +292,7 @@ class _Method:
 
 
 def _narrowest(matrix: sp.csc_array, along: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """The order of the rows that makes the narrower band, and the place of each row in it."""
+    """Choose the order of the rows that makes the narrower band; also gives the place of each row in it."""
     rows = matrix.shape[0]
     pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape[::-1])
     orders = [reverse_cuthill_mckee(sp.csr_matrix(pattern.T @ pattern), symmetric_mode=True)]
@@ -317,7 +317,7 @@ def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float
 
 
 def _lengths(rates: np.ndarray, corrections: np.ndarray, weights: np.ndarray) -> list[float]:
-    """The longest steps, up to 1, at relative changes corrected with each of the weights."""
+    """Longest steps, up to 1, at relative changes corrected with each of the weights."""
     return [1.0 / max(1.0, -float((rates + weight * corrections).min())) for weight in weights]
 
 
@@ -328,7 +328,7 @@ def interior_point(
     upper: np.ndarray,
     along: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Minimises cost · x subject to lower ≤ A x ≤ upper and x ≥ 0.
+    """Minimise cost · x subject to lower ≤ A x ≤ upper and x ≥ 0.
 
     Parameters
     ----------

@@ -36,6 +36,26 @@ ROUTES: dict[str, dict[str, object]] = {
 
 
 def run_highs(program: LinearProgram, route: str) -> tuple[LPSolution | None, str]:
+    """Solve a program by one route.
+
+    Parameters
+    ----------
+    program : LinearProgram
+    route : str
+        One of ``ROUTES``.
+
+    Returns
+    -------
+    LPSolution or None
+        None where HiGHS has none; its check is up to the caller.
+    str
+        What HiGHS says of it.
+
+    Raises
+    ------
+    Unbounded
+        If a ray proves that the program has no minimum.
+    """
     started = time.perf_counter()
     highs = highspy.Highs()
     options: dict[str, object] = {
@@ -47,7 +67,7 @@ def run_highs(program: LinearProgram, route: str) -> tuple[LPSolution | None, st
         "ipm_optimality_tolerance": FEASIBILITY_TOLERANCE,
         # HiGHS drops entries below 1e-9 otherwise, and forces of hundreds of blocks at such arms are missing.
         "small_matrix_value": 1e-12,
-        # An interior method that stalls goes round for ever; a simplex method that cycles, too.
+        # Without limits an interior method that stalls never ends, nor does a simplex method that cycles.
         "ipm_iteration_limit": IPM_ITERATIONS,
         "simplex_iteration_limit": SIMPLEX_ITERATIONS * sum(program.matrix.shape),
         **ROUTES[route],

@@ -91,7 +91,7 @@ class LPSolution:
 
 
 def raise_if_proved(program: LinearProgram, ray: np.ndarray) -> None:
-    """Raises ``Unbounded`` where a ray proves it; otherwise the word of whoever found it counts for nothing."""
+    """Raise ``Unbounded`` where the ray proves it by our own check, whatever the solver that found it says."""
     x = np.maximum(ray, 0.0)
     size = float(np.abs(x).max(initial=0.0))
     if size == 0.0:
@@ -104,6 +104,17 @@ def raise_if_proved(program: LinearProgram, ray: np.ndarray) -> None:
 def checked(
     program: LinearProgram, x: np.ndarray, y: np.ndarray, route: str, iterations: int, seconds: float
 ) -> LPSolution:
+    """Measure a solution by the program alone.
+
+    Parameters
+    ----------
+    program : LinearProgram
+    x : (n,) array
+    y : (m,) array
+        Multipliers of the rows.
+    route, iterations, seconds
+        As of :class:`LPSolution`.
+    """
     activity = program.matrix @ x
     reduced = program.cost - program.matrix.T @ y
     return LPSolution(

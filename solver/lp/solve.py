@@ -20,7 +20,7 @@ INTERIOR_ROUTES = (BAND, "hipo", "hipo without presolve", "ipx", "ipx with cross
 
 
 def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> LPSolution:
-    """Solves a linear program, trying one route after another until a solution passes its check.
+    """Solve a linear program, trying one route after another until a solution passes its check.
 
     Parameters
     ----------

@@ -19,12 +19,12 @@ Function = Callable[..., int]
 
 
 class NotLimited(RuntimeError):
-    """A library below scipy or numpy cannot be kept to one thread from here."""
+    """The library below scipy or numpy has no function that limits its threads."""
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Keeps OpenBLAS to one thread, and gives it back what it had.
+    """Keep OpenBLAS to one thread, and give it back what it had.
 
     A band is factorised in hundreds of products of small matrices. Shared among threads, each takes as long as it takes
     to wake them: four hundred times as long where other processes work on the same cores. And the last bits of a
@@ -52,7 +52,7 @@ def one_thread() -> Iterator[None]:
 
 @cache
 def _libraries() -> list[tuple[Function, Function]]:
-    """The functions that tell and set the threads of scipy's library and of numpy's."""
+    """Functions that get and set the number of threads of scipy's library and of numpy's."""
     core = "numpy._core" if hasattr(np, "_core") else "numpy.core"
     return [_functions(sys.modules[name].__file__) for name in (lapack._flapack.__name__, f"{core}._multiarray_umath")]
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 
 
 @dataclass(frozen=True)
@@ -28,3 +29,11 @@ class Certificate:
     duality_gap: float
     complementarity: float
     kinematic_violation: float
+
+
+def worst_of(certificates: Iterable[Certificate]) -> Certificate | None:
+    """Largest of each measure over some increments; None where there are none."""
+    found = tuple(certificates)
+    if not found:
+        return None
+    return Certificate(*(max(getattr(one, field.name) for one in found) for field in fields(Certificate)))

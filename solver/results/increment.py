@@ -87,8 +87,8 @@ class State:
     forces : (n_contacts, 2) array [N]
         Normal (compression positive) and shear force on ``block_a`` at each contact point.
     displacements : (n_contacts, 2) array
-        Opening and slip of each contact point in the increment that follows, per unit of the parameter; in a fall,
-        per frame.
+        Rates of opening and slip of each contact point in the increment that follows, per unit of the parameter: a
+        number, or m/rad; in a fall per frame [m].
     friction : (n_contacts,) array
         Friction coefficient of each contact point.
     velocity : (n_blocks, 3) array
@@ -110,7 +110,7 @@ class StoredState(Protocol):
     """A state that is kept elsewhere, in a file, and read whenever it is asked for."""
 
     def read(self) -> State:
-        """The state."""
+        """Read the state."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class Increment:
     held : State or StoredState
         The arrays, in memory or in a file; :attr:`state` has them in any case.
     notes : tuple of str
-        What happened on the way to it that forces and poses do not tell: blocks that fell and were caught.
+        Events on the way to it that forces and poses do not show: blocks that fell and were caught.
     checkpoint : optional
         Where the loop that yields the increment goes on after it: :class:`Checkpoint` of a settlement,
         :class:`PushoverCheckpoint` of a pushover. A :class:`Response` keeps none.
@@ -173,7 +173,7 @@ class Increment:
         return self.held if isinstance(self.held, State) else self.held.read()
 
     def with_arrays(self, **arrays: Any) -> Increment:
-        """The increment in memory, some of its arrays replaced.
+        """Replace some of the arrays; the others are in memory then.
 
         Parameters
         ----------
@@ -233,13 +233,8 @@ class Increment:
         rate = SMALLEST_RATE * np.abs(self.velocity[:, : self.forces.shape[1]]).max(initial=0.0)
         slipping = ~at_rest(np.linalg.norm(self.displacements[:, 1:], axis=1), rate)
         sliding = carrying & slipping & used_up(self.forces, self.friction)
-        low, high = (
-            np.minimum(self.contacts.block_a, self.contacts.block_b),
-            np.maximum(self.contacts.block_a, self.contacts.block_b),
-        )
-        joint = low.astype(np.int64) * len(self.velocity) + high
-        _, joint = np.unique(joint, return_inverse=True)
-        opens = np.zeros(joint.max(initial=-1) + 1, dtype=bool)
+        pairs, joint = self.contacts.joints()
+        opens = np.zeros(len(pairs), dtype=bool)
         opens[joint[self.displacements[:, 0] > rate]] = True
         states = np.full(len(carrying), ContactState.OPEN, dtype=np.uint8)
         states[carrying] = ContactState.STICKING

@@ -35,7 +35,8 @@ class LimitLoad:
     Attributes
     ----------
     multiplier : float
-        α of the live loads at the limit; ``inf`` where they are no danger, ``nan`` where there is no equilibrium.
+        α of the live loads at the limit; ``inf`` where no live load of this pattern causes collapse, ``nan`` where
+        there is no equilibrium.
     bounds : (float, float)
         Static value, from forces in equilibrium within friction, and kinematic value, from the power balance of the
         mechanism, - dead · velocity / live · velocity (plus friction where it is not associative). For associative
@@ -122,6 +123,7 @@ class LimitLoad:
         )
 
     def __str__(self) -> str:
+        """Say how large it is, or why there is none."""
         moving = int((np.abs(self.mechanism).max(axis=1) > 0.01).sum())
         if self.status is LimitStatus.NO_EQUILIBRIUM:
             return f"no equilibrium under the dead load: {moving} blocks fall"
@@ -134,7 +136,7 @@ class LimitLoad:
 def limit_state(
     pose: Pose, contacts: Contacts, forces: np.ndarray, friction: np.ndarray, mechanism: np.ndarray
 ) -> State:
-    """The arrays of a limit state; parameters as the attributes of :class:`LimitLoad`."""
+    """Make the state of a limit load; parameters as the attributes of :class:`LimitLoad`."""
     return State(
         pose=pose,
         contacts=contacts,

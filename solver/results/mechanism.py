@@ -13,7 +13,7 @@ from solver.tolerances import CLOSED, NOTICEABLE, TOGETHER
 
 from .increment import Increment, at_rest, carries, slides
 
-#: Joints that are named one by one in words; of more, their number is told.
+#: Joints that are named one by one in words; the others are counted.
 NAMED = 8
 
 
@@ -49,6 +49,7 @@ class Mechanism:
     names: tuple[str, ...]
 
     def __str__(self) -> str:
+        """Count the macro-blocks, and name the hinges and sliding joints."""
         n = len(self.motions)
         words = [f"{n} macro-block{'' if n == 1 else 's'}"]
         for what, pairs in (("hinge", self.hinges), ("sliding", self.sliding)):
@@ -83,7 +84,7 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
 
 
 def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
-    """The mechanism in the motion that follows an increment: macro-blocks, hinges, sliding joints.
+    """Find the mechanism in the motion that follows an increment: macro-blocks, hinges, sliding joints.
 
     Parameters
     ----------
@@ -96,7 +97,7 @@ def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
 
     Notes
     -----
-    Joints are told apart by their motion: one slides where a closed contact point moves along it (and carries force,
+    The motion distinguishes joints: one slides where a closed contact point moves along it (and carries force,
     where any does), and hinges where a point stays while the blocks turn against each other. A hinge may have no other
     point that opens: of a joint that is wide open already, only the corner it turns about is near enough to touch.
     """
@@ -133,7 +134,7 @@ def _joints(contacts: Contacts, chosen: np.ndarray, normal: np.ndarray) -> tuple
 
 
 def with_motion(increment: Increment, motion: np.ndarray) -> Increment:
-    """The increment with its hinges and sliding joints those of another motion.
+    """Give an increment another motion, and so other hinges and sliding joints.
 
     Parameters
     ----------

@@ -40,10 +40,10 @@ LOAD_MULTIPLIER = Quantity("load multiplier", "α", "")
 
 
 def settlement_in(unit: str) -> Quantity:
-    """The parameter of supports that move [m], or rotate [rad]."""
+    """Make the parameter of supports that move [m], or rotate [rad]."""
     return replace(SETTLEMENT, unit=unit)
 
 
 def reaction_to(unit: str) -> Quantity:
-    """The reaction of supports whose settlement has a unit: the force of a distance [m], the moment of a rotation."""
+    """Make the reaction to a settlement in a unit: a force for a distance [m], a moment for a rotation [rad]."""
     return replace(REACTION, unit="N·m" if unit == "rad" else "N")

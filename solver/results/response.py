@@ -47,6 +47,7 @@ class Collapse:
     lost: str = "equilibrium"
 
     def __str__(self) -> str:
+        """Say where, at which reaction, and how."""
         low, high = self.bracket
         force = "N" if self.unit == "m" else "N·m"
         return (
@@ -123,7 +124,7 @@ class Response:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the increments tell in words, in their order."""
+        """Notes of the increments, in their order."""
         return tuple(note for increment in self.increments for note in increment.notes)
 
     @property

@@ -13,7 +13,7 @@ import solver
 from blockvis import generators
 from blockvis.cases.case import parse_case
 from blockvis.pictures.curves import draw_curve
-from blockvis.pictures.drawer import Look, Studio
+from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.opengl import rendering_available
 from blockvis.pictures.video import write_film
 from blockvis.report.page import report_html
@@ -118,8 +118,8 @@ def test_results_are_read_one_at_a_time(use, folder, tmp_path, monkeypatch):
     elif use == "report":
         assert f"{response.collapse.displacement:.6g} m" in report_html(response)
     else:
-        with Studio(response, Look(), (320, 180), response.increments, curve=True) as studio:
-            write_film(studio.frames(4.0, 2.0), tmp_path / "film.gif", size=(320, 180), fps=4.0)
+        with Drawer(response, Look(), (320, 180), response.increments, curve=True) as drawer:
+            write_film(drawer.frames(4.0, 2.0), tmp_path / "film.gif", size=(320, 180), fps=4.0)
     # Each is read, and no more than a few times.
     assert n < len(seen) < 6 * n
     assert max(most) <= AT_LEAST + 1, most

@@ -10,7 +10,7 @@ from structures import BENT, arch_response, parted, wall
 
 import solver
 from blockvis.pictures import opengl, palette
-from blockvis.pictures.drawer import Look, Studio
+from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.flat_scene import Scene, magnified
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.opengl import rendering_available
@@ -35,12 +35,12 @@ def test_what_is_where(tmp_path):
     """Cracks, hinges, blocks and supports stand at their places, in their colours."""
     response = arch_response()
     last, assembly = response.path[-1], response.assembly
-    with Studio(response, Look(forces="none"), (1280, 720), (last,)) as studio:
-        picture = np.asarray(studio.picture(last)).astype(int)
-        left, top = studio.sheet.inside[:2]
+    with Drawer(response, Look(forces="none"), (1280, 720), (last,)) as drawer:
+        picture = np.asarray(drawer.picture(last)).astype(int)
+        left, top = drawer.sheet.inside[:2]
 
         def colour_at(point):
-            x, y = studio.scene.at_pixel(np.array([point]))[0].round().astype(int)
+            x, y = drawer.scene.at_pixel(np.array([point]))[0].round().astype(int)
             return picture[top + y, left + x]
 
     corners = solver.moved_vertices(assembly, last.pose)
@@ -78,10 +78,10 @@ def test_bent_blocks_are_filled_without_triangle_lines():
 @drawing
 def test_nothing_leaves_the_picture_in_any_frame():
     response = arch_response()
-    with Studio(response, Look(), SMALL, response.increments) as studio:
-        left, top, right, bottom = studio.sheet.inside
+    with Drawer(response, Look(), SMALL, response.increments) as drawer:
+        left, top, right, bottom = drawer.sheet.inside
         for increment in response.increments[::4] + response.increments[-1:]:
-            picture = np.asarray(studio.picture(increment)).astype(int)[top:bottom, left:right]
+            picture = np.asarray(drawer.picture(increment)).astype(int)[top:bottom, left:right]
             for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1]):
                 assert alike(edge, palette.PAPER).all()
 
