@@ -25,7 +25,7 @@ from blockvis.studies import campaign
 from blockvis.studies.campaign import carry_out, local_cluster
 from blockvis.studies.run_one import run_once
 from blockvis.studies.study_file import read_study
-from blockvis.studies.study_folder import Ledger
+from blockvis.studies.study_folder import StudyFolder
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -59,13 +59,13 @@ def main() -> None:
         run_once(*arguments, order, study.n_seeded)
     work, alone = time.process_time() - work, time.perf_counter() - started
     with tempfile.TemporaryDirectory() as folder, local_cluster(given.workers) as client:
-        ledger = Ledger(Path(folder) / "study", study)
+        records = StudyFolder(Path(folder) / "study", study)
         there = sum(client.run(time.process_time).values())
         started, here = time.perf_counter(), time.process_time()
-        carry_out(ledger, range(study.n_runs), client, progress=False)
+        carry_out(records, range(study.n_runs), client, progress=False)
         wall, here = time.perf_counter() - started, time.process_time() - here
         there = sum(client.run(time.process_time).values()) - there
-        inside = sum(row["seconds"] for row in ledger.rows.values())
+        inside = sum(row["seconds"] for row in records.rows.values())
         cost = per_empty_run(Path(folder), client)
     n = study.n_runs
     print(f"runs                                 {n:10d}")
@@ -83,7 +83,7 @@ def main() -> None:
 
 
 def per_empty_run(folder: Path, client: Client) -> float:
-    """Processor time [s] that scheduler, client and ledger take for a run that does nothing."""
+    """Processor time [s] that scheduler, client and study folder take for a run that does nothing."""
     study = read_study(
         {
             "study": {"case": CASE, "runs": 600, "method": "random"},
@@ -93,9 +93,9 @@ def per_empty_run(folder: Path, client: Client) -> float:
     row, shape = run_once(study.values, str(study.case_source), study.order(0), study.n_seeded)
     original, campaign.run_once = campaign.run_once, partial(_nothing, row, shape)
     try:
-        ledger = Ledger(folder / "empty", study)
+        records = StudyFolder(folder / "empty", study)
         started = time.process_time()
-        carry_out(ledger, range(study.n_runs), client, progress=False)
+        carry_out(records, range(study.n_runs), client, progress=False)
         return (time.process_time() - started) / study.n_runs
     finally:
         campaign.run_once = original

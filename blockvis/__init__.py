@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from .formats.read import read as read
     from .formats.read import save_layout as save_layout
     from .pictures.render import animate as animate
-    from .results.folder import write as write
     from .runs.reopen import open_results as open_results
     from .runs.run import run_case as run_case
+    from .runs.write import write as write
     from .studies.campaign import study as study
 
 #: Public names and where they live; loaded when first used, because VTK takes seconds to import.
@@ -43,7 +43,7 @@ _HOMES = {
     "save_layout": "formats.read",
     "show": "report.notebook",
     "study": "studies.campaign",
-    "write": "results.folder",
+    "write": "runs.write",
     "write_layout": "formats.read",
     "write_report": "report.page",
 }
@@ -52,13 +52,13 @@ __all__ = sorted(_HOMES)
 
 
 def _plot(response: solver.Response, **options: Any) -> Any:
-    """The response as a player for notebooks; see :func:`blockvis.show`."""
+    """Show the response in a player for notebooks; see :func:`blockvis.show`."""
     from .report.notebook import show
 
     return show(response, **options)
 
 
-# The mechanics draw nothing; who has pictures lends them: `response.plot()` works once blockvis is imported.
+# solver has no plotting; importing blockvis adds `Response.plot()`.
 setattr(solver.Response, "plot", _plot)  # noqa: B010
 
 

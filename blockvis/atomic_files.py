@@ -1,4 +1,4 @@
-"""Files written whole or not at all: whatever ends the process or the machine, nobody finds half of one."""
+"""Atomic file writes: a file appears complete under its name, or not at all, whatever ends the process."""
 
 from __future__ import annotations
 
@@ -7,31 +7,30 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-#: Pattern of the names under which files are written before they are put in their place; what a process that was
-#: killed has left of it may be removed.
+#: Pattern of the temporary names under which files are written; those of a process that was killed may be removed.
 PARTIAL = ".*.part*"
 
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str], *, last: bool = True) -> Iterator[Path]:
-    """A name to write a file under, which is put in its place when the block ends; taken away if it fails.
+    """Yield a temporary name to write a file under; move the file to its place at the end, or remove it on failure.
 
     Parameters
     ----------
     path : path
-        Its folder is made where it does not exist. A link stays one; what is no file (a pipe) is written to directly.
+        Its folder is made if it does not exist. A link stays a link; a pipe or device is written to directly.
     last : bool
-        Whether no other file follows at once. If one does, the list of names of the folder is flushed with that.
+        Whether this is the last of several files written together: only then the folder's list of names is flushed.
 
     Yields
     ------
     pathlib.Path
-        Beside it, so that replacing stays on one file system, with the same suffix.
+        In the folder of ``path``, so that the move stays on one file system, with the same suffix.
 
     Notes
     -----
-    The file is flushed to the disk before it takes the place of the one before, and its folder after: when the machine
-    goes down, files are there in the order in which they were written, whole.
+    The file is flushed to the disk before it replaces an older one, and its folder after: if the machine goes down,
+    the files on the disk are complete and were written in this order.
     """
     path = Path(path)
     if path.exists() and not path.is_file() and not path.is_dir():
@@ -52,7 +51,7 @@ def whole_file(path: str | os.PathLike[str], *, last: bool = True) -> Iterator[P
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes, *, last: bool = True) -> Path:
-    """Writes a text, in UTF-8, or bytes, whole or not at all; see :func:`whole_file`.
+    """Write a text in UTF-8, or bytes, whole or not at all; see :func:`whole_file`.
 
     Parameters
     ----------
@@ -70,7 +69,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, last: boo
 
 
 def make_folder(path: Path) -> None:
-    """Makes a folder and those above it, where they do not exist, to stay when the machine goes down.
+    """Make a folder and its missing parents, and flush them to the disk.
 
     Parameters
     ----------
@@ -83,7 +82,7 @@ def make_folder(path: Path) -> None:
 
 
 def flush(path: Path) -> None:
-    """Has the system bring a file, or the list of names of a folder, to the disk.
+    """Flush a file, or the list of names of a folder, to the disk.
 
     Parameters
     ----------

@@ -280,7 +280,9 @@ def _parameter(given: str) -> tuple[str, Any]:
 
 def _in_words(response: solver.Response, folder: Path) -> str:
     """The summary of a run for a reader."""
-    path = response.path
+    from .runs.kinds import KINDS
+
+    path, kind = response.path, KINDS[response.analysis]
     width, height = np.ptp(
         response.assembly.vertices[response.assembly.free[response.assembly.block_of_vertex]], axis=0
     )
@@ -288,17 +290,12 @@ def _in_words(response: solver.Response, folder: Path) -> str:
     lines = [
         f"{response.assembly.n_blocks} blocks ({int(response.assembly.free.sum())} free), "
         f"{width:.4g} m wide, {height:.4g} m high, weight {weight:.6g} N",
-        f"{_done(response)}, {sum(i.programs for i in response.increments)} linear "
+        f"{kind.headline(response)}, {sum(i.programs for i in response.increments)} linear "
         f"programs, {sum(i.seconds for i in response.increments):.2f} s of solver time",
     ]
-    if response.collapse is None and response.message and not _found(response):
+    if response.message and not kind.tells_message(response):
         lines.append(response.message)
-    if response.analysis == "settlement":
-        lines += _settlement_in_words(response)
-    elif response.analysis == "pushover":
-        lines += _pushover_in_words(response)
-    else:
-        lines += _limit_in_words(response)
+    lines += kind.lines(response)
     if path:
         residual = max(i.certificate.equilibrium_residual for i in path)
         gap = max(i.certificate.duality_gap for i in path)
@@ -309,83 +306,6 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         )
     lines.append(f"results in {folder}/")
     return "\n".join(lines)
-
-
-def _done(response: solver.Response) -> str:
-    if response.analysis != "limit load":
-        return f"{response.stop} after {len(response.path)} increments"
-    number = len(response.limits)
-    return f"{number} limit load{'' if number == 1 else 's'}"
-
-
-def _found(response: solver.Response) -> bool:
-    """Whether there is a limit load, which its own lines tell."""
-    return response.analysis == "limit load" and response.stop is solver.Status.COLLAPSED
-
-
-def _settlement_in_words(response: solver.Response) -> list[str]:
-    path, weight, unit = response.path, response.total_weight, response.settlements[-1].unit
-    lines = []
-    if path:
-        lines.append(f"first reaction       {path[0].reaction:12.6g} N   {path[0].reaction / weight:.6f} W")
-    if response.collapse is not None:
-        low, high = response.collapse.bracket
-        last = response.collapse.reaction
-        lines += [
-            f"last reaction        {last:12.6g} N   {last / weight:.6f} W",
-            f"collapse displacement{response.collapse.displacement:12.6g} {unit}   between {low:.6g} and {high:.6g}",
-            f"mechanism: {response.collapse.words}",
-        ]
-    elif len(path) > 1:
-        lines.append(f"last reaction        {path[-1].reaction:12.6g} N   {path[-1].reaction / weight:.6f} W")
-        lines.append(f"last settlement      {path[-1].settlement:12.6g} {unit}")
-    return lines
-
-
-def _pushover_in_words(response: solver.Response) -> list[str]:
-    path, weight = response.path, response.total_weight
-    lines = []
-    if path:
-        largest = max(path, key=lambda i: i.load_multiplier)
-        for name, i in (("first", path[0]), ("largest", largest), ("last", path[-1])):
-            load = f"live load {i.reaction:.6g} N = {i.reaction / weight:.6f} W"
-            name = f"{name} multiplier"
-            lines.append(f"{name:<21}{i.load_multiplier:12.6g}     at {i.settlement:.6g} m, {load}")
-    if response.collapse is not None:
-        low, high = response.collapse.bracket
-        lines += [
-            f"zero capacity at     {response.collapse.displacement:12.6g} m   between {low:.6g} and {high:.6g}",
-            f"mechanism: {response.collapse.words}",
-        ]
-    return lines
-
-
-def _limit_in_words(response: solver.Response) -> list[str]:
-    from .results.quantities import POSITION, governing, parameter_word
-    from .results.tables import capacity_summary
-
-    path, state, said = response.path, governing(response), capacity_summary(response)
-    if state is None or said["limit_load_multiplier"] is None:
-        return []
-    low, high = said["limit_load_bounds"]
-    kind = "bounds" if said["limit_load_flow"] == "associative" else "values, no bounds,"
-    lines = [
-        f"load multiplier      {state.load_multiplier:12.6g}     {said['limit_load_flow']} friction, static and "
-        f"kinematic {kind} differ by {high - low:.1e}",
-        f"live load            {state.reaction:12.6g} N   {state.reaction / response.total_weight:.6f} W",
-    ]
-    if said["limit_load_status"] != "limit load":
-        lines.append(f"status: {said['limit_load_status']}")
-    if parameter_word(response) == POSITION and len(path) > 1:
-        lines.append(f"the lowest of {len(path)} positions: load at x = {state.settlement:.6g} m")
-    elif response.settlements:
-        unit = response.settlements[-1].unit
-        lines.append(f"after a settlement of{state.settlement:12.6g} {unit}   before it {path[0].load_multiplier:.6g}")
-    if response.collapse is not None:
-        lines.append(response.message)
-    else:
-        lines.append(f"mechanism: {said['mechanism']}")
-    return lines
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:

@@ -1,4 +1,4 @@
-"""Lengths and forces as text: rounded, in the unit in which they read well."""
+"""Lengths and forces as text: rounded, in a suitable unit."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def length_text(length: float) -> str:
-    """A round length with its unit.
+    """Write a round length [m] with its unit.
 
     Examples
     --------
@@ -17,7 +17,7 @@ def length_text(length: float) -> str:
 
 
 def force_text(force: float, moment: bool = False) -> str:
-    """A force with four digits and the unit that suits it.
+    """Write a force [N], or a moment [N·m], with four digits and the unit that suits it.
 
     Examples
     --------
@@ -30,7 +30,7 @@ def force_text(force: float, moment: bool = False) -> str:
 
 
 def rounded_length(largest: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not above ``largest``.
+    """Round down to 1, 2 or 5 times a power of ten; 1 unless the length is positive and finite.
 
     Examples
     --------

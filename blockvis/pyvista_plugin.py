@@ -1,10 +1,10 @@
-"""Blockvis as a guest of PyVista: layouts through ``pyvista.read`` and ``save``, and ``mesh.blockvis``.
+"""Plugin for PyVista: layouts through ``pyvista.read`` and ``save``, and ``mesh.blockvis``.
 
     import pyvista, blockvis.pyvista_plugin
     mesh = pyvista.read("wall.dxf")
     response = mesh.blockvis.settle({"right": "moving", "left": "fixed"}, direction=(1, 0), friction_coefficient=0.6)
 
-Importing this module registers everything. What PyVista reads or writes itself stays its own.
+Importing this module registers everything. Suffixes that PyVista reads or writes itself stay with PyVista.
 """
 
 from __future__ import annotations
@@ -24,48 +24,48 @@ from .layout.layout import Layout
 
 
 def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:
-    """A layout as a dataset of one polygon per block; options are those of ``blockvis.formats.read.read_layout``."""
+    """Read a layout as a dataset of one polygon per block; the options are those of ``read_layout``."""
     return dataset_of(read_layout(path, **options))
 
 
 def _writer(dataset: Any, path: str, **options: Any) -> None:
-    """Writes the blocks of a dataset to a layout file."""
+    """Write the blocks of a dataset to a layout file."""
     write_layout(layout_of_dataset(dataset), path)
 
 
 def _registered(register: Any, suffixes: Sequence[str], handler: Any) -> tuple[str, ...]:
     taken = []
     for suffix in suffixes:
-        # PyVista refuses a suffix that it serves itself; then it stays PyVista's.
+        # PyVista refuses a suffix that it reads or writes itself.
         with contextlib.suppress(ValueError):
             register(suffix, handler)
             taken.append(suffix)
     return tuple(taken)
 
 
-#: Suffixes that ``pyvista.read`` now takes through blockvis.
+#: Suffixes that ``pyvista.read`` now reads through blockvis.
 READS = _registered(pv.register_reader, (".dxf", ".json", ".msh", ".svg"), _reader)
 
-#: Suffixes that ``dataset.save`` now takes through blockvis.
+#: Suffixes that ``dataset.save`` now writes through blockvis.
 WRITES = _registered(pv.register_writer, (".dxf", ".json", ".msh", ".svg"), _writer)
 
 
 class BlockvisAccessor:
     """The blocks of a polygon mesh: ``mesh.blockvis``.
 
-    A cell array ``block_id`` says which cells are one block; without it every polygon is one, and triangles that
-    share points are one. ``name``, ``role``, ``material``, ``density`` and ``thickness`` are used where present.
+    A cell array ``block_id`` says which cells form one block; without it every polygon is a block, and triangles that
+    share points form one. The cell arrays ``name``, ``role``, ``material``, ``density`` and ``thickness`` are optional.
     """
 
     def __init__(self, mesh: Any) -> None:
         self._mesh = mesh
 
     def layout(self) -> Layout:
-        """The blocks as a drawing, lengths taken as m."""
+        """Read the blocks as a layout, lengths in m."""
         return layout_of_dataset(self._mesh)
 
     def assembly(self, roles: Mapping[str, str] | None = None, **options: Any) -> solver.Assembly:
-        """The blocks as an assembly; the options are those of :func:`blockvis.layout.assemble.assemble`."""
+        """Build an assembly of the blocks; the options are those of :func:`blockvis.layout.assemble.assemble`."""
         return assemble(self.layout(), roles=roles, **options)
 
     def settle(
@@ -78,17 +78,22 @@ class BlockvisAccessor:
         friction_coefficient: float = 0.6,
         **options: Any,
     ) -> solver.Response:
-        """Settles the moving supports until the structure falls.
+        """Move the moving supports until the structure collapses.
 
         Parameters
         ----------
         roles : mapping of str to {"free", "fixed", "moving"}, optional
         direction : (2,) tuple
-            Of the moving supports.
+            Of the settlement of the moving supports.
         increment, limit : float [m]
+            Length of a step, and the settlement at which the analysis stops.
         friction_coefficient : float
         **options
             Those of :func:`blockvis.layout.assemble.assemble`: supports, joint_thickness, density ...
+
+        Returns
+        -------
+        solver.Response
         """
         motion = solver.Settlement(direction=direction, increment=increment, limit=limit)
         return solver.settle(self.assembly(roles, **options), motion, friction_coefficient=friction_coefficient)

@@ -1,4 +1,4 @@
-"""VTK files that a viewer can open while the run that writes them goes on."""
+"""VTK files that a viewer can open while a run still writes them."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .atomic_files import write_whole
 
 
 def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True) -> Path:
-    """Writes a dataset as VTU, whole or not at all.
+    """Write a dataset as VTU, whole or not at all.
 
     Parameters
     ----------
     dataset : pyvista.UnstructuredGrid
     path : path
-        Its folder is made where it does not exist.
+        Its folder is made if it does not exist.
     last : bool
         As of :func:`blockvis.atomic_files.whole_file`.
 
@@ -30,12 +30,12 @@ def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, las
 
     Notes
     -----
-    Inline binary with zlib and 64-bit headers: what ParaView from 5.11 on, pyvista and meshio all read. Appended
-    raw data, VTK's default, fails in ParaView 5.11 above some 10 kB.
+    The format is inline binary with zlib and 64-bit headers, which ParaView from 5.11 on, pyvista and meshio read.
+    Appended raw data, VTK's default, fails in ParaView 5.11 above some 10 kB.
     """
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(dataset)
-    # Into memory first: on a full disk VTK's writer ends the process.
+    # Written into memory first: on a full disk VTK's own writer ends the process.
     writer.WriteToOutputStringOn()
     writer.SetDataModeToBinary()
     writer.SetCompressorTypeToZLib()
@@ -48,7 +48,7 @@ def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, las
 def write_pvd(
     path: str | os.PathLike[str], entries: Iterable[tuple[float, str | os.PathLike[str]]], *, last: bool = True
 ) -> Path:
-    """Writes the list of files of a time series, whole or not at all.
+    """Write the list of files of a time series (PVD), whole or not at all.
 
     Parameters
     ----------

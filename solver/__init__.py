@@ -16,34 +16,52 @@ from .analysis.checkpoint import Checkpoint, PushoverCheckpoint
 from .analysis.limit_load import limit_load, limit_load_envelope
 from .analysis.pushover import ControlDisplacement, pushover, pushover_increments
 from .analysis.settlement import Controls, Ending, check_settlement, settle, settlement_increments
-from .assembly import FIXED, FREE, MOVING, ROLES, Assembly
+from .assembly import FIXED, FREE, MOVING, ROLES, Assembly, find_contacts, measure_contacts
 from .equilibrium import block_forces
 from .geometry.contacts import Contacts
-from .geometry.planar_contacts import find_contacts, measure_contacts
-from .geometry.polygons import overlap_depths
+from .geometry.outlines import overlap_depths
+from .geometry.planar_contacts import corners_and_edges, features_of
+from .geometry.polygons import Polygons
+from .geometry.shapes import Shapes
 from .interfaces import InterfaceLaw, Interfaces, JointScatter
-from .kinematics import Pose, carried, moved_vertices, swung
+from .kinematics import Pose, carried, motion_size, moved_vertices, point_velocities, swung, turned
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
 from .lp.problem import SolveError
 from .results.certificate import Certificate
-from .results.increment import ContactState, Increment, Status
+from .results.increment import ContactState, Increment, State, Status, StoredState
 from .results.limit import Envelope, LimitLoad, LimitStatus
 from .results.mechanism import Mechanism, mechanism_of, rigid_parts, with_motion
-from .results.response import Collapse, Response, total_weight
+from .results.quantities import (
+    CONTROL_DISPLACEMENT,
+    LOAD_MULTIPLIER,
+    LOAD_POSITION,
+    REACTION,
+    SETTLEMENT,
+    Quantity,
+    reaction_to,
+    settlement_in,
+)
+from .results.response import Collapse, Control, Response, path_parameters, total_weight
 from .surface_loads import edge_pressure, load_on_top, surface_pressure
 
 __all__ = [
+    "CONTROL_DISPLACEMENT",
     "FIXED",
     "FREE",
     "GRAVITY",
+    "LOAD_MULTIPLIER",
+    "LOAD_POSITION",
     "MOVING",
+    "REACTION",
     "ROLES",
+    "SETTLEMENT",
     "Assembly",
     "Certificate",
     "Checkpoint",
     "Collapse",
     "ContactState",
     "Contacts",
+    "Control",
     "ControlDisplacement",
     "Controls",
     "Ending",
@@ -56,34 +74,47 @@ __all__ = [
     "LimitStatus",
     "Loads",
     "Mechanism",
+    "Polygons",
     "Pose",
     "PushoverCheckpoint",
+    "Quantity",
     "Response",
     "Settlement",
+    "Shapes",
     "SolveError",
+    "State",
     "Status",
+    "StoredState",
     "block_forces",
     "carried",
     "check_settlement",
+    "corners_and_edges",
     "edge_pressure",
+    "features_of",
     "find_contacts",
     "limit_load",
     "limit_load_envelope",
     "load_on_top",
     "measure_contacts",
     "mechanism_of",
+    "motion_size",
     "moved_vertices",
     "overlap_depths",
+    "path_parameters",
     "point_load",
+    "point_velocities",
     "pushover",
     "pushover_increments",
+    "reaction_to",
     "rigid_parts",
     "self_weight",
     "settle",
+    "settlement_in",
     "settlement_increments",
     "surface_pressure",
     "swung",
     "total_weight",
+    "turned",
     "weight_fraction",
     "with_motion",
 ]

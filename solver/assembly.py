@@ -1,4 +1,4 @@
-"""Assembly: the outlines of all blocks as flat arrays, with what belongs to each block."""
+"""Assembly: the shapes of all blocks, with what belongs to each block."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .geometry.polygons import overlap_depths, polygon_integrals, self_crossings
+from .geometry.contacts import Contacts
+from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
+from .geometry.polygons import Polygons
+from .geometry.shapes import Shapes
+from .tolerances import DRAWN_GAP
 
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 
@@ -22,31 +26,25 @@ SMALLEST_SHAPE_FACTOR = 1e-9
 class Assembly:
     """Rigid blocks of a masonry structure, supports included.
 
-    Use :meth:`from_outlines` unless the flat arrays are at hand: it checks its input.
+    Use :meth:`from_outlines` unless the shapes are at hand: it checks its input.
 
     Attributes
     ----------
-    vertices : (n_vertices, 2) array [m]
-        Corners of all blocks, block after block, counter-clockwise in each.
-    offsets : (n_blocks + 1,) int array
-        Block ``i`` owns ``vertices[offsets[i]:offsets[i + 1]]``.
+    shapes : Shapes
+        Where the blocks are drawn, and how they touch: :class:`Polygons` in the plane.
     names : tuple of str
         One name per block, all different.
     roles : (n_blocks,) str array
         ``"free"``, ``"fixed"`` or ``"moving"``.
     density : (n_blocks,) array [kg/m³]
-    thickness : (n_blocks,) array [m]
-        Out of plane.
     materials : tuple of str
         One material per block; pairs of materials choose the law of an interface.
     """
 
-    vertices: np.ndarray
-    offsets: np.ndarray
+    shapes: Shapes
     names: tuple[str, ...]
     roles: np.ndarray
     density: np.ndarray
-    thickness: np.ndarray
     materials: tuple[str, ...]
 
     @classmethod
@@ -104,8 +102,8 @@ class Assembly:
         rings = [_checked_ring(outline, name) for outline, name in zip(outlines, names, strict=True)]
         offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
         vertices = np.concatenate(rings)
-        areas, _, _ = polygon_integrals(vertices, offsets)
-        lengths = np.hypot(*(vertices[_next(offsets)] - vertices).T)
+        areas, _ = polygon_integrals(vertices, offsets)
+        lengths = np.hypot(*(vertices[next_vertices(offsets)] - vertices).T)
         perimeter = np.add.reduceat(lengths, offsets[:-1])
         for i in np.flatnonzero(np.abs(areas) <= SMALLEST_SHAPE_FACTOR * perimeter**2).tolist():
             raise ValueError(
@@ -121,12 +119,10 @@ class Assembly:
                 f"({b[0]:.6g}, {b[1]:.6g}) meet; order its corners around the outline"
             )
         return cls(
-            vertices=vertices,
-            offsets=offsets,
+            shapes=Polygons(vertices, offsets, _positive(thickness, n, "thickness", "m", names)),
             names=names,
             roles=roles_array,
             density=_positive(density, n, "density", "kg/m³", names),
-            thickness=_positive(thickness, n, "thickness", "m", names),
             materials=materials,
         )
 
@@ -138,7 +134,7 @@ class Assembly:
     @property
     def n_blocks(self) -> int:
         """Number of blocks, supports included."""
-        return len(self.offsets) - 1
+        return len(self.names)
 
     @cached_property
     def free(self) -> np.ndarray:
@@ -150,68 +146,80 @@ class Assembly:
         """(n_blocks,) bool array: true where the block is a moving support."""
         return self.roles == MOVING
 
-    @cached_property
-    def areas(self) -> np.ndarray:
-        """(n_blocks,) array [m²]."""
-        return self._integrals[0]
+    @property
+    def vertices(self) -> np.ndarray:
+        """(n_vertices, d) array [m]: corners of all blocks, block after block; in the plane counter-clockwise."""
+        return self.shapes.vertices
 
-    @cached_property
+    @property
+    def block_of_vertex(self) -> np.ndarray:
+        """(n_vertices,) int array: the block each vertex belongs to."""
+        return self.shapes.block_of_vertex
+
+    @property
     def centroids(self) -> np.ndarray:
-        """(n_blocks, 2) array [m], before any movement."""
-        return self._integrals[1]
+        """(n_blocks, d) array [m], before any movement."""
+        return self.shapes.centroids
+
+    @property
+    def widths(self) -> np.ndarray:
+        """(n_blocks,) array [m]: how thick each block is where it is thin, near b for a long a × b."""
+        return self.shapes.widths
 
     @cached_property
     def masses(self) -> np.ndarray:
         """(n_blocks,) array [kg]."""
-        return self.areas * self.thickness * self.density
-
-    @cached_property
-    def _integrals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return polygon_integrals(self.vertices, self.offsets)
-
-    @cached_property
-    def block_of_vertex(self) -> np.ndarray:
-        """(n_vertices,) int array: the block each vertex belongs to."""
-        return np.repeat(np.arange(self.n_blocks), np.diff(self.offsets))
-
-    @cached_property
-    def next_vertex(self) -> np.ndarray:
-        """(n_vertices,) int array: the vertex that follows counter-clockwise; edge i runs from i to it."""
-        return _next(self.offsets)
-
-    @cached_property
-    def previous_vertex(self) -> np.ndarray:
-        """(n_vertices,) int array: the vertex before."""
-        previous = np.empty_like(self.next_vertex)
-        previous[self.next_vertex] = np.arange(len(self.next_vertex))
-        return previous
-
-    @cached_property
-    def edge_lengths(self) -> np.ndarray:
-        """(n_vertices,) array [m]: length of the edge that starts at each vertex."""
-        return np.hypot(*(self.vertices[self.next_vertex] - self.vertices).T)
-
-    @cached_property
-    def convex_vertex(self) -> np.ndarray:
-        """(n_vertices,) bool array: false at re-entrant corners, which touch nothing first."""
-        to_next = self.vertices[self.next_vertex] - self.vertices
-        from_previous = self.vertices - self.vertices[self.previous_vertex]
-        cross = from_previous[:, 0] * to_next[:, 1] - from_previous[:, 1] * to_next[:, 0]
-        return cross > 0.0
-
-    @cached_property
-    def widths(self) -> np.ndarray:
-        """(n_blocks,) array [m]: twice the area over the perimeter of each block, near b for a long a × b."""
-        return 2.0 * self.areas / np.add.reduceat(self.edge_lengths, self.offsets[:-1])
+        return self.shapes.volumes * self.density
 
     @cached_property
     def block_size(self) -> float:
-        """Square root of the mean area of the free blocks [m]: the length the program is scaled by."""
-        chosen = self.areas[self.free] if self.free.any() else self.areas
-        return float(np.sqrt(chosen.mean()))
+        """Edge of the square or cube as large as the mean free block [m]: the length the program is scaled by."""
+        return self.shapes.size(self.free if self.free.any() else ~self.free)
+
+    @property
+    def polygons(self) -> Polygons:
+        """The shapes of blocks in the plane; raises ``TypeError`` for others."""
+        if not isinstance(self.shapes, Polygons):
+            raise TypeError(f"blocks in the plane are needed; these have {self.vertices.shape[1]} coordinates")
+        return self.shapes
+
+    @property
+    def offsets(self) -> np.ndarray:
+        """(n_blocks + 1,) int array: in the plane, block ``i`` owns ``vertices[offsets[i]:offsets[i + 1]]``."""
+        return self.polygons.offsets
+
+    @property
+    def thickness(self) -> np.ndarray:
+        """(n_blocks,) array [m]: in the plane, how thick the blocks are out of it."""
+        return self.polygons.thickness
+
+    @property
+    def areas(self) -> np.ndarray:
+        """(n_blocks,) array [m²]: in the plane."""
+        return self.polygons.areas
+
+    @property
+    def next_vertex(self) -> np.ndarray:
+        """(n_vertices,) int array: in the plane, the vertex that follows; edge i runs from i to it."""
+        return self.polygons.next_vertex
+
+    @property
+    def previous_vertex(self) -> np.ndarray:
+        """(n_vertices,) int array: in the plane, the vertex before."""
+        return self.polygons.previous_vertex
+
+    @property
+    def edge_lengths(self) -> np.ndarray:
+        """(n_vertices,) array [m]: in the plane, length of the edge that starts at each vertex."""
+        return self.polygons.edge_lengths
+
+    @property
+    def convex_vertex(self) -> np.ndarray:
+        """(n_vertices,) bool array: in the plane, false at re-entrant corners, which touch nothing first."""
+        return self.polygons.convex_vertex
 
     def outline(self, block: int) -> np.ndarray:
-        """(n, 2) array [m]: corners of one block, counter-clockwise, before any movement."""
+        """(n, 2) array [m]: in the plane, corners of one block, counter-clockwise, before any movement."""
         return self.vertices[self.offsets[block] : self.offsets[block + 1]]
 
     def index(self, name: str) -> int:
@@ -247,8 +255,8 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
     """
     if not assembly.free.any():
         raise ValueError(f"all {assembly.n_blocks} blocks are supports; at least one must be free")
-    tolerance = 1e-3 * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
-    i, j, depth = overlap_depths(assembly.vertices, assembly.offsets, tolerance)
+    tolerance = DRAWN_GAP * float(assembly.widths.min()) if overlap_tolerance is None else overlap_tolerance
+    i, j, depth = assembly.shapes.overlaps(assembly.vertices, tolerance)
     real = np.flatnonzero(assembly.free[i] | assembly.free[j])
     if len(real):
         k = int(real[np.argmax(depth[real])])
@@ -260,10 +268,37 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
         )
 
 
-def _next(offsets: np.ndarray) -> np.ndarray:
-    following = np.arange(1, offsets[-1] + 1)
-    following[offsets[1:] - 1] = offsets[:-1]
-    return following
+def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Contacts:
+    """The points at which blocks touch or may touch within one increment.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    vertices : (n_vertices, d) array [m]
+        Current corners of all blocks.
+    reach : float [m]
+        Largest gap of a contact point that is kept.
+
+    Returns
+    -------
+    Contacts
+        None between two supports; sorted, so that the same geometry gives the same order.
+    """
+    return assembly.shapes.find(vertices, reach, assembly.free)
+
+
+def measure_contacts(assembly: Assembly, vertices: np.ndarray, contacts: Contacts) -> Contacts:
+    """The same contact points where the corners now are.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    vertices : (n_vertices, d) array [m]
+        Current corners of all blocks.
+    contacts : Contacts
+        Of which only the features count.
+    """
+    return assembly.shapes.measure(vertices, contacts)
 
 
 def _checked_ring(outline: ArrayLike, name: str) -> np.ndarray:

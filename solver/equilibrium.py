@@ -6,10 +6,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from .geometry.contacts import Contacts
-from .kinematics import Pose
+from .kinematics import Pose, cross_rows
+
+#: Rays of a friction pyramid in space; in the plane two span the cone.
+FACETS = 16
 
 
-def equilibrium_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc_array:
+def wrench_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc_array:
     """Forces and moments on every block from unit normal and shear forces at the contact points.
 
     Parameters
@@ -22,52 +25,61 @@ def equilibrium_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> s
 
     Returns
     -------
-    (3 n_blocks, 2 n_contacts) sparse array
-        Rows fx, fy, moment of block 0, then of block 1 ...; columns normal and shear force of contact 0,
-        then of contact 1 .... Its transpose maps movements of the blocks to relative displacements (a minus b)
-        of the contact points.
+    (n_dof n_blocks, d n_contacts) sparse array
+        Rows of block 0 (in the plane fx, fy, moment), then of block 1 ...; columns normal and shear forces of
+        contact 0, then of contact 1 .... Its transpose maps movements of the blocks to relative displacements
+        (a minus b) of the contact points.
     """
-    n, n_blocks = len(contacts), len(pose.rotations)
-    rows, values = [], []
+    n, d = contacts.points.shape
+    n_dof = d + pose.rotations.shape[1]
+    force = np.swapaxes(contacts.frames, 1, 2)
+    values, rows = [], []
     for block, sign in ((contacts.block_a, 1.0), (contacts.block_b, -1.0)):
-        arm = contacts.points - pose.positions[block]
-        for axis in (0, 1):
-            f = contacts.frames[:, axis]
-            moment = (arm[:, 0] * f[:, 1] - arm[:, 1] * f[:, 0]) / length
-            values.append(sign * np.stack([f[:, 0], f[:, 1], moment], axis=1))
-            rows.append(3 * block[:, None] + np.arange(3))
-    # Column by column: the entries of block a, then of block b, for the normal and then for the shear force.
-    values_by_column = np.stack([np.hstack([values[0], values[2]]), np.hstack([values[1], values[3]])], axis=1)
-    rows_by_column = np.stack([np.hstack([rows[0], rows[2]]), np.hstack([rows[1], rows[3]])], axis=1)
-    pointers = np.arange(0, 12 * n + 1, 6)
-    return sp.csc_array((values_by_column.ravel(), rows_by_column.ravel(), pointers), shape=(3 * n_blocks, 2 * n))
+        arms = cross_rows(contacts.points - pose.positions[block])
+        # Summed coordinate by coordinate: a product of small matrices rounds as the processor likes.
+        products = [arms[:, :, k, None] * force[:, None, k] for k in range(d)]
+        moment = sum(products[1:], products[0]) / length
+        values.append(sign * np.concatenate([force, moment], axis=1))
+        rows.append(n_dof * block[:, None] + np.arange(n_dof))
+    # Column by column: the entries of block a, then of block b.
+    data = np.swapaxes(np.concatenate(values, axis=1), 1, 2)
+    index = np.repeat(np.concatenate(rows, axis=1)[:, None, :], d, axis=1)
+    pointers = np.arange(0, 2 * n_dof * d * n + 1, 2 * n_dof)
+    return sp.csc_array((data.ravel(), index.ravel(), pointers), shape=(n_dof * len(pose.positions), d * n))
 
 
-def compatibility_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csr_array:
-    """Transpose of :func:`equilibrium_matrix`, (2 n_contacts, 3 n_blocks)."""
-    return sp.csr_array(equilibrium_matrix(contacts, pose, length).T)
-
-
-def cone_rays(friction: np.ndarray) -> sp.csc_array:
-    """The two edges of each friction cone as combinations of normal and shear force.
+def friction_rays(friction: np.ndarray, d: int = 2, facets: int = FACETS) -> sp.csc_array:
+    """The rays of each friction cone as combinations of normal and shear forces.
 
     Parameters
     ----------
     friction : (n,) array
         Friction coefficients.
+    d : int
+        Dimensions.
+    facets : int
+        In space, how many rays of the cone span the pyramid that stands for it. It lies inside the cone, so that
+        forces found with it are admissible.
 
     Returns
     -------
-    (2 n, 2 n) sparse array
-        Column 2k is n - μ t, column 2k + 1 is n + μ t of contact k, divided by √(1 + μ²) so that a
-        large coefficient does not unbalance the program.
+    (d n, k n) sparse array
+        In the plane, where k is 2, column 2i is n - μ t and column 2i + 1 is n + μ t of contact i; in space k is
+        ``facets``. Divided by √(1 + μ²) so that a large coefficient does not unbalance the program.
     """
     n = len(friction)
+    if d == 2:
+        directions = np.array([[-1.0], [1.0]])
+    else:
+        angles = 2.0 * np.pi * np.arange(facets) / facets
+        directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    k = len(directions)
     scale = 1.0 / np.hypot(1.0, friction)
-    values = np.stack([scale, -friction * scale, scale, friction * scale], axis=1).ravel()
-    first = 2 * np.arange(n)
-    rows = np.stack([first, first + 1, first, first + 1], axis=1).ravel()
-    return sp.csc_array((values, rows, np.arange(0, 4 * n + 1, 2)), shape=(2 * n, 2 * n))
+    values = np.empty((n, k, d))
+    values[:, :, 0] = scale[:, None]
+    values[:, :, 1:] = (friction * scale)[:, None, None] * directions
+    rows = np.broadcast_to(d * np.arange(n)[:, None, None] + np.arange(d), values.shape)
+    return sp.csc_array((values.ravel(), rows.ravel(), np.arange(0, d * k * n + 1, d)), shape=(d * n, k * n))
 
 
 def with_slack(*columns: sp.csc_array) -> sp.csc_array:
@@ -99,11 +111,12 @@ def block_forces(contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarr
     ----------
     contacts : Contacts
     pose : Pose
-    forces : (n_contacts, 2) array [N]
-        Normal (compression positive) and shear force at each contact point, on ``block_a``.
+    forces : (n_contacts, d) array [N]
+        Normal (compression positive) and shear forces at each contact point, on ``block_a``.
 
     Returns
     -------
-    (n_blocks, 3) array [N, N, N·m]
+    (n_blocks, n_dof) array
+        Forces [N] and moments [N·m].
     """
-    return (equilibrium_matrix(contacts, pose) @ forces.ravel()).reshape(-1, 3)
+    return (wrench_matrix(contacts, pose) @ forces.ravel()).reshape(len(pose.positions), -1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,14 +15,14 @@ from .geometry.contacts import Contacts
 
 @dataclass(frozen=True)
 class Pose:
-    """Positions and rotations of all blocks.
+    """Positions and rotations of all blocks, in the plane or in space.
 
     Attributes
     ----------
-    positions : (n_blocks, 2) array [m]
+    positions : (n_blocks, d) array [m]
         Current centroids.
-    rotations : (n_blocks,) array [rad]
-        Counter-clockwise from the drawn outline.
+    rotations : (n_blocks, n_rot) array [rad]
+        Rotation vectors from the drawing, n_rot = d (d - 1) / 2: in the plane one column, the angle counter-clockwise.
     """
 
     positions: np.ndarray
@@ -30,17 +31,83 @@ class Pose:
     @classmethod
     def initial(cls, assembly: Assembly) -> Pose:
         """The blocks where the drawing has them."""
-        return cls(assembly.centroids.copy(), np.zeros(assembly.n_blocks))
+        n, d = assembly.centroids.shape
+        return cls(assembly.centroids.copy(), np.zeros((n, rotation_count(d))))
 
     def displacements(self, assembly: Assembly) -> np.ndarray:
-        """(n_blocks, 3) array: displacement of each centroid [m] and rotation [rad] since the drawing."""
-        return np.column_stack([self.positions - assembly.centroids, self.rotations])
+        """(n_blocks, n_dof) array: displacement of each centroid [m] and rotation [rad] since the drawing."""
+        return np.concatenate([self.positions - assembly.centroids, self.rotations], axis=1)
 
 
-def rotation_matrices(angles: np.ndarray) -> np.ndarray:
-    """(n, 2, 2) array of counter-clockwise rotations by the given angles [rad]."""
-    c, s = np.cos(angles), np.sin(angles)
-    return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
+def rotation_count(d: int) -> int:
+    """Numbers that a rotation has in d dimensions: 1 in the plane, 3 in space."""
+    return d * (d - 1) // 2
+
+
+def dimension_of(n_dof: int) -> int:
+    """Dimensions in which a rigid block has so many degrees of freedom: 2 for 3, 3 for 6."""
+    return (math.isqrt(8 * n_dof + 1) - 1) // 2
+
+
+def unit_lengths(n_dof: int, length: float) -> np.ndarray:
+    """(n_dof,) array: 1 for translations, ``length`` for rotations; makes movements of both kinds lengths [m]."""
+    return np.where(np.arange(n_dof) < dimension_of(n_dof), 1.0, length)
+
+
+def cross_rows(arms: np.ndarray) -> np.ndarray:
+    """(n, n_rot, d) array: ``moment = cross_rows(arm) @ force``, and ``cross_rows(arm).T @ spin`` the velocity there.
+
+    Parameters
+    ----------
+    arms : (n, d) array [m]
+    """
+    n, d = arms.shape
+    if d == 2:
+        return np.stack([-arms[:, 1], arms[:, 0]], axis=1)[:, None, :]
+    x, y, z = arms.T
+    o = np.zeros(n)
+    rows = [np.stack(row, axis=1) for row in ((o, -z, y), (z, o, -x), (-y, x, o))]
+    return np.stack(rows, axis=1)
+
+
+def rotation_matrices(rotations: np.ndarray) -> np.ndarray:
+    """(n, d, d) array of rotations by the given vectors, (n, 1) or (n, 3) [rad], counter-clockwise seen from their tip.
+
+    Notes
+    -----
+    In space Rodrigues' formula, R = I + sin θ / θ K + (1 - cos θ) / θ² K² with K v = rotation × v.
+    """
+    if rotations.shape[1] == 1:
+        c, s = np.cos(rotations[:, 0]), np.sin(rotations[:, 0])
+        return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
+    cross = cross_rows(rotations)
+    angle = np.linalg.norm(rotations, axis=1)
+    # np.sinc(x) is sin πx / πx, and 1 at 0; 1 - cos θ = 2 sin² θ/2.
+    first, second = np.sinc(angle / np.pi), np.sinc(angle / (2.0 * np.pi)) ** 2 / 2.0
+    return np.eye(3) + first[:, None, None] * cross + second[:, None, None] * (cross @ cross)
+
+
+def composed_rotations(rotations: np.ndarray, then: np.ndarray) -> np.ndarray:
+    """(n, n_rot) array: the rotation vectors of one rotation after another; in the plane angles add up.
+
+    Notes
+    -----
+    In space through unit quaternions, which lose no digits at small angles nor near half a turn.
+    """
+    if rotations.shape[1] == 1:
+        return rotations + then
+    (first, u), (second, v) = _quaternions(rotations), _quaternions(then)
+    scalar = first * second - (u * v).sum(axis=1)
+    vector = first[:, None] * v + second[:, None] * u + np.cross(v, u)
+    sine = np.linalg.norm(vector, axis=1)
+    angle = 2.0 * np.arctan2(sine, np.abs(scalar)) * np.where(scalar < 0.0, -1.0, 1.0)
+    return vector * np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 0.0)[:, None]
+
+
+def _quaternions(rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) scalar and (n, 3) vector parts of the unit quaternions of rotation vectors."""
+    half = np.linalg.norm(rotations, axis=1) / 2.0
+    return np.cos(half), rotations * (np.sinc(half / np.pi) / 2.0)[:, None]
 
 
 def moved(pose: Pose, q: np.ndarray) -> Pose:
@@ -49,36 +116,39 @@ def moved(pose: Pose, q: np.ndarray) -> Pose:
     Parameters
     ----------
     pose : Pose
-    q : (n_blocks, 3) array
+    q : (n_blocks, n_dof) array
         Translations [m] and rotation [rad] of each block.
     """
-    return Pose(pose.positions + q[:, :2], pose.rotations + q[:, 2])
+    d = pose.positions.shape[1]
+    return Pose(pose.positions + q[:, :d], composed_rotations(pose.rotations, q[:, d:]))
 
 
 def moved_vertices(assembly: Assembly, pose: Pose) -> np.ndarray:
-    """(n_vertices, 2) array [m]: corners of all blocks where the pose has them."""
+    """(n_vertices, d) array [m]: corners of all blocks where the pose has them."""
     block = assembly.block_of_vertex
     arms = assembly.vertices - assembly.centroids[block]
     turned = np.einsum("nij,nj->ni", rotation_matrices(pose.rotations)[block], arms)
     return pose.positions[block] + turned
 
 
+def turned(vectors: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    """(n, d) array: vectors turned by rotation vectors, (n, d) and (n, n_rot) [rad]."""
+    return np.einsum("nij,nj->ni", rotation_matrices(rotations), vectors)
+
+
 def carried(points: np.ndarray, blocks: np.ndarray, before: Pose, after: Pose) -> np.ndarray:
-    """(n, 2) array [m]: where points that ride on blocks get to.
+    """(n, d) array [m]: where points that ride on blocks get to.
 
     Parameters
     ----------
-    points : (n, 2) array [m]
+    points : (n, d) array [m]
         Where they are when the blocks are at ``before``.
     blocks : (n,) int array
         The block each rides on.
     before, after : Pose
     """
-    arms = points - before.positions[blocks]
-    turn = after.rotations[blocks] - before.rotations[blocks]
-    c, s = np.cos(turn), np.sin(turn)
-    turned = np.stack([c * arms[:, 0] - s * arms[:, 1], s * arms[:, 0] + c * arms[:, 1]], axis=1)
-    return after.positions[blocks] + turned
+    turn = composed_rotations(-before.rotations[blocks], after.rotations[blocks])
+    return after.positions[blocks] + turned(points - before.positions[blocks], turn)
 
 
 def swung(pose: Pose, motion: np.ndarray) -> Pose:
@@ -87,39 +157,88 @@ def swung(pose: Pose, motion: np.ndarray) -> Pose:
     Parameters
     ----------
     pose : Pose
-    motion : (n_blocks, 3) array
-        Translation of the centroid [m] and rotation [rad], as a linear program has them.
+    motion : (n_blocks, n_dof) array
+        Translation of the centroid [m] and rotation [rad], as a linear program has them; in space a screw motion.
+
+    Notes
+    -----
+    In space the centroid, at velocity v and spin ω, travels on a helix: with θ = |ω|, by
+    v sin θ / θ + ω × v (1 - cos θ) / θ² + ω (ω · v) (θ - sin θ) / θ³; in the plane on an arc about the pole.
     """
-    angle = motion[:, 2]
+    d = pose.positions.shape[1]
+    travel, spin = motion[:, :d], motion[:, d:]
+    paths = _arcs(travel, spin[:, 0]) if d == 2 else _helices(travel, spin)
+    return Pose(pose.positions + paths, composed_rotations(pose.rotations, spin))
+
+
+def _arcs(travel: np.ndarray, angle: np.ndarray) -> np.ndarray:
     turns = np.abs(angle) > 1e-9
     safe = np.where(turns, angle, 1.0)
-    arm = np.stack([motion[:, 1] / safe, -motion[:, 0] / safe], axis=1)
+    arm = np.stack([travel[:, 1] / safe, -travel[:, 0] / safe], axis=1)
     c, s = np.cos(angle) - 1.0, np.sin(angle)
     arc = np.stack([c * arm[:, 0] - s * arm[:, 1], s * arm[:, 0] + c * arm[:, 1]], axis=1)
-    return Pose(pose.positions + np.where(turns[:, None], arc, motion[:, :2]), pose.rotations + angle)
+    return np.where(turns[:, None], arc, travel)
+
+
+def _helices(travel: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    angle = np.linalg.norm(spin, axis=1)
+    first, second = np.sinc(angle / np.pi), np.sinc(angle / (2.0 * np.pi)) ** 2 / 2.0
+    third = np.divide(1.0 - first, angle**2, out=np.full_like(angle, 1.0 / 6.0), where=angle > 1e-4)
+    along = np.einsum("ni,ni->n", spin, travel)
+    return first[:, None] * travel + second[:, None] * np.cross(spin, travel) + (third * along)[:, None] * spin
 
 
 def point_velocities(points: np.ndarray, block: np.ndarray, pose: Pose, velocity: np.ndarray) -> np.ndarray:
-    """Velocity of points that move with blocks.
+    """Velocity of points that move with blocks: that of the centroid, and spin × arm.
 
     Parameters
     ----------
-    points : (n, 2) array [m]
+    points : (n, d) array [m]
     block : (n,) int array
     pose : Pose
-    velocity : (n_blocks, 3) array
+    velocity : (n_blocks, n_dof) array
         Of the centroids, and angular.
 
     Returns
     -------
-    (n, 2) array
+    (n, d) array
     """
-    arm = points - pose.positions[block]
-    return velocity[block, :2] + velocity[block, 2:] * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+    d = points.shape[1]
+    rows = cross_rows(points - pose.positions[block])
+    spin = velocity[block, d:]
+    turning = [spin[:, k, None] * rows[:, k] for k in range(spin.shape[1])]
+    return velocity[block, :d] + sum(turning[1:], turning[0])
+
+
+def relative_velocities(contacts: Contacts, pose: Pose, velocity: np.ndarray) -> np.ndarray:
+    """(n_contacts, d) array: opening and slip of each contact point, block a against block b, in its own frame.
+
+    Parameters
+    ----------
+    contacts : Contacts
+    pose : Pose
+    velocity : (n_blocks, n_dof) array
+        Of the centroids, and angular, in any scale.
+    """
+    a, b = (point_velocities(contacts.points, k, pose, velocity) for k in (contacts.block_a, contacts.block_b))
+    return np.einsum("kij,kj->ki", contacts.frames, a - b)
+
+
+def motion_size(motion: np.ndarray, length: float) -> np.ndarray:
+    """(n,) array [m]: largest component of each block's movement, rotations times a length.
+
+    Parameters
+    ----------
+    motion : (n, n_dof) array
+        Translations [m] and rotations [rad], or their rates.
+    length : float [m]
+        Usually the block size.
+    """
+    return np.abs(motion * unit_lengths(motion.shape[1], length)).max(axis=1, initial=0.0)
 
 
 def moving_together(
-    n_blocks: int, contacts: Contacts, apart: np.ndarray, turned: np.ndarray, together: float
+    n_blocks: int, contacts: Contacts, apart: np.ndarray, spins: np.ndarray, together: float
 ) -> np.ndarray:
     """(n_blocks,) int array: number of the group of each block.
 
@@ -129,7 +248,7 @@ def moving_together(
     contacts : Contacts
     apart : (n_contacts,) array [m]
         Relative movement of each contact point.
-    turned : (n_blocks,) array [m]
+    spins : (n_blocks, n_rot) array [m]
         Rotation of each block times a length.
     together : float [m]
         Two blocks belong together where all their contact points move apart by less than this, and their rotations too:
@@ -141,6 +260,6 @@ def moving_together(
     most = np.zeros(len(pair))
     np.maximum.at(most, which.ravel(), apart)
     a, b = pair // n_blocks, pair % n_blocks
-    stay = (most < together) & (np.abs(turned[a] - turned[b]) < together)
+    stay = (most < together) & (np.abs(spins[a] - spins[b]).max(axis=1) < together)
     links = sp.coo_array((np.ones(np.count_nonzero(stay)), (a[stay], b[stay])), shape=(n_blocks, n_blocks))
     return connected_components(links, directed=False)[1]

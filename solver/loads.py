@@ -140,7 +140,7 @@ class Settlement:
         part = self.taking_part(assembly)
         travel, angle, centre = self._motion(s)
         positions, rotations = start.positions.copy(), start.rotations.copy()
-        turn = rotation_matrices(np.array([angle]))[0]
+        turn = rotation_matrices(np.array([[angle]]))[0]
         positions[part] = centre + travel + (start.positions[part] - centre) @ turn.T
         rotations[part] += angle
         return Pose(positions, rotations)
@@ -153,7 +153,7 @@ class Settlement:
         direction = np.zeros(2) if self.direction is None else np.asarray(self.direction)
         rate[part, :2] = direction
         if self.rotation_centre is not None:
-            turn = rotation_matrices(np.array([angle]))[0]
+            turn = rotation_matrices(np.array([[angle]]))[0]
             arm = (start.positions[part] - centre) @ turn.T
             rate[part, 0] -= self.rotation * arm[:, 1]
             rate[part, 1] += self.rotation * arm[:, 0]

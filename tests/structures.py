@@ -1,7 +1,15 @@
 """Structures and responses that several tests look at."""
 
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
@@ -64,7 +72,7 @@ def parted(assembly: solver.Assembly, path: int, fall: int, settlement: float = 
         positions = assembly.centroids.copy()
         positions[right | assembly.moving, 1] -= s
         positions[right] += max(0, k - path + 1) * np.array([0.02, -0.01])
-        pose = solver.Pose(positions, np.zeros(assembly.n_blocks))
+        pose = solver.Pose(positions, np.zeros((assembly.n_blocks, 1)))
         contacts = solver.find_contacts(assembly, solver.moved_vertices(assembly, pose), 0.002)
         normal = np.where(np.abs(contacts.gaps) < 1e-3, (edge[1] - contacts.points[:, 1] + 0.1) * 1e3, 0.0)
         normal *= random.random(len(normal))
@@ -72,17 +80,20 @@ def parted(assembly: solver.Assembly, path: int, fall: int, settlement: float = 
         apart = velocity[contacts.block_a, :2] - velocity[contacts.block_b, :2]
         increments.append(
             solver.Increment(
-                settlement=s,
+                parameter=s,
+                measured=2000.0 - 3000.0 * s,
                 phase=0,
                 load_multiplier=0.0,
-                pose=pose,
-                contacts=contacts,
-                forces=forces,
-                displacements=np.einsum("kij,kj->ki", contacts.frames, apart),
-                friction=np.full(len(normal), 0.6),
-                velocity=velocity,
                 reaction=2000.0 - 3000.0 * s,
-                support_forces=np.zeros((assembly.n_blocks, 3)),
+                held=solver.State(
+                    pose=pose,
+                    contacts=contacts,
+                    forces=forces,
+                    displacements=np.einsum("kij,kj->ki", contacts.frames, apart),
+                    friction=np.full(len(normal), 0.6),
+                    velocity=velocity,
+                    support_forces=np.zeros((assembly.n_blocks, 3)),
+                ),
                 certificate=certificate,
                 status=solver.Status.EQUILIBRIUM if k < path else solver.Status.FALLING,
                 programs=1,
@@ -99,3 +110,33 @@ def parted(assembly: solver.Assembly, path: int, fall: int, settlement: float = 
         message="made up",
         collapse=solver.Collapse(settlement, (settlement, settlement + 1e-3), 1700.0, velocity),
     )
+
+
+@contextmanager
+def started_cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
+    """A Dask scheduler and two workers as a user starts them, without anybody who restarts what dies.
+
+    Yields the scheduler's address, the scheduler and its workers.
+    """
+    file = folder / "scheduler.json"
+    common = {
+        "env": {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        "cwd": folder,
+        "stdout": subprocess.DEVNULL,
+        "stderr": subprocess.DEVNULL,
+    }
+    dask = [sys.executable, "-m", "dask"]
+    local = ["--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file), "--no-dashboard"]
+    scheduler = subprocess.Popen([*dask, "scheduler", *local], **common)
+    join = ["worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    workers = [subprocess.Popen([*dask, *join], **common) for _ in range(2)]
+    try:
+        deadline = time.monotonic() + 60
+        while not file.exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        yield json.loads(file.read_text(encoding="utf-8"))["address"], scheduler, workers
+    finally:
+        for process in [*workers, scheduler]:
+            process.kill()
+            process.wait(timeout=20)

@@ -1,4 +1,4 @@
-"""From a checked case to its assembly, interfaces and loads."""
+"""From a case to its assembly, interfaces and loads."""
 
 from __future__ import annotations
 
@@ -15,22 +15,37 @@ from blockvis.layout import layout
 from blockvis.layout.assemble import assemble
 from blockvis.suggestions import nearest
 
-from .case import Case
+from .contents import Case
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
 
-#: A block lighter than this part of the whole may drown in what rounding leaves of the forces on the others.
+#: The weight of a block lighter than this fraction of the whole may be lost in rounding errors of the other forces.
 LIGHTEST = 1e-14
 
-#: Blocks that are all smaller than this [m] are a drawing in another unit.
+#: If all blocks are smaller than this [m], the unit of the file is probably another one.
 SMALLEST_BLOCKS = 2e-3
 
-#: What a file's blocks are made of where nothing else is said [kg/m³, m].
+#: Defaults of blocks for which neither file nor case has a value [kg/m³, m].
 DENSITY, THICKNESS = 2000.0, 1.0
 
 
 def case_assembly(case: Case) -> solver.Assembly:
-    """The assembly of a case: its layout file or parametric layout with roles, supports and materials applied."""
+    """Build the assembly of a case.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    solver.Assembly
+        Of its layout file or parametric layout, with roles, supports, materials and imperfections.
+
+    Raises
+    ------
+    ValueError
+        For a layout that cannot be read or built, and for settlements without a moving support.
+    """
     sketch = _case_layout(case)
     if case.densities:
         sketch = _with_densities(case, sketch)
@@ -54,14 +69,14 @@ def case_assembly(case: Case) -> solver.Assembly:
 
 
 def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
-    """Says so where numbers are not what was meant, or beyond what double precision solves."""
+    """Warn of blocks too light for double precision, and of a unit that is probably wrong."""
     weight = np.where(assembly.free, assembly.masses, 0.0)
     light = np.flatnonzero(assembly.free & (weight < LIGHTEST * weight.sum()))
     if len(light):
         shown = ", ".join(f"'{assembly.names[i]}'" for i in light[:6].tolist()) + (" ..." if len(light) > 6 else "")
         warnings.warn(
             f"{source}: {len(light)} blocks weigh less than {LIGHTEST:g} of the whole ({shown}), less than rounding "
-            "leaves: they may stay in the air; remove them or check their size and density",
+            "errors of the others: they may stay in the air; remove them or check their size and density",
             stacklevel=3,
         )
     largest = float(np.sqrt(assembly.areas[assembly.free].max(initial=0.0)))
@@ -81,7 +96,7 @@ def _case_layout(case: Case) -> layout.Layout:
         sketch = layout.layout_of(generators.build(case.layout, case.parameters))
     except (TypeError, ValueError) as error:
         raise ValueError(f"{case.source}: [geometry] layout: {error}") from None
-    # A layout brings its own density and thickness, unless the case says otherwise.
+    # A parametric layout has its own density and thickness; those of the case replace them.
     return replace(
         sketch,
         density=sketch.density if case.density is None else None,
@@ -104,7 +119,7 @@ def _with_densities(case: Case, sketch: layout.Layout) -> layout.Layout:
 
 
 def case_interfaces(case: Case) -> solver.Interfaces:
-    """The laws of the interfaces of a case."""
+    """Build the interface laws of a case."""
     return solver.Interfaces(
         solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength),
         dict(case.interfaces),
@@ -113,5 +128,5 @@ def case_interfaces(case: Case) -> solver.Interfaces:
 
 
 def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
-    """Self-weight and the loads of a case that stand still, in N."""
+    """Sum self-weight and the loads of a case that do not move [N, N·m]."""
     return loads_of(case.loads, assembly, case.source)

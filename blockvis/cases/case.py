@@ -1,13 +1,10 @@
-"""Case: the TOML case file, read and checked."""
+"""The TOML case file, read and checked."""
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
-import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,81 +13,39 @@ import numpy as np
 import solver
 from blockvis import generators
 from blockvis.formats import FORMATS
+from blockvis.runs.kinds import KINDS
+from blockvis.suggestions import files_like
+from blockvis.video_suffixes import VIDEO_SUFFIXES
 
+from .contents import Case
 from .imperfections import Imperfection, read_imperfection
 from .loads import LoadCase
 from .toml_table import Table, is_number, shortened
 
-ANALYSES = ("settlement", "limit load", "pushover")
-
-#: How sliding joints of a limit load behave.
-FLOWS = ("associative", "non-associative")
-
-#: Endings of animations.
-FILMS = (".mp4", ".gif", ".webp")
-
-#: More increments or frames than this are a slip of the pen.
+#: More increments or frames than this are taken for a typing error.
 MOST_STEPS = 1_000_000
 
 
-@dataclass(frozen=True)
-class Case:
-    """A checked case file. The keys are those of the file; see the README.
-
-    Attributes
-    ----------
-    source : Path
-        The case file; paths in it are relative to its folder.
-    text : str
-        The case file as it was read.
-    """
-
-    source: Path
-    text: str
-    file: Path | None = None
-    layout: str | None = None
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    unit: str | None = None
-    thickness: float | None = None
-    joint_thickness: float | str = 0.0
-    overlap_tolerance: float | None = None
-    roles: Mapping[str, str] = field(default_factory=dict)
-    supports: tuple[Mapping[str, Any], ...] = ()
-    density: float | None = None
-    densities: Mapping[str, float] = field(default_factory=dict)
-    friction_coefficient: float = 0.6
-    cohesion: float = 0.0
-    compressive_strength: float = math.inf
-    interfaces: Mapping[tuple[str, str], solver.InterfaceLaw] = field(default_factory=dict)
-    imperfections: tuple[Imperfection, ...] = ()
-    settlements: tuple[solver.Settlement, ...] = ()
-    loads: tuple[LoadCase, ...] = ()
-    analysis: str = "settlement"
-    flow: str = "associative"
-    capacity_at: tuple[float, ...] | None = None
-    displacement: float | None = None
-    control: solver.ControlDisplacement | None = None
-    controls: solver.Controls = field(default_factory=solver.Controls)
-    animation: str | None = "collapse.mp4"
-
-
 def read_case(path: str | Path) -> Case:
-    """Reads and checks a case file.
+    """Read and check a case file.
 
     Parameters
     ----------
     path : str or Path
 
+    Returns
+    -------
+    Case
+
     Raises
     ------
     ValueError
-        Names the file, the key and the remedy: a missing file, broken TOML (with its line), an unknown key (with the
-        nearest valid one), a value of the wrong kind.
+        For a missing file, broken TOML, an unknown key, a value of the wrong kind; names the file, the key or line and
+        the remedy.
     """
     path = Path(path)
     if not path.is_file():
-        beside = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
-        near = difflib.get_close_matches(path.name, beside, n=3, cutoff=0.4) or beside[:3]
+        near = files_like(path, "*.toml", or_any=True)
         hint = f"; beside it are {', '.join(near)}" if near else ""
         raise ValueError(f"there is no case file '{path}'{hint}")
     if path.suffix.lower() in FORMATS:
@@ -106,7 +61,7 @@ def read_case(path: str | Path) -> Case:
 
 
 def parse_case(text: str, source: Path) -> Case:
-    """As :func:`read_case`, from the text of a case file; paths in it are relative to the folder of ``source``."""
+    """Read a case from the text of a case file; paths in it are relative to the folder of ``source``."""
     try:
         values = tomllib.loads(text)
     except RecursionError:
@@ -117,7 +72,7 @@ def parse_case(text: str, source: Path) -> Case:
 
 
 def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
-    """As :func:`parse_case`, from the values that TOML makes of a text."""
+    """Make a case of the values of a parsed TOML text; paths in it are relative to the folder of ``source``."""
     top = Table(values, "", source)
     geometry = top.table("geometry")
     file, layout = geometry.text("file"), geometry.text("layout")
@@ -144,15 +99,18 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         densities[name] = one.number("density", positive=True)
         one.finish()
     analysis = top.table("analysis")
+    kind = KINDS[analysis.text("kind", next(iter(KINDS)), among=tuple(KINDS))]
+    # Every kind reads its keys: one that is given to another kind is named, not ignored.
+    settings = {name: known.read(top, analysis) for name, known in KINDS.items()}
     output = top.table("output")
     animation = output.take("animation", "collapse.mp4")
     if animation is not False:
         animation = output.text("animation", "collapse.mp4")
-        if not Path(animation).name == animation or "\\" in animation or not animation.lower().endswith(FILMS):
+        if not Path(animation).name == animation or "\\" in animation or not animation.lower().endswith(VIDEO_SUFFIXES):
             raise output.error(
                 "animation",
-                f"is {shortened(animation)}; give a name ending in {', '.join(FILMS)}, without a folder: it is written "
-                "into the results folder",
+                f"is {shortened(animation)}; give a name ending in {', '.join(VIDEO_SUFFIXES)}, without a folder: "
+                "it is written into the results folder",
             )
     case = Case(
         source=source,
@@ -174,76 +132,34 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         imperfections=_imperfections(top),
         settlements=tuple(_settlement(entry) for entry in top.tables("settlement")),
         loads=tuple(_load(entry) for entry in top.tables("loads")),
-        analysis=analysis.text("kind", "settlement", among=ANALYSES),
-        flow=analysis.text("flow", "associative", among=FLOWS),
-        capacity_at=analysis.numbers("capacity_at"),
-        displacement=_displacement(analysis),
-        control=_control(top.table("control")),
+        analysis=kind.name,
+        settings=settings[kind.name],
         controls=_controls(analysis, geometry.number("overlap_tolerance", positive=True)),
         animation=animation or None,
     )
     for table in (geometry, material, analysis, output, top):
         table.finish()
-    return _fitting(case)
+    return _checked(case, settings)
 
 
-def _fitting(case: Case) -> Case:
-    """The case, once its keys fit the analysis that it asks for."""
-    source, kind = case.source, case.analysis
-    live = any(load.kind == "live" for load in case.loads)
-    moving = [k + 1 for k, load in enumerate(case.loads) if load.positions]
-    if kind == "settlement" and not case.settlements:
-        raise ValueError(f"{source}: [settlement] is missing; say how the moving supports move, direction = [1, 0]")
-    if kind == "settlement" and live:
-        warnings.warn(
-            f'{source}: a settlement analysis leaves the live loads out; give loads that act during it kind = "dead"',
-            stacklevel=4,
-        )
-    if kind != "settlement" and not live:
-        raise ValueError(
-            f'{source}: [analysis] kind is "{kind}", but no load is live; add [[loads]] with kind = "live", for '
-            "instance weight_fraction = [1.0, 0.0]"
-        )
-    laws = [solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength)]
-    if not all(law.dry for law in [*laws, *case.interfaces.values()]) and (kind != "limit load" or case.settlements):
-        raise ValueError(
-            f"{source}: cohesion and compressive_strength are for limit loads without a settlement; what follows the "
-            "geometry follows dry joints"
-        )
-    if kind == "pushover" and case.control is None:
-        raise ValueError(
-            f'{source}: [control] is missing; a pushover needs the displacement that grows, block = "..." and '
-            "direction = [1, 0]"
-        )
-    if kind != "pushover" and case.control is not None:
-        raise ValueError(f'{source}: [control] belongs to [analysis] kind = "pushover", not "{kind}"')
-    if kind != "limit load" and case.flow != "associative":
-        raise ValueError(
-            f'{source}: [analysis] flow "{case.flow}" belongs to kind = "limit load"; a {kind} follows the geometry, '
-            "in which friction never dilates"
-        )
-    if case.displacement is not None and (kind != "limit load" or not case.settlements):
-        raise ValueError(
-            f"{source}: [analysis] displacement is that of a limit load after a settlement, in which open joints may "
-            "close"
-        )
-    if kind == "pushover" and moving:
-        raise ValueError(f'{source}: [loads {moving[0]}] positions belong to [analysis] kind = "limit load"')
+def _checked(case: Case, settings: Mapping[str, Any]) -> Case:
+    """Check that the keys of a case fit its kind of analysis.
+
+    Parameters
+    ----------
+    case : Case
+    settings : mapping
+        What each kind has read from its keys, by its name.
+    """
+    moving = [k for k, load in enumerate(case.loads, start=1) if load.positions]
     if len(moving) > 1:
-        raise ValueError(f"{source}: [loads {moving[1]}] positions: only one load may move, and loads {moving[0]} does")
-    if case.capacity_at is None:
-        return case
-    if kind != "limit load" or not case.settlements or moving:
         raise ValueError(
-            f'{source}: [analysis] capacity_at asks for limit loads (kind = "limit load") of loads that stand still, '
-            "along a [settlement]"
+            f"{case.source}: [loads {moving[1]}] positions: only one load may move, and loads {moving[0]} does"
         )
-    last = case.settlements[-1]
-    try:
-        stopping = replace(last, stops=case.capacity_at)
-    except ValueError as error:
-        raise ValueError(f"{source}: [analysis] capacity_at: {error}") from None
-    return replace(case, settlements=(*case.settlements[:-1], stopping))
+    for name, other in KINDS.items():
+        if name != case.analysis:
+            other.refuse(settings[name], case)
+    return KINDS[case.analysis].checked(case)
 
 
 def _friction(table: Table, default: float | None = 0.6) -> float:
@@ -274,7 +190,7 @@ def _support(table: Table) -> Mapping[str, Any]:
 
 
 def _strength(table: Table) -> dict[str, float]:
-    """Cohesion and compressive strength [Pa], where they are given."""
+    """Cohesion and compressive strength [Pa]; without a key no cohesion, and infinite strength."""
     cohesion = table.number("cohesion", 0.0)
     if cohesion < 0.0:
         raise table.error("cohesion", f"is {cohesion:g}; give a stress in Pa of at least 0")
@@ -330,33 +246,6 @@ def _settlement(table: Table) -> solver.Settlement:
         raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 
 
-def _displacement(table: Table) -> float | None:
-    value = table.number("displacement")
-    if value is not None and value < 0.0:
-        raise table.error("displacement", f"is {value:g}; give a length in m of at least 0")
-    return None if value is None else float(value)
-
-
-def _control(table: Table) -> solver.ControlDisplacement | None:
-    if not table.values:
-        return None
-    keys = {
-        "direction": table.pair("direction", (1.0, 0.0)),
-        "point": table.pair("point"),
-        "increment": table.number("increment", 0.01, positive=True),
-        "limit": table.number("limit", 1.0, positive=True),
-        "tolerance": table.number("tolerance", positive=True),
-    }
-    block = table.text("block")
-    table.finish()
-    if block is None:
-        raise table.error("block", "is missing; name the block whose displacement grows")
-    try:
-        return solver.ControlDisplacement(block, **keys)
-    except ValueError as error:
-        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
-
-
 def _load(table: Table) -> LoadCase:
     given = set(table.values)
     load = LoadCase(
@@ -384,7 +273,7 @@ def _load(table: Table) -> LoadCase:
             raise table.error("positions", 'are those of a live force; give kind = "live" and force = [fx, fy]')
         for key in ("blocks", "weight_fraction", "point", "moment", "pressure"):
             if key in given:
-                raise table.error(key, "does not go with positions: the force stands on what is topmost at each")
+                raise table.error(key, "does not go with positions: the force acts on the topmost block at each")
     elif load.weight_fraction is None and load.pressure is None and load.force == (0.0, 0.0) and not load.moment:
         raise table.error("force", "is missing or zero; give force, moment, weight_fraction or pressure")
     return load

@@ -1,4 +1,4 @@
-"""Named distributions of the numbers that are not known: read, checked, and turned into values."""
+"""Probability distributions of uncertain numbers: read, checked, and evaluated."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from scipy import special
 
 from blockvis.suggestions import nearest, refuse_unknown
 
-#: The numbers each distribution needs, by its name; "normal" and "lognormal" may be cut off by lower and upper.
+from .toml_table import is_number
+
+#: The numbers that each distribution needs, by its name; "normal" and "lognormal" may be truncated by lower and upper.
 KINDS: dict[str, tuple[str, ...]] = {
     "uniform": ("lower", "upper"),
     "loguniform": ("lower", "upper"),
@@ -22,9 +24,9 @@ KINDS: dict[str, tuple[str, ...]] = {
     "beta": ("alpha", "beta", "lower", "upper"),
 }
 
-_CUT = ("normal", "lognormal")
+_TRUNCATED = ("normal", "lognormal")
 
-#: A truncated distribution of which less than this lies inside its limits is a mistake, not a distribution.
+#: Least probability that a truncated distribution must have between its limits; less is taken for a mistake.
 LEAST_INSIDE = 1e-6
 
 
@@ -37,14 +39,14 @@ class Distribution:
     kind : str
         A key of :data:`KINDS`.
     numbers : mapping of str to float
-        Mean and deviation are those of the variable itself before it is cut off, also for "lognormal".
+        Mean and deviation are those of the variable itself before truncation, also for "lognormal".
     """
 
     kind: str
     numbers: Mapping[str, float]
 
     def quantile(self, probability: np.ndarray) -> np.ndarray:
-        """(n,) array: the values below which the variable stays with the given (n,) probabilities.
+        """(n,) array: the values that the variable does not exceed with the given (n,) probabilities.
 
         Examples
         --------
@@ -52,10 +54,10 @@ class Distribution:
         array([2.5, 3. ])
         """
         p, n = np.asarray(probability, dtype=float), self.numbers
-        if self.kind in _CUT:
+        if self.kind in _TRUNCATED:
             below, inside = self._inside()
-            # Rounding may carry a value a hair beyond a limit that has a physical meaning.
-            value = self._uncut(special.ndtri(below + p * inside))
+            # Rounding may carry a value beyond a limit that has a physical meaning.
+            value = self._untruncated(special.ndtri(below + p * inside))
             value = np.clip(value, n.get("lower", -np.inf), n.get("upper", np.inf))
         elif self.kind == "uniform":
             value = n["lower"] + p * (n["upper"] - n["lower"])
@@ -72,11 +74,11 @@ class Distribution:
 
     @property
     def lowest(self) -> float:
-        """The value below which the variable never is."""
+        """Lower bound of the variable."""
         return self.numbers.get("lower", 0.0 if self.kind == "lognormal" else -math.inf)
 
-    def _uncut(self, normal: np.ndarray) -> np.ndarray:
-        """Standard normal values as those of the variable."""
+    def _untruncated(self, normal: np.ndarray) -> np.ndarray:
+        """Turn standard normal values into values of the variable."""
         if self.kind == "normal":
             return self.numbers["mean"] + self.numbers["deviation"] * normal
         centre, spread = self._logarithm()
@@ -88,7 +90,7 @@ class Distribution:
         return math.log(self.numbers["mean"]) - variance / 2.0, math.sqrt(variance)
 
     def _inside(self) -> tuple[float, float]:
-        """Probability below the lower limit, and between the limits, before the variable is cut off."""
+        """Probability below the lower limit, and between the limits, before truncation."""
 
         def below(value: float) -> float:
             if self.kind == "normal":
@@ -104,22 +106,26 @@ class Distribution:
 def read_distribution(
     values: Mapping[str, Any], where: str, defaults: Mapping[str, float] | None = None
 ) -> Distribution:
-    """The distribution of a table, checked.
+    """Read and check the distribution of a table.
 
     Parameters
     ----------
     values : mapping
-        ``distribution``, the name, and its numbers.
+        ``distribution``, its name, and its numbers.
     where : str
-        What the messages start with.
+        Beginning of the messages.
     defaults : mapping of str to float, optional
-        Numbers that may be left out.
+        Numbers that may be missing.
+
+    Returns
+    -------
+    Distribution
 
     Raises
     ------
     ValueError
-        For a name that does not exist (with the nearest), a number that is missing or none, limits in the wrong order,
-        and limits between which nothing lies.
+        For an unknown name (with the most similar one), a missing or invalid number, limits in the wrong order, and
+        limits between which the variable almost never is.
 
     Examples
     --------
@@ -135,10 +141,12 @@ def read_distribution(
         problem = f"distribution is {kind!r}{hint}" if kind is not None else "names no distribution"
         raise ValueError(f"{where}: {problem}; choose from {', '.join(KINDS)}")
     needed = KINDS[kind]
-    refuse_unknown(values, [*needed, *(("lower", "upper") if kind in _CUT else ())], f"{where}: distribution '{kind}'")
+    refuse_unknown(
+        values, [*needed, *(("lower", "upper") if kind in _TRUNCATED else ())], f"{where}: distribution '{kind}'"
+    )
     numbers = {key: float(value) for key, value in (defaults or {}).items() if key in needed}
     for key, value in values.items():
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        if not is_number(value):
             raise ValueError(f"{where}: {key} is {value!r}; give a number")
         numbers[key] = float(value)
     for key in needed:
@@ -154,7 +162,7 @@ def read_distribution(
     if kind == "triangular" and not low <= numbers["mode"] <= high:
         raise ValueError(f"{where}: mode is {numbers['mode']:g}; it must lie between {low:g} and {high:g}")
     found = Distribution(kind, numbers)
-    if kind in _CUT and found._inside()[1] < LEAST_INSIDE:
+    if kind in _TRUNCATED and found._inside()[1] < LEAST_INSIDE:
         raise ValueError(
             f"{where}: of a {kind} variable with mean {numbers['mean']:g} and deviation {numbers['deviation']:g} "
             f"nothing lies between {low:g} and {high:g}; move the limits"

@@ -1,4 +1,4 @@
-"""Imperfections: what no drawing knows of old masonry, drawn at random from a seed."""
+"""Imperfections: random scatter of corners, friction and density, from a seed."""
 
 from __future__ import annotations
 
@@ -18,36 +18,36 @@ from blockvis.suggestions import nearest
 
 from .distributions import Distribution, read_distribution
 
-#: What each kind scatters, and the numbers of its distribution that may be left out.
+#: The kinds of imperfections, and default numbers of their distributions.
 IMPERFECTIONS: dict[str, dict[str, float]] = {
     "vertices": {"mean": 0.0},
     "friction": {"mean": 1.0},
     "density": {"mean": 1.0},
 }
 
-#: Corners this near, as a fraction of the width of the thinnest block, are one corner of several blocks: the
-#: overlap that is accepted of a drawing.
+#: Corners closer than this fraction of the width of the thinnest block are one corner of several blocks: the overlap
+#: that an assembly accepts.
 SAME_PLACE = 1e-3
 
-#: A corner moves at most by this fraction of the distance to the next corner, and of the width of its blocks, so that
+#: A corner moves by at most this fraction of the distance to the next corner, and of the width of its blocks, so that
 #: no block turns inside out.
 LARGEST_SHARE = 0.25
 
-#: An edge changes by at most this fraction of its length; where it would by more, what is drawn for the corners around
-#: it is halved, at most so many times.
+#: An edge changes by at most this fraction of its length; otherwise the random displacements of the corners of its
+#: block are halved, at most so many times.
 LARGEST_CHANGE, HALVINGS = 0.5, 12
 
-#: Imperfections of which more corners than this have to be held back are too large for the blocks.
+#: If the displacements of more than this fraction of the corners are too large, the imperfections are refused.
 MOST_HELD_BACK = 0.1
 
-#: Rounds of Newton's method in which corners on edges find their places: displacements are small against the edges, so
-#: that four reach rounding, and one is to spare.
-ROUNDS = 5
+#: Iterations of Newton's method for corners that slide along edges: displacements are small compared with the edges,
+#: so that four reach rounding error; one more is in reserve.
+ITERATIONS = 5
 
 
 @dataclass(frozen=True)
 class Imperfection:
-    """One ``[[imperfections]]`` entry.
+    """One entry of ``[[imperfections]]``.
 
     Attributes
     ----------
@@ -64,18 +64,23 @@ class Imperfection:
 
 
 def read_imperfection(values: Mapping[str, Any], where: str) -> Imperfection:
-    """The imperfection of a table, checked.
+    """Read and check the imperfection of a table.
 
     Parameters
     ----------
     values : mapping
         ``kind``, ``seed`` and the keys of :func:`blockvis.cases.distributions.read_distribution`.
     where : str
-        What the messages start with.
+        Beginning of the messages.
+
+    Returns
+    -------
+    Imperfection
 
     Raises
     ------
     ValueError
+        For an unknown kind, a seed that is no whole number, and a factor that may become negative or 0.
     """
     values = dict(values)
     kind, seed = values.pop("kind", None), values.pop("seed", 0)
@@ -98,7 +103,7 @@ def read_imperfection(values: Mapping[str, Any], where: str) -> Imperfection:
 
 
 def joint_scatter(imperfections: Sequence[Imperfection]) -> solver.JointScatter | None:
-    """The scatter of friction from joint to joint, if there is any."""
+    """Find the scatter of friction from joint to joint; None without one."""
     for one in imperfections:
         if one.kind == "friction":
             return solver.JointScatter(one.seed, one.distribution.quantile)
@@ -106,13 +111,13 @@ def joint_scatter(imperfections: Sequence[Imperfection]) -> solver.JointScatter 
 
 
 def imperfect(assembly: solver.Assembly, imperfections: Sequence[Imperfection]) -> solver.Assembly:
-    """The assembly with its corners and densities scattered.
+    """Scatter the corners and densities of an assembly.
 
     Parameters
     ----------
     assembly : solver.Assembly
     imperfections : sequence of Imperfection
-        Those of friction belong to the joints: see :func:`joint_scatter`.
+        Those of friction do not change the assembly: see :func:`joint_scatter`.
 
     Raises
     ------
@@ -129,13 +134,13 @@ def imperfect(assembly: solver.Assembly, imperfections: Sequence[Imperfection]) 
 
 
 def _uniform(imperfection: Imperfection, *shape: int) -> np.ndarray:
-    # Each kind has a stream of its own: another imperfection with the same seed must not repeat it.
+    # Each kind has its own stream of random numbers: two kinds with the same seed must not be correlated.
     stream = list(IMPERFECTIONS).index(imperfection.kind)
     return np.random.default_rng([imperfection.seed, stream]).uniform(2.0**-54, 1.0 - 2.0**-53, size=shape)
 
 
 def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solver.Assembly:
-    """The assembly with its corners moved at random, faces plane and joints closed.
+    """Move the corners of an assembly at random; faces stay plane and joints closed.
 
     Parameters
     ----------
@@ -143,11 +148,15 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
     imperfection : Imperfection
         Of kind "vertices".
 
+    Raises
+    ------
+    ValueError
+        For displacements that are too large for the blocks.
+
     Notes
     -----
-    Corners in one place move together. A corner in the middle of another block's edge slides along this edge, wherever
-    the edge itself goes: bed joints of a wall stay straight from end to end, head joints move and tilt. Corners that
-    supports share stay.
+    Corners at one place move together. A corner on the edge of another block slides along this edge and moves with it:
+    bed joints of a wall stay straight from end to end, head joints move and tilt. Corners of supports stay.
     """
     vertices, owner = assembly.vertices, assembly.block_of_vertex
     near = SAME_PLACE * float(assembly.widths.min())
@@ -170,20 +179,20 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
     if too_far.sum() > MOST_HELD_BACK * max((~held).sum(), 1):
         raise ValueError(
             f"imperfections of kind 'vertices' move {int(too_far.sum())} of {int((~held).sum())} corners by more than "
-            f"a quarter of what lies beside them, typically {np.median(LARGEST_SHARE * share):.3g} m; make them "
-            "smaller"
+            "a quarter of the distance to the next corner or the width of their blocks, typically "
+            f"{np.median(LARGEST_SHARE * share):.3g} m; make them smaller"
         )
     drawn *= np.where(too_far, LARGEST_SHARE * share / np.maximum(size, 1e-300), 1.0)[:, None]
-    new = _settled(positions, drawn, rails, place, assembly.next_vertex)
+    new = _on_rails(positions, drawn, rails, place, assembly.next_vertex)
     for _ in range(HALVINGS):
-        # A cut brick has edges much shorter than those its corners slide along; what moves these moves them too.
+        # A cut brick has edges much shorter than those along which its corners slide, and moves with them.
         distorted = _distorted(assembly, positions, new, place)
         if not distorted.any():
             break
         near_by = set(place[distorted[owner]].tolist())
         rail_ends = [(place[rails[p]], place[assembly.next_vertex[rails[p]]]) for p in near_by if p in rails]
         drawn[sorted(near_by.union(*rail_ends))] /= 2.0
-        new = _settled(positions, drawn, rails, place, assembly.next_vertex)
+        new = _on_rails(positions, drawn, rails, place, assembly.next_vertex)
 
     try:
         return solver.Assembly.from_outlines(
@@ -199,35 +208,34 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
 
 
 def _places(vertices: np.ndarray, near: float) -> np.ndarray:
-    """(n_vertices,) int array: a number per corner, the same for corners in one place."""
+    """(n_vertices,) int array: number of the place of each corner; corners at one place share it."""
     pairs = cKDTree(vertices).query_pairs(near, output_type="ndarray")
     graph = sp.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(vertices),) * 2)
     return connected_components(graph, directed=False)[1].astype(int)
 
 
 def _rails(assembly: solver.Assembly, positions: np.ndarray, place: np.ndarray, near: float) -> dict[int, int]:
-    """The edge that each place inside an edge slides along, named by the vertex it starts at.
+    """Find the edge, its rail, along which each place inside an edge slides; an edge is numbered by its first vertex.
 
-    A place inside straight edges of two blocks has these on both sides and room for no third, but for the accuracy of
-    the drawing: the longest edge is taken.
+    A place inside the edges of two blocks slides along the longer one.
     """
     start, end = positions[place], positions[place[assembly.next_vertex]]
     edges = shapely.linestrings(np.stack([start, end], axis=1))
     point, edge = shapely.STRtree(edges).query(shapely.points(positions), predicate="dwithin", distance=near)
     length = np.hypot(*(end - start).T)
     tangent = (end - start)[edge] / length[edge, None]
-    along = ((positions[point] - start[edge]) * tangent).sum(axis=1)
+    distance = ((positions[point] - start[edge]) * tangent).sum(axis=1)
     # A block's own corner that touches another of its edges is no joint.
     owned = np.unique(place.astype(np.int64) * assembly.n_blocks + assembly.block_of_vertex)
     own = np.isin(point.astype(np.int64) * assembly.n_blocks + assembly.block_of_vertex[edge], owned)
-    inside = (along > near) & (along < length[edge] - near) & ~own
+    inside = (distance > near) & (distance < length[edge] - near) & ~own
     point, edge = point[inside], edge[inside]
     shortest_first = np.lexsort((-edge, length[edge], point))
     return dict(zip(point[shortest_first].tolist(), edge[shortest_first].tolist(), strict=True))
 
 
 def _distorted(assembly: solver.Assembly, positions: np.ndarray, new: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """(n_blocks,) bool array: blocks of which an edge has changed by more than half its length."""
+    """(n_blocks,) bool array: blocks with an edge that has changed by more than half its length."""
     following = assembly.next_vertex
     before = positions[place[following]] - positions[place]
     change = new[place[following]] - new[place] - before
@@ -235,14 +243,14 @@ def _distorted(assembly: solver.Assembly, positions: np.ndarray, new: np.ndarray
     return np.bincount(assembly.block_of_vertex, weights=too_much, minlength=assembly.n_blocks) > 0
 
 
-def _settled(
+def _on_rails(
     positions: np.ndarray, drawn: np.ndarray, rails: Mapping[int, int], place: np.ndarray, following: np.ndarray
 ) -> np.ndarray:
-    """(n, 2) array [m]: where the places go, those on rails on the line between the rail's new ends.
+    """(n, 2) array [m]: new positions of the places, those on rails on the line between the rail's new ends.
 
-    A place on a rail slides by what was drawn for it along the rail's old direction, and lies on the line through the
-    rail's ends wherever these go: two equations for each, solved together by Newton's method because the end of one
-    rail may itself lie on another, as along a course of running bond.
+    A place on a rail moves by its random displacement along the rail's old direction, and lies on the line through the
+    rail's new ends: two equations for each, solved together by Newton's method because the end of one rail may itself
+    lie on another, as along a course of running bond.
     """
     new = positions + drawn
     if not rails:
@@ -257,7 +265,7 @@ def _settled(
     unknown = np.full(len(positions), -1)
     unknown[on] = np.arange(len(on))
     row = np.arange(len(on))
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         along, beside = (new[end] - new[start]) / length[:, None], (new[on] - new[start]) / length[:, None]
         off = along[:, 0] * beside[:, 1] - along[:, 1] * beside[:, 0]
         slid = (new[on] * direction).sum(axis=1) - target

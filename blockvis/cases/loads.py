@@ -1,4 +1,4 @@
-"""The loads of a case on its blocks: self-weight, dead and live loads, and a live load that moves."""
+"""Loads of a case: self-weight, dead and live loads, and a live load that moves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from blockvis.suggestions import nearest
 
 @dataclass(frozen=True)
 class LoadCase:
-    """One ``[[loads]]`` entry.
+    """One entry of ``[[loads]]``.
 
     Attributes
     ----------
@@ -28,13 +28,13 @@ class LoadCase:
     point : (2,) tuple [m], optional
     moment : float [N·m]
     pressure : float, optional [Pa]
-        On the faces that ``direction`` meets first, or on ``edge``.
+        On the first faces in the way of ``direction``, or on ``edge``.
     direction : (2,) tuple
-        Where the pressure pushes.
+        In which the pressure pushes.
     edge : int, optional
         Number of the edge, from 1, that the pressure pushes into: counter-clockwise from the first corner.
     positions : tuple of float [m]
-        Places x of a force that moves over the structure, on its topmost surface; empty where it does not.
+        Places x of a force that moves over the topmost surface of the structure; empty for other loads.
     """
 
     kind: str = "dead"
@@ -50,7 +50,7 @@ class LoadCase:
 
 
 def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path) -> solver.Loads:
-    """Self-weight and the loads that stand still, in N.
+    """Sum self-weight and the loads that do not move.
 
     Parameters
     ----------
@@ -59,10 +59,15 @@ def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Pat
     source : Path
         The case file, for messages.
 
+    Returns
+    -------
+    solver.Loads
+        [N, N·m]
+
     Raises
     ------
     ValueError
-        For a pattern that matches no free block, an edge that a block does not have.
+        For a pattern that matches no free block, and for an edge that a block does not have.
     """
     weight = solver.self_weight(assembly)
     parts = {"dead": weight.dead.copy(), "live": weight.live.copy()}
@@ -91,14 +96,24 @@ def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Pat
 def moving_loads(
     entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path
 ) -> tuple[np.ndarray, Callable[[int], np.ndarray]]:
-    """Positions (n,) [m] of the load that moves, none without one, and the live load (n_blocks, 3) at the k-th of them.
+    """Find the load that moves.
 
-    Parameters are those of :func:`loads_of`.
+    Parameters
+    ----------
+    entries, assembly, source
+        As of :func:`loads_of`.
+
+    Returns
+    -------
+    positions : (n,) array [m]
+        Empty if no load moves.
+    live : function of int
+        The live load (n_blocks, 3) [N, N·m] at a position, by its number.
 
     Raises
     ------
     ValueError
-        For a position at which nothing, or a support, is below.
+        For a position above no block, or above a support.
     """
     moving = next(((number, load) for number, load in enumerate(entries, start=1) if load.positions), None)
     if moving is None:
@@ -109,14 +124,14 @@ def moving_loads(
             solver.load_on_top(assembly, x, load.force)
         except ValueError as error:
             raise ValueError(f"{source}: [loads {number}] positions: {error}") from None
-    # One at a time: each is as long as the list of blocks.
+    # Made one at a time: each array is as long as the list of blocks.
     return np.array(load.positions), lambda k: solver.load_on_top(assembly, load.positions[k], load.force)
 
 
 def with_moving_load(
     loads: solver.Loads, entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path, x: float | None
 ) -> solver.Loads:
-    """The loads with the one that moves standing at x [m]; as they are where there is no such place."""
+    """Add the load that moves, at its place nearest to x [m]; without x or such a load return the loads unchanged."""
     places, live = moving_loads(entries, assembly, source)
     if x is None or len(places) == 0:
         return loads

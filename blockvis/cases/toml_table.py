@@ -1,4 +1,4 @@
-"""A table of a TOML file that knows which of its keys have been asked for."""
+"""Tables of TOML files, read with checks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,21 @@ from blockvis.suggestions import nearest
 
 
 class Table:
-    """A table of the case file that knows which of its keys have been asked for."""
+    """A table of the case file; it keeps the keys that were read, so that the others can be refused.
+
+    Parameters
+    ----------
+    values : mapping
+    where : str
+        Name of the table in messages, "" for the whole file.
+    source : Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        From every method, for a value of the wrong kind; names the file, the table, the key and the remedy.
+    """
 
     def __init__(self, values: Mapping[str, Any], where: str, source: Path) -> None:
         if not isinstance(values, Mapping):
@@ -20,10 +34,12 @@ class Table:
         self.known: list[str] = []
 
     def take(self, key: str, default: Any = None) -> Any:
+        """Read a value of any kind."""
         self.known.append(key)
         return self.values.get(key, default)
 
     def number(self, key: str, default: float | None = None, *, positive: bool = False) -> Any:
+        """Read a finite number as a float; None if it is missing and has no default."""
         value = self.take(key, default)
         if value is None:
             return None
@@ -34,6 +50,7 @@ class Table:
         return float(value)
 
     def pair(self, key: str, default: tuple[float, float] | None = None) -> Any:
+        """Read two finite numbers."""
         value = self.take(key, default)
         if value is None:
             return None
@@ -42,6 +59,7 @@ class Table:
         return float(value[0]), float(value[1])
 
     def text(self, key: str, default: str | None = None, *, among: Sequence[str] = ()) -> Any:
+        """Read a text, one of ``among`` if there are any."""
         value = self.take(key, default)
         if value is None:
             return None
@@ -52,6 +70,7 @@ class Table:
         return value
 
     def numbers(self, key: str) -> tuple[float, ...] | None:
+        """Read a list of finite numbers."""
         value = self.take(key)
         if value is None:
             return None
@@ -61,15 +80,18 @@ class Table:
         return tuple(float(v) for v in value)
 
     def whole(self, key: str, least: int) -> int | None:
+        """Read a whole number of at least ``least``."""
         value = self.number(key)
         if value is not None and (value < least or value != int(value)):
             raise self.error(key, f"is {value:g}; give a whole number of at least {least}")
         return None if value is None else int(value)
 
     def table(self, key: str) -> Table:
+        """Read a table; a missing one is empty."""
         return Table(self.take(key, {}), f"{self.where}.{key}" if self.where else key, self.source)
 
     def tables(self, key: str) -> list[Table]:
+        """Read a list of tables, or a single one."""
         value = self.take(key, [])
         entries = [value] if isinstance(value, Mapping) else value
         if not isinstance(entries, list):
@@ -79,18 +101,19 @@ class Table:
         ]
 
     def error(self, key: str, problem: str) -> ValueError:
+        """Make an error that names the file, the table and the key."""
         where = f"[{self.where}] {key}" if self.where else f"[{key}]"
         return ValueError(f"{self.source}: {where} {problem}")
 
     def finish(self) -> None:
-        """Refuses keys nobody asked for, naming the nearest one that exists."""
+        """Refuse keys that were not read, naming the most similar one that was."""
         for key in self.values:
             if key not in self.known:
                 raise self.error(key, f"is not a key here{nearest(key, self.known)}; keys are {', '.join(self.known)}")
 
 
 def is_number(value: object) -> bool:
-    """Whether it is a number that a double holds; TOML has whole numbers of any size."""
+    """Whether a value is a number that fits a double; TOML has whole numbers of any size."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return False
     try:
@@ -100,7 +123,7 @@ def is_number(value: object) -> bool:
 
 
 def shortened(value: object) -> str:
-    """A value as an error message shows it."""
+    """Write a value for an error message, shortened."""
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**30:
         return "a number too large for any length or force"
     words = repr(value)

@@ -1,8 +1,8 @@
-"""Layout files: which module reads and writes which suffix.
+"""The table of layout formats: which module reads and writes which suffix.
 
 A reader takes the path and a :class:`~blockvis.formats.reading.Reading` and returns a ``Layout`` in the file's own unit
-of length, which it names in ``Layout.unit`` ("" where the file does not say). A writer takes a ``Layout`` in m and the
-path.
+of length, which it names in ``Layout.unit`` ("" if the file does not state it). A writer takes a ``Layout`` in m and
+the path.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ __all__ = ["FORMATS", "Format"]
 
 @dataclass(frozen=True)
 class Format:
-    """One family of files: the module that knows it and what it can do."""
+    """One family of files: its module in this room, and whether it reads and writes them."""
 
     module: str
     reads: bool = True

@@ -1,4 +1,4 @@
-"""Cells of any mesh to a drawing: who belongs to which block, and what the arrays beside them say of it."""
+"""From the surface cells of any mesh, and their cell arrays, to a layout."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BLOCK_ARRAYS = ("block_id", "BlockId", "block", "gmsh:geometrical", "CellEntityI
 
 
 def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
-    """(n_cells,) int array: the connected piece each cell belongs to, through shared points."""
+    """(n_cells,) int array: number of the connected piece of each cell; shared points connect cells."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -33,7 +33,7 @@ def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
 def layout_of_cells(
     points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray], path: Path | str
 ) -> Layout:
-    """A drawing from surface cells.
+    """Make a layout of surface cells.
 
     Parameters
     ----------
@@ -41,11 +41,16 @@ def layout_of_cells(
     rings : sequence of (n,) int arrays
         Points around each cell.
     data : mapping of str to (n_cells, ...) array
-        Cell arrays. ``block_id`` says which cells are one block; without it polygons and quadrangles are a block
-        each, and triangles that share points are one. ``name``, ``role``, ``material``, ``group``, ``thickness``
-        and ``density`` say the rest.
+        Cell arrays. ``block_id`` says which cells form one block; without it every cell is a block if one has more
+        than three corners, and triangles that share points form one. ``name``, ``role``, ``material``, ``group``,
+        ``thickness`` and ``density`` are optional.
     path : Path or str
         Named in messages.
+
+    Raises
+    ------
+    ValueError
+        If there are no cells, a cell uses a point that does not exist, or a block has no outline.
     """
     if not rings:
         raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
@@ -54,7 +59,7 @@ def layout_of_cells(
     if used.min() < 0 or used.max() >= len(points):
         raise ValueError(f"'{path}': a cell uses point {int(used.max())}, but there are {len(points)}; export it again")
     numbered = [name for name in BLOCK_ARRAYS if name in data and np.ndim(data[name]) == 1]
-    # An array that is the same everywhere, as some programs write by default, tells no blocks apart.
+    # An array with one value everywhere, as some programs write by default, does not distinguish blocks.
     key = next((name for name in numbered if name == "block_id" or (data[name] != data[name][0]).any()), None)
     if key is not None:
         ids, owner = np.unique(np.asarray(data[key]), return_inverse=True)
@@ -76,6 +81,15 @@ def layout_of_cells(
 
 
 def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, Any]:
+    """Read the row of the block table of a block from the cell arrays at one of its cells.
+
+    Parameters
+    ----------
+    data : mapping of str to (n_cells, ...) array
+    cell : int
+    name : str
+        Of the block, unless the arrays have another.
+    """
     row: dict[str, Any] = {"name": name}
     for key in ("name", "group", "material", "role_name", "role"):
         if key not in data or len(data[key]) <= cell:
@@ -96,14 +110,23 @@ def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, An
     return row
 
 
-def merged(drawings: Sequence[Layout], labels: Sequence[str], path: Path | str) -> Layout:
-    """Several drawings as one; a block that has no name of its own is named after its part of the file."""
-    if not drawings:
+def merged(layouts: Sequence[Layout], labels: Sequence[str], path: Path | str) -> Layout:
+    """Join layouts to one; blocks without a name of their own are named after their part of the file.
+
+    Parameters
+    ----------
+    layouts : sequence of Layout
+    labels : sequence of str
+        Names of the parts of the file, "" for none.
+    path : Path or str
+        Named in messages.
+    """
+    if not layouts:
         raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
-    if len(drawings) == 1:
-        return drawings[0]
+    if len(layouts) == 1:
+        return layouts[0]
     named = []
-    for layout, label in zip(drawings, labels, strict=True):
+    for layout, label in zip(layouts, labels, strict=True):
         plain = all(name.startswith("block ") for name in layout.names)
         own = (label,) if layout.n_blocks == 1 else tuple(f"{label} {k + 1}" for k in range(layout.n_blocks))
         named.append(replace(layout, names=own if plain and label else layout.names))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.layout.block_table import rows_of, with_rows
+from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import arc_points
 from blockvis.layout.units import metres_per
@@ -23,13 +23,13 @@ from .reading import Reading
 #: Units by the header variable $INSUNITS.
 UNIT_CODES = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 14: "dm"}
 
-#: Application name under which a block's name, role and material stand in the extended data of its outline.
+#: Application name of the extended data of an outline that hold the block's row of the block table.
 APPLICATION = "BLOCKVIS"
 
-#: Nesting of inserted blocks beyond this is a loop.
+#: Inserted blocks that are nested deeper than this insert themselves.
 DEEPEST_INSERT = 16
 
-#: A polyline that misses its own start by less than this fraction of its size is closed.
+#: A polyline whose ends are closer than this fraction of its size is closed.
 CLOSES = 1e-6
 
 _CURVES = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE", "ARC", "LINE", "SOLID", "TRACE", "3DFACE"}
@@ -37,7 +37,7 @@ _CURVES = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE", "ARC", "LINE
 
 @dataclass
 class _Found:
-    """What the entities of a drawing gave so far."""
+    """Outlines and loose lines found so far, and what was skipped."""
 
     rings: list[np.ndarray] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
@@ -55,7 +55,7 @@ class _Found:
 
 
 def read(path: Path, reading: Reading) -> Layout:
-    """Reads a .dxf drawing; the header's $INSUNITS names its unit."""
+    """Read a .dxf drawing; its unit is that of the header variable $INSUNITS."""
     import ezdxf
     from ezdxf import recover
 
@@ -70,7 +70,7 @@ def read(path: Path, reading: Reading) -> Layout:
     tolerance = None if reading.chord_tolerance is None else reading.chord_tolerance / in_metres
     shut = {layer.dxf.name for layer in document.layers if layer.is_off() or layer.is_frozen()}
     found = _Found()
-    # A small file can ask for any number of copies; more of them than a quarter of its bytes are a trap.
+    # A small file can insert any number of copies: more entities than a quarter of its bytes are refused.
     size = path.stat().st_size
     most = budget = max(size // 4, 1000)
     for entity, handle in _flat(document.modelspace(), 0, path):
@@ -114,7 +114,7 @@ def read(path: Path, reading: Reading) -> Layout:
 
 
 def _flat(entities: Any, depth: int, path: Path, parent: str = "") -> Iterator[tuple[Any, str]]:
-    """All entities, inserted blocks resolved, with a handle to name each by."""
+    """Yield all entities, inserted blocks resolved, each with a handle that names it."""
     if depth > DEEPEST_INSERT:
         raise ValueError(f"'{path}' inserts blocks into each other more than {DEEPEST_INSERT} deep; explode them")
     for number, entity in enumerate(entities):
@@ -129,7 +129,7 @@ def _flat(entities: Any, depth: int, path: Path, parent: str = "") -> Iterator[t
 
 
 def _inserted(insert: Any, path: Path) -> Iterator[Any]:
-    """The entities of an inserted block where it is; ezdxf lets whatever a damaged one runs into through."""
+    """Yield the entities of an inserted block at its place; ezdxf raises errors of any kind for a damaged one."""
     try:
         yield from insert.virtual_entities()
     except (TypeError, AttributeError, ValueError, KeyError, IndexError, ArithmeticError) as error:
@@ -139,7 +139,7 @@ def _inserted(insert: Any, path: Path) -> Iterator[Any]:
 
 
 def _points(curve: Any, tolerance: float | None) -> np.ndarray:
-    """(n, 3) array: a path with its arcs turned to chords within the tolerance, ends included."""
+    """(n, 3) array: points of a path, its arcs replaced by chords within the tolerance, both ends included."""
     box = np.array([(p.x, p.y, p.z) for p in curve.control_vertices()])
     size = float(np.ptp(box, axis=0).max()) if len(box) and np.isfinite(box).all() else 0.0
     if not curve.has_curves or size == 0.0:
@@ -180,9 +180,10 @@ def _add_curve(entity: Any, handle: str, found: _Found, tolerance: float | None)
 
 
 def _circular(entity: Any, tolerance: float | None) -> np.ndarray | None:
-    """(n, 3) array: what consists of lines and circular arcs, its chords measured on the arcs themselves.
+    """(n, 3) array: points of an entity of lines and circular arcs; None for other entities.
 
-    ezdxf's paths replace an arc by a cubic first, which lies up to 2.7e-4 of the radius beside it.
+    The chords are measured on the arcs themselves: ezdxf's paths replace an arc by a cubic first, which deviates from
+    it by up to 2.7e-4 of the radius.
     """
     kind = entity.dxftype()
     if kind in ("CIRCLE", "ARC"):
@@ -205,7 +206,7 @@ def _circular(entity: Any, tolerance: float | None) -> np.ndarray | None:
 
 
 def _with_bulges(corners: list[tuple[float, float, float]], closed: bool, tolerance: float | None) -> np.ndarray:
-    """(n, 2) array: a polyline whose bulged segments are chords; closed ones end where they start."""
+    """(n, 2) array: points of a polyline, its arcs replaced by chords; a closed one ends where it starts."""
     from ezdxf.math import bulge_to_arc
 
     points = [np.array(corner[:2]) for corner in corners[:1]]
@@ -221,13 +222,13 @@ def _with_bulges(corners: list[tuple[float, float, float]], closed: bool, tolera
 
 
 def _hatch_rings(entity: Any, tolerance: float | None) -> list[np.ndarray]:
-    """Boundaries of a hatch as (n, 3) rings."""
+    """(n, 3) arrays: boundaries of a hatch."""
     from ezdxf.path import from_hatch
 
     rings = []
     for boundary in entity.paths:
         if not hasattr(boundary, "vertices"):
-            # Boundaries of separate edges may turn either way and hold splines: ezdxf orders them.
+            # Boundaries of separate edges may turn either way and contain splines: ezdxf orders them.
             return [_points(curve, tolerance) for curve in from_hatch(entity)]
         flat = _with_bulges([tuple(corner) for corner in boundary.vertices], True, tolerance)
         system = entity.ocs()
@@ -257,7 +258,7 @@ def _add_hatch(entity: Any, handle: str, found: _Found, tolerance: float | None,
 
 
 def _drawn_already(ring: np.ndarray, found: _Found) -> bool:
-    """Whether a hatch only fills the outline that stands just before it, as drawing programs do."""
+    """Whether a hatch fills the outline just before it, as drawing programs write them."""
     if not found.rings or len(found.rings[-1]) != len(ring):
         return False
     return bool(np.abs(found.rings[-1].mean(0) - ring.mean(0)).max() <= CLOSES * float(np.ptp(ring, axis=0).max()))
@@ -298,20 +299,18 @@ def _own_data(entity: Any) -> dict[str, Any]:
 
 
 def write(layout: Layout, path: Path) -> None:
-    """Writes .dxf R2000 in m: one closed LWPOLYLINE per block on the layer of its group, role or material."""
+    """Write .dxf R2000 in m: a closed LWPOLYLINE per block on the layer of its group, role or material."""
     import ezdxf
 
     document = ezdxf.new("R2000")
     document.header["$INSUNITS"] = 6
     document.appids.add(APPLICATION)
     space = document.modelspace()
-    for i, row in enumerate(rows_of(layout)):
-        role = layout.roles[i] if layout.roles[i] in ("fixed", "moving") else ""
-        layer = layout.groups[i] or role or layout.materials[i] or "0"
+    for row, layer, ring in zip(rows_of(layout), layers_of(layout, "0"), layout.outlines, strict=True):
         layer = "".join("_" if c in '<>/\\":;?*|=`' or ord(c) < 32 else c for c in layer)[:255]
         if layer not in document.layers:
             document.layers.add(layer)
-        outline = space.add_lwpolyline(layout.outlines[i].tolist(), close=True, dxfattribs={"layer": layer})
+        outline = space.add_lwpolyline(ring.tolist(), close=True, dxfattribs={"layer": layer})
         text = json.dumps(row)
         outline.set_xdata(APPLICATION, [(1000, text[k : k + 200]) for k in range(0, len(text), 200)])
     document.saveas(path)

@@ -20,10 +20,10 @@ from .gmsh_process import NO_LIBRARY
 from .reading import Reading
 from .solids import Body, layout_of_bodies
 
-#: A geometry script that needs longer is taken for one that does not end.
+#: A geometry script that takes longer is stopped: it may never end.
 LONGEST_SECONDS = 120
 
-#: Words of gmsh's script language that run programs or touch other files.
+#: Words of gmsh's script language that run programs, or read or write other files.
 _REACHES_OUT = re.compile(
     r"\b(SystemCall|NonBlockingSystemCall|OnelabRun|Include|Merge|ShapeFromFile|Save|CreateDir)\b|Printf[^;]*\)\s*>"
 )
@@ -32,7 +32,7 @@ _PACKAGES = "libglu1-mesa libxcursor1 libxft2 libxinerama1 libxrender1 libxi6 li
 
 
 def read(path: Path, reading: Reading) -> Layout:
-    """Reads a geometry file; .step and .brep come in m, a .geo does not say its unit."""
+    """Read a geometry file; gmsh converts .step and .brep to m, a .geo states no unit."""
     script = path.suffix.lower().startswith(".geo")
     if script:
         text = re.sub(r"//[^\n]*|/\*.*?\*/", "", path.read_text(encoding="utf-8", errors="replace"), flags=re.DOTALL)
@@ -42,7 +42,7 @@ def read(path: Path, reading: Reading) -> Layout:
                 f"'{path}' uses '{found[0].strip()}', which reaches beyond the file; "
                 "run gmsh on it yourself and give the .msh"
             )
-    # A thousandth of the radius, or what the tolerance makes of a radius of 1 m.
+    # Chords within a thousandth of the radius, or within the given tolerance for a radius of 1 m.
     allowed = min(max(reading.chord_tolerance or 1e-3, 1e-6), 0.5)
     chords = math.ceil(math.pi / math.acos(1.0 - allowed))
     with tempfile.TemporaryDirectory() as folder:

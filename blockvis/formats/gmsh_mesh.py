@@ -1,8 +1,7 @@
 """Meshes of gmsh, .msh 2.2 and 4.1, ASCII and binary: one surface entity is one block.
 
-Read here and not through meshio, which keeps one of two physical groups of an entity, one of two groups of the same
-name in different dimensions, and reserves whatever memory the file asks for. Written down from the format's
-description, https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format.
+This reader replaces that of meshio, which keeps one of two physical groups of an entity, one of two groups of the same
+name in different dimensions, and reserves whatever memory the file asks for. It follows the description of the format, https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format.
 """
 
 from __future__ import annotations
@@ -13,22 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
+from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import flattened, outlines_of_cells
+from blockvis.layout.triangulation import cells_of_ring
 
+from .node_order import GMSH, ring_of_nodes
 from .reading import Reading
-from .triangles import cells_of_ring
-
-#: Points around a surface element, by gmsh's element type: corners with the points of curved sides between them.
-RINGS = {
-    2: (0, 1, 2),
-    3: (0, 1, 2, 3),
-    9: (0, 3, 1, 4, 2, 5),
-    10: (0, 4, 1, 5, 2, 6, 3, 7),
-    16: (0, 4, 1, 5, 2, 6, 3, 7),
-    21: (0, 3, 4, 1, 5, 6, 2, 7, 8),
-    36: (0, 4, 5, 1, 6, 7, 2, 8, 9, 3, 10, 11),
-}
 
 #: Number of nodes of each element type.
 N_NODES = {
@@ -37,13 +27,13 @@ N_NODES = {
     37: 25, 92: 64, 93: 125,
 }  # fmt: skip
 
-#: Section of ours that keeps what physical groups cannot: other programs skip it.
+#: Our own section with the block table, which physical groups cannot hold; other programs skip it.
 TABLE = "BlockvisBlocks"
 
 
 @dataclass
 class _Mesh:
-    """What the sections of a file hold; elements of surfaces only."""
+    """Content of the sections of a file; of elements only those of surfaces."""
 
     points: dict[int, int] = field(default_factory=dict)
     coordinates: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
@@ -55,7 +45,7 @@ class _Mesh:
 
 
 class _Numbers:
-    """Reads the numbers of a section one after another, ASCII or binary alike."""
+    """The numbers of a section, ASCII or binary, read one after another."""
 
     def __init__(self, body: bytes, section: str, path: Path, binary: bool, order: str, wide: str) -> None:
         self.section, self.path, self.binary = section, path, binary
@@ -64,10 +54,10 @@ class _Numbers:
         self.position = 0
 
     def take(self, kind: str, n: int) -> np.ndarray:
-        """(n,) array of "int", "size" or "double"."""
+        """Read n numbers of kind "int", "size" or "double" as a (n,) array."""
         dtype = self.types[kind]
         width = dtype.itemsize if self.binary else 1
-        # A count is checked against what the file holds before any memory is reserved for it.
+        # A count is checked against the length of the file before memory is reserved for it.
         if n < 0 or self.position + n * width > len(self.body):
             raise ValueError(
                 f"'{self.path}' is cut off: its section ${self.section} announces {n} more numbers and holds "
@@ -86,11 +76,11 @@ class _Numbers:
             ) from None
 
     def one(self, kind: str) -> int:
-        """The next whole number."""
+        """Read the next whole number."""
         return int(self.take(kind, 1)[0])
 
     def line(self) -> int:
-        """The next whole number, which stands in text even in a binary section."""
+        """Read the next whole number of a count that is text even in a binary section."""
         if not isinstance(self.body, bytes):
             return self.one("size")
         end = self.body.find(b"\n", self.position)
@@ -102,7 +92,7 @@ class _Numbers:
 
 
 def read(path: Path, reading: Reading) -> Layout:
-    """Reads a .msh file; the file does not say its unit."""
+    """Read a .msh file, which states no unit."""
     data = path.read_bytes()
     mesh, table = _sections(data, path)
     if not mesh.rings:
@@ -166,7 +156,7 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
     order = "<"
     if binary and head is not None:
         order = "<" if head.split(b"\n", 1)[1][:4] == b"\x01\x00\x00\x00" else ">"
-    # Sizes are read as signed: no count of a real file reaches the sign bit, and a hostile one must not wrap.
+    # Sizes are read as signed numbers: no count of a real file reaches the sign bit, and a hostile one cannot wrap.
     wide = f"{order}i{8 if width == b'8' else 4}"
     mesh, table = _Mesh(), {}
 
@@ -273,9 +263,9 @@ def _elements_41(numbers: _Numbers, mesh: _Mesh) -> None:
 
 def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
     n = numbers.line()
-    left = n
+    remaining = n
     seen: dict[tuple[int, ...], int] = {}
-    while left > 0:
+    while remaining > 0:
         if numbers.binary:
             kind, follow, n_tags = map(int, numbers.take("int", 3))
             rows = numbers.take("int", follow * (1 + n_tags + _width(kind, numbers))).reshape(follow, -1)[:, 1:]
@@ -285,8 +275,8 @@ def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
             rows = numbers.take("int", n_tags + _width(kind, numbers)).reshape(1, -1)
         if follow < 1:
             raise ValueError(f"'{numbers.path}': its section $Elements has a header of {follow} elements; export again")
-        left -= follow
-        if kind in RINGS:
+        remaining -= follow
+        if kind in GMSH:
             surface = rows[:, 1] if n_tags > 1 else np.zeros(follow, dtype=np.int64)
             for row, tag in zip(rows, surface, strict=True):
                 group = int(row[0]) if n_tags else 0
@@ -309,10 +299,10 @@ def _width(kind: int, numbers: _Numbers) -> int:
 
 
 def _add(mesh: _Mesh, numbers: _Numbers, dimension: int, kind: int, nodes: np.ndarray, tags: np.ndarray) -> None:
-    if dimension != 2 or kind not in RINGS:
+    if dimension != 2 or kind not in GMSH:
         mesh.other_elements += len(nodes)
         return
-    rings = nodes[:, RINGS[kind]]
+    rings = ring_of_nodes(nodes, GMSH[kind])
     try:
         known = [mesh.points[int(node)] for node in rings.ravel()]
     except KeyError as error:
@@ -324,27 +314,20 @@ def _add(mesh: _Mesh, numbers: _Numbers, dimension: int, kind: int, nodes: np.nd
 
 
 def _with_table(layout: Layout, table: dict[str, dict[str, object]], tags: np.ndarray) -> Layout:
-    """What our own writer kept of each block beside its group, where the file still has all of them."""
+    """Add the rows of our own section to the layout, if it has one for every block."""
     rows = [table.get(str(tag)) for tag in tags]
     if not all(isinstance(row, dict) for row in rows):
         return layout
-    from blockvis.layout.block_table import with_rows
-
     return with_rows(layout, rows)
 
 
 def write(layout: Layout, path: Path) -> None:
-    """Writes .msh 4.1 ASCII: one surface per block, its corners as nodes, physical groups kept.
+    """Write .msh 4.1 ASCII: a surface per block, its corners as nodes, its group as physical group.
 
-    A block without a group is put into one named after its role, its material, or "blocks". A section of our own,
-    which other programs skip, keeps names, roles, materials, density and thickness.
+    The physical group of a block without a group is its role as a support, its material, or "blocks". A section of
+    our own, which other programs skip, holds names, roles, materials, density and thickness.
     """
-    from blockvis.layout.block_table import rows_of
-
-    groups = [
-        group or (role if role in ("fixed", "moving") else "") or material or "blocks"
-        for group, role, material in zip(layout.groups, layout.roles, layout.materials, strict=True)
-    ]
+    groups = layers_of(layout, "blocks")
     number = {group: k + 1 for k, group in enumerate(dict.fromkeys(groups))}
     nodes, elements, entities = [], [], []
     n_nodes = n_elements = n_parts = 0

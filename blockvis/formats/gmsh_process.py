@@ -1,8 +1,8 @@
 """Gmsh in a process of its own: ``python -m blockvis.formats.gmsh_process IN OUT CHORDS``.
 
-A geometry script can loop for ever, fill the memory or bring the library down; here it takes nothing else with it.
-OUT gets a mesh (.msh) where the file has surfaces only, or bodies as triangles (.json) where it has volumes; the last
-line on standard output says which. CHORDS is the number of chords of a full circle.
+A geometry script can loop for ever, fill the memory or crash the library; in its own process it harms nothing else.
+OUT is a mesh (.msh) if the file has surfaces only, or bodies of triangles (.json) if it has volumes; the last line on
+standard output says which. CHORDS is the number of chords of a full circle.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ NO_LIBRARY = 3
 
 
 def main(source: str, target: str, chords: str) -> int:
-    """Meshes a geometry file and writes what it found; 0 on success."""
+    """Mesh a geometry file and write its surfaces or bodies; return the exit code, 0 on success."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -43,7 +43,7 @@ def main(source: str, target: str, chords: str) -> int:
         else:
             gmsh.write(target + ".msh")
     except Exception as error:  # noqa: BLE001
-        # gmsh raises bare Exception with the last line of its log.
+        # gmsh raises a bare Exception with the last line of its log.
         sys.stderr.write(str(error))
         return 1
     finally:

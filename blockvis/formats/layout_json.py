@@ -1,4 +1,4 @@
-"""Our own layout file, .json: everything a drawing holds, in plain lists.
+"""Our own layout file, .json: everything a layout holds, in plain lists.
 
 {"format": "blockvis layout", "version": 1, "unit": "m",
  "blocks": [{"name": ..., "outline": [[x, y], ...], "group": ..., "role": ..., "material": ..., "thickness": ...,
@@ -21,7 +21,7 @@ FORMAT = "blockvis layout"
 
 
 def read(path: Path, reading: Reading) -> Layout:
-    """Reads a .json layout."""
+    """Read a .json layout."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
@@ -47,7 +47,7 @@ def read(path: Path, reading: Reading) -> Layout:
 
 
 def write(layout: Layout, path: Path) -> None:
-    """Writes a .json layout."""
+    """Write a .json layout."""
     blocks = [{**row, "outline": ring.tolist()} for row, ring in zip(rows_of(layout), layout.outlines, strict=True)]
     lines = ",\n  ".join(json.dumps(block, ensure_ascii=False) for block in blocks)
     head = f'"format": "{FORMAT}", "version": 1, "unit": "m"'

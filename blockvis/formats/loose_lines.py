@@ -1,4 +1,4 @@
-"""Loose lines to outlines: the faces between them."""
+"""From loose lines of a drawing to outlines: the faces between the lines."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-#: Ends closer than this fraction of the drawing meet.
+#: Ends of lines closer than this fraction of the size of the drawing meet.
 MEETS = 1e-6
 
 
@@ -20,7 +20,7 @@ class Line:
     points : (n, 2) or (n, 3) array
     layer, handle : str
     must_close : bool
-        A polyline, which was meant as an outline; a single line may also be a dimension or an axis.
+        Whether it is a polyline, and so part of an outline; a single line may also be a dimension or an axis.
     """
 
     points: np.ndarray
@@ -30,7 +30,13 @@ class Line:
 
 
 def faces_of_lines(lines: list[Line], path: Path) -> tuple[list[np.ndarray], list[str], int]:
-    """Faces between lines.
+    """Find the faces between lines.
+
+    Parameters
+    ----------
+    lines : list of Line
+    path : Path
+        Named in messages.
 
     Returns
     -------
@@ -43,7 +49,7 @@ def faces_of_lines(lines: list[Line], path: Path) -> tuple[list[np.ndarray], lis
     Raises
     ------
     ValueError
-        For a polyline that nothing closes, with its layer, handle and the ends of the gap; for a face with a hole.
+        For an open polyline, with its layer, handle and the ends of the gap; for a face with a hole.
     """
     import shapely
 
@@ -86,7 +92,7 @@ def _open_message(line: Line, path: Path) -> str:
 
 
 def _sharpened(ring: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
-    """Corners put back from the grid of the noding to the drawn points beside them."""
+    """Move the corners from the grid on which lines were intersected back to the drawn points beside them."""
     from scipy.spatial import cKDTree
 
     distance, nearest = cKDTree(points).query(ring)

@@ -1,4 +1,4 @@
-"""Every other mesh that meshio reads and that has surface cells: Abaqus, Nastran, MED, Medit, XDMF, SU2 ..."""
+"""Meshes with surface cells that meshio reads: Abaqus, Nastran, MED, Medit, XDMF, SU2 ..."""
 
 from __future__ import annotations
 
@@ -13,23 +13,18 @@ import numpy as np
 from blockvis.layout.layout import Layout
 
 from .cells import layout_of_cells
+from .node_order import MESHIO, ring_of_nodes
 from .reading import Reading
-
-#: Points around a surface cell, by meshio's name; None: all of them in order.
-RINGS: dict[str, tuple[int, ...] | None] = {
-    "triangle": None, "quad": None, "polygon": None, "triangle6": (0, 3, 1, 4, 2, 5), "triangle7": (0, 3, 1, 4, 2, 5),
-    "quad8": (0, 4, 1, 5, 2, 6, 3, 7), "quad9": (0, 4, 1, 5, 2, 6, 3, 7),
-}  # fmt: skip
 
 
 def read(path: Path, reading: Reading) -> Layout:
-    """Reads a mesh through meshio; it does not say its unit."""
+    """Read a mesh through meshio; it states no unit."""
     import meshio
 
     _check_text(path)
     said = io.StringIO()
     try:
-        # meshio prints to the terminal and on some files leaves the program by SystemExit.
+        # meshio prints to the terminal, and raises SystemExit for some files.
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             if path.suffix.lower() in (".tec", ".dat"):
                 mesh = meshio.read(_Ending(path.read_text(encoding="utf-8", errors="replace")), "tecplot")
@@ -45,14 +40,10 @@ def read(path: Path, reading: Reading) -> Layout:
     rings: list[np.ndarray] = []
     chosen: list[tuple[int, int]] = []
     for k, block in enumerate(mesh.cells):
-        order = RINGS.get(block.type, ())
-        if order == ():
-            if not block.type.startswith("polygon"):
-                continue
-            order = None
-        for cell in block.data:
-            nodes = np.asarray(cell, dtype=np.int64)
-            rings.append(nodes if order is None else nodes[list(order)])
+        kind = "polygon" if block.type.startswith("polygon") else block.type
+        if kind not in MESHIO:
+            continue
+        rings += [ring_of_nodes(np.asarray(cell, dtype=np.int64), MESHIO[kind]) for cell in block.data]
         chosen.append((k, len(block.data)))
     data: dict[str, np.ndarray] = {}
     for key, arrays in mesh.cell_data.items():
@@ -63,12 +54,12 @@ def read(path: Path, reading: Reading) -> Layout:
 
 
 class _Ending(io.StringIO):
-    """A text whose end is an error when it is read on and on: meshio's reader of Tecplot files waits for more."""
+    """A text that raises an error if it is read far beyond its end, as meshio's reader of Tecplot files does."""
 
     ends = 0
 
     def readline(self, size: int | None = -1, /) -> str:  # type: ignore[override]
-        """The next line."""
+        """Read the next line."""
         line = super().readline(-1 if size is None else size)
         self.ends = 0 if line else self.ends + 1
         if self.ends > 100:
@@ -77,7 +68,7 @@ class _Ending(io.StringIO):
 
 
 def _check_text(path: Path) -> None:
-    """Refuses what a reader would follow out of the folder, or count to without end."""
+    """Refuse names of files outside the folder, and counts that the file is too short for."""
     suffix = path.suffix.lower()
     if suffix in (".inp", ".xdmf", ".xmf"):
         text = path.read_text(encoding="utf-8", errors="replace")
@@ -96,7 +87,7 @@ def _check_text(path: Path) -> None:
 
 
 def _sets(mesh: Any, chosen: list[tuple[int, int]]) -> dict[str, np.ndarray]:
-    """Named cell sets (Abaqus ELSET, XDMF sets) as blocks, where every surface cell is in one of them."""
+    """Cell arrays of blocks from named cell sets (Abaqus ELSET, XDMF sets), if every surface cell is in one of them."""
     total = sum(n for _, n in chosen)
     start = (
         dict(zip((k for k, _ in chosen), np.cumsum([0] + [n for _, n in chosen[:-1]]), strict=True)) if chosen else {}

@@ -1,4 +1,4 @@
-"""Files of VTK, .vtu .vtp .vtk .vtm .pvd, through pyvista; and datasets that are in memory already."""
+"""Files of VTK, .vtu .vtp .vtk .vtm .pvd, and datasets in memory, through pyvista."""
 
 from __future__ import annotations
 
@@ -17,32 +17,28 @@ from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 
 from .cells import layout_of_cells, merged, row_of
+from .node_order import VTK, ring_of_nodes
 from .reading import Reading
 from .vtk_arrays import largest_number
 
 if TYPE_CHECKING:
     import pyvista
 
-#: Points around a surface cell, by VTK's cell type; None: all of them in order.
-RINGS: dict[int, tuple[int, ...] | None] = {
-    5: None, 7: None, 9: None, 8: (0, 1, 3, 2), 22: (0, 3, 1, 4, 2, 5), 34: (0, 3, 1, 4, 2, 5),
-    23: (0, 4, 1, 5, 2, 6, 3, 7), 28: (0, 4, 1, 5, 2, 6, 3, 7),
-}  # fmt: skip
-
+#: VTK's types of cells with a volume.
 SOLID_CELLS = {10, 11, 12, 13, 14, 15, 16, 24, 25, 26, 27, 29, 41, 42, 71, 72}
 
-#: zlib packs no better than 1032 to 1: a file that announces more than this many numbers per byte lies.
+#: zlib compresses at most 1032 to 1: a file cannot hold more than this many numbers per byte.
 MOST_PER_BYTE = 1100
 
 #: Numbers that all arrays of a file may hold together: 400 MB, a thousand times a large drawing.
 MOST_NUMBERS = 50_000_000
 
-#: Elements of an XML file of VTK are nested a handful deep.
+#: XML elements nested deeper than this are refused; VTK nests a handful.
 DEEPEST = 64
 
 
 def read(path: Path, reading: Reading) -> Layout:
-    """Reads a file of VTK; it does not say its unit."""
+    """Read a file of VTK, which states no unit."""
     import pyvista
     from vtkmodules.vtkCommonCore import vtkObject
 
@@ -50,7 +46,7 @@ def read(path: Path, reading: Reading) -> Layout:
     if path.suffix.lower() in (".pvd", ".vtm"):
         _check_parts(path)
     try:
-        # VTK writes every fault of a file to the terminal as well; the reason below is enough.
+        # VTK would print every fault of a file to the terminal as well; the message below has the reason.
         with warnings.catch_warnings(), pyvista.vtk_verbosity("off"):
             warnings.simplefilter("ignore")
             vtkObject.GlobalWarningDisplayOff()
@@ -66,7 +62,7 @@ def read(path: Path, reading: Reading) -> Layout:
 
 
 def _check_counts(path: Path) -> None:
-    """Refuses what the file cannot hold or should not, before VTK reserves memory for it and ends the process."""
+    """Refuse counts that the file is too short for, before VTK reserves memory for them and ends the process."""
     if path.suffix.lower() == ".vtk":
         _check_legacy(path)
     else:
@@ -96,7 +92,7 @@ def _check_legacy(path: Path) -> None:
 
 
 def _check_xml(path: Path) -> None:
-    """One pass with a parser of the standard library, which keeps nothing: entities, nesting, counts."""
+    """Check document type, nesting and counts in one pass of a parser that keeps nothing."""
     data = path.read_bytes()
     if not data.lstrip().startswith(b"<"):
         raise _not_vtk(path, data)
@@ -110,7 +106,7 @@ def _check_xml(path: Path) -> None:
     parser.StartElementHandler, parser.EndElementHandler = held.start, held.end
     parser.CharacterDataHandler = held.text
     try:
-        # In pieces: what has been refused is not read on; raw data may follow, which are no XML.
+        # In pieces, so that parsing stops at appended raw data, which are no XML.
         for first in range(0, len(data), 1 << 20):
             if not held.appended:
                 parser.Parse(data[first : first + (1 << 20)], False)
@@ -127,7 +123,7 @@ def _check_xml(path: Path) -> None:
 
 
 class _Held:
-    """What an XML file says that it holds, added up as its elements come."""
+    """Numbers of points, cells and values that an XML file announces, added up element by element."""
 
     def __init__(self, path: Path, size: int) -> None:
         self.path, self.size = path, size
@@ -139,6 +135,7 @@ class _Held:
         self.content: list[str] = []
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
+        """Check the counts of an element when it begins."""
         self.depth += 1
         if self.depth > DEEPEST:
             raise ValueError(
@@ -173,17 +170,19 @@ class _Held:
             self.appended = attributes.get("encoding", "base64")
 
     def end(self, tag: str) -> None:
+        """Check the offsets of cells when their element ends."""
         self.depth -= 1
         if self.offsets is not None:
             self.check_offsets("".join(self.content).strip().encode(), self.offsets)
             self.offsets = None
 
     def text(self, data: str) -> None:
+        """Collect the text of an element of offsets."""
         if self.offsets is not None:
             self.content.append(data)
 
     def check_offsets(self, content: bytes, attributes: dict[str, str]) -> None:
-        """The last offset is how many numbers VTK makes room for; it believes it."""
+        """Check the last offset: VTK reserves memory for so many numbers."""
         try:
             largest = largest_number(content, attributes, self.file, 8 * MOST_NUMBERS)
         except (ValueError, KeyError, OverflowError, zlib.error) as error:
@@ -208,7 +207,7 @@ def _not_vtk(path: Path, data: bytes) -> ValueError:
 
 
 def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
-    """Refuses lists of files (.pvd, .vtm) that name what is not there, not beside them, or not to be read."""
+    """Refuse lists of files (.pvd, .vtm) that name a missing file, one outside the folder, or one of no VTK format."""
     if path in seen:
         raise ValueError(f"'{path}' names itself; export it again")
     data = path.read_text(encoding="utf-8", errors="replace")
@@ -227,7 +226,7 @@ def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
 
 
 def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
-    """The drawing of a pyvista dataset: a mesh, or a multiblock of meshes.
+    """Make a layout of a pyvista dataset: a mesh, or a multiblock of meshes.
 
     Parameters
     ----------
@@ -247,16 +246,15 @@ def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
             labels.append("" if re.fullmatch(r"Block-\d+", name) else name)
         return merged(parts, labels, path)
     grid = _as_cells(data, path)
-    flat_types = np.asarray(grid.celltypes)
-    if np.isin(flat_types, list(SOLID_CELLS)).any():
+    types = np.asarray(grid.celltypes)
+    if np.isin(types, list(SOLID_CELLS)).any():
         return _layout_of_solids(grid, path)
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
-    surface = np.flatnonzero(np.isin(flat_types, list(RINGS)))
+    surface = np.flatnonzero(np.isin(types, list(VTK)))
     rings = []
     for cell in surface:
         nodes = connectivity[offset[cell] : offset[cell + 1]].astype(np.int64)
-        order = RINGS[int(flat_types[cell])]
-        rings.append(nodes if order is None else nodes[list(order)])
+        rings.append(ring_of_nodes(nodes, VTK[int(types[cell])]))
     cell_data = {str(key): np.asarray(grid.cell_data[key])[surface] for key in grid.cell_data}
     return layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path)
 
@@ -290,7 +288,7 @@ def _layout_of_solids(grid: Any, path: Path | str) -> Layout:
 
 
 def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:
-    """A dataset of one polygon cell per block, with the arrays that the reader understands."""
+    """Make a dataset of a polygon cell per block, with the cell arrays that the reader understands."""
     import pyvista
 
     counts = [len(ring) for ring in layout.outlines]
@@ -312,7 +310,7 @@ def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:
 
 
 def _add_words(attributes: Any, name: str, words: list[str]) -> None:
-    """A string array, filled by hand: pyvista refuses letters beyond ASCII, which VTK's files carry well."""
+    """Add a string array without pyvista, which refuses letters beyond ASCII although VTK writes them."""
     from vtkmodules.vtkCommonCore import vtkStringArray
 
     array = vtkStringArray()
@@ -324,7 +322,7 @@ def _add_words(attributes: Any, name: str, words: list[str]) -> None:
 
 
 def write(layout: Layout, path: Path) -> None:
-    """Writes .vtu, .vtp or .vtk: a polygon cell per block, double precision, lengths in m."""
+    """Write .vtu, .vtp or .vtk: a polygon cell per block, double precision, lengths in m."""
     grid = dataset_of(layout)
     if path.suffix.lower() == ".vtp":
         surface = _surface(grid)

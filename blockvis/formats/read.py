@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,16 +15,17 @@ from blockvis.atomic_files import whole_file
 from blockvis.formats import FORMATS, Format
 from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
-from blockvis.layout.layout import Layout, layout_of, ring_areas
-from blockvis.layout.outlines import without_collinear
+from blockvis.layout.layout import Layout, layout_of
+from blockvis.layout.outlines import ring_area, without_collinear
 from blockvis.layout.units import chosen_unit, metres_per
+from blockvis.suggestions import files_like
 
 from .reading import Reading
 
-#: Coordinates beyond this [m] belong to no building on Earth; double precision leaves less than 0.1 mm there.
+#: Largest coordinate [m], larger than the Earth; double precision resolves 1e-8 m there.
 LARGEST_COORDINATE = 1e8
 
-#: Corners of one block: more make checks quadratic in them expensive and are never meant.
+#: Most corners of one block: more indicate a bad export, and some checks take the square of their number.
 MOST_CORNERS = 2000
 
 
@@ -34,25 +34,30 @@ class MissingFile(FileNotFoundError, ValueError):
 
 
 def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: float | None = None) -> Layout:
-    """Reads the blocks that a file draws.
+    """Read the blocks of a layout file.
 
     Parameters
     ----------
     path : str or Path
         The suffix chooses the format; see :data:`blockvis.formats.FORMATS`.
     unit : str, optional
-        Unit of the file's lengths; holds over what the file says.
+        Unit of the file's lengths; it replaces the one that the file states.
     chord_tolerance : float, optional [m]
-        Largest distance of an arc from the chords that replace it; a thousandth of its radius where not given.
+        Largest distance of an arc from the chords that replace it; by default a thousandth of its radius.
+
+    Returns
+    -------
+    Layout
+        Lengths in m, outlines without collinear points.
 
     Raises
     ------
     ValueError
-        With the reason and the remedy, for whatever is not a drawing of blocks.
+        With the reason and the remedy, for a file that is missing, damaged or no layout.
     """
     path = Path(path)
     if not path.exists():
-        near = difflib.get_close_matches(path.name, _names_in(path.parent), n=3)
+        near = files_like(path)
         hint = f"; did you mean {' or '.join(near)}?" if near else "; check the path"
         raise MissingFile(f"there is no file '{path}'{hint}")
     if path.is_dir():
@@ -71,7 +76,7 @@ def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: f
                 f"'{path}': block '{layout.names[i]}' has a corner at {bad.tolist()}; "
                 "coordinates must be finite numbers: repair the file"
             )
-    sizes = np.sqrt(np.abs(ring_areas(layout.outlines)))
+    sizes = np.sqrt([abs(ring_area(ring)) for ring in layout.outlines])
     chosen, note = chosen_unit(unit, layout.unit, sizes)
     factor = metres_per(chosen)
     outlines = tuple(without_collinear(ring * factor) for ring in layout.outlines)
@@ -92,7 +97,7 @@ def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: f
 
 
 def write_layout(layout: Layout, path: str | Path) -> None:
-    """Writes a drawing to a layout file; the suffix chooses the format, lengths in m."""
+    """Write a layout to a file; the suffix chooses the format, lengths in m."""
     if layout.n_blocks == 0:
         raise ValueError(f"there is no block to write to '{path}'")
     _write_by_suffix(layout, Path(path))
@@ -110,7 +115,20 @@ def read(
     overlap_tolerance: float | None = None,
     chord_tolerance: float | None = None,
 ) -> solver.Assembly:
-    """Reads a layout file into an assembly; parameters of :func:`read_layout` and :func:`assemble`."""
+    """Read a layout file into an assembly.
+
+    Parameters
+    ----------
+    path : str or Path
+    roles, supports, density, thickness, joint_thickness, overlap_tolerance
+        As of :func:`blockvis.layout.assemble.assemble`.
+    unit, chord_tolerance
+        As of :func:`read_layout`.
+
+    Returns
+    -------
+    solver.Assembly
+    """
     layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance)
     return assemble(
         layout,
@@ -124,33 +142,29 @@ def read(
 
 
 def save_layout(assembly: solver.Assembly, path: str | Path, *, pose: solver.Pose | None = None) -> None:
-    """Writes an assembly to a layout file, as drawn or where a pose has its blocks."""
+    """Write an assembly to a layout file, its blocks as drawn or as displaced in a pose."""
     write_layout(layout_of(assembly, pose=pose), path)
 
 
 def inspect(path: str | Path, *, unit: str | None = None) -> Inspection:
-    """Reads a layout file and measures what it holds.
+    """Read a layout file and measure it.
 
     Parameters
     ----------
     path : str or Path
     unit : str, optional
-        Unit of the file's lengths; holds over what the file says.
+        Unit of the file's lengths; it replaces the one that the file states.
     """
     return inspected(read_layout(path, unit=unit))
 
 
-def _names_in(folder: Path) -> list[str]:
-    return [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
-
-
 def _read_by_suffix(path: Path, reading: Reading) -> Layout:
-    """Reads a file through the module that its suffix names."""
+    """Read a file with the module of its suffix."""
     return _module_of(path, "read").read(path, reading)
 
 
 def _write_by_suffix(layout: Layout, path: Path) -> None:
-    """Writes a file, whole or not at all, through the module that its suffix names."""
+    """Write a file, whole or not at all, with the module of its suffix."""
     module = _module_of(path, "write")
     with whole_file(path) as partial:
         module.write(layout, partial)

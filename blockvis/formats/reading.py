@@ -1,4 +1,4 @@
-"""What the caller asks of a reader."""
+"""Options of a reader."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Reading:
-    """What the caller asks of a reader.
+    """Options of a reader.
 
     Attributes
     ----------
     unit : str or None
-        Unit of the file's lengths, where the caller knows it.
+        Unit of the file's lengths, if the caller gives it.
     chord_tolerance : float or None [m]
         Largest distance of an arc from its chords.
     """

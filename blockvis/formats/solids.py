@@ -13,15 +13,15 @@ import numpy as np
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import FLAT, outlines_of_cells
+from blockvis.layout.triangulation import triangles_of_ring
 
 from .cells import components, layout_of_cells, merged
 from .reading import Reading
-from .triangles import triangles_of_ring
 
-#: Points closer than this fraction of the drawing are one: single precision leaves 6e-8 of a coordinate.
+#: Points closer than this fraction of the size of the drawing are one: single precision is accurate to 6e-8.
 SAME_POINT = 2e-6
 
-#: A face whose normal leaves the axis or its plane by more than this (sine) makes a body no prism.
+#: In a prism the sine of the angle between a face's normal and the axis, or the plane across it, is at most this.
 SQUARE = 1e-3
 
 
@@ -35,7 +35,7 @@ class Body:
 
 
 def read(path: Path, reading: Reading) -> Layout:
-    """Reads bodies or a flat mesh; .glb is in metres, the other formats do not say their unit."""
+    """Read bodies or a flat mesh; .glb is in metres, the other formats state no unit."""
     import trimesh
 
     suffix = path.suffix.lower()
@@ -53,7 +53,7 @@ def read(path: Path, reading: Reading) -> Layout:
             named = {name: k for k, name in enumerate(_object_names(path))}
             parts.sort(key=lambda part: named.get(part[0], len(named)))
     except Exception as error:  # noqa: BLE001
-        # trimesh lets the errors of whatever parser it uses through.
+        # trimesh passes on the errors of whatever parser it uses.
         reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
         raise ValueError(f"'{path}' cannot be read as {suffix} ({reason}); export it again") from None
     if not parts:
@@ -76,7 +76,7 @@ def read(path: Path, reading: Reading) -> Layout:
         return replace(_flat(parts, size, path, rows), unit=unit)
     bodies = [body for part in parts for body in _bodies(*part, size, path)]
     if suffix == ".obj":
-        # Its reader returns the objects in an order of its own; their names say which is which.
+        # The reader returns the objects in an order of its own: rows are matched to them by name.
         by_name = {row.get("name"): row for row in rows}
         rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
@@ -84,7 +84,7 @@ def read(path: Path, reading: Reading) -> Layout:
 
 
 def _placed(scene: Any) -> list[tuple[str, Any]]:
-    """Meshes of a scene where its transforms put them, by the name of their node."""
+    """Meshes of a scene with its transforms applied, and their names."""
     found = []
     order = {name: k for k, name in enumerate(scene.geometry)}
     placed = [(*scene.graph[node], str(node)) for node in scene.graph.nodes_geometry]
@@ -96,7 +96,7 @@ def _placed(scene: Any) -> list[tuple[str, Any]]:
 
 
 def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """The parts of a .ply whose faces carry the number of their block, one part per number."""
+    """Split a .ply whose faces have a ``block_id`` into one part per number."""
     raw = next(iter(scene.geometry.values())).metadata.get("_ply_raw", {})
     data = raw.get("face", {}).get("data")
     names = getattr(getattr(data, "dtype", None), "names", None) or (data if isinstance(data, dict) else ())
@@ -109,13 +109,13 @@ def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any) -> li
     return [(f"block {value}", points, faces[ids == value]) for value in np.unique(ids).tolist()]
 
 
-def _welded(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """One number for points that coincide; faces without area dropped."""
+def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Merge points that coincide, and drop the faces that have no area then."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    # Exact copies first: a million of them must not become a million squared pairs.
+    # Exact copies first: a million of them would make a million squared pairs.
     unique, inverse = np.unique(points, axis=0, return_inverse=True)
     pairs = cKDTree(unique).query_pairs(SAME_POINT * size, output_type="ndarray")
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(unique), len(unique)))
@@ -127,7 +127,7 @@ def _welded(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndar
 
 
 def _bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path: Path) -> list[Body]:
-    points, faces = _welded(points, faces, size)
+    points, faces = _with_points_merged(points, faces, size)
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     if (counts == 1).any():
@@ -143,7 +143,7 @@ def _bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path:
             f"edges belong to more than two faces, one around ({x:.6g}, {y:.6g}, {z:.6g}); "
             "export one file or one named object per block (.obj, .glb, .step)"
         )
-    # Through edges, not through points: blocks that touch in a corner stay two.
+    # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.
     inverse = inverse.ravel().reshape(-1, 3)
     piece = components(list(inverse), len(unique))
     n = int(piece.max()) + 1
@@ -151,7 +151,7 @@ def _bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path:
 
 
 def layout_of_bodies(bodies: Sequence[Body], path: Path | str, rows: Sequence[dict[str, Any]] = ()) -> Layout:
-    """Outlines and thicknesses of prismatic bodies, cut by the plane of their common extrusion.
+    """Make a layout of prismatic bodies: outlines across the axis of their extrusion, thicknesses along it.
 
     Parameters
     ----------
@@ -160,12 +160,12 @@ def layout_of_bodies(bodies: Sequence[Body], path: Path | str, rows: Sequence[di
     path : Path or str
         Named in messages.
     rows : sequence of dict
-        What is known of each body beside its name.
+        Rows of the block table, one per body.
 
     Raises
     ------
     ValueError
-        Where no axis makes all bodies prisms.
+        If the bodies are not all prisms along one axis.
     """
     if not bodies:
         raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
@@ -180,7 +180,7 @@ def layout_of_bodies(bodies: Sequence[Body], path: Path | str, rows: Sequence[di
             continue
         depths = np.array([np.ptp(body.points[np.unique(body.faces)][:, axis]) for body in bodies])
         ends = np.array([body.points[np.unique(body.faces)][:, axis].min() for body in bodies])
-        # All bodies lie between the same two planes along the axis of extrusion.
+        # Along the axis of extrusion all bodies lie between the same two planes: take the axis that comes closest.
         scatter = float(np.ptp(depths) + np.ptp(ends)) / size
         if best is None or scatter < best[0] - 1e-4:
             best = (scatter, axis)
@@ -190,7 +190,7 @@ def layout_of_bodies(bodies: Sequence[Body], path: Path | str, rows: Sequence[di
             "export extrusions of the blocks' outlines, or draw them in the plane"
         )
     axis = best[1]
-    # Seen so that the picture is not mirrored: from +z, from -y, from +x.
+    # The view from +z, -y or +x, which mirrors nothing.
     first, second = {2: (0, 1), 1: (0, 2), 0: (1, 2)}[axis]
     outlines, depth = [], []
     for body in bodies:
@@ -224,19 +224,19 @@ def _is_prism(body: Body, axis: int, size: float) -> bool:
 def _flat(
     parts: list[tuple[str, np.ndarray, np.ndarray]], size: float, path: Path, rows: list[dict[str, Any]]
 ) -> Layout:
-    drawings = [layout_of_cells(points, list(faces), {}, path) for _, points, faces in parts]
-    layout = merged(drawings, [name for name, _, _ in parts], path)
+    layouts = [layout_of_cells(points, list(faces), {}, path) for _, points, faces in parts]
+    layout = merged(layouts, [name for name, _, _ in parts], path)
     return with_rows(layout, rows) if len(rows) == layout.n_blocks else layout
 
 
 def _object_names(path: Path) -> list[str]:
-    """Names of the objects of an .obj file in its order."""
+    """Names of the objects of an .obj file, in the order of the file."""
     with path.open("rb") as stream:
         return [line[2:].decode("utf-8", "replace").strip() for line in stream if line.startswith(b"o ")]
 
 
 def _own_rows(path: Path) -> list[dict[str, Any]]:
-    """What our own writer kept in comments, one JSON line per block."""
+    """Read the rows of the block table that our own writer puts into comments, one line of JSON per block."""
     if path.suffix.lower() not in (".obj", ".ply"):
         return []
     rows = []
@@ -263,7 +263,7 @@ def _prism(ring: np.ndarray, thickness: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def write(layout: Layout, path: Path) -> None:
-    """Writes .stl, .obj or .ply as text: each block extruded along z by its thickness, 1 m where it has none."""
+    """Write .stl, .obj or .ply as text: each block extruded along z by its thickness, 1 m if it has none."""
     depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
     prisms = [_prism(ring, float(t)) for ring, t in zip(layout.outlines, depth, strict=True)]
     rows = rows_of(layout)

@@ -1,7 +1,7 @@
-"""Vector drawings, .svg: closed shapes are blocks; layers, ids and titles are kept; y points down there, up here.
+"""Vector drawings, .svg: closed shapes are blocks; layers, ids and titles are kept; y is turned to point up.
 
-A parser of our own on the standard library. Entities and document types are refused before parsing: no drawing needs
-them, and they can be made to fill any memory.
+The parser is that of the standard library. Document types with entities are refused before parsing: no drawing needs
+them, and they can fill any memory.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 import solver
-from blockvis.layout.block_table import rows_of, with_rows
+from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import LARGEST_CHORD
 from blockvis.layout.units import UNITS, metres_per
@@ -28,7 +28,7 @@ from .reading import Reading
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _COMMAND = re.compile(r"([MmZzLlHhVvCcSsQqTtAa])([^MmZzLlHhVvCcSsQqTtAa]*)")
-#: The two flags of an arc may stand without anything between them and the next number.
+#: Nothing need separate the two flags of an arc from each other and from the next number.
 _ARC = re.compile(
     rf"({_NUMBER})[\s,]*({_NUMBER})[\s,]*({_NUMBER})[\s,]*([01])[\s,]*([01])[\s,]*({_NUMBER})[\s,]*({_NUMBER})"
 )
@@ -38,16 +38,16 @@ _INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}"
 #: Numbers that follow each path command.
 _TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 
-#: Groups nested deeper than this are no drawing.
+#: Groups nested deeper than this are refused.
 DEEPEST = 200
 
-#: Chords of one curve: finer than any drawing, and a bound on what a small file can ask for.
+#: Most chords of one curve: finer than any drawing, and a bound on the memory that a small file can fill.
 MOST_CHORDS = 512
 
 
 @dataclass
 class _Found:
-    """What the elements gave so far, in user units, y down."""
+    """Outlines found so far, in user units, y down."""
 
     rings: list[np.ndarray] = field(default_factory=list)
     rows: list[dict[str, Any]] = field(default_factory=list)
@@ -57,7 +57,7 @@ class _Found:
 
 @dataclass(frozen=True)
 class _Where:
-    """Where an element stands: the transform of its parents, its layer, and how far chords may lie off a curve."""
+    """Context of an element: transform of its parents, layer, and largest distance of chords from a curve."""
 
     matrix: np.ndarray
     layer: str
@@ -67,7 +67,7 @@ class _Where:
 
 
 def read(path: Path, reading: Reading) -> Layout:
-    """Reads a .svg drawing; width and height beside the viewBox name its unit."""
+    """Read a .svg drawing; its unit follows from its width and its viewBox."""
     text = path.read_bytes()
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise ValueError(f"'{path}' is not in UTF-8; save it as plain SVG")
@@ -96,7 +96,7 @@ def read(path: Path, reading: Reading) -> Layout:
 
 
 def _unit(root: ElementTree.Element) -> str:
-    """The unit of the drawing where one user unit is one of it; "" where the file does not say."""
+    """Find the unit of length that one user unit is; "" if the file does not state it."""
     width, box = root.get("width", ""), root.get("viewBox", "").replace(",", " ").split()
     match = re.fullmatch(rf"\s*({_NUMBER})\s*([a-z]+)\s*", width)
     if not match or match[2] not in UNITS or match[2] == "px":
@@ -263,7 +263,7 @@ def _chords(sweep: float, radius: float, where: _Where) -> int:
 
 
 def _tokens(d: str) -> list[tuple[str, str]]:
-    """Commands and numbers of a path in order, as pairs of which one is empty."""
+    """Split a path into (command, "") and ("", number), in order."""
     tokens = []
     for command, arguments in _COMMAND.findall(d):
         tokens.append((command, ""))
@@ -276,7 +276,7 @@ def _tokens(d: str) -> list[tuple[str, str]]:
 
 
 def _path(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
-    """Subpaths of a path as points, and whether each was closed by Z."""
+    """Points of each subpath, and whether Z closes it."""
     tokens = _tokens(element.get("d", ""))
     parts: list[tuple[np.ndarray, bool]] = []
     points: list[np.ndarray] = []
@@ -328,7 +328,7 @@ def _path(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray,
 
 
 def _bezier(controls: list[np.ndarray], where: _Where) -> list[np.ndarray]:
-    """Points of a quadratic or cubic curve after its start."""
+    """Points of a quadratic or cubic Bézier curve after its start."""
     c = np.array(controls)
     degree = len(c) - 1
     size = float(np.ptp(c, axis=0).max())
@@ -351,7 +351,7 @@ def _arc(start: np.ndarray, end: np.ndarray, v: list[float], where: _Where) -> l
     half = rotation.T @ (start - end) / 2.0 / [rx, ry]
     grow = float(half @ half)
     if not (math.isfinite(grow) and grow > 1e-24):
-        # Ends that coincide against the radii, or numbers beyond the largest: a straight line.
+        # The ends coincide compared with the radii, or numbers overflow: a straight line.
         return [end]
     if grow > 1:
         rx, ry, half = rx * math.sqrt(grow), ry * math.sqrt(grow), half / math.sqrt(grow)
@@ -381,7 +381,7 @@ _SHAPES: dict[str, Callable[[ElementTree.Element, _Where], list[tuple[np.ndarray
 
 
 def write(layout: Layout, path: Path) -> None:
-    """Writes .svg in m: a layer per group, role or material, a path per block with its name as title."""
+    """Write .svg in m: a layer per group, role or material, a path per block with its name as title."""
     every = np.concatenate(layout.outlines)
     low, high = every.min(axis=0), every.max(axis=0)
     size = np.maximum(high - low, 1e-9)
@@ -393,16 +393,13 @@ def write(layout: Layout, path: Path) -> None:
         'data-blockvis-unit="m">',
     ]
     rows = rows_of(layout)
-    labels = [
-        group or (role if role in ("fixed", "moving") else "") or material or "blocks"
-        for group, role, material in zip(layout.groups, layout.roles, layout.materials, strict=True)
-    ]
-    # One group per run of equal labels keeps the order of the blocks.
+    layers = layers_of(layout, "blocks")
+    # Blocks keep their order: a new group begins whenever the layer changes.
     for i, row in enumerate(rows):
-        if i == 0 or labels[i] != labels[i - 1]:
+        if i == 0 or layers[i] != layers[i - 1]:
             lines += ["</g>"] if i else []
             lines.append(
-                f'<g inkscape:groupmode="layer" inkscape:label={quoteattr(labels[i])} fill="#e0cfae" stroke="#333" '
+                f'<g inkscape:groupmode="layer" inkscape:label={quoteattr(layers[i])} fill="#e0cfae" stroke="#333" '
                 f'stroke-width="{0.1 * margin:.4g}">'
             )
         points = " L ".join(f"{float(x)!r},{-float(y)!r}" for x, y in layout.outlines[i])

@@ -1,4 +1,4 @@
-"""Numbers out of the arrays of VTK's XML files, without VTK: what it would reserve memory for unasked."""
+"""Numbers in the arrays of VTK's XML files, read without VTK, which would reserve memory for any count."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ _TYPES = {f"{sign}Int{bits}": f"{'u' if sign else 'i'}{bits // 8}" for sign in (
 
 
 def largest_number(text: bytes, attributes: dict[str, str], file: dict[str, str], most: int) -> int:
-    """The number of largest size, sign or not, in an array of whole numbers.
+    """Find the largest absolute value in an array of whole numbers.
 
     Parameters
     ----------
     text : bytes
-        Content of the array, or of the file's appended data from where the array begins.
+        Content of the array, or the file's appended data from the beginning of the array on.
     attributes, file : dict of str to str
-        Of the array's element, ``format`` "ascii", "binary" (base64) or "raw", and of the file's.
+        XML attributes of the array, with ``format`` "ascii", "binary" (base64) or "raw", and of the file.
     most : int
-        Bytes the array may have.
+        Largest size of the array [bytes].
 
     Raises
     ------
     ValueError
-        If the array cannot be unpacked, or is larger than that.
+        If the array cannot be unpacked or is too large.
     """
     if attributes.get("format", "ascii") == "ascii":
         numbers = np.array(re.findall(rb"-?\d{1,18}", text), dtype=np.int64)
@@ -40,7 +40,7 @@ def largest_number(text: bytes, attributes: dict[str, str], file: dict[str, str]
 
 
 def _unpacked(text: bytes, raw: bool, word: np.dtype, compressor: str, most: int) -> bytes:
-    """The bytes of an array: a header of words, then the data, in one piece or in compressed chunks."""
+    """Unpack an array: a header of words, then the data, in one piece or in compressed chunks."""
     if not compressor:
         size = _words(text, raw, word, 1)[0]
         if size > most:
@@ -69,7 +69,7 @@ def _words(text: bytes, raw: bool, word: np.dtype, count: int) -> list[int]:
 
 
 def _bytes(text: bytes, raw: bool, count: int) -> bytes:
-    """The first bytes of what is written plain or in base 64."""
+    """Read the first bytes of plain data or of base 64."""
     data = text[:count] if raw else base64.b64decode(text[: 4 * -(-count // 3)])[:count]
     if len(data) < count:
         raise ValueError(f"{len(data)} bytes where {count} should be")

@@ -1,4 +1,4 @@
-"""Parametric layouts in masonry terms; each comes with its ground."""
+"""Parametric layouts: arches, frames and walls, each with its ground."""
 
 from .arches import arch, basket_handle_arch, pointed_arch, segmental_arch
 from .catalogue import LAYOUTS, build, parameters_of

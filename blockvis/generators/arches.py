@@ -22,7 +22,7 @@ def arch(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """A circular arch of equal voussoirs between two springers.
+    """Build a circular arch of equal voussoirs between two springers.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def arch(
     embrace : float [degrees]
         Angle between the springing joints, at most 180.
     voussoirs : int
-        Quadrilaterals with all four corners on the circles.
+        Number of voussoirs, quadrilaterals with all four corners on the circles.
     density : float [kg/m³]
     depth : float [m]
         Out of plane.
@@ -72,7 +72,7 @@ def segmental_arch(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """An arch along one arc of a circle, by span and rise.
+    """Build an arch along one arc of a circle, by span and rise.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def segmental_arch(
     thickness : float [m]
         Radial.
     voussoirs : int
-        Quadrilaterals with all four corners on the circles.
+        Number of voussoirs, quadrilaterals with all four corners on the circles.
     density : float [kg/m³]
     depth : float [m]
         Out of plane.
@@ -110,7 +110,7 @@ def pointed_arch(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """A pointed (Gothic) arch: two arcs with their centres on the springing line.
+    """Build a pointed (Gothic) arch: two arcs with their centres on the springing line.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def pointed_arch(
     thickness : float [m]
         Radial.
     voussoirs : int
-        An even number meets in a joint at the apex, an odd one has a keystone astride it.
+        An even number has a joint at the apex, an odd number a keystone.
     density : float [kg/m³]
     depth : float [m]
         Out of plane.
@@ -170,7 +170,7 @@ def basket_handle_arch(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """A basket-handle (three-centred) arch: three arcs of 60° that run into each other without a kink.
+    """Build a basket-handle (three-centred) arch: three arcs of 60° that join without a kink.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def basket_handle_arch(
     thickness : float [m]
         Radial.
     voussoirs : int
-        Equally long along the intrados.
+        Number of voussoirs, equally long along the intrados.
     density : float [kg/m³]
     depth : float [m]
         Out of plane.
@@ -212,10 +212,10 @@ def basket_handle_arch(
     crown, sixty = haunch + apart, math.pi / 3.0
     lengths = np.array([haunch, crown, haunch]) * sixty
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
-    along = np.linspace(0.0, ends[-1], n + 1)
-    angles = math.pi - np.interp(along, ends, sixty * np.arange(4))
+    arc_length = np.linspace(0.0, ends[-1], n + 1)
+    angles = math.pi - np.interp(arc_length, ends, sixty * np.arange(4))
     centres = np.array([[-apart / 2.0, 0.0], [0.0, -apart * math.sqrt(3.0) / 2.0], [apart / 2.0, 0.0]])
-    arc = np.clip(np.searchsorted(ends, along, side="right") - 1, 0, 2)
+    arc = np.clip(np.searchsorted(ends, arc_length, side="right") - 1, 0, 2)
     radii = np.array([haunch, crown, haunch])[arc]
     direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     radial = np.stack([radii, radii + thickness], axis=1)
@@ -224,7 +224,7 @@ def basket_handle_arch(
 
 
 def radial_joints(inner: float, outer: float, angles: np.ndarray) -> np.ndarray:
-    """Joints of an arch along a circle about the origin.
+    """Lay out the joints of an arch along a circle about the origin.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def radial_joints(inner: float, outer: float, angles: np.ndarray) -> np.ndarray:
 
 
 def segmental_joints(span: float, rise: float, thickness: float, voussoirs: int) -> tuple[np.ndarray, np.ndarray]:
-    """Joints of a segmental arch over the middle of its span, and their angles.
+    """Lay out the joints of a segmental arch, the middle of its span at x = 0.
 
     Parameters
     ----------
@@ -266,7 +266,7 @@ def segmental_joints(span: float, rise: float, thickness: float, voussoirs: int)
             "take a pointed arch"
         )
     radius = (span**2 / 4.0 + rise**2) / (2.0 * rise)
-    # Of the semicircle exactly a quarter turn, which the arcsine gives to half the digits only.
+    # Half of the angle of a semicircle is set exactly: an arctangent would miss it by rounding.
     half = math.pi / 2.0 if rise >= span / 2.0 else math.atan2(span / 2.0, radius - rise)
     angles = np.linspace(math.pi / 2.0 + half, math.pi / 2.0 - half, n + 1)
     joints = radial_joints(radius, radius + thickness, angles) - np.array([0.0, radius - rise])
@@ -277,12 +277,12 @@ def segmental_joints(span: float, rise: float, thickness: float, voussoirs: int)
 
 
 def voussoir_outlines(joints: np.ndarray) -> list[np.ndarray]:
-    """The quadrilaterals between (n + 1, 2, 2) joints [m], n outlines from left to right."""
+    """Outline the n voussoirs between (n + 1, 2, 2) joints [m], from left to right."""
     return [np.array([a[0], a[1], b[1], b[0]]) for a, b in pairwise(joints)]
 
 
 def _bearings(joints: np.ndarray) -> np.ndarray:
-    """The first and last of the joints, (2, 2, 2) array [m], lengthened by half the arch's thickness at either end."""
+    """(2, 2, 2) array [m]: the first and the last joint, lengthened by half the arch's thickness at either end."""
     springing = joints[[0, -1]]
     half = (springing[:, 1] - springing[:, 0]) / 2.0
     return springing + np.stack([-half, half], axis=1)
@@ -296,7 +296,7 @@ def _on_springers(
     density: float,
     depth: float,
 ) -> solver.Assembly:
-    """The arch between a fixed springer on the left and a moving one on the right, both twice its thickness deep."""
+    """Put an arch between a fixed springer on the left and a moving one on the right, twice its thickness deep."""
     n = len(outlines)
     outlines = list(outlines)
     for joint, angle, sense in ((bearings[0], angles[0], 1.0), (bearings[-1], angles[-1], -1.0)):

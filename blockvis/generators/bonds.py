@@ -1,4 +1,4 @@
-"""Bonds: where the head joints of each course are."""
+"""Bonds: positions of the head joints of each course."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 
 BONDS = ("running", "stack", "english")
 
-#: A brick cut shorter than this fraction of its length is joined to its neighbour: shorter than the closer (a quarter)
-#: that a mason would still lay.
+#: A brick cut shorter than this fraction of its length is joined to its neighbour: a mason lays no piece shorter than a
+#: closer, a quarter of a brick.
 SHORTEST_BRICK = 0.2
 
 
 def head_joints(bond: str, course: int, width: float, brick_length: float) -> np.ndarray:
-    """Head joints of one course of a wall, both ends included.
+    """Position the head joints of one course of a wall, both ends included.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def head_joints(bond: str, course: int, width: float, brick_length: float) -> np
     Returns
     -------
     (n,) array [m]
-        From 0 to the width; a last brick that would be too short is joined to the one before.
+        From 0 to the width; a brick too short at either end is joined to its neighbour.
 
     Examples
     --------

@@ -13,19 +13,25 @@ from blockvis.layout.outlines import without_collinear
 
 from .bonds import SHORTEST_BRICK, head_joints
 
-#: All corners lie on a grid of this fraction of the brick height, so that cuts leave no splinters of rounding errors.
+#: All corners lie on a grid of this fraction of the brick height, so that cuts leave no slivers of rounding errors.
 GRID = 1e-10
 
-#: A piece lower than this fraction of a course is joined to a neighbour, like one that is too short.
+#: A piece lower than this fraction of a course is joined to a neighbour.
 LOWEST_BRICK = 0.3
 
 #: So is a piece into which no circle of this fraction of the brick height in diameter fits: the end of a wedge.
 NARROWEST = 0.25
 
+#: Pieces are joined along at least this fraction of the brick height, not where they touch at a corner,
+LEAST_SHARED = 0.01
+
+#: or along this fraction of the sliver's own perimeter: one so small that all its edges are shorter is joined, too.
+LEAST_OF_PERIMETER = 0.05
+
 
 @dataclass(frozen=True)
 class Bond:
-    """How a wall is bonded.
+    """Bond of a wall and size of its bricks.
 
     Attributes
     ----------
@@ -45,7 +51,7 @@ class Bond:
 
 @dataclass(frozen=True)
 class Brick:
-    """A brick or what is left of it.
+    """A brick, or a part of one that an opening cuts.
 
     Attributes
     ----------
@@ -59,7 +65,19 @@ class Brick:
 
 
 def lay_bricks(bond: Bond, width: float, courses: int) -> list[Brick]:
-    """The bricks of a wall without openings, course by course from the left; its lower left corner is (0, 0)."""
+    """Lay the bricks of a wall without openings.
+
+    Parameters
+    ----------
+    bond : Bond
+    width : float [m]
+    courses : int
+
+    Returns
+    -------
+    list of Brick
+        Course by course from the left; the lower left corner of the wall is (0, 0).
+    """
     bricks = []
     levels = bond.brick_height * np.arange(courses + 1)
     for course in range(courses):
@@ -71,7 +89,7 @@ def lay_bricks(bond: Bond, width: float, courses: int) -> list[Brick]:
 
 
 def cut_bricks(bond: Bond, bricks: Sequence[Brick], rings: Sequence[np.ndarray]) -> list[Brick]:
-    """What is left of the bricks outside the rings.
+    """Cut bricks along rings and drop the parts inside.
 
     Parameters
     ----------
@@ -82,7 +100,7 @@ def cut_bricks(bond: Bond, bricks: Sequence[Brick], rings: Sequence[np.ndarray])
     Returns
     -------
     list of Brick
-        Each in one piece; a sliver has been joined to the neighbour with which it makes the least bent block.
+        Each in one piece; a sliver is joined to the neighbour with which it makes the most convex block.
     """
     kept = list(bricks)
     for ring in rings:
@@ -101,26 +119,26 @@ def cut_bricks(bond: Bond, bricks: Sequence[Brick], rings: Sequence[np.ndarray])
 
 
 def brick_outline(brick: Brick) -> np.ndarray:
-    """(n, 2) array [m]: corners of a brick, none of them on a straight line between its neighbours."""
+    """(n, 2) array [m]: corners of a brick, without collinear points."""
     return without_collinear(shapely.get_coordinates(brick.shape)[:-1], 1e-9)
 
 
 def _without_slivers(bond: Bond, bricks: list[Brick]) -> list[Brick]:
     bricks = list(bricks)
-    stuck: set[int] = set()
+    unjoinable: set[int] = set()
     while True:
-        slivers = [i for i, brick in enumerate(bricks) if i not in stuck and _is_sliver(bond, brick.shape)]
+        slivers = [i for i, brick in enumerate(bricks) if i not in unjoinable and _is_sliver(bond, brick.shape)]
         if not slivers:
             return bricks
         i = min(slivers, key=lambda k: bricks[k].shape.area)
         neighbour = _best_neighbour(bond, bricks, i)
         if neighbour is None:
-            stuck.add(i)
+            unjoinable.add(i)
             continue
         larger = max(i, neighbour, key=lambda k: bricks[k].shape.area)
         bricks[neighbour] = Brick(bricks[larger].course, _joined(bond, bricks[i].shape, bricks[neighbour].shape))
         del bricks[i]
-        stuck = {k - (k > i) for k in stuck}
+        unjoinable = {k - (k > i) for k in unjoinable}
 
 
 def _is_sliver(bond: Bond, shape: shapely.Polygon) -> bool:
@@ -135,11 +153,12 @@ def _is_sliver(bond: Bond, shape: shapely.Polygon) -> bool:
 
 
 def _best_neighbour(bond: Bond, bricks: list[Brick], sliver: int) -> int | None:
-    """The neighbour with which a sliver makes the block that fills most of its convex hull."""
+    """Find the neighbour with which a sliver makes the block that fills most of its convex hull."""
     shape = bricks[sliver].shape
+    least = min(LEAST_SHARED * bond.brick_height, LEAST_OF_PERIMETER * shape.length)
     best, fullest = None, 0.0
     for i in np.flatnonzero(shapely.intersects([brick.shape for brick in bricks], shape)).tolist():
-        if i == sliver or shape.boundary.intersection(bricks[i].shape.boundary).length < 0.01 * bond.brick_height:
+        if i == sliver or shape.boundary.intersection(bricks[i].shape.boundary).length < least:
             continue
         whole = _joined(bond, shape, bricks[i].shape)
         if whole.geom_type != "Polygon" or len(whole.interiors):

@@ -1,4 +1,4 @@
-"""Layouts by name, as case files and the command line ask for them."""
+"""Layouts by name, as in case files and on the command line."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
 
 
 def parameters_of(name: str) -> dict[str, Any]:
-    """Parameters of a layout and their defaults.
+    """List the parameters of a layout with their defaults.
 
     Examples
     --------
@@ -41,19 +41,23 @@ def parameters_of(name: str) -> dict[str, Any]:
 
 
 def build(name: str, parameters: Mapping[str, Any] | None = None) -> solver.Assembly:
-    """The layout of a name with the given parameters, the others at their defaults.
+    """Build a layout by name with the given parameters, the others at their defaults.
 
     Parameters
     ----------
     name : str
         A key of :data:`LAYOUTS`; "-" and "_" count as spaces.
     parameters : mapping, optional
-        Numbers, texts, lists and tables, as TOML and JSON have them. A number that must be whole may be 12.0.
+        Numbers, texts, lists and tables, as in TOML and JSON. A whole number may be written 12.0.
+
+    Returns
+    -------
+    solver.Assembly
 
     Raises
     ------
     ValueError
-        For a name or parameter that does not exist, naming the nearest, and for values that make no layout.
+        For a name or parameter that does not exist, naming the most similar one, and for impossible values.
 
     Examples
     --------

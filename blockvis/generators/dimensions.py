@@ -1,4 +1,4 @@
-"""The numbers a layout is described by, checked where they enter."""
+"""Checks of the parameters of a layout; each returns the value or raises ``ValueError`` with its name."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-#: Blocks in a layout, or along a side of it: beyond anything that could be solved.
+#: Most blocks in a layout, or along a side of it: more than can be solved.
 MOST_BLOCKS = 100_000
 
-#: Voussoirs are radial, and the boxes around thin ones overlap by the hundred: memory grows with their number squared,
-#: 1.9 GB at 5,000.
+#: Most voussoirs of an arch: the boxes around thin radial blocks overlap, so that memory grows with the square of their
+#: number, 1.9 GB at 5,000.
 MOST_VOUSSOIRS = 2_000
 
 
 def finite(name: str, value: Any, unit: str = "m") -> float:
-    """The value as a float; raises ``ValueError`` unless it is a finite number."""
+    """Return the value as a float if it is a finite number."""
     try:
         number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
     except OverflowError:
@@ -26,7 +26,7 @@ def finite(name: str, value: Any, unit: str = "m") -> float:
 
 
 def above_zero(name: str, value: Any, unit: str = "m") -> float:
-    """The value as a float; raises ``ValueError`` unless it is a finite number above zero."""
+    """Return the value as a float if it is a finite number above zero."""
     number = finite(name, value, unit)
     if number <= 0.0:
         raise ValueError(f"{name} is {number:g}{f' {unit}' if unit else ''}; give a number above 0")
@@ -34,7 +34,7 @@ def above_zero(name: str, value: Any, unit: str = "m") -> float:
 
 
 def at_least_zero(name: str, value: Any, unit: str = "m") -> float:
-    """The value as a float; raises ``ValueError`` unless it is a finite number of at least zero."""
+    """Return the value as a float if it is a finite number of at least zero."""
     number = finite(name, value, unit)
     if number < 0.0:
         raise ValueError(f"{name} is {number:g}{f' {unit}' if unit else ''}; give a number of at least 0")
@@ -42,7 +42,7 @@ def at_least_zero(name: str, value: Any, unit: str = "m") -> float:
 
 
 def whole(name: str, value: Any, least: int, most: int = MOST_BLOCKS) -> int:
-    """The value as an int; raises ``ValueError`` unless it is a whole number from ``least`` to ``most``."""
+    """Return the value as an int if it is a whole number from ``least`` to ``most``."""
     number = finite(name, value, "")
     if number != int(number) or number < least:
         raise ValueError(f"{name} is {number:g}; give a whole number of at least {least}")
@@ -53,7 +53,7 @@ def whole(name: str, value: Any, least: int, most: int = MOST_BLOCKS) -> int:
 
 
 def pair(name: str, value: Any, unit: str = "m") -> tuple[float, float]:
-    """The value as two floats; raises ``ValueError`` unless they are finite and the first is the smaller."""
+    """Return the value as two floats if both are finite and the first is the smaller."""
     if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != 2:
         raise ValueError(f"{name} is {value!r}; give two numbers [from, to] in {unit}")
     first, last = finite(name, value[0], unit), finite(name, value[1], unit)
@@ -63,7 +63,7 @@ def pair(name: str, value: Any, unit: str = "m") -> tuple[float, float]:
 
 
 def choice(name: str, value: Any, among: Sequence[str]) -> str:
-    """The value; raises ``ValueError`` unless it is one of the words."""
+    """Return the value if it is one of the words."""
     if value not in among:
         raise ValueError(f"{name} is {value!r}; choose from {', '.join(among)}")
     return str(value)

@@ -1,4 +1,4 @@
-"""Blocks stacked on two feet, or on one: column, portal, arch on piers, buttressed arch."""
+"""Structures on one or two feet: column, portal, arch on piers, buttressed arch."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 import solver
-from blockvis.layout.outlines import without_collinear
+from blockvis.layout.outlines import rectangle, without_collinear
 
 from .arches import segmental_joints, voussoir_outlines
 from .dimensions import above_zero, whole
@@ -23,7 +23,7 @@ def column(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """A stack of equal blocks on a ground that moves.
+    """Build a column of equal blocks on a ground that moves.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ def column(
     n = whole("blocks", blocks, 1)
     width, height = above_zero("width", width), above_zero("block_height", block_height)
     levels = height * np.arange(n + 1)
-    outlines = [_box(-width / 2.0, low, width / 2.0, high) for low, high in pairwise(levels)]
-    outlines.append(_box(-width, -height, width, 0.0))
+    outlines = [rectangle(-width / 2.0, low, width / 2.0, high) for low, high in pairwise(levels)]
+    outlines.append(rectangle(-width, -height, width, 0.0))
     return solver.Assembly.from_outlines(
         outlines,
         names=[*(f"block {i + 1}" for i in range(n)), "ground"],
@@ -69,14 +69,14 @@ def portal(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """Two columns of blocks that carry a lintel.
+    """Build two columns of blocks that carry a lintel.
 
     Parameters
     ----------
     span, height : float [m]
         Clear width and height of the opening.
     column_width : float [m]
-        The lintel bears on all of it.
+        The lintel bears on the full width.
     column_blocks : int
         In each column.
     lintel_height : float [m]
@@ -100,8 +100,8 @@ def portal(
     n = whole("column_blocks", column_blocks, 1)
     inner, outer = span / 2.0, span / 2.0 + width
     levels = np.linspace(0.0, height, n + 1)
-    right = [_box(inner, low, outer, high) for low, high in pairwise(levels)]
-    lintel = _box(-outer, height, outer, height + lintel_height)
+    right = [rectangle(inner, low, outer, high) for low, high in pairwise(levels)]
+    lintel = rectangle(-outer, height, outer, height + lintel_height)
     return _on_two_feet({"column": right}, [("lintel", lintel)], inner, outer, density, depth)
 
 
@@ -117,7 +117,7 @@ def arch_on_piers(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """A segmental or semicircular arch on two piers.
+    """Build a segmental or semicircular arch on two piers.
 
     Parameters
     ----------
@@ -127,11 +127,11 @@ def arch_on_piers(
         Of the arch, radial.
     voussoirs : int
     pier_width : float [m]
-        At least what the springing joint covers.
+        At least the horizontal extent of the springing joint.
     pier_height : float [m]
         From the ground to the springing of the intrados.
     pier_blocks : int
-        In each pier, 1 for a monolith; the top one carries the skewback.
+        In each pier, 1 for a monolith; the top block has the skewback.
     density : float [kg/m³]
     depth : float [m]
         Out of plane.
@@ -167,7 +167,7 @@ def buttressed_arch(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """An arch on piers too slender for its thrust, each with a battered buttress against its outer face.
+    """Build an arch on piers too slender for its thrust, each with a battered buttress against its outer face.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def _arch_and_pier(
         )
     inner, outer = span / 2.0, span / 2.0 + width
     levels = np.linspace(0.0, height, n + 1)
-    pier = [_box(inner, low, outer, high) for low, high in pairwise(levels[:-1])]
+    pier = [rectangle(inner, low, outer, high) for low, high in pairwise(levels[:-1])]
     crown = [[inner, levels[-2]], [outer, levels[-2]], [outer, skewback[1, 1]], skewback[1], skewback[0]]
     ring = np.array(crown)
     kept = np.abs(ring - np.roll(ring, 1, axis=0)).max(axis=1) > 1e-12 * height
@@ -250,13 +250,13 @@ def _on_two_feet(
     density: float,
     depth: float,
 ) -> solver.Assembly:
-    """Parts given for the right and mirrored to the left, what they carry, and a ground under either foot."""
+    """Mirror the parts of the right foot to the left, and add the blocks above and a ground under either foot."""
     named = list(above)
     for side, mirror in (("left", MIRROR), ("right", np.ones(2))):
         for part, outlines in parts.items():
             named += [(f"{side} {part} {i + 1}", outline * mirror) for i, outline in enumerate(outlines)]
     margin = (outer - inner) / 4.0
-    ground = _box(max(inner - margin, 0.25 * inner), -(outer - inner) / 2.0, outer + margin, 0.0)
+    ground = rectangle(max(inner - margin, 0.25 * inner), -(outer - inner) / 2.0, outer + margin, 0.0)
     n = len(named)
     named += [("ground left", ground * MIRROR), ("ground right", ground)]
     return solver.Assembly.from_outlines(
@@ -267,7 +267,3 @@ def _on_two_feet(
         density=density,
         thickness=depth,
     )
-
-
-def _box(left: float, low: float, right: float, high: float) -> np.ndarray:
-    return np.array([[left, low], [right, low], [right, high], [left, high]])

@@ -1,4 +1,4 @@
-"""Openings in walls, and what spans them: lintels, flat, segmental and round arches."""
+"""Openings in walls and their heads: lintels, flat, segmental and round arches."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from blockvis.layout.outlines import rectangle
 from blockvis.suggestions import refuse_unknown
 
 from .arches import segmental_joints, voussoir_outlines
@@ -59,21 +60,25 @@ class Opening:
 def checked_opening(
     values: Mapping[str, Any], number: int, *, brick_length: float, brick_height: float, wall_height: float
 ) -> Opening:
-    """An opening from its keys, with defaults from the bricks.
+    """Make an opening of its keys, with defaults from the size of the bricks.
 
     Parameters
     ----------
     values : mapping
-        Keys as in :class:`Opening`; ``x``, ``y``, ``width`` and ``height`` are needed. The head is a lintel by
-        default, or none where the opening reaches the top of the wall.
+        Keys as in :class:`Opening`; ``x``, ``y``, ``width`` and ``height`` are required. The head is a lintel by
+        default, or none if the opening reaches the top of the wall.
     number : int
         From 1, for messages.
     brick_length, brick_height, wall_height : float [m]
 
+    Returns
+    -------
+    Opening
+
     Raises
     ------
     ValueError
-        Names the opening, the key and the remedy.
+        For impossible values; names the opening, the key and the remedy.
     """
     where = f"opening {number}"
     if not isinstance(values, Mapping):
@@ -116,12 +121,12 @@ def checked_opening(
 
 
 def _odd(number: float) -> int:
-    """The nearest odd number of at least three: an arch has a keystone."""
+    """Round to an odd number of at least three, so that an arch has a keystone."""
     return max(3, 2 * round((number - 1.0) / 2.0) + 1)
 
 
 def head_joints_of(opening: Opening) -> np.ndarray | None:
-    """Joints of the head's voussoirs, (n + 1, 2, 2) array [m] from left to right; None where it has none."""
+    """(n + 1, 2, 2) array [m]: joints of the voussoirs of the head from left to right; None without voussoirs."""
     middle, n = opening.x + opening.width / 2.0, opening.voussoirs
     if opening.head in ("segmental arch", "round arch"):
         joints, _ = segmental_joints(opening.width, opening.rise, opening.depth, n)
@@ -138,14 +143,14 @@ def head_joints_of(opening: Opening) -> np.ndarray | None:
 
 
 def head_outlines(opening: Opening, joints: np.ndarray | None) -> list[np.ndarray]:
-    """Outlines of the lintel or the voussoirs from left to right, (4, 2) arrays [m]; none where there is no head."""
+    """(4, 2) arrays [m]: outlines of the lintel, or of the voussoirs from left to right; none without a head."""
     if joints is not None:
         return voussoir_outlines(joints)
     return [_lintel(opening)] if opening.head == "lintel" else []
 
 
 def opening_ring(opening: Opening, joints: np.ndarray | None) -> np.ndarray:
-    """What the bricks leave free, (n, 2) array [m]: the rectangle, its head and what is under the head."""
+    """(n, 2) array [m]: outline of the area without bricks: the rectangle, the head, and the area between them."""
     left, right = opening.x, opening.x + opening.width
     sides = [[left, opening.top], [left, opening.y], [right, opening.y], [right, opening.top]]
     if joints is not None:
@@ -157,5 +162,4 @@ def opening_ring(opening: Opening, joints: np.ndarray | None) -> np.ndarray:
 
 def _lintel(opening: Opening) -> np.ndarray:
     left, right = opening.x - opening.bearing, opening.x + opening.width + opening.bearing
-    low, high = opening.top, opening.top + opening.depth
-    return np.array([[left, low], [right, low], [right, high], [left, high]])
+    return rectangle(left, opening.top, right, opening.top + opening.depth)

@@ -1,4 +1,4 @@
-"""Brick walls: any bond, any openings, a ground of which a part settles; the façade and the panel are such walls."""
+"""Brick walls with openings on a ground of which a part settles: wall, façade, panel."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import numpy as np
 import shapely
 
 import solver
+from blockvis.layout.outlines import rectangle
 
 from .bonds import BONDS, SHORTEST_BRICK
 from .bricks import LOWEST_BRICK, Bond, brick_outline, cut_bricks, lay_bricks
 from .dimensions import MOST_BLOCKS, above_zero, choice, finite, pair, whole
 from .openings import Opening, checked_opening, head_joints_of, head_outlines, opening_ring
 
-#: An edge of an opening this near a joint, as a fraction of their spacing, was meant to be on it.
+#: An edge of an opening closer to a joint than this fraction of the spacing of joints is moved onto it.
 ROUNDING = 1e-6
 
 
@@ -35,15 +36,15 @@ def wall(
     density: float = 1800.0,
     depth: float = 0.25,
 ) -> solver.Assembly:
-    """A brick wall with openings on a ground of which a part may settle.
+    """Build a brick wall with openings on a ground of which a part may settle.
 
     Parameters
     ----------
     bricks, courses : int, optional
         Brick lengths along the wall, and courses; 12 and 18 by default.
     width, height : float [m], optional
-        Instead of these; a width that is no whole number of bricks ends in cut bricks, a height must be a whole
-        number of courses.
+        Instead of bricks and courses; at a width that is no whole number of bricks the last ones are cut, a height must
+        be a whole number of courses.
     brick_length, brick_height : float [m]
     bond : {"running", "stack", "english"}
     openings : sequence of mappings
@@ -66,7 +67,7 @@ def wall(
     Raises
     ------
     ValueError
-        For dimensions that are no positive numbers, and openings that leave the wall or overlap each other.
+        For dimensions that are no positive numbers, and for openings outside the wall or across each other.
 
     Examples
     --------
@@ -130,7 +131,7 @@ def facade(
     density: float = 1800.0,
     depth: float = 0.25,
 ) -> solver.Assembly:
-    """A façade in running bond with rows of windows under segmental arches; its right part settles.
+    """Build a façade in running bond with rows of windows under segmental arches; its right part settles.
 
     Parameters
     ----------
@@ -212,13 +213,13 @@ def panel(
     density: float = 2000.0,
     depth: float = 1.0,
 ) -> solver.Assembly:
-    """A running-bond panel of blocks twice as long as high, on a base that settles to the right of x_s.
+    """Build a running-bond panel of blocks twice as long as high, on a base that settles to the right of x_s.
 
     Parameters
     ----------
     nb, nc : int
-        Blocks along the panel, and courses; courses of whole blocks and those that start and end with a half block
-        alternate, from a whole one at the bottom.
+        Blocks along the panel, and courses; courses of whole blocks, the first at the bottom, alternate with courses
+        that start and end with a half block.
     x_s : float [m], optional
         The base is fixed under x < x_s and moves under x > x_s; the middle by default.
     block_height : float [m]
@@ -279,7 +280,7 @@ def _size(
 def _placed(
     bond: Bond, openings: Sequence[Mapping[str, Any]], width: float, height: float
 ) -> list[tuple[Opening, np.ndarray | None]]:
-    """The openings with the joints of their voussoirs, checked against the wall."""
+    """Make the openings, with the joints of their voussoirs, and check them against the wall."""
     if isinstance(openings, (str, Mapping)) or not isinstance(openings, Sequence):
         raise ValueError(f"openings is {openings!r}; give a list of tables with x, y, width, height and head")
     placed = []
@@ -310,7 +311,7 @@ def _placed(
 
 
 def _on_joints(bond: Bond, opening: Opening) -> Opening:
-    """The opening with its edges moved onto the joints of the bond that they miss by a rounding error."""
+    """Move the edges of an opening onto the joints of the bond that they miss by a rounding error."""
 
     def moved(value: float, spacing: float) -> float:
         nearest = round(value / spacing) * spacing
@@ -324,7 +325,7 @@ def _on_joints(bond: Bond, opening: Opening) -> Opening:
 
 
 def _check_room(bond: Bond, rings: Sequence[np.ndarray], width: float, height: float) -> None:
-    """Refuses heads that leave the wall or splinters above and below, and openings that overlap, heads included."""
+    """Refuse openings that leave the wall, leave less than a brick above or below, or overlap, heads included."""
     least = LOWEST_BRICK * bond.brick_height
     small = 1e-9 * max(width, height)
     for number, ring in enumerate(rings, start=1):
@@ -350,10 +351,10 @@ def _check_room(bond: Bond, rings: Sequence[np.ndarray], width: float, height: f
 
 
 def _ground(width: float, brick_length: float, settling: Sequence[float] | None) -> list[tuple[str, str, np.ndarray]]:
-    """Name, role and outline of the parts of the ground, from left to right; it reaches a brick past the wall."""
+    """Name, role and outline of the parts of the ground, from left to right; it extends a brick beyond the wall."""
     ends = [-brick_length, width + brick_length]
     if settling is None:
-        return [("ground", solver.FIXED, _box(ends[0], -brick_length, ends[1], 0.0))]
+        return [("ground", solver.FIXED, rectangle(ends[0], -brick_length, ends[1], 0.0))]
     first, last = pair("settling", settling)
     if first >= width or last <= 0.0:
         raise ValueError(f"settling is [{first:g}, {last:g}] m, beside the wall; choose a part of 0 to {width:g} m")
@@ -364,9 +365,5 @@ def _ground(width: float, brick_length: float, settling: Sequence[float] | None)
     for name, left, right in zip(names[len(stops) - 1], stops[:-1], stops[1:], strict=True):
         middle = (max(left, 0.0) + min(right, width)) / 2.0
         role = solver.MOVING if first < middle < last else solver.FIXED
-        parts.append((name, role, _box(left, -brick_length, right, 0.0)))
+        parts.append((name, role, rectangle(left, -brick_length, right, 0.0)))
     return parts
-
-
-def _box(left: float, low: float, right: float, high: float) -> np.ndarray:
-    return np.array([[left, low], [right, low], [right, high], [left, high]])

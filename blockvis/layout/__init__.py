@@ -1,1 +1,1 @@
-"""Layouts: the blocks as a drawing has them, repaired, and made an assembly of. Knows no format."""
+"""Layouts: the blocks of a drawing, repaired and assembled. This room knows no file format."""

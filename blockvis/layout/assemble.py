@@ -1,8 +1,7 @@
-"""From a layout to an assembly: roles, supports, what the layout leaves open."""
+"""From a layout to an assembly: roles, supports, default density and thickness, repair."""
 
 from __future__ import annotations
 
-import difflib
 import fnmatch
 import warnings
 from collections.abc import Mapping, Sequence
@@ -12,9 +11,10 @@ from typing import Any
 import numpy as np
 
 import solver
+from blockvis.suggestions import by_similarity
 
 from .layout import Layout
-from .repair import duplicates, mended
+from .repair import duplicates, repaired
 
 
 def assemble(
@@ -27,7 +27,7 @@ def assemble(
     joint_thickness: float | str = 0.0,
     overlap_tolerance: float | None = None,
 ) -> solver.Assembly:
-    """Makes an assembly of a drawing.
+    """Make an assembly of a layout.
 
     Parameters
     ----------
@@ -39,18 +39,23 @@ def assemble(
         Support blocks that the file does not contain: ``name``, ``role`` and ``outline`` [m] of each, perhaps
         ``density``, ``thickness`` and ``material``.
     density : float [kg/m³]
-        Where the drawing has none.
+        Of blocks for which the layout has none.
     thickness : float [m]
-        Where the drawing has none.
+        Of blocks for which the layout has none.
     joint_thickness : float [m] or "auto"
         Gaps between facing edges up to this width are closed to their midline.
     overlap_tolerance : float, optional [m]
-        Overlaps up to this depth are resolved to their midline, deeper ones are an error.
+        Overlaps up to this depth are resolved to their midline, deeper ones are an error; see
+        :func:`blockvis.layout.repair.repaired` for the default.
+
+    Returns
+    -------
+    solver.Assembly
 
     Raises
     ------
     ValueError
-        For a role that is none, or whose name matches nothing.
+        For an unknown role, a key of ``roles`` that matches no block, and an overlap deeper than the tolerance.
     """
     for note in layout.notes:
         if note.startswith("unit clash"):
@@ -75,7 +80,7 @@ def assemble(
         thickness=_filled(layout.thickness, thickness, layout.n_blocks),
         materials=layout.materials,
     )
-    outlines, _ = mended(
+    outlines, _ = repaired(
         assembly,
         joint_thickness=joint_thickness,
         overlap_tolerance=overlap_tolerance,
@@ -141,7 +146,7 @@ def _checked_role(role: str, whose: str) -> str:
 
 
 def _matched_roles(layout: Layout, roles: Mapping[str, str]) -> list[str]:
-    """Role of every block: what the caller says, then what the file says, then its own name, else free."""
+    """Role of every block: the caller's, else the file's, else its group or name if that is a role, else free."""
     found = []
     for name, group, role in zip(layout.names, layout.groups, layout.roles, strict=True):
         said = (role, group.strip().lower(), name.strip().lower())
@@ -174,9 +179,7 @@ def _matched_roles(layout: Layout, roles: Mapping[str, str]) -> list[str]:
 
 def _unmatched(key: str, layout: Layout) -> str:
     labels = [*dict.fromkeys(label for label in (*layout.groups, *layout.materials, *layout.names) if label)]
-    closeness = {label: difflib.SequenceMatcher(None, key.lower(), label.lower()).ratio() for label in labels[:2000]}
-    nearest = sorted(closeness, key=lambda label: -closeness[label])
-    listed = ", ".join(f"'{label}'" for label in nearest[:12])
+    listed = ", ".join(f"'{label}'" for label in by_similarity(key, labels[:2000])[:12])
     more = f" and {len(labels) - 12} more" if len(labels) > 12 else ""
     where = layout.source or "the drawing"
     return f"roles: '{key}' matches no block, group or layer of {where}; it has {listed}{more}; correct the name"

@@ -1,4 +1,4 @@
-"""The block table: what a layout says of each block beside its outline, as rows of plain values."""
+"""The block table: name, group, role, material, thickness and density of each block as rows of plain values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,14 @@ from .layout import Layout
 
 
 def rows_of(layout: Layout) -> list[dict[str, Any]]:
-    """What a drawing says of each block beside its outline; what it does not say is left out."""
+    """Write the block table of a layout.
+
+    Returns
+    -------
+    list of dict
+        One row per block: ``name``, and ``group``, ``role``, ``material``, ``thickness`` [m] and ``density`` [kg/m³] if
+        the layout has them.
+    """
     rows = []
     for i in range(layout.n_blocks):
         row: dict[str, Any] = {"name": layout.names[i]}
@@ -30,7 +37,13 @@ def rows_of(layout: Layout) -> list[dict[str, Any]]:
 
 
 def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
-    """The drawing with what the rows, one per block, say of its blocks."""
+    """Put the values of a block table, one row per block, into a layout.
+
+    Raises
+    ------
+    ValueError
+        For a thickness or density that is no number, and for an unknown role.
+    """
     entries: list[Mapping[str, Any]] = [row if isinstance(row, dict) else {} for row in rows]
 
     def words(key: str, default: Sequence[str]) -> tuple[str, ...]:
@@ -58,3 +71,11 @@ def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
         thickness=numbers("thickness"),
         density=numbers("density"),
     )
+
+
+def layers_of(layout: Layout, default: str) -> list[str]:
+    """Name the layer of each block: its group, else its role as a support, else its material, else the default."""
+    return [
+        group or (role if role in (solver.FIXED, solver.MOVING) else "") or material or default
+        for group, role, material in zip(layout.groups, layout.roles, layout.materials, strict=True)
+    ]

@@ -1,4 +1,4 @@
-"""What a layout holds, before anything is computed, as numbers."""
+"""Inspection of a layout before any analysis: sizes, joints, overlaps, duplicates."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import solver
 
 from .joints.facing_edges import Facing, proposed_thickness
 from .layout import Layout
-from .repair import CARELESS, ROUNDING, block_widths, duplicates, overlaps
+from .repair import DEFAULT_OVERLAP, ROUNDING, duplicates, overlaps
 
 #: Classes of joint thickness in the report.
 CLASSES = 8
@@ -19,27 +19,27 @@ CLASSES = 8
 
 @dataclass(frozen=True)
 class Inspection:
-    """What was found in a layout file.
+    """Measurements of a layout.
 
     Attributes
     ----------
     layout : Layout
         As read, duplicates included.
     kept : (n_kept,) int array
-        Outlines of the drawing without duplicates.
+        Numbers of the outlines that are no duplicates.
     twins : tuple of (int, int)
         Outlines drawn twice: the first and the later copy.
     overlapping : tuple of (int, int, float)
         Pairs of outlines that overlap and the depth [m], deepest first.
     overlap_tolerance : float [m]
-        Deepest overlap that reading resolves by itself.
+        Deepest overlap that is resolved by default.
     areas : (n_kept,) array [m²]
     low, high : (2,) arrays [m]
-        Corners of the box around everything.
+        Corners of the box around all blocks.
     joints : Facing
         Stretches where edges face each other across a gap; block numbers count the kept outlines.
     joint_thickness : float [m]
-        What closes all of them; 0 where there are none.
+        Joint thickness that closes all of them; 0 if there are none.
     """
 
     layout: Layout
@@ -55,10 +55,11 @@ class Inspection:
 
     @property
     def unit_clash(self) -> str:
-        """The note on a unit that cannot be right, "" where there is none."""
+        """The note on a unit that cannot be right, or ""."""
         return next((note for note in self.layout.notes if note.startswith("unit clash")), "")
 
     def __str__(self) -> str:
+        """Write the measurements as lines of a table."""
         width, height = self.high - self.low
         lines = [
             f"{self.layout.source}",
@@ -120,18 +121,22 @@ class Inspection:
 
 
 def inspected(layout: Layout) -> Inspection:
-    """Measures what a layout holds.
+    """Measure a layout.
 
     Parameters
     ----------
     layout : Layout
         As read, duplicates included.
+
+    Returns
+    -------
+    Inspection
     """
     twins = duplicates(layout.outlines)
     later = {copy for _, copy in twins}
     kept = np.array([i for i in range(layout.n_blocks) if i not in later])
     assembly = solver.Assembly.from_outlines([layout.outlines[i] for i in kept], names=[layout.names[i] for i in kept])
-    width = float(np.median(block_widths(assembly)))
+    width = float(np.median(assembly.widths))
     found = overlaps(assembly, ROUNDING * width)
     thickness, joints = proposed_thickness([assembly.outline(i) for i in range(assembly.n_blocks)])
     return Inspection(
@@ -139,7 +144,7 @@ def inspected(layout: Layout) -> Inspection:
         kept=kept,
         twins=tuple(twins),
         overlapping=tuple((int(kept[i]), int(kept[j]), depth) for i, j, depth in found),
-        overlap_tolerance=CARELESS * width,
+        overlap_tolerance=DEFAULT_OVERLAP * width,
         areas=assembly.areas,
         low=assembly.vertices.min(axis=0),
         high=assembly.vertices.max(axis=0),

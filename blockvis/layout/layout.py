@@ -1,4 +1,4 @@
-"""Layout: what a drawing says of its blocks, before they become an assembly. Knows no format."""
+"""Layout: the blocks of a drawing before they become an assembly, whatever file they come from."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 
 import solver
 
-#: Halves of characters, as they come from escaped JSON and from bytes that are no text.
+#: Surrogate halves of characters, which escaped JSON and bytes that are no text leave behind.
 _HALVES = re.compile("[\ud800-\udfff]")
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Outlines of blocks with what the file says of each.
+    """Outlines of blocks, with their names, groups, roles, materials, thickness and density.
 
     Attributes
     ----------
     outlines : tuple of (n, 2) arrays [m]
-        Corners of each block in order, first corner not repeated.
+        Corners of each block in order, the first corner not repeated.
     names : tuple of str
         One per block; may repeat.
     groups : tuple of str
@@ -34,11 +34,11 @@ class Layout:
     density : (n_blocks,) array [kg/m³] or None
         NaN for a block of which the file says nothing.
     unit : str
-        Unit of length the file was read in; inside a format's reader the unit the file states, "" for none.
+        Unit of length in which the file was read; inside a format's reader the unit that the file states, "" for none.
     notes : tuple of str
         What the reader assumed or dropped.
     source : str
-        Where the drawing came from.
+        The file, "" for a layout that was not read from a file.
     """
 
     outlines: tuple[np.ndarray, ...]
@@ -53,6 +53,7 @@ class Layout:
     source: str = ""
 
     def __post_init__(self) -> None:
+        """Check that there is one entry per block, and replace broken characters."""
         n = len(self.outlines)
         for what in ("groups", "roles", "materials"):
             if not getattr(self, what):
@@ -60,8 +61,8 @@ class Layout:
         for what in ("names", "groups", "roles", "materials"):
             if len(getattr(self, what)) != n:
                 raise ValueError(f"{n} outlines but {len(getattr(self, what))} {what}; give one per block")
-        # A file in another encoding than it says leaves halves of characters, which no other file can hold.
-        note = "characters that are none in the file's encoding are shown as \ufffd"
+        # A file in another encoding than it states leaves halves of characters, which cannot be written to a file.
+        note = "characters that the file's encoding does not have are shown as \ufffd"
         for what in ("names", "groups", "roles", "materials"):
             words = getattr(self, what)
             whole = tuple(_HALVES.sub("\ufffd", word) for word in words)
@@ -75,7 +76,7 @@ class Layout:
         return len(self.outlines)
 
     def chosen(self, blocks: Sequence[int] | np.ndarray) -> Layout:
-        """The same drawing with only these blocks, in this order."""
+        """Take only these blocks, in this order."""
         keep = [int(i) for i in blocks]
         return replace(
             self,
@@ -89,17 +90,8 @@ class Layout:
         )
 
 
-def ring_areas(outlines: Sequence[np.ndarray]) -> np.ndarray:
-    """(n,) array: area of each outline, positive counter-clockwise."""
-    areas = np.zeros(len(outlines))
-    for i, ring in enumerate(outlines):
-        x, y = (ring - ring[0]).T
-        areas[i] = (x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0
-    return areas
-
-
 def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> Layout:
-    """The drawing of an assembly, as drawn or where a pose has its blocks."""
+    """Make a layout of an assembly, with its blocks as drawn or as displaced in a pose."""
     vertices = assembly.vertices if pose is None else solver.moved_vertices(assembly, pose)
     return Layout(
         outlines=tuple(np.split(vertices, assembly.offsets[1:-1])),

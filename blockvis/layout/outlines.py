@@ -1,4 +1,4 @@
-"""Cells to outlines: edges used once, chained to rings; collinear points merged; arcs to chords; flat from 3D."""
+"""Outlines of blocks: from mesh cells, without collinear points, from arcs, from flat drawings in space."""
 
 from __future__ import annotations
 
@@ -7,15 +7,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-#: A point this close to the chord of its neighbours, as a fraction of the size of the block, lies on it:
-#: single precision files (VTK, STL) leave 6e-8 of the coordinate.
+#: A point this close to the line between its neighbours, as a fraction of the size of the block, lies on it: in files
+#: of single precision (VTK, STL) a coordinate is accurate to 6e-8 of its size.
 COLLINEAR = 1e-6
 
 #: Spread of the third coordinate, as a fraction of the size of the drawing, that still counts as flat.
 FLAT = 1e-6
 
-#: Largest angle of a chord: half a hexagon, whatever the tolerance.
+#: Largest angle of a chord, whatever the tolerance: twelve chords make a circle.
 LARGEST_CHORD = math.pi / 6.0
+
+
+def rectangle(left: float, low: float, right: float, high: float) -> np.ndarray:
+    """(4, 2) array: corners of an upright rectangle, counter-clockwise from the lower left."""
+    return np.array([[left, low], [right, low], [right, high], [left, high]])
 
 
 def ring_area(ring: np.ndarray) -> float:
@@ -24,21 +29,31 @@ def ring_area(ring: np.ndarray) -> float:
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0
 
 
+def ring_width(ring: np.ndarray) -> float:
+    """Twice the area over the perimeter of a (n, 2) ring: near b for a long a × b."""
+    return 2.0 * abs(ring_area(ring)) / float(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).sum())
+
+
 def flattened(points: np.ndarray, where: str) -> tuple[np.ndarray, str]:
-    """The two coordinates that a flat drawing uses.
+    """Take the two coordinates in which a flat drawing extends.
 
     Parameters
     ----------
     points : (n, 2) or (n, 3) array
     where : str
-        Named in the error.
+        The file, for messages.
 
     Returns
     -------
     flat : (n, 2) array
         (x, y); of a drawing that stands upright (x, z) or (y, z).
     note : str
-        "" where nothing was assumed.
+        "" if the drawing lies in the plane of x and y.
+
+    Raises
+    ------
+    ValueError
+        For coordinates that are not finite, and for points that are not in a plane.
     """
     if points.shape[1] == 2 or len(points) == 0:
         return points[:, :2], ""
@@ -59,7 +74,7 @@ def flattened(points: np.ndarray, where: str) -> tuple[np.ndarray, str]:
 def outlines_of_cells(
     points: np.ndarray, cells: Sequence[Sequence[int]] | Sequence[np.ndarray], owner: np.ndarray, names: Sequence[str]
 ) -> list[np.ndarray]:
-    """One outline per block from the cells that cover it: the edges used once.
+    """Find the outline of each block: the edges that belong to one of its cells only.
 
     Parameters
     ----------
@@ -74,7 +89,12 @@ def outlines_of_cells(
     Returns
     -------
     list of (n, 2) arrays
-        Counter-clockwise, collinear points merged.
+        Counter-clockwise, without collinear points.
+
+    Raises
+    ------
+    ValueError
+        For a block with a hole, in several pieces, with an outline that meets itself, or with no outline.
     """
     counts = np.array([len(cell) for cell in cells])
     flat = np.concatenate([np.asarray(cell, dtype=np.int64) for cell in cells])
@@ -156,7 +176,7 @@ def _contains(ring: np.ndarray, point: np.ndarray) -> bool:
 
 
 def without_collinear(ring: np.ndarray, tolerance: float = COLLINEAR) -> np.ndarray:
-    """The ring without points that lie on the line between their neighbours.
+    """Drop the points of a ring that lie on the line between their neighbours.
 
     Parameters
     ----------
@@ -180,8 +200,8 @@ def without_collinear(ring: np.ndarray, tolerance: float = COLLINEAR) -> np.ndar
     closed = np.vstack([ring, ring[:1]])
     kept, k, n = [0], 0, len(ring)
     while k < n:
-        # The farthest point that one straight edge reaches without leaving a dropped point aside, by doubling
-        # and halving: a ring of a million points on one line must not take a million squared steps.
+        # Find the farthest point that a straight edge reaches while all points in between lie on it. Doubling and
+        # halving the step keeps a ring of a million collinear points from taking a million squared steps.
         end, step = k + 1, 1
         while end + step <= n and _fits(closed[k], closed[k + 1 : end + step], closed[end + step], limit):
             end, step = end + step, 2 * step
@@ -210,7 +230,7 @@ def _fits(a: np.ndarray, dropped: np.ndarray, b: np.ndarray, limit: float) -> bo
 def arc_points(
     centre: np.ndarray, radius: float, start: float, sweep: float, tolerance: float | None = None
 ) -> np.ndarray:
-    """Points on an arc so that its chords stay within a tolerance of it, both ends included.
+    """Replace an arc by chords that stay within a tolerance of it.
 
     Parameters
     ----------
@@ -224,10 +244,11 @@ def arc_points(
     Returns
     -------
     (n, 2) array
+        Points on the arc, both ends included.
     """
     allowed = radius * 1e-3 if tolerance is None else tolerance
     widest = LARGEST_CHORD if allowed >= radius else min(LARGEST_CHORD, 2.0 * math.acos(1.0 - allowed / radius))
-    # A tolerance far below the radius must not fill the memory: 4096 chords per turn are finer than any drawing.
+    # At most 4096 chords: finer than any drawing, and a tolerance far below the radius cannot fill the memory.
     n = min(max(1, math.ceil(abs(sweep) / widest - 1e-9)), 4096)
     angles = start + sweep * np.linspace(0.0, 1.0, n + 1)
     return centre + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)

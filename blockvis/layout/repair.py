@@ -1,4 +1,4 @@
-"""What a drawing needs before it is an assembly: duplicates dropped, overlaps resolved or refused, joints closed."""
+"""Repair of drawn outlines: duplicates found, overlaps resolved or refused, joints closed."""
 
 from __future__ import annotations
 
@@ -14,30 +14,33 @@ from .joints.facing_edges import proposed_thickness
 #: Two outlines closer than this fraction of the size of a block, corner by corner, are one block drawn twice.
 SAME = 1e-6
 
-#: Depth of an overlap that counts as careless drawing, as a fraction of the width of the usual block.
-CARELESS = 0.02
+#: Deepest overlap that is resolved unless the caller says otherwise, as a fraction of the width of a typical block.
+DEFAULT_OVERLAP = 0.04
 
-#: Overlaps below this fraction of the width of the usual block are rounding and stay what they are.
-ROUNDING = 1e-6
+#: Overlaps below this fraction of the width of a typical block are rounding errors and are not resolved.
+ROUNDING = 2e-6
 
-
-def block_widths(assembly: solver.Assembly) -> np.ndarray:
-    """(n_blocks,) array [m]: twice the area over half the perimeter, the width of a long thin block."""
-    return 4.0 * assembly.areas / np.add.reduceat(assembly.edge_lengths, assembly.offsets[:-1])
+#: Joints thicker than this multiple of the width of a typical block are a mistake.
+THICKEST_JOINT = 2.0
 
 
 def duplicates(outlines: Sequence[np.ndarray]) -> list[tuple[int, int]]:
-    """Blocks drawn twice, as pairs (first, later copy).
+    """Find blocks that are drawn twice.
 
     Parameters
     ----------
     outlines : sequence of (n, 2) arrays [m]
+
+    Returns
+    -------
+    list of (int, int)
+        The first outline and its later copy.
     """
     centres = np.array([(ring.min(axis=0) + ring.max(axis=0)) / 2.0 for ring in outlines])
     sizes = np.array([float(np.ptp(ring, axis=0).max()) for ring in outlines])
     cell = 4.0 * SAME * float(np.median(sizes))
     found: dict[int, int] = {}
-    # Four grids, shifted by half a cell, so that no pair is parted by a grid line in all of them.
+    # Four grids, shifted by half a cell: no grid line separates a pair in all of them.
     for shift in ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)):
         places: dict[tuple[float, float], list[int]] = {}
         for i, (x, y) in enumerate(np.floor(centres / cell + shift)):
@@ -60,19 +63,25 @@ def _same(one: np.ndarray, other: np.ndarray, tolerance: float) -> bool:
 
 
 def overlaps(assembly: solver.Assembly, tolerance: float) -> list[tuple[int, int, float]]:
-    """Pairs of blocks that overlap by more than a tolerance [m], with the depth [m], deepest first."""
+    """Find pairs of blocks that overlap by more than a tolerance [m].
+
+    Returns
+    -------
+    list of (int, int, float)
+        Both blocks and the depth [m], the deepest overlap first.
+    """
     i, j, depth = solver.overlap_depths(assembly.vertices, assembly.offsets, tolerance)
     return [(int(i[k]), int(j[k]), float(depth[k])) for k in np.argsort(-depth)]
 
 
-def mended(
+def repaired(
     assembly: solver.Assembly,
     *,
     joint_thickness: float | str,
     overlap_tolerance: float | None,
     anchored: np.ndarray,
 ) -> tuple[list[np.ndarray], list[str]]:
-    """Outlines with overlaps resolved and joints closed, and notes on what was done.
+    """Resolve the overlaps of the outlines of an assembly and close its joints.
 
     Parameters
     ----------
@@ -80,9 +89,16 @@ def mended(
         Without duplicates.
     joint_thickness : float [m] or "auto"
     overlap_tolerance : float, optional [m]
-        A fiftieth of the width of the usual block where not given.
+        Deeper overlaps are an error; by default 0.04 of the width of a typical block (twice its area over its
+        perimeter).
     anchored : (n_blocks,) bool array
         Blocks that keep their outline.
+
+    Returns
+    -------
+    outlines : list of (n, 2) arrays [m]
+    notes : list of str
+        What was changed.
 
     Raises
     ------
@@ -91,8 +107,8 @@ def mended(
     """
     outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
     free = ~anchored if not anchored.all() else anchored
-    width = float(np.median(block_widths(assembly)[free]))
-    tolerance = CARELESS * width if overlap_tolerance is None else float(overlap_tolerance)
+    width = float(np.median(assembly.widths[free]))
+    tolerance = DEFAULT_OVERLAP * width if overlap_tolerance is None else float(overlap_tolerance)
     if not (np.isfinite(tolerance) and tolerance >= 0):
         raise ValueError(f"overlap_tolerance is {tolerance:g} m; it must be a length of at least 0")
     found = [(i, j, d) for i, j, d in overlaps(assembly, ROUNDING * width) if not (anchored[i] and anchored[j])]
@@ -114,7 +130,7 @@ def mended(
     return list(closing.outlines), notes
 
 
-def _thickness(asked: float | str, outlines: list[np.ndarray], usual: float) -> tuple[float, list[str]]:
+def _thickness(asked: float | str, outlines: list[np.ndarray], width: float) -> tuple[float, list[str]]:
     if isinstance(asked, str):
         if asked.strip().lower() != "auto":
             raise ValueError(f"joint_thickness is '{asked}'; give a length in m or \"auto\"")
@@ -123,10 +139,10 @@ def _thickness(asked: float | str, outlines: list[np.ndarray], usual: float) -> 
     thickness = float(asked)
     if not (np.isfinite(thickness) and thickness >= 0):
         raise ValueError(f"joint_thickness is {thickness:g} m; it must be a length of at least 0")
-    if thickness > usual:
+    if thickness > THICKEST_JOINT * width:
         raise ValueError(
-            f"joint_thickness is {thickness:g} m, more than the usual block is wide ({usual:.3g} m); give the width of "
-            "the mortar joints in m"
+            f"joint_thickness is {thickness:g} m, more than {THICKEST_JOINT:g} times the width of a typical block "
+            f"({width:.3g} m); give the width of the mortar joints in m"
         )
     return thickness, []
 

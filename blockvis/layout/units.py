@@ -1,4 +1,4 @@
-"""Lengths in the units that drawings are made in."""
+"""Units of length of drawings."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def metres_per(unit: str) -> float:
     Raises
     ------
     ValueError
-        For a unit that has no length here.
+        For an unknown unit.
 
     Examples
     --------
@@ -50,14 +50,14 @@ def metres_per(unit: str) -> float:
 
 
 def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str, str]:
-    """The unit to read a file in, and the note that says why.
+    """Choose the unit in which a file is read.
 
     Parameters
     ----------
     given : str or None
-        What the caller asks for; it always holds.
+        Unit that the caller asks for; it always holds.
     stated : str
-        What the file says of itself, "" for nothing.
+        Unit that the file states, "" for none.
     sizes : (n_blocks,) array
         Root of the area of each block, in the unit of the file.
 
@@ -65,7 +65,7 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
     -------
     unit : str
     note : str
-        "" where there is nothing to say.
+        The reason; "" if the stated unit is taken.
     """
     median = float(np.median(sizes)) if len(sizes) else 1.0
     if given is not None:

@@ -16,9 +16,6 @@ SMALLEST_OPENING = 1e-3
 #: the fall, where blocks tumble apart, in lengths of the joint only, and up to this angle [rad].
 WIDEST_STANDING, WIDEST_FALLING, STEEPEST_FALLING = 1.5, 0.6, 1.0
 
-#: A joint is shown sliding from this fraction of the speed of the fastest block on: the slip of the others is not seen.
-SMALLEST_SLIP = 1e-2
-
 #: What cracks and blocks enclose without covering it belongs to the cracks from this fraction of the block size squared
 #: (what is smaller is rounding) up to that: where several cracks meet.
 SMALLEST_POCKET, LARGEST_POCKET = 1e-5, 2.0
@@ -106,7 +103,7 @@ def drawn_joints(assembly: solver.Assembly) -> DrawnJoints:
     tolerance = TOUCHING * assembly.block_size
     contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * tolerance)
     touching = np.abs(contacts.gaps) <= tolerance
-    vertex, edge_b = contacts.vertex[touching], contacts.edge[touching]
+    vertex, edge_b, _ = solver.corners_and_edges(contacts.features[touching])
     # The corner belongs to two faces of block a; either may lie on the edge of block b.
     edge_a = np.concatenate([vertex, assembly.previous_vertex[vertex]])
     edge_b = np.concatenate([edge_b, edge_b])
@@ -137,11 +134,11 @@ def marks_of(assembly: solver.Assembly, joints: DrawnJoints, increment: solver.I
     assembly : solver.Assembly
     joints : DrawnJoints
     increment : solver.Increment
-        Its contact states decide about hinges and sliding.
+        Its mechanism has the hinges and sliding joints.
     shown : solver.Pose
         Where the blocks are drawn: the increment's own pose, or a magnified one.
     """
-    contacts, states = increment.contacts, increment.states
+    contacts, mechanism = increment.contacts, solver.mechanism_of(assembly, increment)
     points = _middle(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
     falling = increment.status == solver.Status.FALLING
     cracks, openings, cracked = _cracks(assembly, joints, increment.pose, shown, falling)
@@ -149,16 +146,9 @@ def marks_of(assembly: solver.Assembly, joints: DrawnJoints, increment: solver.I
         cracks=cracks,
         openings=openings,
         pockets=() if falling else _pockets(assembly, cracks, cracked, shown),
-        sliding=_sliding(contacts, slipping(increment), points),
-        hinges=_apart(points[states == solver.ContactState.HINGING], 0.05 * assembly.block_size),
+        sliding=_sliding(contacts, mechanism.sliding_points, points),
+        hinges=points[mechanism.hinge_points],
     )
-
-
-def slipping(increment: solver.Increment) -> np.ndarray:
-    """(n_contacts,) bool array: contact points that slide fast enough to be seen."""
-    fastest = np.abs(increment.velocity[:, :2]).max(initial=0.0)
-    seen = np.abs(increment.displacements[:, 1]) > SMALLEST_SLIP * fastest
-    return (increment.states == solver.ContactState.SLIDING) & seen
 
 
 def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -209,18 +199,13 @@ def _cracks(
         return on_a, on_b
 
     on_a, on_b = sides(pose)
-    turn = pose.rotations[joints.block_b]
-    c, s = np.cos(turn), np.sin(turn)
-    normal = np.stack(
-        [c * joints.normals[:, 0] - s * joints.normals[:, 1], s * joints.normals[:, 0] + c * joints.normals[:, 1]],
-        axis=1,
-    )
+    normal = solver.turned(joints.normals, pose.rotations[joints.block_b])
     length = np.hypot(*(joints.ends[:, 1] - joints.ends[:, 0]).T)
     opening = np.einsum("nij,nj->ni", on_a - on_b, normal).max(axis=1)
     apart = np.hypot(*np.moveaxis(on_a - on_b, 2, 0)).min(axis=1)
     # Blocks that have parted altogether have no joint any more: what lies between them is air, not a crack.
     if falling:
-        turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])
+        turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])[:, 0]
         together = (apart < WIDEST_FALLING * length) & (turn < STEEPEST_FALLING)
     else:
         together = apart < np.maximum(length, WIDEST_STANDING * assembly.block_size)
@@ -264,9 +249,15 @@ def _pockets(
     return tuple(pockets)
 
 
-def _sliding(contacts: solver.Contacts, slips: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The stretch of each sliding joint between the outermost of its contact points that slip."""
-    k = np.flatnonzero(slips)
+def joint_places(assembly: solver.Assembly, increment: solver.Increment) -> tuple[np.ndarray, np.ndarray]:
+    """Where the hinges are, and the middles of the sliding joints: (n, 2) arrays [m], at the increment's pose."""
+    mechanism, contacts = solver.mechanism_of(assembly, increment), increment.contacts
+    stretches = _sliding(contacts, mechanism.sliding_points, contacts.points)
+    return contacts.points[mechanism.hinge_points], stretches.mean(axis=1)
+
+
+def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """The stretch of each sliding joint between the outermost of its contact points that slide, (k,) numbers."""
     if len(k) == 0:
         return np.zeros((0, 2, 2))
     low = np.minimum(contacts.block_a[k], contacts.block_b[k])
@@ -286,12 +277,3 @@ def _sliding(contacts: solver.Contacts, slips: np.ndarray, points: np.ndarray) -
     lowest, highest = lowest - short, highest + short
     base = points[first]
     return np.stack([base + lowest[:, None] * tangent, base + highest[:, None] * tangent], axis=1)
-
-
-def _apart(points: np.ndarray, distance: float) -> np.ndarray:
-    """One point of each group closer together than ``distance``: two corners of one hinge are one hinge."""
-    if len(points) < 2:
-        return points
-    cell = np.floor(points / distance).astype(np.int64)
-    _, first = np.unique(cell, axis=0, return_index=True)
-    return points[np.sort(first)]

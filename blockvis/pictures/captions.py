@@ -6,7 +6,6 @@ import numpy as np
 
 import solver
 from blockvis.numbers import force_text
-from blockvis.results.quantities import POSITION, governing, parameter_word, reads_multipliers
 
 #: Multipliers above this many times the lowest of an envelope are not shown: over a support a load may grow nearly
 #: without limit.
@@ -15,10 +14,10 @@ MOST_OVER_LOWEST = 8.0
 
 def parameter_unit(response: solver.Response) -> tuple[float, str]:
     """Factor and unit in which the parameter reads well."""
-    unit = response.settlements[0].unit if response.settlements else "m"
-    largest = max((abs(i.settlement) for i in response.increments), default=0.0)
-    millimetres = unit == "m" and 0.0 < largest < 0.1 and parameter_word(response) != POSITION
-    return (1e3, "mm") if millimetres else (1.0, unit)
+    parameter = response.parameter
+    largest = max((abs(i.parameter) for i in response.increments), default=0.0)
+    millimetres = parameter.unit == "m" and 0.0 < largest < 0.1 and parameter.is_path
+    return (1e3, "mm") if millimetres else (1.0, parameter.unit)
 
 
 def parameter_text(value: float, response: solver.Response) -> str:
@@ -34,42 +33,43 @@ def parameter_text(value: float, response: solver.Response) -> str:
 
 
 def parameter_label(response: solver.Response) -> str:
-    """For the axis of a diagram; empty for a single limit load, which has none."""
-    word = parameter_word(response)
-    if word == POSITION and len(response.path) == 1:
-        return ""
-    return f"{word}{' x' if word == POSITION else ''} [{parameter_unit(response)[1]}]"
+    """For the axis of a diagram; empty for a single state that follows no path."""
+    parameter = response.parameter
+    if parameter.is_path:
+        return f"{parameter.name} [{parameter_unit(response)[1]}]"
+    return f"{parameter.name} {parameter.symbol} [{parameter.unit}]" if len(response.path) != 1 else ""
 
 
 def force_unit(response: solver.Response) -> tuple[float, str]:
-    """What to divide :func:`path_values` by, and the unit; a multiplier has none."""
-    if reads_multipliers(response):
-        return 1.0, ""
-    largest = max((abs(i.reaction) for i in response.path), default=0.0)
-    moment = "·m" if response.settlements and response.settlements[0].unit == "rad" else ""
-    for factor, unit in ((1e6, "MN"), (1e3, "kN")):
+    """What to divide the measured values by, and the unit; a multiplier has none."""
+    unit = response.measured.unit
+    if not response.measured.is_force:
+        return 1.0, unit
+    largest = max((abs(i.measured) for i in response.path), default=0.0)
+    for factor, prefix in ((1e6, "M"), (1e3, "k")):
         if largest >= factor:
-            return factor, unit + moment
-    return 1.0, "N" + moment
+            return factor, prefix + unit
+    return 1.0, unit
 
 
 def value_label(response: solver.Response) -> str:
     """For the axis of a diagram."""
-    return "load multiplier α" if reads_multipliers(response) else f"reaction [{force_unit(response)[1]}]"
+    unit = force_unit(response)[1]
+    return f"{response.measured.name} [{unit}]" if unit else f"{response.measured.name} {response.measured.symbol}"
 
 
 def matters(increment: solver.Increment, response: solver.Response) -> bool:
-    """Whether an increment is in equilibrium and, of limit loads at several positions, not far above the lowest."""
+    """Whether an increment is in equilibrium and, of states that stand by themselves, not far above the lowest."""
     if increment.status == solver.Status.FALLING:
         return False
-    lowest = governing(response)
-    if lowest is None or parameter_word(response) != POSITION or not lowest.load_multiplier > 0.0:
+    lowest = response.governing
+    if lowest is None or response.parameter.is_path or not lowest.measured > 0.0:
         return True
-    return increment.load_multiplier <= MOST_OVER_LOWEST * lowest.load_multiplier
+    return increment.measured <= MOST_OVER_LOWEST * lowest.measured
 
 
 def state_text(increment: solver.Increment, response: solver.Response, at: float | None = None) -> str:
-    """The first line of a caption: the parameter and what is read there.
+    """The first line of a caption: the parameter and what is measured there.
 
     Parameters
     ----------
@@ -78,28 +78,32 @@ def state_text(increment: solver.Increment, response: solver.Response, at: float
     at : float, optional [m or rad]
         The parameter, of frames in between increments.
     """
-    place = parameter_text(increment.settlement if at is None else at, response)
-    falling = increment.status == solver.Status.FALLING
-    if not reads_multipliers(response):
-        text = f"Settlement {place}"
-        if falling:
-            return text
-        moment = response.settlements[min(increment.phase, len(response.settlements) - 1)].unit == "rad"
-        text += f"   ·   Reaction {force_text(increment.reaction, moment)}"
-        return text if moment else text + f" = {increment.reaction / response.total_weight:.4f} W"
-    if parameter_word(response) == POSITION:
-        text = f"Load at x = {place}" if len(response.path) > 1 else "Limit load"
+    place = parameter_text(increment.parameter if at is None else at, response)
+    if response.parameter.is_path:
+        text = f"{response.parameter.name.capitalize()} {place}"
     else:
-        text = f"{parameter_word(response).capitalize()} {place}"
-    if falling and response.analysis == "pushover":
+        text = f"Load at {response.parameter.symbol} = {place}" if len(response.path) > 1 else "Limit load"
+    # Frames that swing show the state from which they start, frames of a fall none.
+    if increment.status == solver.Status.FALLING and not response.swings:
         return text
-    if not np.isfinite(increment.load_multiplier):
-        return f"{text}   ·   Load multiplier α unbounded"
-    text += f"   ·   Load multiplier α = {increment.load_multiplier:.5g}"
-    return text + (f"   ·   Live load {force_text(increment.reaction)}" if increment.reaction else "")
+    return f"{text}   ·   {_value_text(increment, response)}"
+
+
+def _value_text(increment: solver.Increment, response: solver.Response) -> str:
+    measured = response.measured
+    name = measured.name.capitalize()
+    if measured.is_force:
+        phase = min(increment.phase, len(response.settlements) - 1)
+        moment = response.settlements[phase].unit == "rad" if response.settlements else measured.unit == "N·m"
+        text = f"{name} {force_text(increment.measured, moment)}"
+        return text if moment else f"{text} = {increment.measured / response.total_weight:.4f} W"
+    if not np.isfinite(increment.measured):
+        return f"{name} {measured.symbol} unbounded"
+    text = f"{name} {measured.symbol} = {increment.measured:.5g} {measured.unit}".rstrip()
+    live = increment.reaction if measured == solver.LOAD_MULTIPLIER else 0.0
+    return text + (f"   ·   Live load {force_text(live)}" if live else "")
 
 
 def badge_of(response: solver.Response) -> str:
     """The warning on frames that are no equilibrium."""
-    swung = response.analysis == "limit load" and response.collapse is None and bool(response.path)
-    return "MECHANISM · pseudo-motion" if swung else "FALLING · pseudo-time"
+    return "MECHANISM · pseudo-motion" if response.swings else "FALLING · pseudo-time"

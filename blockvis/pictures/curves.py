@@ -16,14 +16,6 @@ from PIL import Image, ImageDraw
 
 import solver
 from blockvis.atomic_files import whole_file
-from blockvis.results.quantities import (
-    POSITION,
-    governing,
-    parameter_word,
-    path_parameters,
-    path_values,
-    reads_multipliers,
-)
 
 from . import palette
 from .captions import MOST_OVER_LOWEST, force_unit, parameter_label, parameter_unit, value_label
@@ -92,14 +84,13 @@ def events_of(response: solver.Response) -> list[Event]:
     response : solver.Response
     """
     path = response.path
-    total, values = path_parameters(path), path_values(response)
+    total, values = response.parameters, response.values
     found = []
-    kinds = ((solver.ContactState.HINGING, "hinge"), (solver.ContactState.SLIDING, "sliding joint"))
-    # Each is asked for its contact points once: they may come from a file.
-    pairs = ([_pairs(increment.states, increment.contacts, state) for state, _ in kinds] for increment in path)
+    # Each is asked for its mechanism once: its contact points may come from a file.
+    pairs = (_joints(solver.mechanism_of(response.assembly, increment)) for increment in path)
     for k, (earlier, later) in enumerate(pairwise(pairs), start=1):
         text = []
-        for (_, word), before, after in zip(kinds, earlier, later, strict=True):
+        for word, before, after in zip(("hinge", "sliding joint"), earlier, later, strict=True):
             if before != after:
                 some = f"{len(after) or 'no'} {word}{'s' if len(after) != 1 else ''}"
                 text.append(some if len(before) != len(after) else f"{word}s move")
@@ -129,17 +120,15 @@ class CurvePanel:
         canvas.draw()
         self._picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
         per_length, _ = parameter_unit(response)
-        total = path_parameters(response.path)
+        total = response.parameters
         factor, _ = force_unit(response)
-        values = np.nan_to_num(path_values(response) / factor)
+        values = np.nan_to_num(response.values / factor)
         places = (
             axes.transData.transform(np.column_stack([total * per_length, values])) if len(total) else np.zeros((0, 2))
         )
         self._total = total
         self._places = np.column_stack([places[:, 0], size[1] - places[:, 1]])
-        self._offsets = {
-            i.phase: float(t - i.settlement) for t, i in zip(total[::-1], response.path[::-1], strict=True)
-        }
+        self._offsets = {i.phase: float(t - i.parameter) for t, i in zip(total[::-1], response.path[::-1], strict=True)}
 
     def image(self, increment: solver.Increment) -> Image.Image:
         """The curve with the dot at an increment; at the end of the curve during the fall."""
@@ -147,8 +136,8 @@ class CurvePanel:
         if len(self._total) == 0:
             return picture
         falling = increment.status == solver.Status.FALLING
-        at = self._offsets.get(increment.phase, 0.0) + increment.settlement
-        if falling and self._response.analysis != "limit load":
+        at = self._offsets.get(increment.phase, 0.0) + increment.parameter
+        if falling and not self._response.swings:
             at = self._total[-1]
         x, y = (float(np.interp(at, self._total, self._places[:, k])) for k in (0, 1))
         r = 0.34 * self._text
@@ -160,10 +149,10 @@ class CurvePanel:
 def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 11.0) -> None:
     path = response.path
     factor, _ = force_unit(response)
-    moment = any(s.unit == "rad" for s in response.settlements)
+    moment = any(s.unit == "rad" for s in response.settlements) or response.measured.unit == "N·m"
     per_length, _ = parameter_unit(response)
-    total = path_parameters(path) * per_length
-    values = path_values(response) / factor
+    total = response.parameters * per_length
+    values = response.values / factor
     known = values[np.isfinite(values)]
     axes.set_ylabel(value_label(response), fontsize=text)
     axes.tick_params(labelsize=0.9 * text)
@@ -172,10 +161,10 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
     axes.margins(x=0.02, y=0.12)
     if len(known):
         low, high = min(0.0, known.min()), max(0.0, known.max())
-        if parameter_word(response) == POSITION:
+        if not response.parameter.is_path:
             high = min(high, MOST_OVER_LOWEST * max(known.min(), 0.0) or high)
         axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
-    if parameter_word(response) == POSITION and len(path) == 1:
+    if not response.parameter.is_path and len(path) == 1:
         _draw_single(axes, known, text)
         return
     blue = palette.hexadecimal(palette.FORCE)
@@ -184,14 +173,14 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
         axes.plot(total, values, "o", color=blue, markersize=3.0, zorder=3)
     axes.set_xlabel(parameter_label(response), fontsize=text)
     axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5))
-    if not moment and not reads_multipliers(response) and response.total_weight > 0:
+    if not moment and response.measured.is_force and response.total_weight > 0:
         weight = response.total_weight / factor
         over_weight = axes.secondary_yaxis(
             "right", functions=(lambda r: np.asarray(r) / weight, lambda w: np.asarray(w) * weight)
         )
         over_weight.set_ylabel("reaction / weight W", fontsize=text)
         over_weight.tick_params(labelsize=0.9 * text)
-    if parameter_word(response) == POSITION:
+    if not response.parameter.is_path:
         _mark_lowest(axes, response, text, events)
     elif events:
         _mark_events(axes, response, factor, text)
@@ -219,15 +208,16 @@ def _draw_single(axes: Axes, known: np.ndarray, text: float) -> None:
 
 
 def _mark_lowest(axes: Axes, response: solver.Response, text: float, words: bool) -> None:
-    lowest = governing(response)
-    if lowest is None or not np.isfinite(lowest.load_multiplier):
+    lowest = response.governing
+    if lowest is None or not np.isfinite(lowest.measured):
         return
     red = palette.hexadecimal(palette.WARNING)
-    place = (lowest.settlement, lowest.load_multiplier)
+    place = (lowest.parameter, lowest.measured)
     axes.plot(*place, "o", color=red, markersize=8 if words else 5, zorder=4)
     if words:
         axes.annotate(
-            f"lowest α = {place[1]:.5g} at x = {place[0]:.4g} m",
+            f"lowest {response.measured.symbol} = {place[1]:.5g} at {response.parameter.symbol} = {place[0]:.4g} "
+            f"{response.parameter.unit}",
             (0.5, 0.96),
             xycoords="axes fraction",
             ha="center",
@@ -243,11 +233,13 @@ def _mark_collapse(
     collapse = response.collapse
     assert collapse is not None
     red = palette.hexadecimal(palette.WARNING)
-    what = "no capacity" if response.analysis == "pushover" else "collapse"
+    # A capacity that is lost ends at the foot of the diagram.
+    above = collapse.lost == "capacity"
+    what = "no capacity" if above else "collapse"
     # Phases before the last shift the curve.
     per_length, _ = parameter_unit(response)
     low, middle, high = per_length * np.array([collapse.bracket[0], collapse.displacement, collapse.bracket[1]])
-    start = total[-1] - per_length * response.path[-1].settlement
+    start = total[-1] - per_length * response.path[-1].parameter
     axes.axvspan(start + low, start + high, color=red, alpha=0.25, linewidth=0)
     axes.axvline(start + middle, color=red, linewidth=1.0, linestyle=(0, (4, 3)), zorder=2)
     axes.plot(total[-1:], reactions[-1:], "X", color=red, markersize=9 if words else 6, zorder=4)
@@ -255,12 +247,12 @@ def _mark_collapse(
         axes.annotate(
             f"{what} at {collapse.displacement:.5g} {collapse.unit}\n"
             f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]",
-            (start + middle, 0.96 if response.analysis == "pushover" else 0.04),
+            (start + middle, 0.96 if above else 0.04),
             xycoords=("data", "axes fraction"),
             xytext=(-6, 0),
             textcoords="offset points",
             ha="right",
-            va="top" if response.analysis == "pushover" else "bottom",
+            va="top" if above else "bottom",
             fontsize=0.9 * text,
             color=red,
         )
@@ -294,7 +286,6 @@ def _mark_events(axes: Axes, response: solver.Response, factor: float, text: flo
         axes.legend(loc="upper left", fontsize=0.8 * text, frameon=False)
 
 
-def _pairs(states: np.ndarray, contacts: solver.Contacts, state: solver.ContactState) -> set[tuple[int, int]]:
-    chosen = states == state
-    a, b = contacts.block_a[chosen], contacts.block_b[chosen]
-    return set(zip(np.minimum(a, b).tolist(), np.maximum(a, b).tolist(), strict=True))
+def _joints(mechanism: solver.Mechanism) -> list[set[tuple[int, int]]]:
+    """The pairs of blocks of the hinges, and of the sliding joints."""
+    return [set(map(tuple, pairs.tolist())) for pairs in (mechanism.hinges, mechanism.sliding)]

@@ -12,7 +12,6 @@ from PIL import Image
 
 import solver
 from blockvis.numbers import force_text, rounded_length
-from blockvis.results.quantities import POSITION, governing, parameter_word, reads_multipliers
 
 from . import annotations as marks
 from . import palette
@@ -170,7 +169,7 @@ class Studio:
         """The sheet of one increment; with its blocks at another pose and settlement for frames in between."""
         true = increment.pose if pose is None else pose
         shown = magnified(self.assembly, true, self.look.magnification)
-        at = replace(increment, pose=true, contacts=_contacts_at(increment, true)) if pose is not None else increment
+        at = increment.with_arrays(pose=true, contacts=_contacts_at(increment, true)) if pose is not None else increment
         self.scene.pose(shown, self._vertex_colours(true))
         self._draw_joints(at, shown)
         self._draw_forces(at, shown)
@@ -186,7 +185,7 @@ class Studio:
             badge=badge_of(self.response) if falling else "",
             keys=self.keys(),
             pixel=self.scene.pixel,
-            beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, settlement=s)),
+            beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, parameter=s)),
         )
 
     def frames(self, fps: float, seconds: float) -> Iterator[Image.Image]:
@@ -368,8 +367,7 @@ class Studio:
             # A bent support may have its centroid outside.
             inside = outline.centroid if outline.contains(outline.centroid) else outline.point_on_surface()
             place = np.array(inside.coords[0])
-            arm = place - shown.positions[block]
-            speed = rate[block, :2] + rate[block, 2] * np.array([-arm[1], arm[0]])
+            speed = solver.point_velocities(place[None], np.array([block]), shown, rate)[0]
             if np.hypot(*speed) > 0:
                 along = speed / np.hypot(*speed) * length
                 tails.append(place - along / 2.0)
@@ -455,13 +453,7 @@ def _even_motion(
     """``n`` frames at even settlement: the increment before each, the pose in between, and the settlement."""
     if not path:
         return
-    reached, before, last = [], 0.0, 0.0
-    for previous, increment in zip([path[0], *path], path, strict=False):
-        if increment.phase != previous.phase:
-            before = last
-        last = before + increment.settlement
-        reached.append(last)
-    total = np.array(reached)
+    total = solver.path_parameters(path)
     if total[-1] <= total[0]:
         yield path[-1], None, None
         return
@@ -473,8 +465,8 @@ def _even_motion(
         t = (at - total[k]) / (total[k + 1] - total[k])
         a, b = path[k].pose, path[k + 1].pose
         pose = solver.Pose(a.positions + t * (b.positions - a.positions), a.rotations + t * (b.rotations - a.rotations))
-        start = path[k].settlement if path[k].phase == path[k + 1].phase else 0.0
-        yield path[k], pose, start + t * (path[k + 1].settlement - start)
+        start = path[k].parameter if path[k].phase == path[k + 1].phase else 0.0
+        yield path[k], pose, start + t * (path[k + 1].parameter - start)
 
 
 def _caption(response: solver.Response, increment: solver.Increment, look: Look, s: float | None) -> tuple[str, str]:
@@ -487,23 +479,23 @@ def _caption(response: solver.Response, increment: solver.Increment, look: Look,
 
 
 def _state(response: solver.Response, increment: solver.Increment) -> str:
-    swung = response.analysis == "limit load" and response.collapse is None
     if increment.status == solver.Status.FALLING:
-        if swung and response.path:
+        if response.swings:
             return "pseudo-motion: the mechanism at the limit load, followed to first order and out of scale"
         return "no equilibrium, no dynamics: the mechanism followed step by step"
-    if response.analysis == "limit load":
-        flow = f"limit state, {response.limits[0].flow} friction" if response.limits else "limit state"
-        lowest = len(response.path) > 1 and parameter_word(response) == POSITION and _decides(response, increment)
-        return flow + (f"   ·   the lowest of {len(response.path)} positions" if lowest else "")
-    if response.stop == solver.Status.COLLAPSED and increment.settlement == response.path[-1].settlement:
-        return "last equilibrium before " + ("capacity is lost" if reads_multipliers(response) else "collapse")
+    if response.limits:
+        lowest = len(response.path) > 1 and not response.parameter.is_path and _decides(response, increment)
+        words = f"limit state, {response.limits[0].flow} friction"
+        return words + (f"   ·   the lowest of {len(response.path)} positions" if lowest else "")
+    if response.stop == solver.Status.COLLAPSED and increment.parameter == response.path[-1].parameter:
+        capacity = response.collapse is not None and response.collapse.lost == "capacity"
+        return "last equilibrium before " + ("capacity is lost" if capacity else "collapse")
     return "equilibrium"
 
 
 def _decides(response: solver.Response, increment: solver.Increment) -> bool:
-    lowest = governing(response)
-    return lowest is not None and lowest.settlement == increment.settlement
+    lowest = response.governing
+    return lowest is not None and lowest.parameter == increment.parameter
 
 
 def _largest_displacement(assembly: solver.Assembly, increment: solver.Increment) -> float:

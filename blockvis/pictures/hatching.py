@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 import solver
+from blockvis.layout.triangulation import triangles_of_ring
 
 
 def triangles(assembly: solver.Assembly) -> np.ndarray:
@@ -24,44 +25,15 @@ def triangles(assembly: solver.Assembly) -> np.ndarray:
         for k in range(1, count - 1):
             fans.append(np.column_stack([np.full(len(first), 3), first, first + k, first + k + 1]))
     for block in np.flatnonzero(bent):
-        fans.append(_ears(assembly.outline(int(block)), int(offsets[block])))
+        corners = offsets[block] + triangles_of_ring(assembly.outline(int(block)))
+        fans.append(np.column_stack([np.full(len(corners), 3), corners]))
     return np.concatenate(fans)
 
 
 def cut_into_triangles(outlines: Sequence[np.ndarray]) -> np.ndarray:
     """(n, 3, 2) array [m]: triangles that fill outlines, (k, 2) arrays [m] counter-clockwise, bent ones included."""
-    cut = [outline[_ears(outline, 0)[:, 1:]] for outline in outlines]
+    cut = [outline[triangles_of_ring(outline)] for outline in outlines]
     return np.concatenate([np.zeros((0, 3, 2)), *cut])
-
-
-def _ears(outline: np.ndarray, first: int) -> np.ndarray:
-    """VTK cells of the triangles of one outline, by cutting ears."""
-    left = list(range(len(outline)))
-    cells = []
-    while len(left) > 3:
-        n = len(left)
-        areas, blocked = np.zeros(n), np.zeros(n, dtype=bool)
-        for k in range(n):
-            a, b, c = (outline[left[(k + j) % n]] for j in (-1, 0, 1))
-            areas[k] = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-            others = outline[[left[(k + j) % n] for j in range(2, n - 1)]]
-            blocked[k] = _any_inside(others, a, b, c)
-        # A point where three corners are in line makes an ear without area: cut it, it draws nothing.
-        ears = np.flatnonzero((areas >= -1e-12 * np.abs(areas).max()) & ~blocked)
-        k = int(ears[0]) if len(ears) else int(np.argmax(areas))
-        cells.append([3, *(first + left[(k + j) % n] for j in (-1, 0, 1))])
-        left.pop(k)
-    cells.append([3, *(first + i for i in left)])
-    return np.array(cells)
-
-
-def _any_inside(points: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
-    inside = np.ones(len(points), dtype=bool)
-    for start, stop in ((a, b), (b, c), (c, a)):
-        along, rest = stop - start, points - start
-        inside &= along[0] * rest[:, 1] - along[1] * rest[:, 0] >= 0.0
-    at_corner = [(points == corner).all(axis=1) for corner in (a, b, c)]
-    return bool((inside & ~np.logical_or.reduce(at_corner)).any())
 
 
 def hatch_lines(

@@ -9,7 +9,6 @@ import numpy as np
 
 import solver
 from blockvis.numbers import force_text
-from blockvis.results.quantities import POSITION, parameter_word
 
 #: Loads below this fraction of the largest are rounding.
 ROUNDING = 1e-5
@@ -44,7 +43,7 @@ class LiveLoad:
     @classmethod
     def none(cls) -> LiveLoad:
         """No load."""
-        nowhere = solver.Pose(np.zeros((0, 2)), np.zeros(0))
+        nowhere = solver.Pose(np.zeros((0, 2)), np.zeros((0, 1)))
         return cls(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, dtype=int), nowhere)
 
     def carried(self, pose: solver.Pose) -> np.ndarray:
@@ -75,9 +74,9 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     It is what the contact forces balance beyond the dead load, so that it is right for every position of a load that
     moves, whose place is not kept with the increment.
     """
-    standing = increment.status == solver.Status.EQUILIBRIUM or response.analysis == "limit load"
+    standing = increment.status == solver.Status.EQUILIBRIUM or bool(response.limits)
     finite = np.isfinite(increment.load_multiplier) and increment.load_multiplier != 0.0
-    if response.analysis == "settlement" or not (standing and finite):
+    if not (standing and finite):
         return LiveLoad.none()
     assembly, pose = response.assembly, increment.pose
     live = -(solver.block_forces(increment.contacts, pose, increment.forces) + response.loads.dead)
@@ -106,16 +105,16 @@ class LiveLoads:
     """
 
     def __init__(self, response: solver.Response, increments: Iterable[solver.Increment], extent: float) -> None:
-        self._swinging = response.analysis == "limit load" and response.collapse is None
+        self._swinging = bool(response.limits) and response.collapse is None
         self._loads: dict[tuple[int, float], LiveLoad] = {}
-        if response.analysis != "settlement":
+        if response.measured == solver.LOAD_MULTIPLIER:
             # Frames of a swinging mechanism have the load of their limit state.
             states = {_place(state): state for state in response.path}
             for increment in increments:
                 place = _place(increment)
                 if place not in self._loads:
                     self._loads[place] = live_load_of(response, states.get(place, increment), extent)
-        self._places = parameter_word(response) == POSITION and len(self._loads) > 1
+        self._places = not response.parameter.is_path and len(self._loads) > 1
         if self._places:
             # From place to place the limit differs a hundredfold; what shall be seen is where the load is.
             for place, load in self._loads.items():
@@ -152,7 +151,7 @@ class LiveLoads:
 
 
 def _place(increment: solver.Increment) -> tuple[int, float]:
-    return increment.phase, increment.settlement
+    return increment.phase, increment.parameter
 
 
 def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.ndarray) -> np.ndarray:

@@ -10,7 +10,6 @@ from PIL import Image
 
 import solver
 from blockvis.atomic_files import whole_file
-from blockvis.results.quantities import governing
 
 from .drawer import MOST_PARTS, Look, Studio
 from .frame import framed
@@ -90,7 +89,7 @@ def draw_mechanism(
     pathlib.Path
     """
     _check_response(response)
-    last = governing(response) or response.increments[0]
+    last = response.governing or response.increments[0]
     motion = last.velocity if response.collapse is None else response.collapse.mechanism
     last = solver.with_motion(last, motion)
     assembly = response.assembly
@@ -112,8 +111,7 @@ def draw_mechanism(
 def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
     """(n_blocks,) array: speed of the fastest corner of each free block, zero for supports."""
     block = assembly.block_of_vertex
-    arms = solver.moved_vertices(assembly, pose) - pose.positions[block]
-    velocity = motion[block, :2] + motion[block, 2:] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+    velocity = solver.point_velocities(solver.moved_vertices(assembly, pose), block, pose, motion)
     speeds = np.maximum.reduceat(np.hypot(*velocity.T), assembly.offsets[:-1])
     return np.where(assembly.free, speeds, 0.0)
 
@@ -170,17 +168,16 @@ def animate(
 def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
     n = int(parts.max(initial=-1)) + 1
     bodies = f"{n} moving part{'s' if n != 1 else ''}{', darker where faster' if n > MOST_PARTS else ''}"
-    if response.collapse is None and response.analysis == "limit load" and response.limits:
+    if response.collapse is None and response.limits:
         return f"mechanism at the limit load   ·   {response.limits[-1].flow} friction   ·   {bodies}"
     if response.collapse is None:
         if response.stop == solver.Status.NO_INITIAL_EQUILIBRIUM:
-            when = "before any settlement" if response.analysis == "settlement" else "under the dead load"
+            when = f"before any {response.parameter.name}" if response.measured.is_force else "under the dead load"
             return f"no equilibrium {when}   ·   {bodies}"
         return f"{response.stop}: the motion that would follow   ·   {bodies}"
-    low, high = response.collapse.bracket
-    unit = response.collapse.unit
-    what = "capacity" if response.analysis == "pushover" else "equilibrium"
-    return f"collapse mechanism   ·   {what} at {low:.5g} {unit}, none at {high:.5g} {unit}   ·   {bodies}"
+    collapse = response.collapse
+    low, high = (f"{end:.5g} {collapse.unit}" for end in collapse.bracket)
+    return f"collapse mechanism   ·   {collapse.lost} at {low}, none at {high}   ·   {bodies}"
 
 
 def _check_response(response: solver.Response) -> None:

@@ -14,8 +14,7 @@ import numpy as np
 from PIL import Image
 
 from blockvis.atomic_files import whole_file
-
-FILM_SUFFIXES = (".mp4", ".gif", ".webp")
+from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 #: What imageio's writer is given for each format. Quality of x264 is 0 lossless, 51 worst: line drawings show ringing
 #: from about 22 on. A gif has a palette per frame: one of the first frame lacks the colours of cracks that open later.
@@ -70,9 +69,9 @@ def write_film(
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in FILM_SUFFIXES:
+    if suffix not in VIDEO_SUFFIXES:
         raise ValueError(
-            f"'{path.name}' is no animation that blockvis writes; end its name in {', '.join(FILM_SUFFIXES)}"
+            f"'{path.name}' is no animation that blockvis writes; end its name in {', '.join(VIDEO_SUFFIXES)}"
         )
     if size[0] % 2 or size[1] % 2:
         raise ValueError(f"an animation of {size[0]} × {size[1]} pixels cannot be encoded; both must be even")

@@ -32,15 +32,7 @@ from blockvis.pictures.captions import (
 )
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
-from blockvis.results.quantities import (
-    POSITION,
-    governing,
-    parameter_word,
-    path_parameters,
-    path_values,
-    reads_multipliers,
-)
-from blockvis.results.tables import limit_states
+from blockvis.runs.kinds import KINDS
 
 #: Increments beyond this many are thinned out evenly; the page stays below 2 MB for a thousand blocks. Of more than
 #: four thousand blocks fewer are shown, so that poses times blocks stay what a browser can hold.
@@ -91,7 +83,7 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
     # No "<" may survive in the data: a name with "</script>" in it would end the script.
     model = json.dumps(_model(response), ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
     return Template((page / "player.html").read_text(encoding="utf-8")).substitute(
-        title=html.escape(title or _title(response)),
+        title=html.escape(title or KINDS[response.analysis].title(response)),
         badge=html.escape(badge_of(response)),
         style=(page / "player.css").read_text(encoding="utf-8"),
         script=(page / "player.js").read_text(encoding="utf-8"),
@@ -208,7 +200,7 @@ def _packed_geometry(assembly: solver.Assembly, origin: np.ndarray, unit: float)
 
 
 class _Tables:
-    """What changes from frame to frame, as integers: motion, resultants of the joints, hinges (1), sliding points (2).
+    """What changes from frame to frame, as integers: motion, resultants of the joints, hinges (1), sliding joints (2).
 
     Parameters
     ----------
@@ -240,10 +232,9 @@ class _Tables:
             self.places.append(_rounded(points[kept] - origin, unit * coarse) * coarse)
             self.vectors.append(_rounded(forces[kept], FORCE_FINENESS * largest))
             self.sizes.append(size[kept])
-            hinging, sliding = increment.states == solver.ContactState.HINGING, marks.slipping(increment)
-            places = np.concatenate([increment.contacts.points[hinging], increment.contacts.points[sliding]])
-            self.mark_places.append(_rounded(places - origin, unit))
-            self.mark_kinds.append(np.repeat([1, 2], [hinging.sum(), sliding.sum()]))
+            hinges, sliding = marks.joint_places(assembly, increment)
+            self.mark_places.append(_rounded(np.concatenate([hinges, sliding]) - origin, unit))
+            self.mark_kinds.append(np.repeat([1, 2], [len(hinges), len(sliding)]))
 
     def force_length(self, block_size: float, extent: float) -> float:
         """Length per force [m/N]."""
@@ -298,7 +289,7 @@ def _frames(response: solver.Response, shown: list[solver.Increment]) -> list[di
 
 def _times(shown: list[solver.Increment]) -> list[float]:
     """Seconds at which each frame plays: even settlement, then the fall."""
-    path = path_parameters(tuple(i for i in shown if i.status != solver.Status.FALLING))
+    path = solver.path_parameters([i for i in shown if i.status != solver.Status.FALLING])
     path = path - path[:1]
     total = float(path[-1]) if len(path) and path[-1] > 0 else 1.0
     times: list[float] = []
@@ -314,16 +305,16 @@ def _times(shown: list[solver.Increment]) -> list[float]:
 def _curve(response: solver.Response) -> dict[str, Any]:
     per_length, _ = parameter_unit(response)
     factor, _ = force_unit(response)
-    x = path_parameters(response.path) * per_length
-    y = path_values(response) / factor
+    x = response.parameters * per_length
+    y = response.values / factor
     known = y[np.isfinite(y)]
     low, high = min(0.0, float(known.min(initial=0.0))), max(0.0, float(known.max(initial=0.0)))
-    if parameter_word(response) == POSITION and len(known):
+    if not response.parameter.is_path and len(known):
         high = min(high, MOST_OVER_LOWEST * max(float(known.min()), 0.0) or high)
     high = high + 0.08 * (high - low) if high > low else 1.0
     collapse = None
     if response.collapse is not None and len(x):
-        start = float(x[-1]) - per_length * response.path[-1].settlement
+        start = float(x[-1]) - per_length * response.path[-1].parameter
         collapse = start + per_length * response.collapse.displacement
     first = min(0.0, float(x.min(initial=0.0))) * 1.02
     widest = max([float(x.max(initial=0.0)), collapse or 0.0]) * 1.02 or 1.0
@@ -346,81 +337,12 @@ def _curve(response: solver.Response) -> dict[str, Any]:
     }
 
 
-def _title(response: solver.Response) -> str:
-    if reads_multipliers(response):
-        return _capacity_title(response)
-    if response.collapse is not None:
-        return f"Collapse at a settlement of {response.collapse.displacement:.5g} {response.collapse.unit}"
-    return {
-        solver.Status.LIMIT_REACHED: "Standing at the end of the settlement",
-        solver.Status.NO_INITIAL_EQUILIBRIUM: "No equilibrium before any settlement",
-        solver.Status.SOLVER_FAILED: "The solver failed; the path up to there",
-    }.get(response.stop, "Settling masonry")
-
-
-def _capacity_title(response: solver.Response) -> str:
-    state = governing(response)
-    if response.analysis == "pushover":
-        if response.collapse is not None:
-            return f"No capacity left at a control displacement of {response.collapse.displacement:.5g} m"
-        return f"Pushover: {response.stop}"
-    if state is None or not np.isfinite(state.load_multiplier):
-        return response.message or f"Limit load: {response.stop}"
-    where = ""
-    if len(response.path) > 1:
-        where = (
-            f" at {parameter_word(response)} {state.settlement:.5g} {parameter_unit(response)[1].replace('mm', 'm')}"
-        )
-    return f"Limit load: α = {state.load_multiplier:.5g}{where}"
-
-
-def _capacity_rows(response: solver.Response) -> list[tuple[str, str]]:
-    """The numbers of a limit load or a pushover."""
-    rows, path, state = [], response.path, governing(response)
-    if response.collapse is not None:
-        c = response.collapse
-        what = "zero capacity at" if response.analysis == "pushover" else "settlement alone: collapse at"
-        rows.append((what, f"{c.displacement:.6g} {c.unit}, between {c.bracket[0]:.6g} and {c.bracket[1]:.6g}"))
-    if response.analysis == "pushover" and path:
-        values = path_values(response)
-        rows.append(("load multiplier α at the start", f"{values[0]:.6g}"))
-        rows.append(("largest, last", f"{np.nanmax(values):.6g}, {values[-1]:.6g}"))
-    elif state is not None and np.isfinite(state.load_multiplier):
-        limit = next((limit for limit, told in limit_states(response) if told is state), None)
-        rows.append(("load multiplier α", f"{state.load_multiplier:.6g}"))
-        if limit is not None:
-            rows.append(("static, kinematic value", f"{limit.bounds[0]:.7g}, {limit.bounds[1]:.7g}"))
-            rows.append(("friction", limit.flow))
-            rows.append(("live load at α = 1", force_text(limit.live_force)))
-        if parameter_word(response) == POSITION and len(path) > 1:
-            rows.append(("lowest of", f"{len(path)} positions, at x = {state.settlement:.5g} m"))
-        elif response.settlements:
-            rows.append(("after a settlement of", f"{state.settlement:.6g} {response.settlements[-1].unit}"))
-            rows.append(("before it", f"{path[0].load_multiplier:.6g}"))
-    return rows
-
-
 def _summary(response: solver.Response) -> list[tuple[str, str]]:
-    assembly, path, weight = response.assembly, response.path, response.total_weight
-    moment = bool(response.settlements) and response.settlements[0].unit == "rad"
-
-    def reaction(value: float) -> str:
-        over = "" if moment or weight <= 0 else f" = {value / weight:.4f} W"
-        return force_text(value, moment) + over
-
-    rows = [("analysis", response.analysis), ("status", str(response.stop))]
-    if reads_multipliers(response):
-        rows += _capacity_rows(response)
-    elif response.collapse is not None:
-        c = response.collapse
-        rows.append(("collapse displacement", f"{c.displacement:.6g} {c.unit}"))
-        rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))
-    if path and not reads_multipliers(response):
-        rows.append(("first reaction", reaction(path[0].reaction)))
-        rows.append(("last reaction", reaction(path[-1].reaction)))
-    frames = "of pseudo-motion" if badge_of(response).startswith("MECHANISM") else "falling"
+    assembly, path = response.assembly, response.path
+    rows = [("analysis", response.analysis), ("status", str(response.stop)), *KINDS[response.analysis].rows(response)]
+    frames = "of pseudo-motion" if response.swings else "falling"
     rows += [
-        ("weight W", force_text(weight)),
+        ("weight W", force_text(response.total_weight)),
         ("blocks", f"{assembly.n_blocks} ({int(assembly.free.sum())} free)"),
         ("contact points", str(len(response.increments[0].contacts.points))),
         ("increments", f"{len(path)} in equilibrium, {len(response.increments) - len(path)} {frames}"),

@@ -29,8 +29,8 @@ def block_dataset(assembly: solver.Assembly, increment: solver.Increment | None 
     pyvista.UnstructuredGrid
         Cell arrays ``block_id``, ``name``, ``role`` (number), ``role_name``, ``material_id``, ``material``,
         ``displacement`` (n_blocks, 3) of the centroids [m] and ``rotation`` [rad]; point array ``displacement``
-        (n_vertices, 3) [m]; field arrays ``settlement`` [m or rad] (of a pushover the control displacement, of a load
-        that moves its position), ``phase``, ``load_multiplier``,
+        (n_vertices, 3) [m]; field arrays ``settlement`` (the parameter: of a pushover the control displacement, of a
+        load that moves its position), ``phase``, ``load_multiplier``,
         ``reaction`` [N or N·m], ``status``, ``role_names`` and ``material_names``.
 
     Examples
@@ -119,7 +119,7 @@ def output_times(increments: Sequence[solver.Increment]) -> list[float]:
     Returns
     -------
     list of float [m or rad]
-        The settlement in equilibrium, phases one after another; frames of the fall go on by a hundredth of the
+        The parameter in equilibrium, phases one after another; frames of the fall go on by a hundredth of the
         settlement reached each, since they share one settlement.
     """
     times: list[float] = []
@@ -127,7 +127,7 @@ def output_times(increments: Sequence[solver.Increment]) -> list[float]:
     for increment in increments:
         if increment.phase != phase:
             before, phase = last, increment.phase
-        time = before + increment.settlement
+        time = before + increment.parameter
         if (times and time <= times[-1]) or increment.status == solver.Status.FALLING:
             time = last + 0.01 * (abs(last) or 1.0) if not times else times[-1] + 0.01 * (abs(last) or 1.0)
         else:
@@ -137,7 +137,7 @@ def output_times(increments: Sequence[solver.Increment]) -> list[float]:
 
 
 def _describe(grid: pv.UnstructuredGrid, increment: solver.Increment) -> None:
-    grid.field_data["settlement"] = np.array([increment.settlement])
+    grid.field_data["settlement"] = np.array([increment.parameter])
     grid.field_data["phase"] = np.array([increment.phase])
     grid.field_data["load_multiplier"] = np.array([increment.load_multiplier])
     grid.field_data["reaction"] = np.array([increment.reaction])

@@ -17,25 +17,16 @@ import numpy as np
 import solver
 from blockvis.atomic_files import PARTIAL, make_folder, write_whole
 
-from .increments import StoredIncrement, StoredIncrements, packed_increment
-from .npz import checked_arrays, packed, unpacked
-from .quantities import parameter_word
+from .increments import StoredIncrements, packed_increment
+from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
-from .tables import (
-    CAPACITY_TABLES,
-    COLUMNS,
-    row_of_increment,
-    stored_limits,
-    stored_parameters,
-    summary_of,
-    write_capacity,
-)
+from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
 
 #: Where a run can go on from, beside the increments it belongs to.
 CHECKPOINT = "checkpoint.npz"
 
 #: Files that list or sum up others; what a run starts with; pictures of the results.
-_LISTS = ("summary.json", "response.csv", "blocks.pvd", "contacts.pvd", *CAPACITY_TABLES)
+_LISTS = ("summary.json", "response.csv", "blocks.pvd", "contacts.pvd", *LIMIT_TABLES)
 _STARTED = (RECORD, CHECKPOINT, "assembly.npz")
 _PICTURES = (
     *("report.html", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
@@ -75,8 +66,8 @@ class ResultsFolder:
         What the run is made from.
     overwrite : bool
         Whether results that are there already may be replaced.
-    parameter : {"settlement", "control displacement", "load position"}
-        What the path runs over.
+    parameter : solver.Quantity
+        What the increments run over.
 
     Raises
     ------
@@ -96,11 +87,11 @@ class ResultsFolder:
         *,
         record: Record | None = None,
         overwrite: bool = False,
-        parameter: str = "settlement",
+        parameter: solver.Quantity = solver.SETTLEMENT,
     ) -> None:
         self.parameter = parameter
         self.path, self.assembly, self.record = Path(path), assembly, record or Record(versions=versions())
-        self.increments: list[StoredIncrement] = []
+        self.increments: list[solver.Increment] = []
         self._files = StoredIncrements(self.path)
         refuse_results(self.path, overwrite)
         make_folder(self.path / "increments")
@@ -109,18 +100,18 @@ class ResultsFolder:
         for name in (*_LISTS, *_PICTURES, *_STARTED):
             (self.path / name).unlink(missing_ok=True)
         self._remove_from(0)
-        write_whole(self.path / "assembly.npz", _packed(_assembly_arrays(assembly)))
+        write_whole(self.path / "assembly.npz", compressed(flat(assembly)))
         write_whole(self.path / RECORD, self.record.text())
         self._start_table()
 
     @classmethod
-    def reopened(cls, path: str | Path, parameter: str, kind: type[C]) -> tuple[ResultsFolder, C | None]:
+    def reopened(cls, path: str | Path, parameter: solver.Quantity, kind: type[C]) -> tuple[ResultsFolder, C | None]:
         """The folder of a run that was stopped, as it was after its last checkpoint, and that checkpoint.
 
         Parameters
         ----------
         path : str or Path
-        parameter : str
+        parameter : solver.Quantity
             As of the folder.
         kind : type
             Of the checkpoint.
@@ -167,17 +158,36 @@ class ResultsFolder:
         write_vtu(block_dataset(self.assembly, increment), folder / f"blocks_{number:05d}.vtu", last=False)
         write_vtu(contact_dataset(self.assembly, increment), folder / f"contacts_{number:05d}.vtu", last=False)
         write_whole(self._files.file(number), packed_increment(increment))
-        self.increments.append(self._files.told(number, increment))
+        self.increments.append(self._files.without_arrays(number, increment))
         self._add_row(number, increment)
         self._write_lists()
         if increment.checkpoint is not None:
             write_whole(self.path / CHECKPOINT, packed(increment.checkpoint, increments=number + 1))
 
-    def finish(self, response: solver.Response, seconds: float) -> dict[str, Any]:
-        """Writes and returns the summary."""
+    def finish(
+        self,
+        response: solver.Response,
+        seconds: float,
+        *,
+        own: Mapping[str, Any] | None = None,
+        tables: Mapping[str, str] | None = None,
+    ) -> dict[str, Any]:
+        """Writes and returns the summary.
+
+        Parameters
+        ----------
+        response : solver.Response
+        seconds : float
+            Solver time.
+        own : mapping, optional
+            What the kind of analysis adds to the summary.
+        tables : mapping from file name to text, optional
+            Tables of the kind of analysis.
+        """
         self._write_lists()
-        write_capacity(response, self.path)
-        summary = summary_of(response, seconds=seconds, record=self.record)
+        for name, text in (tables or {}).items():
+            write_whole(self.path / name, text)
+        summary = summary_of(response, seconds=seconds, record=self.record, own=own or {})
         write_whole(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
         return summary
@@ -185,14 +195,11 @@ class ResultsFolder:
     def _start_table(self) -> None:
         self._rows = io.StringIO()
         self._table = csv.writer(self._rows, lineterminator="\n")
-        own = () if self.parameter == "settlement" else (self.parameter.replace(" ", "_"),)
-        self._table.writerow((*COLUMNS, *own))
+        self._table.writerow((*COLUMNS, *own_columns(self.parameter)))
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
-            self._table.writerow(
-                row_of_increment(number, increment, solver.total_weight(self.assembly), self.parameter)
-            )
+            self._table.writerow(row_of_increment(number, increment, self.assembly, self.parameter))
 
     def _write_lists(self) -> None:
         """The table and the lists of files, of everything so far."""
@@ -237,54 +244,6 @@ def _held(owner: ResultsFolder, folder: Path) -> Callable[[], None]:
     return weakref.finalize(owner, os.close, handle)
 
 
-def write(response: solver.Response, folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Writes the results folder of a response: VTU per increment, PVD, CSV and summary.json.
-
-    Parameters
-    ----------
-    response : solver.Response
-    folder : str or Path
-    overwrite : bool
-        Whether results that are there already may be replaced.
-
-    Raises
-    ------
-    ResultsExist
-    ValueError
-        If the response is read from that very folder.
-    """
-    for increment in response.increments:
-        if isinstance(increment, StoredIncrement) and increment.folder and _is_same(increment.folder, Path(folder)):
-            raise ValueError(f"the response is read from '{folder}' itself; write it to another folder")
-    results = ResultsFolder(folder, response.assembly, overwrite=overwrite, parameter=parameter_word(response))
-    for increment in response.increments:
-        results.add(increment)
-    results.finish(response, sum(i.seconds for i in response.increments))
-    return results.path
-
-
-def _is_same(one: Path, other: Path) -> bool:
-    return one.resolve() == other.resolve()
-
-
-def _packed(arrays: Mapping[str, Any]) -> bytes:
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
-    return buffer.getvalue()
-
-
-def _assembly_arrays(assembly: solver.Assembly) -> dict[str, Any]:
-    return {
-        "vertices": assembly.vertices,
-        "offsets": assembly.offsets,
-        "names": np.array(assembly.names),
-        "roles": assembly.roles,
-        "density": assembly.density,
-        "thickness": assembly.thickness,
-        "materials": np.array(assembly.materials),
-    }
-
-
 def _stored_assembly(folder: Path) -> solver.Assembly:
     if not (folder / "assembly.npz").is_file():
         raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
@@ -314,7 +273,7 @@ def stored_case(folder: str | Path) -> str:
 
 
 def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
-    """The response of a results folder as far as the folder itself tells it, and its summary, {} where it has none.
+    """The response of a results folder without what its kind of analysis adds, and its summary, {} where it has none.
 
     Parameters
     ----------
@@ -340,15 +299,13 @@ def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     response = solver.Response(
         assembly=assembly,
-        settlements=stored_parameters(summary),
+        settlements=(),
         interfaces=solver.Interfaces(),
         loads=solver.self_weight(assembly),
         increments=tuple(increments),
         stop=solver.Status(summary.get("status", solver.Status.INTERRUPTED)),
         message=summary.get("message", ""),
         collapse=_collapse_of(summary, increments, assembly),
-        analysis=summary.get("analysis", "settlement"),
-        limits=stored_limits(summary, increments),
     )
     return response, summary
 
@@ -362,7 +319,7 @@ def _collapse_of(
     falling = [i for i in increments if i.status == solver.Status.FALLING]
     if falling:
         motion = falling[0].velocity
-        mechanism = motion / max(np.abs(motion * [1.0, 1.0, assembly.block_size]).max(), 1e-300)
+        mechanism = motion / max(solver.motion_size(motion, assembly.block_size).max(), 1e-300)
     return solver.Collapse(
         displacement=summary["collapse_displacement"],
         bracket=(summary["collapse_bracket"][0], summary["collapse_bracket"][1]),

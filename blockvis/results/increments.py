@@ -6,79 +6,59 @@ from the increment's file and forgotten again, so that memory does not grow with
 
 from __future__ import annotations
 
-import dataclasses
-import io
 import math
 from collections import OrderedDict
 from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import solver
 
-from .npz import checked_arrays
+from .npz import checked_arrays, compressed, flat, from_flat
 
 #: Bytes of arrays that are kept of the increments read last, and how many of them are kept whatever their size: frames
 #: of a film lie between two.
 CACHED, AT_LEAST = 8 << 20, 2
 
-_CONTACT_ARRAYS = ("vertex", "edge", "corner", "block_a", "block_b", "points", "frames", "gaps", "along")
-_ARRAYS = ("forces", "displacements", "friction", "velocity", "support_forces")
-_NUMBERS = ("settlement", "phase", "load_multiplier", "reaction", "programs", "seconds")
-_CERTIFICATE = (
-    "equilibrium_residual",
-    "largest_penetration",
-    "duality_gap",
-    "complementarity",
-    "kinematic_violation",
-)
+#: Names in the files of fields that are called otherwise.
+_STORED_AS = {"parameter": "settlement"}
 
-#: What is kept of an increment, and what is read.
-_KEPT = (*_NUMBERS, "certificate", "status", "notes")
-_READ = ("pose", "contacts", *_ARRAYS)
+#: Fields of an increment that are not in its file by themselves.
+_APART = ("held", "checkpoint")
 
 
-class StoredIncrement(solver.Increment):
-    """An increment in a file: an :class:`solver.Increment` whose arrays are read whenever they are asked for.
+@dataclass(frozen=True)
+class StateInFile:
+    """The state of an increment in a file, read whenever it is asked for.
 
-    :func:`dataclasses.replace` gives one that is in memory.
+    Attributes
+    ----------
+    files : StoredIncrements
+    number : int
+        Of the increment.
+    numbers : tuple of float
+        Of the increment, by which a file that was replaced is noticed.
     """
 
-    def __getattr__(self, name: str) -> Any:
-        if name in _READ and "_files" in self.__dict__:
-            return getattr(self.__dict__["_files"].read(self.__dict__["_number"], self), name)
-        raise AttributeError(f"an increment has no {name}")
+    files: StoredIncrements
+    number: int
+    numbers: tuple[float, ...]
 
-    @property
-    def folder(self) -> Path | None:
-        """The results folder whose files are read; None of an increment that is in memory."""
-        files = self.__dict__.get("_files")
-        return None if files is None else files.folder
+    def read(self) -> solver.State:
+        """The state.
 
-
-class StoredLimit(solver.LimitLoad):
-    """A limit load whose arrays are those of the increment that tells it."""
-
-    def __getattr__(self, name: str) -> Any:
-        if name in ("contacts", "forces", "pose", "friction", "mechanism") and "_state" in self.__dict__:
-            return getattr(self.__dict__["_state"], "velocity" if name == "mechanism" else name)
-        raise AttributeError(f"a limit load has no {name}")
-
-    @classmethod
-    def of(cls, state: solver.Increment, **numbers: Any) -> StoredLimit:
-        """The limit load of a state.
-
-        Parameters
-        ----------
-        state : solver.Increment
-        **numbers
-            The fields that the state does not tell: multiplier, bounds, status, flow, live_force, programs.
+        Raises
+        ------
+        ValueError
+            If the file is missing, damaged or no longer that of the increment; names it.
         """
-        limit = object.__new__(cls)
-        limit.__dict__.update(numbers, certificate=state.certificate, _state=state)
-        return limit
+        found = self.files.read(self.number)
+        if not all(_same(*pair) for pair in zip(_numbers(found), self.numbers, strict=True)):
+            file = self.files.file(self.number)
+            raise ValueError(f"'{file}' is not what it was when it was opened; open the results again")
+        return found.state
 
 
 class StoredIncrements:
@@ -102,19 +82,17 @@ class StoredIncrements:
     def __len__(self) -> int:
         return len(list((self.folder / "increments").glob("state_*.npz")))
 
-    def told(self, number: int, increment: solver.Increment) -> StoredIncrement:
-        """An increment that has been written, without its arrays.
+    def without_arrays(self, number: int, increment: solver.Increment) -> solver.Increment:
+        """An increment that has been written, its arrays in its file.
 
         Parameters
         ----------
         number : int
         increment : solver.Increment
         """
-        told = object.__new__(StoredIncrement)
-        told.__dict__.update({name: getattr(increment, name) for name in _KEPT}, _files=self, _number=number)
-        return told
+        return replace(increment, held=StateInFile(self, number, _numbers(increment)), checkpoint=None)
 
-    def opened(self, number: int) -> StoredIncrement:
+    def opened(self, number: int) -> solver.Increment:
         """An increment of which nothing is known yet; its file is read once, whole, so that what is damaged is found.
 
         Raises
@@ -122,21 +100,19 @@ class StoredIncrements:
         ValueError
             If the file is missing or damaged; names it.
         """
-        return self.told(number, self._read(number))
+        return self.without_arrays(number, self._read(number))
 
-    def read(self, number: int, told: solver.Increment | None = None) -> solver.Increment:
+    def read(self, number: int) -> solver.Increment:
         """The increment with its arrays, from its file or from memory.
 
         Parameters
         ----------
         number : int
-        told : solver.Increment, optional
-            What is known of it.
 
         Raises
         ------
         ValueError
-            If the file is missing, damaged, or no longer that of the increment told; names it.
+            If the file is missing or damaged; names it.
         """
         if number in self._last:
             self._last.move_to_end(number)
@@ -146,10 +122,7 @@ class StoredIncrements:
             self._bytes += _bytes_of(found)
             while len(self._last) > AT_LEAST and self._bytes > CACHED:
                 self._bytes -= _bytes_of(self._last.popitem(last=False)[1])
-        found = self._last[number]
-        if told is not None and not all(_same(getattr(found, name), getattr(told, name)) for name in _NUMBERS):
-            raise ValueError(f"'{self.file(number)}' is not what it was when it was opened; open the results again")
-        return found
+        return self._last[number]
 
     def _read(self, number: int) -> solver.Increment:
         try:
@@ -163,31 +136,36 @@ class StoredIncrements:
             raise ValueError(f"'{self.file(number)}' cannot be read ({error}); run the case again") from None
 
 
+def folder_of(increment: solver.Increment) -> Path | None:
+    """The results folder whose files hold the arrays of an increment; None where they are in memory."""
+    return increment.held.files.folder if isinstance(increment.held, StateInFile) else None
+
+
 def packed_increment(increment: solver.Increment) -> bytes:
     """An increment as the bytes of its file."""
-    arrays: dict[str, Any] = {name: getattr(increment.contacts, name) for name in _CONTACT_ARRAYS}
-    arrays.update({name: getattr(increment, name) for name in (*_ARRAYS, *_NUMBERS)})
-    arrays.update({name: getattr(increment.certificate, name) for name in _CERTIFICATE})
-    arrays.update(
-        positions=increment.pose.positions, rotations=increment.pose.rotations, status=np.array(str(increment.status))
-    )
-    arrays["notes"] = np.array(increment.notes, dtype=str)
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
-    return buffer.getvalue()
+    numbers = flat(increment, without=_APART)
+    numbers = {_STORED_AS.get(name, name): number for name, number in numbers.items()}
+    return compressed(_arrays_of(increment.state) | numbers)
+
+
+def _arrays_of(state: solver.State) -> dict[str, np.ndarray]:
+    """The arrays of a file, in whose words contact points have a vertex, an edge and a corner, and slip along it."""
+    arrays = flat(state)
+    vertex, edge, corner = solver.corners_and_edges(arrays.pop("features"))
+    rotations, slip = arrays["rotations"][:, 0], arrays.pop("slip")[:, 0]
+    return arrays | {"vertex": vertex, "edge": edge, "corner": corner, "along": slip, "rotations": rotations}
 
 
 def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
-    fields: dict[str, Any] = {name: arrays[name] for name in _ARRAYS}
-    fields.update({name: arrays[name].item() for name in _NUMBERS})
-    return solver.Increment(
-        pose=solver.Pose(arrays["positions"], arrays["rotations"]),
-        contacts=solver.Contacts(**{name: arrays[name] for name in _CONTACT_ARRAYS}),
-        certificate=solver.Certificate(**{name: arrays[name].item() for name in _CERTIFICATE}),
-        status=solver.Status(str(arrays["status"])),
-        notes=tuple(map(str, arrays.get("notes", ()))),
-        **fields,
-    )
+    named = dict(arrays) | {name: arrays[stored] for name, stored in _STORED_AS.items()}
+    named["features"] = solver.features_of(arrays["vertex"], arrays["edge"], arrays["corner"])
+    named["slip"], named["rotations"] = arrays["along"][:, None], arrays["rotations"][:, None]
+    return from_flat(named, solver.Increment, held=from_flat(named, solver.State), checkpoint=None)
+
+
+def _numbers(increment: solver.Increment) -> tuple[float, ...]:
+    values = (getattr(increment, field.name) for field in fields(increment))
+    return tuple(value for value in values if isinstance(value, int | float) and not isinstance(value, str))
 
 
 def _same(one: float, other: float) -> bool:
@@ -195,6 +173,4 @@ def _same(one: float, other: float) -> bool:
 
 
 def _bytes_of(increment: solver.Increment) -> int:
-    parts = (increment, increment.pose, increment.contacts)
-    values = [getattr(part, field.name) for part in parts for field in dataclasses.fields(part)]
-    return sum(value.nbytes for value in values if isinstance(value, np.ndarray))
+    return sum(array.nbytes for array in flat(increment.state).values())

@@ -8,7 +8,7 @@ import json
 import math
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import UnionType
 from typing import IO, Any, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -55,6 +55,67 @@ def unpacked(data: bytes, kind: type[T]) -> tuple[T, dict[str, Any]]:
         return _built(tree["value"], kind, arrays), dict(tree["extra"])
     except (KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"no stored {kind.__name__}: {error}") from None
+
+
+def flat(value: Any, without: Collection[str] = ()) -> dict[str, np.ndarray]:
+    """The fields of a dataclass as arrays by their names, those of dataclasses in it among them.
+
+    Parameters
+    ----------
+    value : dataclass
+        Its fields hold numbers, texts, tuples of texts, arrays and other dataclasses; no two have one name.
+    without : collection of str
+        Fields to leave out.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    for field in dataclasses.fields(value):
+        if field.name in without:
+            continue
+        one = getattr(value, field.name)
+        if dataclasses.is_dataclass(one):
+            arrays |= flat(one)
+        else:
+            arrays[field.name] = np.array(one, dtype=str) if isinstance(one, tuple | str) else np.asarray(one)
+    return arrays
+
+
+def from_flat(arrays: Mapping[str, np.ndarray], kind: type[T], **given: Any) -> T:
+    """The dataclass of the given kind whose fields :func:`flat` made arrays of.
+
+    Parameters
+    ----------
+    arrays : mapping from name to array
+    kind : type
+    **given
+        Fields that were left out.
+
+    Raises
+    ------
+    KeyError
+        If an array is missing.
+    """
+    hints = get_type_hints(kind)
+    fields = dict(given)
+    for field in dataclasses.fields(kind):  # type: ignore[arg-type]
+        if field.name in given:
+            continue
+        one = hints[field.name]
+        if dataclasses.is_dataclass(one):
+            fields[field.name] = from_flat(arrays, one)  # type: ignore[arg-type]
+        elif one is np.ndarray:
+            fields[field.name] = arrays[field.name]
+        elif get_origin(one) is tuple:
+            fields[field.name] = tuple(map(str, arrays[field.name]))
+        else:
+            fields[field.name] = one(arrays[field.name].item())
+    return kind(**fields)
+
+
+def compressed(arrays: Mapping[str, np.ndarray]) -> bytes:
+    """Arrays as the bytes of an .npz file."""
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
+    return buffer.getvalue()
 
 
 def checked_arrays(source: str | Path | io.BytesIO) -> dict[str, np.ndarray]:

@@ -8,54 +8,56 @@ from typing import TextIO
 
 import solver
 
+from .kind import Course
+
 #: Seconds between two redrawings of the bar.
 REDRAW = 0.1
 
 
 class Progress:
-    """A bar that follows the settlement of the phase towards its limit.
+    """A bar that follows the parameter of an analysis towards its limit.
 
     Parameters
     ----------
-    settlements : tuple of solver.Settlement
+    course : Course
+        What the increments run over.
     stream : text stream, optional
         stderr by default; nothing is written unless it is a terminal.
     """
 
-    def __init__(self, settlements: tuple[solver.Settlement, ...], stream: TextIO | None = None) -> None:
-        self.settlements = settlements
+    def __init__(self, course: Course, stream: TextIO | None = None) -> None:
+        self.course = course
         self.stream = sys.stderr if stream is None else stream
         self.shown = self.stream.isatty()
         self.started = time.perf_counter()
         self.last, self.count = -1.0, 0
 
     def increment(self, increment: solver.Increment) -> None:
-        """Shows an increment."""
+        """Show an increment."""
         self.count += 1
         if not self.shown or time.perf_counter() - self.last < REDRAW:
             return
-        falls = increment.status == solver.Status.FALLING
-        what = "falls" if falls else f"reaction {increment.reaction:.5g} N"
-        if increment.load_multiplier and not falls:
-            what = f"load multiplier {increment.load_multiplier:.5g}"
-        if not self.settlements:
+        parameter, measured, drivers = self.course.parameter, self.course.measured, self.course.drivers
+        what = f"{measured.name} {increment.measured:.5g} {measured.unit}".rstrip()
+        if increment.status == solver.Status.FALLING:
+            what = "falls"
+        if not drivers:
             self._line(f"{what}, {self.count} increments")
             return
-        settlement = self.settlements[increment.phase]
-        part = min(increment.settlement / settlement.limit, 1.0)
-        word = "settlement" if isinstance(settlement, solver.Settlement) else "control displacement"
+        driver = drivers[min(increment.phase, len(drivers) - 1)]
+        part = min(increment.parameter / driver.limit, 1.0)
         self._line(
-            f"[{'#' * int(24 * part):<24}] {word} {increment.settlement:.4g} of at most {settlement.limit:g} "
-            f"{settlement.unit}, {what}, {self.count} increments"
+            f"[{'#' * int(24 * part):<24}] {parameter.name} {increment.parameter:.4g} of at most {driver.limit:g} "
+            f"{driver.unit}, {what}, {self.count} increments"
         )
 
     def picture(self, done: int, total: int) -> None:
-        """Shows how many frames of the animation are drawn."""
+        """Show how many frames of the animation are drawn."""
         if self.shown and (done == total or time.perf_counter() - self.last >= REDRAW):
             self._line(f"[{'#' * (24 * done // max(total, 1)):<24}] frame {done} of {total}")
 
     def done(self) -> None:
-        """Clears the bar."""
+        """Clear the bar."""
         if self.shown:
             self.stream.write("\r\x1b[K")
             self.stream.flush()
@@ -90,7 +92,7 @@ class StudyProgress:
         self.last = -1.0
 
     def finished(self, *, failed: bool = False) -> None:
-        """Counts a run."""
+        """Count a run."""
         self.count += 1
         self.failed += failed
         now, done = time.perf_counter(), self.before + self.count
@@ -104,7 +106,7 @@ class StudyProgress:
         self.stream.flush()
 
     def done(self) -> None:
-        """Clears the bar."""
+        """Clear the bar."""
         if self.shown:
             self.stream.write("\r\x1b[K")
             self.stream.flush()

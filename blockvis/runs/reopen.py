@@ -11,9 +11,11 @@ from blockvis.cases.case import parse_case
 from blockvis.cases.loads import with_moving_load
 from blockvis.results.folder import stored_case, stored_response
 
+from .kinds import KINDS
+
 
 def open_results(folder: str | Path) -> solver.Response:
-    """Reopens a results folder as the response it was written from, without solving.
+    """Reopen a results folder as the response it was written from, without solving.
 
     Parameters
     ----------
@@ -33,13 +35,25 @@ def open_results(folder: str | Path) -> solver.Response:
     folder = Path(folder)
     response, summary = stored_response(folder)
     text = stored_case(folder)
-    if not text:
+    case = parse_case(text, folder / "case.toml") if text else None
+    analysis = summary.get("analysis", case.analysis if case else response.analysis)
+    kind = KINDS[analysis]
+    response = kind.restored(replace(response, analysis=analysis), summary)
+    if case is None:
         return response
-    case = parse_case(text, folder / "case.toml")
+    if "parameter" not in summary:
+        # The run was stopped before it wrote a summary.
+        course = kind.course(case)
+        response = replace(
+            response,
+            settlements=course.settlements,
+            control=course.control,
+            parameter=course.parameter,
+            measured=course.measured,
+        )
     loads = case_loads(case, response.assembly)
     return replace(
         response,
-        settlements=response.settlements if "parameter" in summary else case.settlements,
         interfaces=case_interfaces(case),
         loads=with_moving_load(loads, case.loads, response.assembly, case.source, summary.get("governing_position")),
     )

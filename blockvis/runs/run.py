@@ -16,17 +16,20 @@ from blockvis.cases.build import case_assembly
 from blockvis.cases.case import Case, parse_case, read_case
 from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
-from blockvis.runs.reopen import open_results
 
-from .plan import Plan, checkpoint_kind, parameter_of, planned
+from .kind import AnalysisRun
+from .kinds import KINDS
+from .plan import planned
 from .progress import Progress
+from .reopen import open_results
+from .write import finish
 
 #: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
 AS_DRAWN = 0.02
 
 
 def record_of(case: Case) -> Record:
-    """The record of a case; without its text where the case was changed in Python and is not what the text says."""
+    """Make the record of a case; without its text where it was changed in Python and is not what the text says."""
     return Record(
         case=case.text if case.text and parse_case(case.text, case.source) == case else "",
         case_file=str(case.source.resolve()) if case.source.is_file() else "",
@@ -62,7 +65,7 @@ class Run:
 
 
 def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overwrite: bool = False) -> Run:
-    """Solves a case and writes everything: VTU, PVD, CSV, summary, pictures.
+    """Solve a case and writes everything: VTU, PVD, CSV, summary, pictures.
 
     Parameters
     ----------
@@ -87,18 +90,18 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
     folder = Path(f"{case.source.stem}-results") if folder is None else Path(folder)
     refuse_results(folder, overwrite)
     assembly = case_assembly(case)
-    plan = planned(case, assembly)
+    run = planned(case, assembly)
     try:
         results = ResultsFolder(
-            folder, assembly, record=record_of(case), overwrite=overwrite, parameter=parameter_of(case)
+            folder, assembly, record=record_of(case), overwrite=overwrite, parameter=run.course.parameter
         )
     except OSError as error:
         raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
-    return _followed(case, results, plan)
+    return _followed(case, results, run)
 
 
 def resume_run(folder: str | Path) -> Run:
-    """Goes on with a run that was stopped, from its results folder alone, to the result it would have had.
+    """Go on with a run that was stopped, from its results folder alone, to the result it would have had.
 
     Parameters
     ----------
@@ -134,12 +137,13 @@ def resume_run(folder: str | Path) -> Run:
         return Run(response, folder, finished, missing, had_finished=True)
     for note in record.changes():
         warnings.warn(note, stacklevel=2)
-    results, checkpoint = ResultsFolder.reopened(folder, parameter_of(case), checkpoint_kind(case))
+    kind = KINDS[case.analysis]
+    results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint)
     return _followed(case, results, planned(case, results.assembly, checkpoint, tuple(results.increments)))
 
 
 def _finished(folder: Path) -> dict[str, Any] | None:
-    """The summary of a run that came to its end; None where it was stopped."""
+    """Read the summary of a run that came to its end; None where it was stopped."""
     if not (folder / "summary.json").is_file():
         return None
     summary: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
@@ -150,36 +154,35 @@ def _drawn(case: Case) -> list[str]:
     return ["report.html", "mechanism.png", *([case.animation] if case.animation else [])]
 
 
-def _followed(case: Case, results: ResultsFolder, plan: Plan) -> Run:
-    """Follows the increments to their end or to Ctrl-C, writing each, and draws what came out."""
+def _followed(case: Case, results: ResultsFolder, run: AnalysisRun) -> Run:
+    """Follow the increments to their end or to Ctrl-C, writing each, and draws what came out."""
     folder = results.path
-    progress = Progress(plan.settlements)
+    progress = Progress(run.course)
     ending = solver.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
     try:
         while True:
             try:
-                increment = next(plan.steps)
+                increment = next(run.steps)
             except StopIteration as stop:
                 ending = stop.value
                 break
             results.add(increment)
-            if len(plan.limits) == len(results.increments):
-                plan.told(results.increments[-1])
+            run.recorded(results.increments)
             if len(results.increments) == 1:
                 _note_settled(results.assembly, increment)
             for note in increment.notes:
                 warnings.warn(note, stacklevel=2)
             progress.increment(increment)
     except KeyboardInterrupt:
-        plan.steps.close()
+        run.steps.close()
     except OSError as error:
         raise _given_up(folder, error) from None
     finally:
         progress.done()
-    response = plan.response(results.increments, ending)
+    response = run.response(results.increments, ending)
     missing: tuple[str, ...] = ()
     try:
-        summary = results.finish(response, sum(i.seconds for i in response.increments))
+        summary = finish(results, response)
         if ending.stop is not solver.Status.INTERRUPTED:
             missing = draw_results(response, folder, animation=case.animation, case_text=case.text)
     except OSError as error:
@@ -188,7 +191,7 @@ def _followed(case: Case, results: ResultsFolder, plan: Plan) -> Run:
 
 
 def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
-    """Says so where the blocks as drawn were in no equilibrium and found one a little further."""
+    """Say so where the blocks as drawn were in no equilibrium and found one a little further."""
     moved = np.hypot(*first.pose.displacements(assembly)[:, :2].T)
     block = int(np.argmax(moved))
     if first.status == solver.Status.EQUILIBRIUM and moved[block] > AS_DRAWN * assembly.block_size:
@@ -200,7 +203,7 @@ def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
 
 
 def _given_up(folder: Path, error: OSError) -> OSError:
-    """Takes away half a file when the disk is full or gone in the middle of a run; what to say and do about it."""
+    """Remove half a file when the disk is full or gone in the middle of a run; returns what to say and do about it."""
     for half in folder.rglob(PARTIAL):
         half.unlink(missing_ok=True)
     return OSError(
@@ -220,7 +223,7 @@ def draw_results(
     animation: str | None = "collapse.mp4",
     case_text: str = "",
 ) -> tuple[str, ...]:
-    """Draws the pictures of a results folder.
+    """Draw the pictures of a results folder.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
-"""Studies: one case, many runs, because friction, joints and geometry of old masonry are never known.
+"""Studies: many runs of one case, because friction, joints and geometry of old masonry are uncertain.
 
-``plan`` reads the study file, ``sampling`` draws the runs, ``single`` carries out one, ``campaign`` all of them on
-Dask, ``ledger`` keeps what is finished; ``fragility``, ``sensitivity`` and ``pictures`` say what came out.
+``study_file`` reads the study, ``sampling`` chooses the runs, ``run_one`` carries out one, ``campaign`` all of them on
+Dask, ``study_folder`` records the finished ones; ``fragility``, ``sensitivity``, ``summary`` and ``pictures`` evaluate
+them.
 """
 
 from .campaign import study

@@ -1,4 +1,4 @@
-"""Campaign: the runs of a study on Dask, one run one task, whatever becomes of a run or of a worker."""
+"""Campaign: the runs of a study on Dask, one task per run; failures of runs and workers are recorded."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from blockvis.runs.progress import StudyProgress
 
 from .run_one import failed_row, run_once
 from .study_file import Study, read_study
-from .study_folder import Ledger, has_failed
+from .study_folder import StudyFolder, has_failed
 
 if TYPE_CHECKING:
     import pandas as pd
     from distributed import Client, Future
 
-#: Runs given to the scheduler at a time: enough for a thousand workers, little for its memory.
+#: Runs that the scheduler holds at a time: enough for a thousand workers, and few for its memory.
 WINDOW = 2000
 
-#: Finished runs that are recorded together at most.
+#: Most finished runs that are recorded together.
 BATCH = 500
 
-#: Seconds to wait for a scheduler to answer, for the first worker, and for one to come back when all are gone.
+#: Seconds to wait for a scheduler to answer, for the first worker, and for a worker to return when all are lost.
 ANSWER, FIRST_WORKER, LAST_WORKER = 10.0, 60.0, 120.0
 
-#: Seconds between two tables on the way.
+#: Seconds between two tables that are written during a study.
 TABLE_EVERY = 60.0
 
 
@@ -48,22 +48,22 @@ def study(
     retry_failed: bool = False,
     progress: bool = True,
 ) -> pd.DataFrame:
-    """Carries out a study, or what is left of it, and gives its table.
+    """Carry out a study, or the rest of one that was interrupted, and return its table.
 
     Parameters
     ----------
     source : str, Path, mapping or Study
-        The study file, or what would stand in it.
+        The study file, or its content.
     folder : str or Path, optional
-        Where rows, table and pictures go; the name of the study with "-study" in the working directory by default.
+        Folder of rows, table and pictures; the name of the study with "-study" in the working directory by default.
     scheduler : str, optional
-        Address of a Dask scheduler, ``tcp://host:8786``; by default a cluster of this machine's own.
+        Address of a Dask scheduler, ``tcp://host:8786``; by default a cluster on this machine is started.
     workers : int, optional
         Processes of the cluster of this machine; one per core by default.
     force : bool
-        Whether runs of another study in the folder may be thrown away.
+        Whether runs of another study in the folder are deleted.
     retry_failed : bool
-        Whether runs that failed before are made again.
+        Whether runs that failed before are repeated.
     progress : bool
 
     Returns
@@ -76,7 +76,7 @@ def study(
     ValueError
         For bad input or a scheduler that does not answer, before anything is started.
     ConnectionError
-        If the scheduler or all workers are lost; finished runs are kept, and the same call goes on.
+        If the scheduler or all workers are lost; finished runs are kept, and the same call continues.
 
     Notes
     -----
@@ -103,8 +103,20 @@ def run_study(
     retry_failed: bool = False,
     progress: bool = True,
     keep: Sequence[int] = (),
-) -> Ledger:
-    """As :func:`study`, but gives the ledger; ``keep`` adds to the runs whose results folder is written."""
+) -> StudyFolder:
+    """Carry out a study as :func:`study`, and return its folder.
+
+    Parameters
+    ----------
+    source, folder, scheduler, workers, force, retry_failed, progress
+        As of :func:`study`.
+    keep : sequence of int
+        Runs whose results folder is written, besides those that the study names.
+
+    Returns
+    -------
+    StudyFolder
+    """
     if "__mp_main__" in sys.modules and multiprocessing.parent_process() is not None:
         raise SystemExit('blockvis: in a script, call blockvis.study under: if __name__ == "__main__":')
     plan = source if isinstance(source, Study) else read_study(source)
@@ -115,43 +127,43 @@ def run_study(
             raise ValueError(f"run {run} is to be kept, but runs are numbered from 0 to {plan.n_runs - 1}")
     folder = Path(f"{plan.source.stem}-study") if folder is None else Path(folder)
     if scheduler is None:
-        ledger = Ledger(folder, plan, force=force)
-        todo = ledger.missing(retry_failed=retry_failed)
+        records = StudyFolder(folder, plan, force=force)
+        todo = records.missing(retry_failed=retry_failed)
         if todo:
             with local_cluster(min(workers or _cores(), len(todo))) as client:
-                carry_out(ledger, todo, client, progress)
+                carry_out(records, todo, client, progress)
     else:
-        # The scheduler answers before the folder is touched.
+        # The folder is not changed unless the scheduler answers.
         with _existing_cluster(scheduler, plan) as client:
-            ledger = Ledger(folder, plan, force=force)
-            carry_out(ledger, ledger.missing(retry_failed=retry_failed), client, progress)
-    _finish(ledger, sorted({*plan.keep, *keep}))
-    return ledger
+            records = StudyFolder(folder, plan, force=force)
+            carry_out(records, records.missing(retry_failed=retry_failed), client, progress)
+    _finish(records, sorted({*plan.keep, *keep}))
+    return records
 
 
-def _finish(ledger: Ledger, keep: Sequence[int]) -> None:
+def _finish(records: StudyFolder, keep: Sequence[int]) -> None:
     from .pictures import draw_study
     from .summary import summary_of
 
-    table = ledger.write_table()
-    ledger.write_summary(summary_of(ledger.study, table))
-    draw_study(ledger, table)
+    table = records.write_table()
+    records.write_summary(summary_of(records.study, table))
+    draw_study(records, table)
     for run in keep:
-        _keep(ledger, run)
+        _keep(records, run)
 
 
-def _keep(ledger: Ledger, run: int) -> None:
-    """The whole results folder of a run, made again on this machine from a case file that stands for itself."""
+def _keep(records: StudyFolder, run: int) -> None:
+    """Write the results folder of a run, repeated on this machine from a case file with the values of the run."""
     import tomli_w
 
     from blockvis.cases.case import parse_case
     from blockvis.runs.run import run_case
 
-    folder = ledger.folder / "results" / f"run_{run:06d}"
+    folder = records.folder / "results" / f"run_{run:06d}"
     if (folder / "summary.json").is_file():
         return
-    values = ledger.study.values_of(run)
-    source = ledger.study.case_source
+    values = records.study.values_of(run)
+    source = records.study.case_source
     geometry = values.get("geometry", {})
     if "file" in geometry:
         geometry["file"] = str(source.parent / geometry["file"])
@@ -169,19 +181,19 @@ def _cores() -> int:
 
 @contextmanager
 def local_cluster(workers: int) -> Iterator[Client]:
-    """A cluster of this machine: processes of one thread each, restarted when they die."""
+    """Start a cluster on this machine: processes of one thread each, restarted when they die."""
     import dask
     from distributed import Client, LocalCluster
 
     settings = {
-        # A worker holds one run and no other waits there, so that a run that kills its worker takes no other along.
+        # No runs wait on a worker, so that a run that kills its worker loses no other run.
         "distributed.scheduler.worker-saturation": 1.0,
         "distributed.scheduler.allowed-failures": 1,
-        # What nobody looks at here takes processor time from the runs.
+        # Monitors that are not used here would take processor time from the runs.
         "distributed.worker.profile.enabled": False,
         "distributed.admin.system-monitor.interval": "5s",
         "distributed.admin.tick.interval": "1s",
-        # Ten looks a second at the memory cost two per cent of a core each; runs grow slowly.
+        # Checking memory ten times a second costs two per cent of a core per worker; runs grow slowly.
         "distributed.worker.memory.monitor-interval": "1s",
         "distributed.scheduler.active-memory-manager.start": False,
     }
@@ -200,24 +212,24 @@ def local_cluster(workers: int) -> Iterator[Client]:
                 'if __name__ == "__main__":'
             ) from None
         with cluster, Client(cluster) as client:
-            client.register_plugin(_deaf_plugin())
+            client.register_plugin(_ignore_interrupts())
             client.run(_probe, "")
             yield client
 
 
-def _deaf_plugin() -> Any:
-    """What keeps Ctrl-C in a terminal from the workers, which get it too: the study itself stops them."""
+def _ignore_interrupts() -> Any:
+    """Make a plugin with which workers ignore Ctrl-C of their terminal: the study itself stops them."""
     import signal
 
     from distributed import WorkerPlugin
 
-    class Deaf(WorkerPlugin):
-        name = "blockvis-deaf"
+    class IgnoreInterrupts(WorkerPlugin):
+        name = "blockvis-ignore-interrupts"
 
         def setup(self, worker: Any) -> None:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 
-    return Deaf()
+    return IgnoreInterrupts()
 
 
 @contextmanager
@@ -246,10 +258,10 @@ def _existing_cluster(address: str, plan: Study) -> Iterator[Client]:
 
 
 def _check_workers(client: Client, file: str) -> None:
-    """Refuses workers that have another blockvis, or do not see the layout file."""
+    """Refuse workers that have another version of blockvis, or cannot read the layout file."""
     try:
         answers = client.run(_probe, file)
-    except Exception as error:  # noqa: BLE001 - whatever a foreign worker raises, it cannot work for us
+    except Exception as error:  # noqa: BLE001 - whatever it raises, this worker cannot run blockvis
         raise ValueError(
             f"a worker cannot run blockvis ({error}); install blockvis {version('blockvis')} on all workers"
         ) from None
@@ -261,58 +273,68 @@ def _check_workers(client: Client, file: str) -> None:
 
 
 def _probe(file: str) -> tuple[str, bool]:
-    """Version of a worker, and whether it sees a file; it has imported all that a run needs when it answers."""
+    """Version of blockvis on a worker, and whether it sees a file; this module imports all that a run needs."""
     return version("blockvis"), not file or Path(file).is_file()
 
 
-def carry_out(ledger: Ledger, todo: Sequence[int], client: Client, progress: bool) -> None:
-    """Makes the runs; every row is on the disk before the next is taken."""
-    bar = StudyProgress(ledger.study.n_runs, ledger.study.n_runs - len(todo), shown=None if progress else False)
+def carry_out(records: StudyFolder, todo: Sequence[int], client: Client, progress: bool) -> None:
+    """Make the runs and record each row on the disk before the next is taken.
+
+    Parameters
+    ----------
+    records : StudyFolder
+    todo : sequence of int
+        Runs to be made.
+    client : distributed.Client
+    progress : bool
+        Whether a progress bar is shown.
+    """
+    bar = StudyProgress(records.study.n_runs, records.study.n_runs - len(todo), shown=None if progress else False)
     suspects: list[int] = []
     written = time.monotonic()
     try:
         window = max(WINDOW, 2 * sum(client.nthreads().values()))
-        for batch in _batches(ledger.study, todo, client, window):
+        for batch in _batches(records.study, todo, client, window):
             suspects += [run for run, row, _ in batch if row is None]
-            _record(ledger, bar, [(row, shape) for _, row, shape in batch if row is not None])
+            _record(records, bar, [(row, shape) for _, row, shape in batch if row is not None])
             if time.monotonic() - written > TABLE_EVERY:
-                ledger.write_table()
+                records.write_table()
                 written = time.monotonic()
-        # A worker that dies may take runs along that only waited there: those suspected get a last try, each alone.
-        for batch in _batches(ledger.study, suspects, client, 1):
-            rows = [(row or failed_row(ledger.study.order(run), KILLED), shape) for run, row, shape in batch]
-            _record(ledger, bar, rows)
+        # Runs whose workers died may not be the cause: each is tried once more, alone.
+        for batch in _batches(records.study, suspects, client, 1):
+            rows = [(row or failed_row(records.study.order(run), KILLED), shape) for run, row, shape in batch]
+            _record(records, bar, rows)
     except BaseException:
-        ledger.write_table()
+        records.write_table()
         raise
     finally:
         bar.done()
 
 
-def _record(ledger: Ledger, bar: StudyProgress, rows: Sequence[tuple[dict[str, Any], bytes]]) -> None:
-    ledger.add(rows)
+def _record(records: StudyFolder, bar: StudyProgress, rows: Sequence[tuple[dict[str, Any], bytes]]) -> None:
+    records.add(rows)
     for row, _ in rows:
         bar.finished(failed=has_failed(row))
 
 
-#: Why a run that no worker survives has no result.
+#: Message of a run that no worker survives.
 KILLED = "every worker that took this run died, perhaps out of memory; make it alone with --keep to see why"
 
 _Finished = tuple[int, dict[str, Any] | None, bytes]
 
 
 def _batches(plan: Study, todo: Sequence[int], client: Client, window: int) -> Iterator[list[_Finished]]:
-    """The runs as they finish: number, row, shape; without a row where the workers died."""
+    """Yield runs as they finish: number, row, shape of the mechanism; without a row if the workers died."""
     finished: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
     token = uuid.uuid4().hex[:8]
     waiting = iter(todo)
-    flying: dict[int, Future] = {}
+    submitted: dict[int, Future] = {}
 
-    def tell(run: int) -> Callable[[Future], None]:
+    def queued(run: int) -> Callable[[Future], None]:
         return lambda future: finished.put((run, future))
 
     def fill() -> None:
-        while len(flying) < window:
+        while len(submitted) < window:
             run = next(waiting, None)
             if run is None:
                 return
@@ -326,22 +348,22 @@ def _batches(plan: Study, todo: Sequence[int], client: Client, window: int) -> I
                 key=f"blockvis-{token}-{run}",
                 pure=False,
             )
-            flying[run] = future
-            future.add_done_callback(tell(run))
+            submitted[run] = future
+            future.add_done_callback(queued(run))
 
     fill()
     last_worker = time.monotonic()
-    while flying:
+    while submitted:
         try:
             done = [finished.get(timeout=1.0)]
         except queue.Empty:
-            last_worker = _still_there(client, last_worker)
+            last_worker = _last_worker_seen(client, last_worker)
             continue
-        # Those that have finished meanwhile come along: one message and one write for many short runs.
+        # Runs that have finished meanwhile are taken with it: one message and one write for many short runs.
         while len(done) < BATCH and not finished.empty():
             done.append(finished.get())
         for run, _ in done:
-            del flying[run]
+            del submitted[run]
         yield _gathered(plan, client, done)
         for _, future in done:
             future.release()
@@ -352,7 +374,7 @@ def _gathered(plan: Study, client: Client, done: Sequence[tuple[int, Future]]) -
     from distributed import KilledWorker
 
     if len(done) > 1 and all(future.status == "finished" for _, future in done):
-        # Anything that goes wrong is looked at one by one.
+        # If gathering fails, the runs are taken one by one.
         with suppress(Exception):
             found = client.gather([future for _, future in done])
             return [(run, *result) for (run, _), result in zip(done, found, strict=True)]
@@ -364,7 +386,7 @@ def _gathered(plan: Study, client: Client, done: Sequence[tuple[int, Future]]) -
             row, shape = None, b""
         except (CancelledError, OSError):
             raise ConnectionError(f"the scheduler does not answer any more; {_GO_ON}") from None
-        except Exception as error:  # noqa: BLE001 - what a worker could not even load or send is this run's result
+        except Exception as error:  # noqa: BLE001 - an error of loading or sending is this run's result
             row, shape = failed_row(plan.order(run), f"{type(error).__name__}: {error}"), b""
         rows.append((run, row, shape))
     return rows
@@ -373,8 +395,8 @@ def _gathered(plan: Study, client: Client, done: Sequence[tuple[int, Future]]) -
 _GO_ON = "finished runs are kept, the same command goes on with the others"
 
 
-def _still_there(client: Client, last_worker: float) -> float:
-    """The time when a worker was last seen; raises ConnectionError when that is too long ago."""
+def _last_worker_seen(client: Client, last_worker: float) -> float:
+    """Return the time when a worker was last seen; raise ``ConnectionError`` if that is too long ago."""
     try:
         workers = client.nthreads() if client.status == "running" else None
     except OSError:

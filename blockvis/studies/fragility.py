@@ -1,4 +1,4 @@
-"""Fragility: the probability of collapse against the settlement, from runs that collapsed and runs that did not."""
+"""Fragility: probability of collapse against settlement, from runs that collapsed and runs that did not."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .study_folder import NO_RESULT
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Status of runs that stood as far as they were followed.
+#: Status of runs that did not collapse within their limit.
 STOOD = (str(solver.Status.LIMIT_REACHED), str(solver.Status.LOCKED))
 
 
@@ -30,11 +30,11 @@ class Fragility:
     probability : (n_steps,) array
         Of a collapse at this settlement or before.
     lower, upper : (n_steps,) arrays
-        Confidence band, point by point.
+        Pointwise confidence band.
     furthest : float [m or rad]
-        Up to here the curve is known: the largest settlement that any run was followed to.
+        The curve is known up to the largest settlement of any run.
     n_runs, n_collapsed, n_stood : int
-        Runs the curve is made of, those that collapsed, and those that stood as far as they were followed.
+        All runs, those that collapsed, and those that did not collapse within their limit.
     confidence : float
     """
 
@@ -49,13 +49,13 @@ class Fragility:
     confidence: float
 
     def quantile(self, probability: float) -> float | None:
-        """The settlement [m or rad] at which the probability of collapse is reached; None where it is not."""
+        """Find the settlement [m or rad] at which a probability of collapse is reached; None if it is not reached."""
         reached = np.flatnonzero(self.probability >= probability - 1e-12)
         return float(self.settlement[reached[0]]) if len(reached) else None
 
 
 def observations(table: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """How far each run with a result went, and whether it collapsed there.
+    """Last settlement of each run with a result, and whether the run collapsed there.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def observations(table: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     settlement : (n,) array [m or rad]
-        Of the collapse, 0 where there was no equilibrium from the start; of a run that stood, the last one.
+        Settlement at collapse, 0 without an initial equilibrium; of a run that did not collapse, its last settlement.
     collapsed : (n,) bool array
     """
     known = table[~table["status"].isin(NO_RESULT)]
@@ -75,19 +75,24 @@ def observations(table: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fragility_of(table: pd.DataFrame, confidence: float = 0.95) -> Fragility:
-    """The fragility curve of the table of a study; runs without result are left out, and have to be told beside it."""
+    """Estimate the fragility curve from the table of a study; runs without result are excluded: report their number."""
     return fragility(*observations(table), confidence)
 
 
 def fragility(settlement: ArrayLike, collapsed: ArrayLike, confidence: float = 0.95) -> Fragility:
-    """The fragility curve of runs that collapsed, and of runs that stood as far as they were followed.
+    """Estimate the fragility curve from runs that collapsed and runs that did not collapse within their limit.
 
     Parameters
     ----------
     settlement : (n,) array [m or rad]
-        Of the collapse, or the last one of a run that stood.
+        Settlement at collapse, or the last one of a run that did not collapse.
     collapsed : (n,) bool array
     confidence : float
+        Of the band, 0 to 1.
+
+    Returns
+    -------
+    Fragility
 
     Notes
     -----
@@ -96,13 +101,13 @@ def fragility(settlement: ArrayLike, collapsed: ArrayLike, confidence: float = 0
 
     The band is Wilson's interval with the effective number of runs p (1 - p) / V from Greenwood's variance V: K. J.
     Rothman, Estimation of confidence limits for the cumulative probability of survival in life table analysis, Journal
-    of Chronic Diseases 31 (1978) 557-560. Where every run collapsed or was followed further this is Wilson's
-    interval of the share of runs. It takes runs as independent; those of a latin hypercube or Sobol' sequence
-    scatter less.
+    of Chronic Diseases 31 (1978) 557-560. If every run collapsed or was followed further, this is Wilson's
+    interval of the share of runs. It assumes independent runs; those of a latin hypercube or Sobol' sequence scatter
+    less.
     """
     end, event = np.asarray(settlement, dtype=float), np.asarray(collapsed, dtype=bool)
     steps, dead = np.unique(end[event], return_counts=True)
-    # A run that stood up to a settlement was at risk there.
+    # A run that did not collapse up to a settlement was at risk there.
     at_risk = len(end) - np.searchsorted(np.sort(end), steps, side="left")
     standing = np.cumprod(1.0 - dead / np.maximum(at_risk, 1))
     last = dead == at_risk
@@ -110,7 +115,7 @@ def fragility(settlement: ArrayLike, collapsed: ArrayLike, confidence: float = 0
     with np.errstate(divide="ignore", invalid="ignore"):
         runs = (1.0 - standing) / (standing * greenwood)
     for k in np.flatnonzero(last):
-        # The variance says nothing where nothing stands: as many runs as at the step before.
+        # The variance is undefined when no run is left standing: take the number of runs of the step before.
         runs[k] = runs[k - 1] if k else at_risk[k]
     lower, upper = wilson(1.0 - standing, runs, confidence)
     return Fragility(
@@ -127,15 +132,19 @@ def fragility(settlement: ArrayLike, collapsed: ArrayLike, confidence: float = 0
 
 
 def wilson(share: ArrayLike, number: ArrayLike, confidence: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
-    """Wilson's interval of a probability.
+    """Compute Wilson's interval of a probability.
 
     Parameters
     ----------
     share : (n,) array
-        Of the observations in which the event happened.
+        Fraction of the observations in which the event happened.
     number : (n,) array
-        Of observations; need not be whole.
+        Number of observations; need not be whole.
     confidence : float
+
+    Returns
+    -------
+    lower, upper : (n,) arrays
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""The pictures of a study: fragility, sensitivity, where which mechanism occurs, and what the mechanisms look like."""
+"""Pictures of a study: fragility, sensitivity, scatter of the runs by mechanism, and the mechanisms."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from blockvis.pictures import palette
 from .fragility import Fragility, fragility_of
 from .sensitivity import first_order, outcome, swings
 from .study_file import Study
-from .study_folder import NO_RESULT, Ledger
+from .study_folder import NO_RESULT, StudyFolder
 from .summary import classes_of, curve_name, independent_rows
 
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Classes with a colour of their own in the scatter, and classes drawn.
+#: Classes of mechanisms with their own colour in the scatter, and classes that are drawn.
 COLOURED, DRAWN = 6, 12
 
-#: Panels of the scatter, for the parameters that matter most.
+#: Panels of the scatter, for the parameters with the largest swings.
 PANELS = 3
 
-#: Colours and marks of the classes, the most frequent first; told apart also in grey.
+#: Colours and marks of the classes, the most frequent first; the marks distinguish them in grey as well.
 CLASSES = ("#145ca8", "#e24e1b", "#00796b", "#7e37b2", "#b08a00", "#7a4a2b")
 MARKS = ("o", "s", "^", "D", "v", "P")
 
@@ -38,15 +38,20 @@ TEXT = 11.0
 HEADING: dict[str, Any] = {"fontsize": 0.95 * TEXT, "loc": "left", "color": "#4a4a4a"}
 
 
-def draw_study(ledger: Ledger, table: pd.DataFrame) -> list[Path]:
-    """Draws what the table has to tell, and returns the files.
+def draw_study(records: StudyFolder, table: pd.DataFrame) -> list[Path]:
+    """Draw the pictures of a study that its table has data for.
 
     Parameters
     ----------
-    ledger : Ledger
+    records : StudyFolder
     table : pandas.DataFrame
+
+    Returns
+    -------
+    list of Path
+        The files.
     """
-    study, folder = ledger.study, ledger.folder
+    study, folder = records.study, records.folder
     drawn = []
     if (~table["status"].isin(NO_RESULT)).any():
         drawn.append(draw_fragility(study, table, folder / "fragility.png"))
@@ -54,12 +59,12 @@ def draw_study(ledger: Ledger, table: pd.DataFrame) -> list[Path]:
             drawn.append(draw_sensitivity(study, table, folder / "sensitivity.png"))
     if classes_of(table):
         drawn.append(draw_scatter(study, table, folder / "scatter.png"))
-        drawn.append(draw_mechanisms(ledger, table, folder / "mechanisms.png"))
+        drawn.append(draw_mechanisms(records, table, folder / "mechanisms.png"))
     return drawn
 
 
 def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draws the probability of collapse against the settlement, with its confidence band.
+    """Draw the probability of collapse against the settlement, with its confidence band.
 
     Parameters
     ----------
@@ -103,7 +108,7 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
 
 
 def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draws the swing of the collapse displacement with every parameter, and Sobol' indices beside it.
+    """Draw the swing of the collapse displacement with every parameter, and Sobol' indices beside it.
 
     Parameters
     ----------
@@ -159,7 +164,7 @@ def draw_sensitivity(study: Study, table: pd.DataFrame, path: str | Path) -> Pat
 
 
 def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draws the collapse displacement of every run against the parameters that matter most, by mechanism.
+    """Draw the collapse displacement of every run against the parameters with the largest swings, by mechanism.
 
     Parameters
     ----------
@@ -202,23 +207,23 @@ def draw_scatter(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     return _saved(figure, path)
 
 
-def draw_mechanisms(ledger: Ledger, table: pd.DataFrame, path: str | Path) -> Path:
-    """Draws one run of each mechanism found, the most frequent first.
+def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path) -> Path:
+    """Draw one run of each mechanism found, the most frequent first.
 
     Parameters
     ----------
-    ledger : Ledger
+    records : StudyFolder
     table : pandas.DataFrame
     path : path
     """
     classes = classes_of(table)
     factor, unit = _length(table)
-    shown = [one for one in classes if ledger.shape_file(one).is_file()][:DRAWN]
+    shown = [one for one in classes if records.shape_file(one).is_file()][:DRAWN]
     columns = min(3, max(1, len(shown)))
     rows = -(-len(shown) // columns) if shown else 1
     shapes = []
     for one in shown:
-        with np.load(ledger.shape_file(one)) as stored:
+        with np.load(records.shape_file(one)) as stored:
             shapes.append({name: stored[name] for name in stored.files})
     tall = _aspect(shapes[0]) if shapes else 0.6
     figure = Figure(figsize=(4.0 * columns, (4.0 * min(max(tall, 0.35), 1.6) + 1.0) * rows + 0.3), layout="constrained")
@@ -264,7 +269,7 @@ def _draw_shape(axes: Axes, shape: dict[str, np.ndarray]) -> None:
 
 
 def _frame(shape: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of what is shown [m]: the free blocks, and as much of the supports as stands near them."""
+    """Corners of the visible area [m]: the free blocks with a margin."""
     free = np.repeat(shape["free"], np.diff(shape["offsets"]))
     points = np.concatenate([shape["vertices"][free], shape["at_rest"][free]])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -278,7 +283,7 @@ def _aspect(shape: dict[str, np.ndarray]) -> float:
 
 
 def _interesting(curve: Fragility) -> float:
-    """Where the axis ends: at the last collapse if all collapsed, else as far as runs were followed [m or rad]."""
+    """End of the axis [m or rad]: the last collapse if all runs collapsed, else the largest settlement of a run."""
     if curve.n_stood == 0 and len(curve.settlement):
         return float(curve.settlement[-1])
     return curve.furthest
@@ -294,7 +299,7 @@ def _counts(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> 
 
 
 def _length(table: pd.DataFrame) -> tuple[float, str]:
-    """Factor and unit in which the settlements read well."""
+    """Factor and unit of the settlements: mm for lengths below 1 m."""
     units = [u for u in table["unit"].unique().tolist() if u]
     unit = units[0] if units else "m"
     largest = float(np.nanmax(np.append(outcome(table), 0.0)))

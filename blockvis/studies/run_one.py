@@ -1,4 +1,4 @@
-"""One run of a study: from the values of a case to a row of the table, whatever happens on the way."""
+"""One run of a study: from the values of a case to a row of the table, even if the run fails."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from blockvis.cases.case import Case, case_of
 
 from .study_file import run_values
 
-#: Status of a run that gave no result, besides "solver failed".
+#: Status of a run that raised an error.
 FAILED = "failed"
 
-#: Joints that a class names one by one; of more, their number is told.
+#: Most joints that a class names; of more joints it gives the number.
 NAMED_JOINTS = 8
 
 #: Largest movement in the picture of a mechanism, as a fraction of the size of the structure.
@@ -35,7 +35,7 @@ class _OutOfTime(RuntimeError):
 def run_once(
     values: Mapping[str, Any], source: str, order: Mapping[str, Any], n_seeded: int, seconds: float | None = None
 ) -> tuple[dict[str, Any], bytes]:
-    """Carries out one run.
+    """Carry out one run.
 
     Parameters
     ----------
@@ -44,32 +44,32 @@ def run_once(
     source : str
         The case file; paths in the case are relative to its folder.
     order : mapping
-        Number, seed and values of the run, as :meth:`blockvis.studies.study_file.Study.order` gives them.
+        Number, seed and values of the run, of :meth:`blockvis.studies.study_file.Study.order`.
     n_seeded : int
-        How many of the imperfections get the run's seed.
+        Number of the first imperfections, those of the study, which get the run's seed.
     seconds : float, optional [s]
-        After this time the run is given up.
+        Longest time of a run; after it the run fails.
 
     Returns
     -------
     row : dict
-        Of the table. A run that raises has the status "failed" and says why in ``message``.
+        Row of the table. A run that raises an error has the status "failed" and the error as ``message``.
     shape : bytes
-        The mechanism to be drawn, as a packed npz; empty where there is none.
+        The mechanism for its picture, as an npz file; empty without a mechanism.
     """
     started = time.perf_counter()
     try:
-        # Notes about the drawing would come once per run; a single run by hand shows them.
+        # Warnings about the layout would appear once per run; a run outside a study shows them.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             found, shape = _outcome(case_of(run_values(values, order, n_seeded), Path(source)), seconds)
-    except Exception as error:  # noqa: BLE001 - whatever it is, it is this run's result and must not end the study
+    except Exception as error:  # noqa: BLE001 - any error is this run's result and must not end the study
         return failed_row(order, _reason(error), time.perf_counter() - started), b""
     return _row(order, **found, seconds=time.perf_counter() - started), shape
 
 
 def failed_row(order: Mapping[str, Any], message: str, seconds: float = 0.0) -> dict[str, Any]:
-    """The row of a run without result.
+    """Make the row of a run without result.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def _reason(error: Exception) -> str:
 
 def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
     assembly = case_assembly(case)
-    # The first frame of the fall tells the mechanism; no one looks at the others.
+    # The first frame of the fall shows the mechanism; the others are not needed.
     controls = replace(case.controls, falling_frames=1)
     steps = solver.settlement_increments(
         assembly,
@@ -101,7 +101,7 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
         controls=controls,
     )
     started = time.perf_counter()
-    # Of the path a study keeps the ends.
+    # Only the ends of the path are kept.
     first = last = falling = None
     n_path = n_programs = 0
     while True:
@@ -136,7 +136,7 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
         found["last_settlement"] = low
         found["collapse_reaction"] = float(ending.collapse.reaction)
     elif ending.stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
-        # It falls before anything has settled.
+        # It collapses before any settlement.
         found |= {"collapse_displacement": 0.0, "bracket_low": 0.0, "bracket_high": 0.0}
     if falling is None or "collapse_displacement" not in found:
         return found, b""
@@ -152,7 +152,7 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
 
 
 def mechanism_class(mechanism: solver.Mechanism) -> str:
-    """The class of a mechanism: its hinges and sliding joints by name, or where there are many, their number.
+    """Name the class of a mechanism by its hinges and sliding joints, or by their numbers if there are many.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def mechanism_class(mechanism: solver.Mechanism) -> str:
     Returns
     -------
     str
-        The same for the same joints, whatever the size and the scale of the motion.
+        The same for the same joints, whatever the displacements of the blocks.
     """
     n, hinges, sliding = len(mechanism.motions), mechanism.hinges, mechanism.sliding
     parts = f"{n} part{'' if n == 1 else 's'}"
@@ -178,7 +178,7 @@ def mechanism_class(mechanism: solver.Mechanism) -> str:
 
 
 def _joints(names: Sequence[str], pairs: Sequence[Sequence[int]]) -> str:
-    """Pairs of blocks, what their names have in common said once: "voussoir 3|4, 6|7"."""
+    """Write pairs of blocks, the common part of their names once: "voussoir 3|4, 6|7"."""
     words, before = [], None
     for pair in pairs:
         first, second = (names[i] for i in sorted(pair, key=lambda i: (len(names[i]), names[i])))
@@ -191,7 +191,7 @@ def _joints(names: Sequence[str], pairs: Sequence[Sequence[int]]) -> str:
 
 
 def _shape(assembly: solver.Assembly, falling: solver.Increment, mechanism: solver.Mechanism) -> bytes:
-    """The blocks where the mechanism takes them, in single precision: for a small picture."""
+    """Pack the blocks as the mechanism displaces them, in single precision, for a small picture."""
     free = assembly.free[assembly.block_of_vertex]
     at_rest = solver.moved_vertices(assembly, falling.pose)
     size = float(np.ptp(at_rest[free], axis=0).max())

@@ -1,4 +1,4 @@
-"""Sampling: which runs a study has; every number from its seed."""
+"""Sampling: the runs of a study; all random numbers follow from its seed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-#: Ways to choose the runs; "saltelli" is for Sobol' indices of first order and total.
+#: Methods of sampling; "saltelli" is for Sobol' indices of first order and total.
 METHODS = ("grid", "latin hypercube", "sobol", "random", "saltelli")
 
 
@@ -19,12 +19,12 @@ class Design:
     Attributes
     ----------
     probabilities : (n_runs, n_parameters) array
-        Inside 0 to 1; the distribution of each parameter makes values of them.
+        Between 0 and 1, exclusive; the quantiles of each parameter's distribution are its values.
     seeds : (n_runs,) int array
         Of the imperfections.
     factors : int
-        Of a "saltelli" design: what is exchanged one by one, the parameters and, where there are any, the imperfections
-        together; 0 for other designs.
+        Number of factors that a "saltelli" design exchanges one by one: the parameters and, if there are any, all
+        imperfections together; 0 for other designs.
     """
 
     probabilities: np.ndarray
@@ -33,7 +33,7 @@ class Design:
 
     @property
     def independent(self) -> np.ndarray:
-        """(n_runs,) bool array: the runs that are a random sample; the others of a "saltelli" design mix these."""
+        """(n_runs,) bool array: runs that form a random sample; the others of a "saltelli" design combine these."""
         if self.factors == 0:
             return np.ones(len(self.seeds), dtype=bool)
         place = np.arange(len(self.seeds)) % (self.factors + 2)
@@ -41,7 +41,7 @@ class Design:
 
 
 def designed(method: str, runs: int, levels: Sequence[int], repeats: int, seed: int, *, scattered: bool) -> Design:
-    """The runs of a study.
+    """Choose the runs of a study.
 
     Parameters
     ----------
@@ -50,17 +50,21 @@ def designed(method: str, runs: int, levels: Sequence[int], repeats: int, seed: 
     runs : int
         For "saltelli" the size N of the two independent samples: the study has N (factors + 2) runs.
     levels : sequence of int
-        For a grid, how many values each parameter takes.
+        Number of values of each parameter in a grid.
     repeats : int
-        Of every point of a grid.
+        Runs per point of a grid.
     seed : int
     scattered : bool
         Whether there are imperfections.
 
+    Returns
+    -------
+    Design
+
     Raises
     ------
     ValueError
-        For a number of runs that a Sobol' sequence cannot have.
+        For a number of runs of a Sobol' sequence that is no power of 2.
 
     Notes
     -----
@@ -107,7 +111,7 @@ def _saltelli(runs: int, n: int, random: np.random.Generator, seed: int, scatter
 
 
 def _inside(probabilities: np.ndarray) -> np.ndarray:
-    """Not 0 or 1 itself, where many distributions have no value."""
+    """Exclude 0 and 1, for which many distributions have no value."""
     return np.clip(probabilities, 1e-12, 1.0 - 1e-12)
 
 

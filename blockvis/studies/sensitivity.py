@@ -1,4 +1,4 @@
-"""Sensitivity: which of the unknown numbers decides how far the supports may move."""
+"""Sensitivity of the collapse displacement to the parameters of a study."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from .study_folder import NO_RESULT
 if TYPE_CHECKING:
     import pandas as pd
 
-#: What the exchange of all imperfections together is called.
+#: Name of the factor of all imperfections together.
 IMPERFECTIONS = "imperfections"
 
-#: A swing compares the runs with the lowest and the highest values of a parameter: this share of them on either side.
+#: A swing compares the runs with the lowest and the highest values of a parameter: this fraction of the runs each.
 FIFTH = 0.2
 
-#: Fewer runs than this tell nothing of an index: of a linear function the error is then a tenth and more.
+#: Fewest runs for an index: with fewer its error is a tenth or more even for a linear function.
 FEWEST_RUNS = 64
 
 
 @dataclass(frozen=True)
 class Swing:
-    """How the outcome differs between low and high values of a parameter, everything else as it comes.
+    """Difference of the mean outcome between low and high values of a parameter, the others at random.
 
     Attributes
     ----------
     name : str
     low_value, high_value : float or str
-        Mean of the parameter in the compared runs, or the value itself where it takes few.
+        Mean of the parameter in the compared runs, or the value itself if it has few.
     low, high : float [m or rad]
         Mean outcome of the runs with the lowest and with the highest values.
     low_error, high_error : float [m or rad]
@@ -53,9 +53,9 @@ class Swing:
 
 
 def outcome(table: pd.DataFrame) -> np.ndarray:
-    """(n_rows,) array [m or rad]: collapse displacement, or how far a run that stood was followed; nan of a failure.
+    """(n_rows,) array [m or rad]: collapse displacement, or the last settlement of a run that did not collapse.
 
-    Where runs stood, the outcome is the displacement the structure bears within the limit, a lower bound of its own.
+    The latter is a lower bound of the collapse displacement. The outcome of a run without result is nan.
     """
     stood = table["collapse_displacement"].isna()
     value = np.where(stood, table["last_settlement"], table["collapse_displacement"]).astype(float)
@@ -64,13 +64,18 @@ def outcome(table: pd.DataFrame) -> np.ndarray:
 
 
 def swings(study: Study, table: pd.DataFrame) -> list[Swing]:
-    """The swing of every parameter, the largest first.
+    """Compute the swing of every parameter.
 
     Parameters
     ----------
     study : Study
     table : pandas.DataFrame
         Its table.
+
+    Returns
+    -------
+    list of Swing
+        The largest first.
     """
     y = outcome(table)
     table, y = table[np.isfinite(y)], y[np.isfinite(y)]
@@ -107,7 +112,7 @@ def swings(study: Study, table: pd.DataFrame) -> list[Swing]:
 
 
 def first_order(study: Study, table: pd.DataFrame) -> dict[str, tuple[float, float]]:
-    """Sobol' indices of first order: the share of the variance of the outcome that each parameter alone accounts for.
+    """Estimate Sobol' indices of first order: the share of each parameter alone in the variance of the outcome.
 
     Parameters
     ----------
@@ -118,15 +123,15 @@ def first_order(study: Study, table: pd.DataFrame) -> dict[str, tuple[float, flo
     Returns
     -------
     dict
-        By name of the parameter, and for a "saltelli" study also of the imperfections together, the index and half its
-        95 % interval; empty where there are too few runs, or the outcome is the same in all.
+        The index and half its 95 % interval by name of the parameter, for a "saltelli" study also of all imperfections
+        together; empty if there are too few runs, or the outcome is the same in all.
 
     Notes
     -----
-    Of a "saltelli" study as Saltelli et al., Computer Physics Communications 181 (2010) 259-270; of other samples by
+    For a "saltelli" study: Saltelli et al., Computer Physics Communications 181 (2010) 259-270; for other samples
     RBD-FAST with the correction of its bias: J.-Y. Tissot and C. Prieur, Reliability Engineering and System Safety 107
-    (2012) 205-213, https://doi.org/10.1016/j.ress.2012.06.010; both by SALib. Of a grid, whose values are all alike in
-    number, the variance of the means over the variance, the error by leaving out one run in turn (jackknife).
+    (2012) 205-213, https://doi.org/10.1016/j.ress.2012.06.010; both by SALib. For a grid, with equal numbers of runs
+    per value: the variance of the means over the variance, its error by the jackknife.
     """
     y = np.full(study.n_runs, np.nan)
     y[table["run"].to_numpy(dtype=int)] = outcome(table)
@@ -146,7 +151,7 @@ def _exchanged(study: Study, y: np.ndarray) -> dict[str, tuple[float, float]]:
     from SALib.analyze import sobol
 
     groups = y.reshape(-1, study.design.factors + 2)
-    # A point of which one run has no result is left out whole.
+    # A point is excluded if one of its runs has no result.
     groups = groups[np.isfinite(groups).all(axis=1)]
     names = [*(p.name for p in study.parameters), IMPERFECTIONS][: study.design.factors]
     if len(groups) < 4:
@@ -165,7 +170,7 @@ def _of_sample(
         return {}
     names = [p.name for p in parameters]
     problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
-    # The harmonics must stay few against the runs.
+    # The number of harmonics must be small compared with the number of runs.
     found = rbd_fast.analyze(problem, u, y, M=max(4, min(10, len(y) // 25)), num_resamples=200, seed=seed)
     return {name: (float(s), float(e)) for name, s, e in zip(names, found["S1"], found["S1_conf"], strict=True)}
 
@@ -181,8 +186,8 @@ def _of_groups(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
 
     n, s, squares = float(len(y)), y.sum(), (y**2).sum()
     whole = float(index(count, total, np.array(n), s, squares))
-    here = np.eye(len(levels))[group]
-    without = index(count - here, total - here * y[:, None], np.array(n - 1.0), s - y, squares - y**2)
+    own = np.eye(len(levels))[group]
+    without = index(count - own, total - own * y[:, None], np.array(n - 1.0), s - y, squares - y**2)
     return whole, float(1.96 * np.sqrt((n - 1.0) / n * ((without - without.mean()) ** 2).sum()))
 
 

@@ -1,4 +1,4 @@
-"""Plan: the study file, read and checked before anything is started."""
+"""The study file, read and checked before any run starts."""
 
 from __future__ import annotations
 
@@ -17,45 +17,47 @@ from blockvis.cases.build import case_assembly
 from blockvis.cases.case import case_of, read_case
 from blockvis.cases.distributions import Distribution, read_distribution
 from blockvis.cases.imperfections import read_imperfection
+from blockvis.cases.toml_table import is_number
+from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import nearest, refuse_unknown
 
 from .sampling import METHODS, Design, designed
 from .value_paths import parse_path, put
 
-#: Columns of the table that are no parameters.
+#: Columns of the table besides the parameters.
 RESERVED = (
     "run", "status", "collapse_displacement", "bracket_low", "bracket_high", "last_settlement", "unit",
     "mechanism_class", "mechanism", "macro_blocks", "hinges", "sliding_joints", "initial_reaction",
     "collapse_reaction", "total_weight", "increments", "programs", "seconds", "seed", "message",
 )  # fmt: skip
 
-#: Most runs of one study: rows are files in one folder, and their table is made in memory.
+#: Most runs of one study: their table is made in memory.
 MOST_RUNS = 1_000_000
 
-#: So many runs are checked as cases before anything starts, which takes a few seconds; of a larger study, a later one
-#: that is no case is recorded as failed.
+#: Number of runs that are checked as cases before any run starts, which takes a few seconds; a later run of a larger
+#: study that is no valid case is recorded as failed.
 CHECKED = 10_000
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number, or other value, of the case that is varied.
+    """A number, or other value, of the case that is varied.
 
     Attributes
     ----------
     path : str
-        Where in the case file, as ``material.friction_coefficient``.
+        Its path in the case file, as ``material.friction_coefficient``.
     name : str
-        Its column in the table; the path unless the study gives a shorter one.
+        Its column in the table; by default the path.
     also : tuple of str
-        Further paths that get the same value.
+        Further paths of the same value.
     distribution : Distribution or None
     values : tuple
-        Instead of a distribution: the values to choose from.
+        The values to choose from, if there is no distribution.
     weights : (n_values,) array
         Their probabilities.
     points : int
-        Values that a grid takes from the distribution.
+        Number of values of the distribution in a grid.
     """
 
     path: str
@@ -73,11 +75,11 @@ class Parameter:
 
     @property
     def n_levels(self) -> int:
-        """Values that a grid takes."""
+        """Number of values in a grid."""
         return self.points if self.distribution is not None else len(self.values)
 
     def value(self, probability: float) -> Any:
-        """The value below which the parameter stays with a probability; for a list, its entry there."""
+        """Find the value that the parameter does not exceed with a probability; of a list, its entry there."""
         if self.distribution is not None:
             return float(self.distribution.quantile(np.array([probability]))[0])
         return self.values[
@@ -96,20 +98,20 @@ class Study:
     case_source : Path
         The base case; paths in it are relative to its folder.
     values : dict
-        The base case as TOML has it, with the study's imperfections in front of its own.
+        The base case as parsed TOML, with the imperfections of the study before its own.
     n_seeded : int
-        The first of these imperfections get a new seed in every run.
+        Number of the first of these imperfections, those of the study, which get a new seed in every run.
     parameters : tuple of Parameter
     method : str
     runs : int
-        As the study file has it: of a "saltelli" design the size of its two independent samples.
+        Number of runs in the study file: of a "saltelli" design the size of its two independent samples.
     repeats : int
         Runs per point of a grid, with different imperfections.
     seed : int
     seconds : float or None
         Longest time of one run [s].
     keep : tuple of int
-        Runs whose whole results folder is written.
+        Runs whose results folder is written.
     """
 
     source: Path
@@ -126,13 +128,13 @@ class Study:
 
     @cached_property
     def design(self) -> Design:
-        """The runs: probabilities of the parameters, and the seed of each."""
+        """The runs: probabilities of the parameters, and seeds."""
         levels = [p.n_levels for p in self.parameters]
         return designed(self.method, self.runs, levels, self.repeats, self.seed, scattered=self.n_seeded > 0)
 
     @property
     def n_runs(self) -> int:
-        """How many runs there are in all."""
+        """Number of runs."""
         return len(self.design.seeds)
 
     def point(self, run: int) -> dict[str, Any]:
@@ -141,17 +143,17 @@ class Study:
         return {p.name: p.value(float(u)) for p, u in zip(self.parameters, probability, strict=True)}
 
     def order(self, run: int) -> dict[str, Any]:
-        """What :func:`blockvis.studies.run_one.run_once` needs to know of one run besides the base case."""
+        """List what :func:`blockvis.studies.run_one.run_once` needs for one run besides the base case."""
         point = self.point(run)
         paths = {path: point[p.name] for p in self.parameters for path in (p.path, *p.also)}
         return {"run": run, "seed": int(self.design.seeds[run]), "paths": paths, "point": point}
 
     def values_of(self, run: int) -> dict[str, Any]:
-        """The case of one run as TOML has it."""
+        """Make the values of the case of one run, as of parsed TOML."""
         return run_values(self.values, self.order(run), self.n_seeded)
 
     def definition(self) -> dict[str, Any]:
-        """Everything the rows depend on, part by part, for comparison with that of rows that are there already."""
+        """Hashes of everything on which the rows depend, to compare with those of rows on the disk."""
         case = {k: v for k, v in self.values.items() if k not in ("output", "imperfections")}
         file = case_of(self.values, self.case_source).file
         parts = {
@@ -172,16 +174,20 @@ class Study:
 
 
 def run_values(values: Mapping[str, Any], order: Mapping[str, Any], n_seeded: int) -> dict[str, Any]:
-    """The case of a run: the base case with the run's values and seeds put in.
+    """Put the values and seeds of a run into the base case.
 
     Parameters
     ----------
     values : mapping
-        The base case as TOML has it.
+        The base case as parsed TOML.
     order : mapping
-        As :meth:`Study.order` gives it.
+        Of :meth:`Study.order`.
     n_seeded : int
-        How many of the imperfections get the run's seed.
+        Number of the first imperfections, those of the study, which get the run's seed.
+
+    Returns
+    -------
+    dict
     """
     case = copy.deepcopy(dict(values))
     for path, value in order["paths"].items():
@@ -192,18 +198,22 @@ def run_values(values: Mapping[str, Any], order: Mapping[str, Any], n_seeded: in
 
 
 def read_study(source: str | Path | Mapping[str, Any]) -> Study:
-    """Reads and checks a study file, and every run of it as a case.
+    """Read and check a study file, and its runs as cases.
 
     Parameters
     ----------
     source : str, Path or mapping
-        The file, or what would stand in it; there a ``case`` is relative to the working directory.
+        The file, or its content; the path of the case in the latter is relative to the working directory.
+
+    Returns
+    -------
+    Study
 
     Raises
     ------
     ValueError
-        Names the file, the key and the remedy: an unknown parameter path, an impossible distribution, a run that is no
-        case.
+        For an unknown path of a parameter, an impossible distribution, a run that is no valid case; names the file, the
+        key and the remedy.
     """
     if isinstance(source, Mapping):
         return _study(source, Path("study"))
@@ -239,7 +249,7 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
         hint = nearest(str(method), list(METHODS))
         raise ValueError(f"{where}[study] method is {method!r}{hint}; choose from {', '.join(METHODS)}")
     seconds = head.get("seconds")
-    if seconds is not None and not (_is_number(seconds) and seconds > 0):
+    if seconds is not None and not (is_number(seconds) and seconds > 0):
         raise ValueError(f"{where}[study] seconds is {seconds!r}; give a positive number, the longest time of one run")
     if method == "grid" and "runs" in head:
         raise ValueError(
@@ -266,25 +276,35 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
 
 def _check(study: Study, where: str) -> None:
     base = case_of(study.values, study.case_source)
-    if base.analysis != "settlement":
+    if not KINDS[base.analysis].in_studies:
         raise ValueError(f"{base.source}: a study follows settlements, but [analysis] kind is '{base.analysis}'")
-    for p in study.parameters:
-        if study.method == "grid" and p.distribution is not None and p.points < 2:
-            raise ValueError(f'{where}[parameters] "{p.path}": a grid needs points, the number of values to take')
-        if study.method == "grid" and len(p.weights) and np.ptp(p.weights) > 0.0:
-            raise ValueError(f'{where}[parameters] "{p.path}": a grid takes every value once; weights are for samples')
+    if study.method == "grid":
+        _check_grid(study, where)
     try:
         n = study.n_runs
     except ValueError as error:
         raise ValueError(f"{where}[study] {error}") from None
     if n > MOST_RUNS:
         raise ValueError(f"{where}the study has {n:,} runs; at most {MOST_RUNS:,} make one study")
-    if study.method == "grid" and study.repeats > 1 and not study.n_seeded:
-        raise ValueError(f"{where}[study] repeats is {study.repeats}, but without [[imperfections]] they are all alike")
     for run in study.keep:
         if isinstance(run, bool) or not isinstance(run, int) or not 0 <= run < n:
             raise ValueError(f"{where}[study] keep names run {run!r}; runs are numbered from 0 to {n - 1}")
-    # Each parameter alone first: a message then names the path that is wrong, not a run.
+    _check_paths(study, where)
+    _check_runs(study, where)
+
+
+def _check_grid(study: Study, where: str) -> None:
+    for p in study.parameters:
+        if p.distribution is not None and p.points < 2:
+            raise ValueError(f'{where}[parameters] "{p.path}": a grid needs points, the number of values to take')
+        if len(p.weights) and np.ptp(p.weights) > 0.0:
+            raise ValueError(f'{where}[parameters] "{p.path}": a grid takes every value once; weights are for samples')
+    if study.repeats > 1 and not study.n_seeded:
+        raise ValueError(f"{where}[study] repeats is {study.repeats}, but without [[imperfections]] they are all alike")
+
+
+def _check_paths(study: Study, where: str) -> None:
+    """Put each parameter alone into the base case, so that a message names the wrong path, not a run."""
     first = study.order(0)
     for p in study.parameters:
         for path in (p.path, *p.also):
@@ -293,12 +313,15 @@ def _check(study: Study, where: str) -> None:
                 case_of(run_values(study.values, alone, study.n_seeded), study.case_source)
             except ValueError as error:
                 raise ValueError(f'{where}[parameters] "{path}": {error}') from None
+
+
+def _check_runs(study: Study, where: str) -> None:
     try:
-        # So that a wrong argument of a layout is found, which only the layout itself knows.
+        # Only building a parametric layout shows whether its parameters are right.
         case_assembly(case_of(study.values_of(0), study.case_source))
     except ValueError as error:
         raise ValueError(f"{where}run 0 cannot be built: {error}") from None
-    for run in range(min(n, CHECKED)):
+    for run in range(min(study.n_runs, CHECKED)):
         try:
             case_of(study.values_of(run), study.case_source)
         except ValueError as error:
@@ -359,7 +382,7 @@ def _parameter(path: str, given: Any, where: str) -> Parameter:
         raise ValueError(f"{where}: values is {values!r}; give a list of at least one")
     share = np.ones(len(values))
     if weights is not None:
-        if not (isinstance(weights, Sequence) and len(weights) == len(values) and all(map(_is_number, weights))):
+        if not (isinstance(weights, Sequence) and len(weights) == len(values) and all(map(is_number, weights))):
             raise ValueError(f"{where}: weights is {weights!r}; give a number for each of the {len(values)} values")
         share = np.array(weights, dtype=float)
         if (share < 0.0).any() or share.sum() <= 0.0:
@@ -386,10 +409,6 @@ def _as_list(given: Any) -> list[Any]:
     return list(given) if isinstance(given, (list, tuple)) else [given]
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and bool(np.isfinite(value))
-
-
 def _whole(table: Mapping[str, Any], key: str, default: int, least: int, where: str) -> int:
     value = table.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
@@ -398,7 +417,7 @@ def _whole(table: Mapping[str, Any], key: str, default: int, least: int, where: 
 
 
 def _sorted(part: Any) -> Any:
-    """The same values in one order, so that a table written otherwise compares alike."""
+    """Sort the keys of tables, so that their order does not matter in a comparison."""
     if isinstance(part, Mapping):
         return sorted((str(k), _sorted(v)) for k, v in part.items())
     return [_sorted(v) for v in part] if isinstance(part, (list, tuple)) else part

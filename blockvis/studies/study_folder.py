@@ -1,4 +1,4 @@
-"""Ledger: the folder of a study. A finished run is a line of a file that only grows, and is never lost."""
+"""The folder of a study: a finished run is a line of a file that only grows, and is never lost."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import numpy as np
 
 import solver
 from blockvis.atomic_files import flush, make_folder, whole_file, write_whole
+from blockvis.results.npz import compressed
 
 from .run_one import FAILED
 from .study_file import RESERVED, Study
@@ -33,7 +34,7 @@ _COUNTS = ("run", "seed", "macro_blocks", "hinges", "sliding_joints", "increment
 
 
 class StudyExists(ValueError):
-    """The folder holds something else already."""
+    """The folder holds another study, or something else."""
 
 
 def has_failed(row: Mapping[str, Any]) -> bool:
@@ -42,20 +43,20 @@ def has_failed(row: Mapping[str, Any]) -> bool:
 
 
 def finished_runs(folder: str | Path) -> int:
-    """How many runs the folder of a study holds."""
+    """Count the finished runs in the folder of a study."""
     file = Path(folder) / RUNS
     return file.read_bytes().count(b"\n") if file.is_file() else 0
 
 
-class Ledger:
-    """The folder of a study.
+class StudyFolder:
+    """The folder of a study, with the rows of its finished runs.
 
     Parameters
     ----------
     folder : str or Path
     study : Study
     force : bool
-        Whether rows of another study may be thrown away.
+        Whether rows of another study are deleted.
 
     Raises
     ------
@@ -66,7 +67,7 @@ class Ledger:
     def __init__(self, folder: str | Path, study: Study, *, force: bool = False) -> None:
         self.folder, self.study = Path(folder), study
         self.rows: dict[int, dict[str, Any]] = {}
-        # The run that shows each mechanism, by the file of its picture.
+        # Number of the run whose shape represents each class of mechanism, by the file of the shape.
         self._first: dict[Path, int | None] = {}
         self._whole = True
         record, definition = self.folder / "study.json", study.definition()
@@ -104,17 +105,17 @@ class Ledger:
         self.rows |= self._stored()
 
     def missing(self, *, retry_failed: bool = False) -> list[int]:
-        """The runs still to be made, in order."""
+        """List the runs that are not finished, in order."""
         done = {run for run, row in self.rows.items() if not (retry_failed and has_failed(row))}
         return [run for run in range(self.study.n_runs) if run not in done]
 
     def add(self, finished: Sequence[tuple[dict[str, Any], bytes]]) -> None:
-        """Records finished runs, and the mechanism of a run if no earlier one shows this class.
+        """Record finished runs, and the shape of a mechanism if no earlier run has one of its class.
 
         Parameters
         ----------
         finished : sequence of (dict, bytes)
-            Rows and shapes, as :func:`blockvis.studies.run_one.run_once` gives them.
+            Rows and shapes of :func:`blockvis.studies.run_one.run_once`.
         """
         for row, shape in finished:
             if shape:
@@ -141,14 +142,14 @@ class Ledger:
             self._first[file] = row["run"]
             with np.load(_buffer(shape)) as stored:
                 arrays = {name: stored[name] for name in stored.files}
-            write_whole(file, _packed({**arrays, "run": np.array(row["run"])}))
+            write_whole(file, compressed({**arrays, "run": np.array(row["run"])}))
 
     def shape_file(self, mechanism_class: str) -> Path:
-        """Where the picture of a class is kept."""
+        """File of the shape of a class of mechanisms."""
         return self.folder / "mechanisms" / f"{sha256(mechanism_class.encode()).hexdigest()[:12]}.npz"
 
     def table(self) -> pd.DataFrame:
-        """The finished runs, a row each, in order."""
+        """Make the table of the finished runs, one row per run, in order."""
         import pandas as pd
 
         names = [p.name for p in self.study.parameters]
@@ -168,7 +169,7 @@ class Ledger:
         return table
 
     def write_table(self) -> pd.DataFrame:
-        """Writes table.csv and table.parquet, each whole or not at all, and returns the table."""
+        """Write table.csv and table.parquet, each whole or not at all, and return the table."""
         table = self.table()
         for name, save in (("table.csv", table.to_csv), ("table.parquet", table.to_parquet)):
             with whole_file(self.folder / name) as partial:
@@ -176,15 +177,15 @@ class Ledger:
         return table
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
-        """Writes summary.json."""
+        """Write summary.json."""
         finished = {"finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
         write_whole(self.folder / "summary.json", _json({**summary, **finished}))
 
     def _stored(self) -> dict[int, dict[str, Any]]:
-        """The rows that are there; a line that some accident has broken counts as a run that was never made."""
+        """Read the rows on the disk; a broken line counts as a run that was never made."""
         file, rows = self.folder / RUNS, {}
         lines = file.read_bytes().split(b"\n") if file.is_file() else [b""]
-        # The last line is whole if it ends: a run killed while it was written has left half of it.
+        # The last line is complete if it ends with a line feed; a study killed while writing leaves part of a line.
         self._whole = not lines[-1]
         for line in lines:
             try:
@@ -196,7 +197,7 @@ class Ledger:
         return rows
 
     def _clear(self) -> None:
-        """Removes what a study writes, and nothing else."""
+        """Remove the files that a study writes, and nothing else."""
         for file in (self.folder / "mechanisms").glob("*.npz"):
             file.unlink()
         for name in (RUNS, "table.csv", "table.parquet", "summary.json", *(f"{p}.png" for p in PICTURES)):
@@ -208,7 +209,7 @@ PICTURES = ("fragility", "sensitivity", "scatter", "mechanisms")
 
 
 def _plain(value: Any) -> Any:
-    """A list or table as text, because a column holds numbers or texts."""
+    """Turn a list or table into text, because a column holds numbers or texts."""
     return json.dumps(value) if isinstance(value, (list, dict)) else value
 
 
@@ -223,12 +224,6 @@ def _buffer(data: bytes) -> Any:
     from io import BytesIO
 
     return BytesIO(data)
-
-
-def _packed(arrays: Mapping[str, Any]) -> bytes:
-    buffer = _buffer(b"")
-    np.savez_compressed(buffer, **arrays)
-    return bytes(buffer.getvalue())
 
 
 def _json(value: Any) -> bytes:

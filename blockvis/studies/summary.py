@@ -1,4 +1,4 @@
-"""What came out of a study, in numbers and in words."""
+"""Summary of a study in numbers and in words."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ from .study_folder import NO_RESULT
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Mechanisms that are told one by one.
-MOST_TOLD = 6
+#: Most mechanisms that the summary lists.
+MOST_MECHANISMS = 6
 
-#: Reasons that are told one by one.
+#: Most reasons of failure that the summary lists.
 MOST_REASONS = 5
 
 
 def independent_rows(study: Study, table: pd.DataFrame) -> pd.DataFrame:
-    """The rows that are a random sample, without those by which a "saltelli" design mixes them."""
+    """Take the rows that form a random sample, without those in which a "saltelli" design combines two."""
     return table[study.design.independent[table["run"].to_numpy(dtype=int)]]
 
 
 def classes_of(table: pd.DataFrame) -> dict[str, int]:
-    """How many runs show each mechanism, the most frequent first."""
+    """Count the runs of each class of mechanisms, the most frequent first."""
     counts = table.loc[table["mechanism_class"] != "", "mechanism_class"].value_counts()
     return {str(k): int(v) for k, v in sorted(counts.items(), key=lambda item: (-item[1], str(item[0])))}
 
 
 def curve_name(study: Study) -> str:
-    """What the fragility curve of a study is: of values somebody has chosen it is no probability."""
+    """Name the fragility curve of a study, which is no probability if the values were chosen by hand."""
     drawn = any(p.distribution is not None for p in study.parameters) or study.method != "grid"
     return "probability of collapse" if drawn else "share of the runs collapsed"
 
 
 def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
-    """What summary.json of a study holds; lengths in m, angles in rad.
+    """Summarise a study, for its summary.json; lengths in m, angles in rad.
 
     Parameters
     ----------
@@ -78,20 +78,20 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
 
 
 def _reasons(messages: list[str]) -> dict[str, int]:
-    """How often each reason occurs, told by its first message: those that differ in numbers only are one reason."""
+    """Count the reasons of failure by their first message; messages that differ in numbers only are one reason."""
     kinds = [re.sub(r"\d[\d.e+-]*", "#", message) for message in messages]
     first = dict(zip(reversed(kinds), reversed(messages), strict=True))
     return {first[kind]: number for kind, number in Counter(kinds).most_common(MOST_REASONS)}
 
 
 def stored_summary(folder: str | Path) -> dict[str, Any]:
-    """What summary.json in the folder of a study holds."""
+    """Read summary.json in the folder of a study."""
     found: dict[str, Any] = json.loads((Path(folder) / "summary.json").read_text(encoding="utf-8"))
     return found
 
 
 def in_words(summary: dict[str, Any]) -> str:
-    """The summary for a reader."""
+    """Write the summary as text."""
     unit = summary["unit"]
     lines = [
         f"{summary['n_finished']} of {summary['n_runs']} runs: "
@@ -115,15 +115,15 @@ def in_words(summary: dict[str, Any]) -> str:
             f"{swing['parameter']}: {low:.4g} {unit} on average at {_value(low_at)}, {high:.4g} {unit} at "
             f"{_value(high_at)}{share}"
         )
-    told = {swing["parameter"] for swing in summary["swings"]}
+    listed = {swing["parameter"] for swing in summary["swings"]}
     for name, (share, error) in summary["first_order_indices"].items():
-        if name not in told:
+        if name not in listed:
             lines.append(f"{name}: {100 * share:.0f} ± {100 * error:.0f} % of the variance")
     classes = summary["mechanism_classes"]
-    for number, (name, count) in enumerate(list(classes.items())[:MOST_TOLD], 1):
+    for number, (name, count) in enumerate(list(classes.items())[:MOST_MECHANISMS], 1):
         lines.append(f"mechanism {number}, {count} time{'' if count == 1 else 's'}: {name}")
-    if len(classes) > MOST_TOLD:
-        lines.append(f"and {len(classes) - MOST_TOLD} more mechanisms")
+    if len(classes) > MOST_MECHANISMS:
+        lines.append(f"and {len(classes) - MOST_MECHANISMS} more mechanisms")
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""Dotted paths into the values of a case file: read, and followed to put a value there."""
+"""Dotted paths into the values of a case file: parsed, and followed to put a value at their end."""
 
 from __future__ import annotations
 
@@ -12,11 +12,17 @@ _STEP = re.compile(r'\.?(?:([A-Za-z0-9_-]+)|"([^"]*)"|\[(\d+)\])')
 
 
 def parse_path(text: str) -> tuple[str | int, ...]:
-    """Keys and positions of a path as TOML writes dotted keys, with ``[n]`` for the entries of a list, from 0.
+    """Split a path, in dotted keys as of TOML, with ``[n]`` for the entries of a list, from 0.
+
+    Returns
+    -------
+    tuple of str and int
+        Keys and numbers of entries.
 
     Raises
     ------
     ValueError
+        For a text that is no path.
 
     Examples
     --------
@@ -43,19 +49,19 @@ def parse_path(text: str) -> tuple[str | int, ...]:
 
 
 def put(values: dict[str, Any], path: Sequence[str | int], value: Any) -> None:
-    """Puts a value at the end of a path, in place; tables on the way that are not there yet are made.
+    """Put a value at the end of a path, in place; missing tables on the path are made.
 
     Parameters
     ----------
     values : dict
-        Of tables, lists and numbers, as TOML has them.
+        Tables, lists and numbers, as of parsed TOML.
     path : sequence of str and int
     value : Any
 
     Raises
     ------
     ValueError
-        Where the path enters a list that has no such entry, or something that is neither table nor list.
+        For a path to a missing entry of a list, or into something that is neither table nor list.
 
     Examples
     --------
@@ -69,7 +75,7 @@ def put(values: dict[str, Any], path: Sequence[str | int], value: Any) -> None:
         last = number == len(path) - 1
         trail = _written(path[:number])
         if isinstance(step, int):
-            # [settlement] and [[settlement]] mean the same where there is one.
+            # [settlement] and [[settlement]] mean the same if there is only one.
             if isinstance(here, dict) and step == 0 and not last:
                 continue
             if not isinstance(here, list):

@@ -8,24 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from solver.assembly import Assembly, check_blocks
-from solver.equilibrium import equilibrium_matrix
+from solver.assembly import Assembly, check_blocks, find_contacts
+from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
-from solver.geometry.planar_contacts import find_contacts
 from solver.interfaces import InterfaceLaw, Interfaces
-from solver.kinematics import Pose, moved_vertices
+from solver.kinematics import Pose, moved_vertices, unit_lengths
 from solver.loads import Loads, checked_loads
 from solver.lp.problem import LinearProgram, Unbounded
 from solver.lp.solve import solve_lp
-from solver.program.increment import FALLING_FRACTION
 from solver.program.strength import Admissible, point_strength
 from solver.results.certificate import Certificate
-from solver.results.limit import Envelope, LimitLoad, LimitStatus
-
-#: Largest gap of a closed contact point: in the drawing, as a fraction of the width of the thinnest block, the accuracy
-#: also accepted for overlaps; at a computed pose, as a fraction of the block size, a hundred times its accuracy.
-DRAWN_GAP = 1e-3
-COMPUTED_GAP = 1e-6
+from solver.results.limit import Envelope, LimitLoad, LimitStatus, limit_state
+from solver.tolerances import COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
 REACH = 0.25
@@ -211,7 +205,7 @@ class _Problem:
         contacts = find_contacts(assembly, vertices, reach)
         around = contacts if interfaces.dry else find_contacts(assembly, vertices, max(reach, REACH * length))
         cohesion, crushing = point_strength(assembly, interfaces, contacts, around)
-        units = np.array([1.0, 1.0, length])
+        units = unit_lengths(3, length)
         weights = np.abs(loads.dead[free] / units)
         live = loads.live[free] / units
         force = float(weights.sum() / len(weights)) or float(np.abs(live).max())
@@ -228,7 +222,7 @@ class _Problem:
             friction=interfaces.friction(assembly, contacts.block_a, contacts.block_b),
             length=length,
             force=force,
-            matrix=sp.csr_array(equilibrium_matrix(contacts, pose, length))[np.repeat(free, 3)],
+            matrix=sp.csr_array(wrench_matrix(contacts, pose, length))[np.repeat(free, 3)],
             dead=(loads.dead[free] / units / force).ravel(),
             live=(live / size).ravel(),
             live_size=size / force,
@@ -379,9 +373,6 @@ class _Problem:
         return LimitLoad(
             multiplier=static if found else nothing,
             bounds=(static, kinematic / self.live_size) if found else (nothing, nothing),
-            mechanism=mechanism,
-            contacts=self.contacts,
-            forces=state.forces * self.force,
             certificate=Certificate(
                 equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / total,
                 largest_penetration=float(np.maximum(-self.contacts.gaps, 0.0).max(initial=0.0)),
@@ -391,10 +382,9 @@ class _Problem:
             ),
             status=status,
             flow=flow,
-            pose=self.pose,
-            friction=self.friction,
             live_force=self.live_force,
             programs=programs,
+            held=limit_state(self.pose, self.contacts, state.forces * self.force, self.friction, mechanism),
         )
 
 

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.assembly import FIXED, FREE, Assembly
-from solver.geometry.planar_contacts import measure_contacts
-from solver.kinematics import Pose, moved, moved_vertices
+from solver.assembly import FIXED, FREE, Assembly, measure_contacts
+from solver.kinematics import Pose, motion_size, moved, moved_vertices
 from solver.lp.problem import SolveError
-from solver.program.correction import FARTHEST_FALL, STILL, Falls, NotConverged, at_rest, solve_again
+from solver.program.correction import Falls, NotConverged, at_rest, solve_again
 from solver.program.increment import Locked, Solved, solve_program
 from solver.program.model import Model
+from solver.results.increment import carries
+from solver.tolerances import FARTHEST_FALL, HOLDS, STILL
 
 #: Largest weight of what may snap, as a fraction of that of the free blocks. Falling by half a block size at most, it
 #: strikes the rest with an energy that would lift all of it by 5e-3 block sizes at most: a knock that statics may pass
@@ -29,9 +30,8 @@ STEP, STEPS = 0.05, 400
 #: which friction may keep a block that rests.
 CYCLE, CYCLE_WORK = 20, 1e-5
 
-#: Blocks are told to have fallen where they moved by this part of the farthest; contact points hold a piece from this
-#: part of the largest force on; so many blocks are named.
-NOTICED, HOLDS, NAMED = 0.05, 1e-3, 4
+#: Blocks are reported to have fallen where they moved by this part of the farthest; so many blocks are named.
+NOTICED, NAMED = 0.05, 4
 
 #: How often blocks that the fall of others has set free may join them.
 JOINS = 3
@@ -127,7 +127,7 @@ def _fallen(model: Model, start: Pose, piece: np.ndarray) -> tuple[Pose, Solved]
     work, done = np.zeros(STEPS + 1), float(np.hypot(*load[:, :2].T).sum()) * alone.length * CYCLE_WORK
     solved, pose = solve_program(alone, start), start
     for step in range(1, STEPS + 1):
-        if not solved.falling and float(_sizes(alone, solved.motion).max()) <= STILL * alone.length:
+        if not solved.falling and float(motion_size(solved.motion, alone.length).max()) <= STILL * alone.length:
             return pose, solved
         pose = moved(pose, solved.motion)
         work[step] = work[step - 1] + float((load * solved.motion).sum())
@@ -156,7 +156,7 @@ def _told(model: Model, start: Pose, end: Pose, piece: np.ndarray, solved: Solve
     fell = way > NOTICED * way.max()
     load = model.load * assembly.free[:, None]
     lower = float(
-        (load[:, :2] * (end.positions - start.positions)).sum() + load[:, 2] @ (end.rotations - start.rotations)
+        (load[:, :2] * (end.positions - start.positions)).sum() + load[:, 2] @ (end.rotations - start.rotations)[:, 0]
     )
     farthest = float(
         np.abs(end.positions - start.positions).max(axis=1, where=assembly.free[:, None], initial=0.0).max()
@@ -164,12 +164,9 @@ def _told(model: Model, start: Pose, end: Pose, piece: np.ndarray, solved: Solve
     stood = lower <= 0.0 or way.max() <= STILL * model.length
     if stood or not _light(assembly, fell | piece) or farthest > FARTHEST_FALL * model.length:
         return None
-    contacts, force = solved.contacts, solved.forces[:, 0]
-    holds = force > HOLDS * force.max(initial=0.0)
+    contacts, holds = solved.contacts, carries(solved.forces, HOLDS)
     holds &= fell[contacts.block_a] != fell[contacts.block_b]
-    before = measure_contacts(
-        assembly, moved_vertices(assembly, start), contacts.vertex, contacts.edge, contacts.corner
-    ).gaps
+    before = measure_contacts(assembly, moved_vertices(assembly, start), contacts).gaps
     caught = holds & (before > NOTICED * way.max())
     chosen = caught if caught.any() else holds
     onto = np.where(fell[contacts.block_a], contacts.block_b, contacts.block_a)[chosen]
@@ -199,12 +196,8 @@ def _light(assembly: Assembly, piece: np.ndarray) -> bool:
 
 def _moving(model: Model, motion: np.ndarray) -> np.ndarray:
     """(n_blocks,) bool array: the free blocks that move with the fastest."""
-    size = np.where(model.assembly.free, _sizes(model, motion), 0.0)
+    size = np.where(model.assembly.free, motion_size(motion, model.length), 0.0)
     return size > MOVES * float(size.max())
-
-
-def _sizes(model: Model, motion: np.ndarray) -> np.ndarray:
-    return np.abs(motion * np.array([1.0, 1.0, model.length])).max(axis=1)
 
 
 def _named(assembly: Assembly, blocks: np.ndarray) -> str:

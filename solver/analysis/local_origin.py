@@ -43,7 +43,8 @@ def without_origin(
         else replace(phase, rotation_centre=tuple((np.asarray(phase.rotation_centre) - origin).tolist()))
         for phase in settlements
     )
-    return replace(assembly, vertices=assembly.vertices - origin), local
+    shapes = replace(assembly.polygons, vertices=assembly.vertices - origin)
+    return replace(assembly, shapes=shapes), local
 
 
 def told_from(steps: Generator[Increment, None, Ended], origin: np.ndarray) -> Generator[Increment, None, Ended]:
@@ -55,8 +56,7 @@ def told_from(steps: Generator[Increment, None, Ended], origin: np.ndarray) -> G
             ended: Ended = stop.value
             return ended
         pose, contacts = increment.pose, increment.contacts
-        yield replace(
-            increment,
+        yield increment.with_arrays(
             pose=Pose(pose.positions + origin, pose.rotations),
             contacts=replace(contacts, points=contacts.points + origin),
         )

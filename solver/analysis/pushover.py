@@ -9,15 +9,24 @@ import numpy as np
 
 from solver.assembly import Assembly, check_blocks
 from solver.interfaces import InterfaceLaw, Interfaces
-from solver.kinematics import Pose, moved, point_velocities, rotation_matrices
+from solver.kinematics import (
+    Pose,
+    motion_size,
+    moved,
+    point_velocities,
+    relative_velocities,
+    rotation_matrices,
+    unit_lengths,
+)
 from solver.loads import Loads
 from solver.lp.problem import SolveError
 from solver.program.closing import GEOMETRY_TOLERANCE
 from solver.program.correction import Falls, NotConverged, at_rest, corrected, solve_again
 from solver.program.increment import Locked, Solved, solve_program
 from solver.program.model import Model
-from solver.results.increment import Increment, Status
+from solver.results.increment import Increment, State, Status
 from solver.results.mechanism import mechanism_of
+from solver.results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER
 from solver.results.response import Collapse, Response
 
 from .checkpoint import PushoverCheckpoint, PushoverPlace
@@ -95,14 +104,6 @@ class ControlDisplacement:
         """Unit of the control displacement."""
         return "m"
 
-    def taking_part(self, assembly: Assembly) -> np.ndarray:
-        """(n_blocks,) bool array: the supports that move, as of a settlement: none."""
-        return np.zeros(assembly.n_blocks, dtype=bool)
-
-    def rate(self, assembly: Assembly, start: Pose, s: float) -> np.ndarray:
-        """(n_blocks, 3) array: velocity of the supports, as of a settlement: they stand still."""
-        return np.zeros((assembly.n_blocks, 3))
-
     def displacement(self, assembly: Assembly, pose: Pose) -> float:
         """Control displacement at a pose [m]."""
         block, arm = self._place(assembly)
@@ -156,7 +157,7 @@ def pushover(
     Response
         ``settlement`` is the control displacement [m], ``load_multiplier`` is α and ``reaction`` the resultant of the
         live loads, α times its value at 1 [N]. The collapse is where α reaches zero: beyond, the structure falls
-        under its dead load alone. ``settlements`` holds the control displacement.
+        under its dead load alone.
 
     Raises
     ------
@@ -188,7 +189,7 @@ def pushover(
     increments, ending = drained(steps, on_increment)
     return Response(
         assembly=assembly,
-        settlements=(control,),  # type: ignore[arg-type]  # stands in for a settlement of no support
+        settlements=(),
         interfaces=interfaces,
         loads=loads,
         increments=increments,
@@ -196,6 +197,9 @@ def pushover(
         message=ending.message,
         collapse=ending.collapse,
         analysis="pushover",
+        parameter=CONTROL_DISPLACEMENT,
+        measured=LOAD_MULTIPLIER,
+        control=control,
     )
 
 
@@ -504,7 +508,7 @@ class _Path:
     def _mechanism_changed(self, predictor: Solved) -> bool:
         if self.here.velocity is None:
             return False
-        size = np.sqrt(self.model.assembly.masses)[:, None] * np.array([1.0, 1.0, self.model.length])
+        size = np.sqrt(self.model.assembly.masses)[:, None] * unit_lengths(3, self.model.length)
         new, old = predictor.motion * size, self.here.velocity * size
         new, old = new / (np.linalg.norm(new) or 1.0), old / (np.linalg.norm(old) or 1.0)
         return bool(np.linalg.norm(new - old) > EVENT_CHANGE)
@@ -517,7 +521,7 @@ class _Path:
 
     def _length(self, solved: Solved) -> float:
         """Largest movement of a block in the motion [m]."""
-        return max(float(np.abs(solved.motion * [1.0, 1.0, self.model.length]).max(initial=0.0)), 1e-300)
+        return max(float(motion_size(solved.motion, self.model.length).max(initial=0.0)), 1e-300)
 
     def _tell_last(self) -> Iterator[Increment]:
         if self.here.d > self.told:
@@ -550,6 +554,7 @@ class _Path:
             mechanism=fall.motion / self._length(fall),
             unit="m",
             words=str(mechanism_of(self.model.assembly, falls)),
+            lost="capacity",
         )
         yield from self._fall(falling_model, fall)
         return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)
@@ -580,22 +585,24 @@ def _scaled(solved: Solved, part: float) -> Solved:
 
 def _increment(model: Model, solved: Solved, d: float, step: float, status: Status) -> Increment:
     contacts, velocity = solved.contacts, solved.motion / step
-    a, b = (point_velocities(contacts.points, k, solved.pose, velocity) for k in (contacts.block_a, contacts.block_b))
     resultant = 0.0 if model.live is None else float(np.hypot(*model.live[:, :2].sum(axis=0)))
     return Increment(
-        settlement=d,
+        parameter=d,
+        measured=solved.multiplier,
         phase=0,
         load_multiplier=solved.multiplier,
-        pose=solved.pose,
-        contacts=contacts,
-        forces=solved.forces,
-        displacements=np.einsum("kij,kj->ki", contacts.frames, a - b),
-        friction=solved.friction,
-        velocity=velocity,
         reaction=solved.multiplier * resultant,
-        support_forces=solved.support_forces,
         certificate=solved.certificate,
         status=status,
         programs=model.tally.take(),
         seconds=0.0,
+        held=State(
+            pose=solved.pose,
+            contacts=contacts,
+            forces=solved.forces,
+            displacements=relative_velocities(contacts, solved.pose, velocity),
+            friction=solved.friction,
+            velocity=velocity,
+            support_forces=solved.support_forces,
+        ),
     )

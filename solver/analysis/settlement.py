@@ -9,17 +9,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.assembly import Assembly, check_blocks
-from solver.geometry.polygons import overlap_depths
 from solver.interfaces import InterfaceLaw, Interfaces
-from solver.kinematics import Pose, moved, moved_vertices, point_velocities
+from solver.kinematics import (
+    Pose,
+    motion_size,
+    moved,
+    moved_vertices,
+    point_velocities,
+    relative_velocities,
+    unit_lengths,
+)
 from solver.loads import Loads, Settlement, checked_loads
 from solver.lp.problem import SolveError
-from solver.program.correction import FARTHEST_FALL, Falls, NotConverged, at_rest, corrected, solve_again
+from solver.program.correction import Falls, NotConverged, at_rest, corrected, solve_again
 from solver.program.increment import Locked, Solved, solve_program
 from solver.program.model import Model
-from solver.results.increment import Increment, Status
+from solver.results.increment import Increment, State, Status
 from solver.results.mechanism import mechanism_of
+from solver.results.quantities import reaction_to, settlement_in
 from solver.results.response import Collapse, Response
+from solver.tolerances import FARTHEST_FALL, JUMP, OVERLAP
 
 from .checkpoint import Checkpoint, Note, Place
 from .local_fall import jump_words, snapped
@@ -29,10 +38,6 @@ from .local_origin import at_origin, told_from, without_origin
 #: size, weighted by mass, times the root of the number of blocks (in a wall a few bricks always change their ways),
 #: up to the second number. Hinges that move change it by more, the slow turning of the geometry by less.
 EVENT_CHANGE, LARGEST_CHANGE = 0.015, 0.5
-
-#: Overlap of two blocks, as a fraction of the width of the thinnest, at which an increment is refused: twice what is
-#: accepted of a drawing.
-OVERLAP = 2e-3
 
 #: Places kept to go back to.
 PLACES = 16
@@ -44,9 +49,6 @@ CLOSING_WORK, CLOSING_WORK_LARGE, CLOSING_WORK_AT_START = 1e-3, 1e-2, 1e-6
 
 #: Snaps of light pieces in one phase after which the structure is said to fall apart.
 SNAPS = 100
-
-#: Movement to the equilibrium of a place, in block sizes, that looks like a fall.
-JUMP = 0.02
 
 #: Step by which a reaction is read off at the last equilibrium, in block sizes.
 PROBE = 1e-6
@@ -147,6 +149,8 @@ def settle(
         stop=ending.stop,
         message=ending.message,
         collapse=ending.collapse,
+        parameter=settlement_in(phases[0].unit),
+        measured=reaction_to(phases[0].unit),
     )
 
 
@@ -425,7 +429,7 @@ class _Path:
         here = self.here
         if here.velocity is None:
             return False
-        size = np.sqrt(self.model.assembly.masses)[:, None] * np.array([1.0, 1.0, self.model.length])
+        size = np.sqrt(self.model.assembly.masses)[:, None] * unit_lengths(3, self.model.length)
         new, old = predictor.motion / step * size, here.velocity * size
         many = np.sqrt(self.model.assembly.free.sum())
         return bool(np.linalg.norm(new - old) > min(EVENT_CHANGE * many, LARGEST_CHANGE) * np.linalg.norm(old))
@@ -438,7 +442,7 @@ class _Path:
         """A last look at the blocks as they are, contact points or not: none may have come into another."""
         assembly = self.model.assembly
         deepest = OVERLAP * float(assembly.widths.min())
-        i, j, depth = overlap_depths(moved_vertices(assembly, pose), assembly.offsets, deepest)
+        i, j, depth = assembly.shapes.overlaps(moved_vertices(assembly, pose), deepest)
         worst = np.where(assembly.free[i] | assembly.free[j], depth, 0.0)
         if worst.max(initial=0.0) > deepest:
             k = int(np.argmax(worst))
@@ -566,7 +570,7 @@ class _Path:
 
 
 def _largest_movement(model: Model, motion: np.ndarray) -> float:
-    return max(float(np.abs(motion * [1.0, 1.0, model.length]).max(initial=0.0)), 1e-300)
+    return max(float(motion_size(motion, model.length).max(initial=0.0)), 1e-300)
 
 
 def check_settlement(assembly: Assembly, phases: Sequence[Settlement], controls: Controls | None = None) -> None:
@@ -617,25 +621,26 @@ def _increment(
     model: Model, solved: Solved, rate: np.ndarray, step: float, s: float, phase: int, status: Status
 ) -> Increment:
     contacts, velocity = solved.contacts, solved.motion / step
-    relative = point_velocities(contacts.points, contacts.block_a, solved.pose, velocity) - point_velocities(
-        contacts.points, contacts.block_b, solved.pose, velocity
-    )
+    reaction = float((solved.support_forces * rate).sum())
     return Increment(
-        settlement=s,
+        parameter=s,
+        measured=reaction,
         phase=phase,
         load_multiplier=0.0,
-        pose=solved.pose,
-        contacts=contacts,
-        forces=solved.forces,
-        displacements=np.einsum("kij,kj->ki", contacts.frames, relative),
-        friction=solved.friction,
-        velocity=velocity,
-        reaction=float((solved.support_forces * rate).sum()),
-        support_forces=solved.support_forces,
+        reaction=reaction,
         certificate=solved.certificate,
         status=status,
         programs=model.tally.take(),
         seconds=0.0,
+        held=State(
+            pose=solved.pose,
+            contacts=contacts,
+            forces=solved.forces,
+            displacements=relative_velocities(contacts, solved.pose, velocity),
+            friction=solved.friction,
+            velocity=velocity,
+            support_forces=solved.support_forces,
+        ),
     )
 
 

@@ -2,57 +2,55 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
-
-from solver.assembly import Assembly
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Contact points at one geometry, contact on axis 0.
+    """Contact points at one geometry, in the plane or in space, contact on axis 0.
 
     Attributes
     ----------
-    vertex : (n,) int array
-        The corner, of ``block_a``.
-    edge : (n,) int array
-        The edge it faces, of ``block_b``, named by the vertex it starts at.
-    corner : (n,) int array
-        Where a corner stands on a corner: the vertex of ``block_b``; -1 elsewhere.
+    features : (n, 4) int array
+        Kind of contact, feature of ``block_a``, feature of ``block_b``, and what else the geometry needs to measure it
+        again. The first three name the contact point; what they mean only the geometry knows.
     block_a, block_b : (n,) int arrays
-    points : (n, 2) array [m]
-    frames : (n, 2, 2) array
-        Row 0: unit normal from ``block_b`` into ``block_a``; row 1: tangent, a quarter turn counter-clockwise.
+    points : (n, d) array [m]
+    frames : (n, d, d) array
+        Row 0: unit normal from ``block_b`` into ``block_a``; then the tangents, in the plane one, a quarter turn
+        counter-clockwise.
     gaps : (n,) array [m]
         Positive where open.
-    along : (n,) array [m]
-        Position of the corner along the tangent, from the end of the edge or from the other corner.
+    slip : (n, d - 1) array [m]
+        Position of the feature of ``block_a`` along the tangents, from a place that is fixed on ``block_b``.
+    areas : (n,) array [m²]
+        Part of the face that each contact point stands for; zero for a corner alone.
     """
 
-    vertex: np.ndarray
-    edge: np.ndarray
-    corner: np.ndarray
+    features: np.ndarray
     block_a: np.ndarray
     block_b: np.ndarray
     points: np.ndarray
     frames: np.ndarray
     gaps: np.ndarray
-    along: np.ndarray
+    slip: np.ndarray
+    areas: np.ndarray
 
     def __len__(self) -> int:
-        return len(self.vertex)
+        return len(self.features)
 
-    def keys(self, assembly: Assembly) -> np.ndarray:
-        """(n,) int array: a number for each contact that stays the same from one geometry to the next."""
-        n = len(assembly.vertices)
-        return np.where(self.corner >= 0, self.corner + n, self.edge) + 2 * n * self.vertex.astype(np.int64)
+    def __getitem__(self, chosen: np.ndarray) -> Contacts:
+        """Some of the contact points, by a mask or their numbers."""
+        return Contacts(**{field.name: getattr(self, field.name)[chosen] for field in fields(self)})
 
 
-def matched_contacts(assembly: Assembly, contacts: Contacts, before: Contacts) -> tuple[np.ndarray, np.ndarray]:
+def matched_contacts(contacts: Contacts, before: Contacts) -> tuple[np.ndarray, np.ndarray]:
     """For each contact, its number among those before, and whether it was there."""
-    keys, known = contacts.keys(assembly), before.keys(assembly)
+    features, earlier = contacts.features[:, :3].astype(np.int64), before.features[:, :3].astype(np.int64)
+    kinds, _, count = np.maximum(features.max(axis=0, initial=0), earlier.max(axis=0, initial=0)) + 1
+    keys, known = ((f[:, 1] * kinds + f[:, 0]) * count + f[:, 2] for f in (features, earlier))
     order = np.argsort(known, kind="stable")
     place = order[np.minimum(np.searchsorted(known[order], keys), len(known) - 1)]
     return place, known[place] == keys

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.assembly import Assembly
+from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import box_pairs, boxes, expand_ranges
 from .contacts import Contacts
-
-#: A corner this close to the end of an edge, as a fraction of the shortest edge involved, stands on the corner
-#: there. Correctors take drift along a hinge back, so that it need not cover the error of an increment, only of
-#: drawings; a bearing shorter than this is none.
-CORNER_TOLERANCE = 1e-5
+from .outlines import Outlines
 
 #: The flank of a corner may lean into the edge it faces by this much (sine of the angle) before the corner no
 #: longer counts as facing it: an open joint that may close again leans by its opening angle.
@@ -28,22 +24,48 @@ PERPENDICULAR = 1e-6
 #: Difference of cosines up to which two pairs of faces at a corner are open alike.
 SAME_OPENING = 1e-9
 
-#: Penetration up to this fraction of the width of the thinner block is a contact to be corrected; beyond, the
-#: corner belongs to another face behind.
-PENETRATION_FRACTION = 0.1
+#: Kinds of contact in the plane, column 0 of the features. A corner on an edge: the corner (a vertex of ``block_a``),
+#: the edge (of ``block_b``, named by the vertex it starts at), -1. A corner on a corner: both vertices, and the edge of
+#: ``block_b`` that the first one faces.
+ON_EDGE, ON_CORNER = 0, 1
+
+#: Contact points of two blocks belong to one face while their normals differ by less than this sine.
+ONE_FACE = 0.5
 
 
-def measure_contacts(
-    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
-) -> Contacts:
+def features_of(vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
+    """(n, 4) int array: the features of contact points in the plane.
+
+    Parameters
+    ----------
+    vertex : (n,) int array
+        The corner, of ``block_a``.
+    edge : (n,) int array
+        The edge it faces, of ``block_b``, named by the vertex it starts at.
+    corner : (n,) int array
+        Where a corner stands on a corner: the vertex of ``block_b``; -1 elsewhere.
+    """
+    on_corner = corner >= 0
+    kind = np.where(on_corner, ON_CORNER, ON_EDGE)
+    return np.stack([kind, vertex, np.where(on_corner, corner, edge), np.where(on_corner, edge, -1)], axis=1)
+
+
+def corners_and_edges(features: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertex, edge and corner, (n,) int arrays, from which :func:`features_of` made the features."""
+    kind, vertex, other, edge = features.T
+    on_corner = kind == ON_CORNER
+    return vertex, np.where(on_corner, edge, other), np.where(on_corner, other, -1)
+
+
+def measured_points(shapes: Outlines, vertices: np.ndarray, features: np.ndarray) -> Contacts:
     """Frames and gaps of given pairs of features where the corners now are.
 
     Parameters
     ----------
-    assembly : Assembly
+    shapes : Outlines
     vertices : (n_vertices, 2) array [m]
         Current corners of all blocks.
-    vertex, edge, corner : (n,) int arrays
+    features : (n, 4) int array
         As in :class:`Contacts`.
 
     Notes
@@ -51,12 +73,13 @@ def measure_contacts(
     A corner on an edge has the normal of the edge. A corner on a corner has the normal that halves the angle
     between the two faces that meet there, so that neither block is preferred, and the point half-way.
     """
-    following = assembly.next_vertex
+    vertex, edge, corner = corners_and_edges(features)
+    following = shapes.next_vertex
     v = vertices[vertex]
     tangent = _unit(vertices[following[edge]] - vertices[edge])
     on_corner = corner >= 0
     if on_corner.any():
-        facing = _facing_edge(assembly, vertex[on_corner], edge[on_corner], corner[on_corner])
+        facing = _facing_edge(shapes, vertex[on_corner], edge[on_corner], corner[on_corner])
         other = _unit(vertices[following[facing]] - vertices[facing])
         tangent[on_corner] = _unit(tangent[on_corner] - other)
     base = vertices[np.where(on_corner, corner, edge)]
@@ -65,29 +88,54 @@ def measure_contacts(
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
     rest = v - base
     points = np.where(on_corner[:, None], (v + base) / 2.0, v)
+    block_a, block_b = shapes.block_of_vertex[vertex], shapes.block_of_vertex[edge]
+    frames = np.stack([normal, tangent], axis=1)
     return Contacts(
-        vertex=vertex,
-        edge=edge,
-        corner=corner,
-        block_a=assembly.block_of_vertex[vertex],
-        block_b=assembly.block_of_vertex[edge],
+        features=features,
+        block_a=block_a,
+        block_b=block_b,
         points=points,
-        frames=np.stack([normal, tangent], axis=1),
+        frames=frames,
         gaps=_dot(rest, normal),
-        along=_dot(rest, tangent),
+        slip=_dot(rest, tangent)[:, None],
+        areas=_areas(shapes, block_a, block_b, points, frames),
     )
 
 
-def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Contacts:
+def _areas(
+    shapes: Outlines, block_a: np.ndarray, block_b: np.ndarray, points: np.ndarray, frames: np.ndarray
+) -> np.ndarray:
+    """(n,) array [m²]: what each contact point stands for of the face between two blocks, ends and middles.
+
+    Half the distance to the neighbours along the face times the smaller thickness. Open contact points count too: a
+    face has its whole length however it has turned.
+    """
+    low, high = np.minimum(block_a, block_b).astype(np.int64), np.maximum(block_a, block_b).astype(np.int64)
+    _, first, which = np.unique(low * len(shapes) + high, return_index=True, return_inverse=True)
+    normal, reference = frames[:, 0], frames[first[which.ravel()], 0]
+    across = np.abs(normal[:, 0] * reference[:, 1] - normal[:, 1] * reference[:, 0]) > ONE_FACE
+    _, first, face = np.unique(2 * which.ravel() + across, return_index=True, return_inverse=True)
+    face = face.ravel()
+    along = np.einsum("ki,ki->k", points, frames[first[face], 1])
+    order = np.lexsort((along, face))
+    step = np.where(np.diff(face[order]) == 0, np.diff(along[order]), 0.0)
+    length = np.zeros(len(points))
+    length[order] = (np.append(step, 0.0) + np.append(0.0, step)) / 2.0 if len(points) else 0.0
+    return length * np.minimum(shapes.thickness[block_a], shapes.thickness[block_b])
+
+
+def find_points(shapes: Outlines, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
     """Finds the points at which blocks touch or may touch within one increment.
 
     Parameters
     ----------
-    assembly : Assembly
+    shapes : Outlines
     vertices : (n_vertices, 2) array [m]
         Current corners of all blocks.
     reach : float [m]
         Largest gap of a contact point that is kept.
+    useful : (n_blocks,) bool array
+        One of two blocks that touch must be of these: those that are free to move.
 
     Returns
     -------
@@ -102,34 +150,36 @@ def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Con
     faces run the same way the pair is a corner on a corner, kept once; where they part, the blocks are
     diagonal neighbours and do not touch.
     """
-    pair_a, pair_b = _near_blocks(assembly, vertices, reach)
-    vertex, edge = _vertex_edge_candidates(assembly, vertices, pair_a, pair_b, reach)
-    vertex, edge, corner = _settle_ends(assembly, vertices, vertex, edge, reach)
-    kept = _closest_faces(assembly, vertices, vertex, edge, corner)
+    pair_a, pair_b = _near_blocks(shapes, vertices, reach, useful)
+    vertex, edge = _vertex_edge_candidates(shapes, vertices, pair_a, pair_b, reach)
+    vertex, edge, corner = _classified_ends(shapes, vertices, vertex, edge)
+    kept = _closest_faces(shapes, vertices, vertex, edge, corner)
     vertex, edge, corner = vertex[kept], edge[kept], corner[kept]
     order = np.lexsort((edge, vertex))
-    return measure_contacts(assembly, vertices, vertex[order], edge[order], corner[order])
+    return measured_points(shapes, vertices, features_of(vertex[order], edge[order], corner[order]))
 
 
-def _near_blocks(assembly: Assembly, vertices: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Ordered pairs of blocks whose boxes come within reach, not both supports."""
-    low, high = boxes(vertices, assembly.offsets)
+def _near_blocks(
+    shapes: Outlines, vertices: np.ndarray, reach: float, useful: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ordered pairs of blocks whose boxes come within reach, one of them useful."""
+    low, high = boxes(vertices, shapes.offsets)
     i, j = box_pairs(low - reach / 2.0, high + reach / 2.0)
-    useful = assembly.free[i] | assembly.free[j]
-    i, j = i[useful], j[useful]
+    chosen = useful[i] | useful[j]
+    i, j = i[chosen], j[chosen]
     return np.concatenate([i, j]), np.concatenate([j, i])
 
 
 def _vertex_edge_candidates(
-    assembly: Assembly, vertices: np.ndarray, pair_a: np.ndarray, pair_b: np.ndarray, reach: float
+    shapes: Outlines, vertices: np.ndarray, pair_a: np.ndarray, pair_b: np.ndarray, reach: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Corners of block a in front of edges of block b, by distance and direction alone."""
-    offsets, following, previous = assembly.offsets, assembly.next_vertex, assembly.previous_vertex
+    offsets, following, previous = shapes.offsets, shapes.next_vertex, shapes.previous_vertex
     counts = np.diff(offsets)
     low, high = boxes(vertices, offsets)
     owner, position = expand_ranges(counts[pair_a])
     vertex, b = offsets[pair_a][owner] + position, pair_b[owner]
-    near = assembly.convex_vertex[vertex]
+    near = shapes.convex_vertex[vertex]
     for axis in (0, 1):
         place = vertices[vertex, axis]
         near &= (place >= (low[:, axis] - reach)[b]) & (place <= (high[:, axis] + reach)[b])
@@ -138,18 +188,18 @@ def _vertex_edge_candidates(
     owner, position = expand_ranges(counts[b])
     edge, vertex = offsets[b][owner] + position, vertex[owner]
     # Most pairs are far from each other: the distance comes first, and nothing else is worked out for them.
-    length, width = assembly.edge_lengths, assembly.widths
+    length, width = shapes.edge_lengths, shapes.widths
     tangents = (vertices[following] - vertices) / length[:, None]
     normals = np.stack([tangents[:, 1], -tangents[:, 0]], axis=1)
     gap = _dot(vertices[vertex] - vertices[edge], normals[edge])
     near = np.flatnonzero((gap >= -PENETRATION_FRACTION * width.max()) & (gap <= reach))
     vertex, edge, gap = vertex[near], edge[near], gap[near]
     along = _dot(vertices[vertex] - vertices[edge], tangents[edge])
-    a_block, b_block = assembly.block_of_vertex[vertex], assembly.block_of_vertex[edge]
+    a_block, b_block = shapes.block_of_vertex[vertex], shapes.block_of_vertex[edge]
     deepest = PENETRATION_FRACTION * np.minimum(width[a_block], width[b_block])
-    end = end_zone(assembly, vertex, edge)
+    end = end_zone(shapes, vertex, edge)
     keep = (gap >= -deepest) & (along >= -end) & (along <= length[edge] + end)
-    keep[keep] = _through_this_face(assembly, vertices, vertex[keep], edge[keep], gap[keep], end[keep])
+    keep[keep] = _through_this_face(shapes, vertices, vertex[keep], edge[keep], gap[keep], end[keep])
     vertex, edge = vertex[keep], edge[keep]
 
     directions = _unit(vertices[following] - vertices)
@@ -165,7 +215,7 @@ def _vertex_edge_candidates(
 
 
 def _through_this_face(
-    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, gap: np.ndarray, end: np.ndarray
+    shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, gap: np.ndarray, end: np.ndarray
 ) -> np.ndarray:
     """Whether a corner behind an edge got there through it: not where a neighbouring face is nearer, or in front of it.
 
@@ -173,63 +223,63 @@ def _through_this_face(
     """
     through = np.ones(len(vertex), dtype=bool)
     k = np.flatnonzero(gap < -end)
-    following, previous = assembly.next_vertex, assembly.previous_vertex
+    following, previous = shapes.next_vertex, shapes.previous_vertex
     for neighbour, shared in ((following[edge[k]], following[edge[k]]), (previous[edge[k]], edge[k])):
         tangent = _unit(vertices[following[neighbour]] - vertices[neighbour])
         rest = vertices[vertex[k]] - vertices[neighbour]
         beside = rest[:, 0] * tangent[:, 1] - rest[:, 1] * tangent[:, 0]
         # The block of a corner that came through the neighbouring face lies on that face's side.
-        inward = _inward(assembly, vertices, vertex[k])
+        inward = _inward(shapes, vertices, vertex[k])
         from_there = inward[:, 0] * tangent[:, 1] - inward[:, 1] * tangent[:, 0] > 0.0
-        through[k] &= ~(assembly.convex_vertex[shared] & from_there & (beside > gap[k] + end[k]))
+        through[k] &= ~(shapes.convex_vertex[shared] & from_there & (beside > gap[k] + end[k]))
     return through
 
 
-def _inward(assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray) -> np.ndarray:
+def _inward(shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray) -> np.ndarray:
     """(n, 2) array: from each corner into its block, half-way between the flanks."""
     p = vertices[vertex]
-    to_next = _unit(vertices[assembly.next_vertex[vertex]] - p)
-    to_previous = _unit(vertices[assembly.previous_vertex[vertex]] - p)
+    to_next = _unit(vertices[shapes.next_vertex[vertex]] - p)
+    to_previous = _unit(vertices[shapes.previous_vertex[vertex]] - p)
     return np.stack([to_previous[:, 1] - to_next[:, 1], to_next[:, 0] - to_previous[:, 0]], axis=1)
 
 
-def _settle_ends(
-    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, reach: float
+def _classified_ends(
+    shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sorts out the corners near the end of their edge: on the corner there, or past it."""
-    following = assembly.next_vertex
+    following = shapes.next_vertex
     start, stop = edge, following[edge]
     tangent = _unit(vertices[stop] - vertices[start])
     rest = vertices[vertex] - vertices[start]
     along = _dot(rest, tangent)
     gap = rest[:, 0] * tangent[:, 1] - rest[:, 1] * tangent[:, 0]
-    far = assembly.edge_lengths[edge] - along
+    far = shapes.edge_lengths[edge] - along
     at_start = along <= far
     other = np.where(at_start, start, stop)
     overlap = np.minimum(along, far)
-    end = end_zone(assembly, vertex, edge)
+    end = end_zone(shapes, vertex, edge)
     # Seen from the nearer end: the way the edge leaves it, and the way the face over the edge leaves the corner.
     sense = np.where(at_start, 1.0, -1.0)[:, None]
-    facing = _facing_edge(assembly, vertex, edge, other)
+    facing = _facing_edge(shapes, vertex, edge, other)
     along_edge = sense * tangent
     along_facing = -sense * _unit(vertices[following[facing]] - vertices[facing])
     same_way = _dot(along_edge, along_facing) > PERPENDICULAR
     # At a re-entrant corner the edge ends at a wall: a corner that gets there is simply on the edge.
-    near_end = (overlap <= end) & assembly.convex_vertex[other]
+    near_end = (overlap <= end) & shapes.convex_vertex[other]
     # Faces that overlap on a bit at an angle touch at the corner below alone: the one above slides past the end
     # before it comes down, and held up by the line of the edge it could not.
-    past = ~same_way & assembly.convex_vertex[other] & ((overlap <= end) | (gap > STEEPEST_LANDING * overlap))
+    past = ~same_way & shapes.convex_vertex[other] & ((overlap <= end) | (gap > STEEPEST_LANDING * overlap))
     # Both corners lie within the end zone of the other's face, seen along the half-way direction.
     halfway = _unit(along_edge + along_facing + 1e-300)
     offset = np.abs(_dot(vertices[vertex] - vertices[other], halfway))
     corner = np.where(near_end & same_way & (offset <= end), other, -1)
     keep = ~past
     vertex, edge, corner = vertex[keep], edge[keep], corner[keep]
-    return _once(assembly, vertex, edge, corner)
+    return _once(shapes, vertex, edge, corner)
 
 
 def _closest_faces(
-    assembly: Assembly, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
+    shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
 ) -> np.ndarray:
     """Whether to keep each pair: of two corners that meet along two pairs of faces, only where these are closest.
 
@@ -240,8 +290,8 @@ def _closest_faces(
     k = np.flatnonzero(corner >= 0)
     if len(k) < 2:
         return kept
-    facing = _facing_edge(assembly, vertex[k], edge[k], corner[k])
-    following = assembly.next_vertex
+    facing = _facing_edge(shapes, vertex[k], edge[k], corner[k])
+    following = shapes.next_vertex
     along = _unit(vertices[following[edge[k]]] - vertices[edge[k]])
     back = -_unit(vertices[following[facing]] - vertices[facing])
     closeness = _dot(along, back)
@@ -253,23 +303,23 @@ def _closest_faces(
 
 
 def _once(
-    assembly: Assembly, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
+    shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Keeps each pair of corners once, seen from the lower numbered vertex."""
     k = np.flatnonzero(corner >= 0)
-    facing = _facing_edge(assembly, vertex[k], edge[k], corner[k])
+    facing = _facing_edge(shapes, vertex[k], edge[k], corner[k])
     turn = vertex[k] > corner[k]
     v, e, c = vertex[k], edge[k], corner[k]
     vertex, edge, corner = vertex.copy(), edge.copy(), corner.copy()
     vertex[k], edge[k], corner[k] = np.where(turn, c, v), np.where(turn, facing, e), np.where(turn, v, c)
     # The pair may have been found from both sides, and two corners may meet along two pairs of faces.
-    low = np.minimum(edge, assembly.next_vertex[edge])
+    low = np.minimum(edge, shapes.next_vertex[edge])
     end = np.where(corner < 0, 0, np.where(corner == low, 1, 2))
-    _, first = np.unique((vertex.astype(np.int64) * len(assembly.vertices) + edge) * 3 + end, return_index=True)
+    _, first = np.unique((vertex.astype(np.int64) * len(shapes.vertices) + edge) * 3 + end, return_index=True)
     return vertex[first], edge[first], corner[first]
 
 
-def feature_pairs(assembly: Assembly, contacts: Contacts) -> tuple[np.ndarray, np.ndarray]:
+def feature_pairs(shapes: Outlines, contacts: Contacts) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of the corner-edge pairs that each contact stands for.
 
     Returns
@@ -279,27 +329,44 @@ def feature_pairs(assembly: Assembly, contacts: Contacts) -> tuple[np.ndarray, n
     reverse : (n,) int array
         Where a corner stands on a corner, the other corner on the other face; -1 elsewhere.
     """
-    n = len(assembly.vertices)
-    own = contacts.vertex.astype(np.int64) * n + contacts.edge
+    n = len(shapes.vertices)
+    vertex, edge, corner = corners_and_edges(contacts.features)
+    own = vertex.astype(np.int64) * n + edge
     reverse = np.full(len(contacts), -1, dtype=np.int64)
-    k = np.flatnonzero(contacts.corner >= 0)
-    facing = _facing_edge(assembly, contacts.vertex[k], contacts.edge[k], contacts.corner[k])
-    reverse[k] = contacts.corner[k].astype(np.int64) * n + facing
+    k = np.flatnonzero(corner >= 0)
+    reverse[k] = corner[k].astype(np.int64) * n + _facing_edge(shapes, vertex[k], edge[k], corner[k])
     return own, reverse
 
 
-def _facing_edge(assembly: Assembly, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
+def past_the_end(shapes: Outlines, contacts: Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How far contact points are beyond the end of the edge they are on.
+
+    Returns
+    -------
+    past : (n,) array [m]
+        Negative before the end; of a corner on a corner, its distance from there.
+    zone : (n,) array [m]
+        How near the end a corner counts as standing on the corner there.
+    on_corner : (n,) bool array
+    """
+    vertex, edge, corner = corners_and_edges(contacts.features)
+    along = contacts.slip[:, 0]
+    far = np.where(corner >= 0, 0.0, shapes.edge_lengths[edge])
+    return np.maximum(-along, along - far), end_zone(shapes, vertex, edge), corner >= 0
+
+
+def _facing_edge(shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
     """The edge of the corner's block that lies over ``edge`` where ``vertex`` stands on ``corner``.
 
     Both outlines run counter-clockwise, so facing edges run against each other: where one starts the other ends.
     """
-    return np.where(corner == edge, assembly.previous_vertex[vertex], vertex)
+    return np.where(corner == edge, shapes.previous_vertex[vertex], vertex)
 
 
-def end_zone(assembly: Assembly, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+def end_zone(shapes: Outlines, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
     """(n,) array [m]: how near the end of the edge the corner counts as standing on the corner there."""
-    length = assembly.edge_lengths
-    shortest = np.minimum(length[vertex], length[assembly.previous_vertex[vertex]])
+    length = shapes.edge_lengths
+    shortest = np.minimum(length[vertex], length[shapes.previous_vertex[vertex]])
     return CORNER_TOLERANCE * np.minimum(shortest, length[edge])
 
 

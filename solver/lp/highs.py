@@ -7,14 +7,9 @@ import time
 import highspy
 import numpy as np
 
+from solver.tolerances import FEASIBILITY_TOLERANCE, INTERIOR_TOLERANCE
+
 from .problem import LinearProgram, LPSolution, checked, raise_if_proved
-
-#: HiGHS' smallest feasibility tolerance; the programs are scaled so that it is small against every force.
-FEASIBILITY_TOLERANCE = 1e-10
-
-#: The same for interior solutions of large programs: a tenth of the iterations less, and far below what a certificate
-#: promises.
-INTERIOR_TOLERANCE = 1e-8
 
 #: Iterations after which a route is given up: twenty times what interior methods need, and simplex iterations per row
 #: and column.

@@ -7,11 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-#: What our own check accepts: violation of rows, bounds and reduced costs, absolute in the scaled program.
-ACCEPTED_VIOLATION = 1e-7
-
-#: Relative difference of the two objectives that our own check accepts.
-ACCEPTED_GAP = 1e-7
+from solver.tolerances import ACCEPTED_GAP, ACCEPTED_VIOLATION
 
 
 class SolveError(RuntimeError):

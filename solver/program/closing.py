@@ -8,32 +8,31 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from solver.assembly import Assembly
-from solver.equilibrium import cone_rays, equilibrium_matrix, with_slack
+from solver.assembly import Assembly, find_contacts, measure_contacts
+from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts, matched_contacts
-from solver.geometry.planar_contacts import CORNER_TOLERANCE, end_zone, feature_pairs, find_contacts, measure_contacts
+from solver.geometry.planar_contacts import feature_pairs, measured_points, past_the_end
 from solver.kinematics import Pose, moved, moved_vertices
 from solver.lp.problem import LinearProgram, SolveError, Unbounded
 from solver.lp.solve import INTERIOR_ROUTES
+from solver.results.increment import carries
+from solver.tolerances import (
+    CARRYING_FRACTION,
+    COORDINATE_ROUNDING,
+    CORNER_TOLERANCE,
+    GEOMETRY_TOLERANCE,
+    LARGEST_DRIFT,
+    LEFT_WEDGED,
+    ROUNDING,
+)
 
-from .increment import LEFT_WEDGED, ROUNDING, Solved, along_structure, distances_of, solved_or_left_wedged
+from .increment import Solved, along_structure, distances_of, solved_or_left_wedged
 from .macroblocks import MacroBlocks, free_blocks
-from .model import Model, motion_size
+from .model import Model, largest_movement
 
 #: Resistance of every block to being moved by the closing of gaps, in mean block weights: without friction at the
 #: points that slide, blocks could drift along their joints for nothing.
 CLOSING_FRICTION = 1e-2
-
-#: A geometry is exact enough when contact points that carry force are closed, and those that stick have
-#: not moved along the joint, to this fraction of the block size.
-GEOMETRY_TOLERANCE = 1e-8
-
-#: Contact points below this fraction of the largest normal force do not decide whether a geometry is exact.
-CARRYING_FRACTION = 1e-6
-
-#: Drift of a hinge within an increment, as a fraction of the shortest edge, before it is corrected: second order in
-#: the rotation, which an increment keeps below a few hundredths.
-LARGEST_DRIFT = 1e-2
 
 #: Newton's method is given up where it has not converged after so many iterations, or moves blocks by more than so
 #: many times the error it is to correct: then the mechanism itself has to change, which takes a program.
@@ -87,15 +86,15 @@ def closing_program(
     assembly = model.assembly
     model.tally.programs += 1
     friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-    place, same = matched_contacts(assembly, contacts, before.contacts)
+    place, same = matched_contacts(contacts, before.contacts)
     sticking = same & before.sticking[place]
     parts = bodies or free_blocks(assembly)
     # Points within a macro-block say nothing about its movement.
     across = parts.part[contacts.block_a] != parts.part[contacts.block_b]
-    matrix = equilibrium_matrix(contacts, pose, model.length)
+    matrix = wrench_matrix(contacts, pose, model.length)
     columns = np.repeat(across, 2)
     columns[1::2] &= sticking
-    rays = cone_rays(np.where(sticking, friction, 0.0))[:, columns]
+    rays = friction_rays(np.where(sticking, friction, 0.0))[:, columns]
     drift = np.where(sticking, drift, 0.0)
     distance = distances_of(model, contacts, drift, ROUNDING)
     weights = np.where(same[:, None], before.forces[place], 0.0) / model.force
@@ -166,7 +165,7 @@ def closed_points(model: Model, pose: Pose, solved: Solved) -> tuple[Pose, Conta
         if best[2] <= GEOMETRY_TOLERANCE * model.length:
             break
         motion = _closing_motion(model, pose, contacts, solved)
-        travelled += motion_size(model, motion)
+        travelled += largest_movement(model, motion)
         if not travelled <= allowed:
             break
         pose = moved(pose, motion)
@@ -188,7 +187,7 @@ def _closing_motion(model: Model, pose: Pose, contacts: Contacts, solved: Solved
     rows = np.zeros(2 * len(contacts), dtype=bool)
     rows[0::2], rows[1::2] = carrying, sticking
     freedoms = np.repeat(assembly.free, 3)
-    jacobian = sp.csr_array(equilibrium_matrix(contacts, pose, model.length).T)[rows][:, freedoms]
+    jacobian = sp.csr_array(wrench_matrix(contacts, pose, model.length).T)[rows][:, freedoms]
     gram = sp.csc_array(jacobian @ jacobian.T + REDUNDANCY * sp.identity(jacobian.shape[0]))
     motion = np.zeros((assembly.n_blocks, 3))
     motion[assembly.free] = (jacobian.T @ splu(gram).solve(wanted[rows])).reshape(-1, 3)
@@ -209,22 +208,20 @@ def contacts_after(model: Model, pose: Pose, solved: Solved) -> Contacts:
     carrying = np.flatnonzero(solved.forces[:, 0] > 0.0)
     carrying = carrying[~_slid_off(assembly, vertices, before, carrying, solved.sliding[carrying] > 0.0)]
     kept = np.union1d(carrying, _gone_through(assembly, vertices, before))
-    own, reverse = feature_pairs(assembly, before)
+    own, reverse = feature_pairs(assembly.polygons, before)
     covered = np.concatenate([own[kept], reverse[kept]])
-    own, reverse = feature_pairs(assembly, found)
+    own, reverse = feature_pairs(assembly.polygons, found)
     new = ~(np.isin(own, covered) | (np.isin(reverse, covered) & (reverse >= 0)))
-    vertex, edge, corner = (
-        np.concatenate([getattr(before, name)[kept], getattr(found, name)[new]])
-        for name in ("vertex", "edge", "corner")
-    )
-    return measure_contacts(assembly, vertices, vertex, edge, corner)
+    features = np.concatenate([before.features[kept], found.features[new]])
+    return measured_points(assembly.polygons, vertices, features)
 
 
 def _gone_through(assembly: Assembly, vertices: np.ndarray, before: Contacts) -> np.ndarray:
     """Numbers of the contact points whose corner was in front of its edge and is now behind it."""
-    now = measure_contacts(assembly, vertices, before.vertex, before.edge, before.corner)
-    inside = (now.along >= 0.0) & (now.along <= assembly.edge_lengths[before.edge]) & (before.corner < 0)
-    rounding = 1e-12 * assembly.block_size
+    now = measure_contacts(assembly, vertices, before)
+    past, _, on_corner = past_the_end(assembly.polygons, now)
+    inside = (past <= 0.0) & ~on_corner
+    rounding = COORDINATE_ROUNDING * assembly.block_size
     return np.flatnonzero(inside & (before.gaps >= -rounding) & (now.gaps < -rounding))
 
 
@@ -232,12 +229,8 @@ def _slid_off(
     assembly: Assembly, vertices: np.ndarray, before: Contacts, kept: np.ndarray, sliding: np.ndarray
 ) -> np.ndarray:
     """Whether corners that carried force have left their edge for good: by sliding, or by more than any drift."""
-    vertex, edge, corner = before.vertex[kept], before.edge[kept], before.corner[kept]
-    now = measure_contacts(assembly, vertices, vertex, edge, corner)
-    far = np.where(corner >= 0, 0.0, assembly.edge_lengths[edge])
-    past = np.maximum(-now.along, now.along - far)
-    drifting = end_zone(assembly, vertex, edge) / CORNER_TOLERANCE * LARGEST_DRIFT
-    return (past > drifting) | (sliding & (corner < 0) & (past > end_zone(assembly, vertex, edge)))
+    past, zone, on_corner = past_the_end(assembly.polygons, measure_contacts(assembly, vertices, before[kept]))
+    return (past > zone / CORNER_TOLERANCE * LARGEST_DRIFT) | (sliding & ~on_corner & (past > zone))
 
 
 def drift_and_allowance(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
@@ -252,9 +245,9 @@ def drift_and_allowance(assembly: Assembly, contacts: Contacts, solved: Solved) 
         gaps would only shrink by a constant factor; a point that closed and slid in the last program is expected
         to do so again in the same proportion.
     """
-    before, same = matched_contacts(assembly, contacts, solved.contacts)
-    expected = solved.contacts.along[before] + solved.slip[before]
-    drift = np.where(same, contacts.along - expected, 0.0)
+    before, same = matched_contacts(contacts, solved.contacts)
+    expected = solved.contacts.slip[before, 0] + solved.slip[before]
+    drift = np.where(same, contacts.slip[:, 0] - expected, 0.0)
     closing, slip = -solved.opening[before], solved.sliding[before]
     again = same & (slip > 0.0) & (closing > SMALLEST_CLOSING * contacts.gaps) & (contacts.gaps > 0.0)
     ratio = np.minimum(np.divide(slip, closing, out=np.zeros_like(slip), where=again), STEEPEST_CLOSING)
@@ -263,9 +256,8 @@ def drift_and_allowance(assembly: Assembly, contacts: Contacts, solved: Solved) 
 
 def carrying_and_sticking(assembly: Assembly, contacts: Contacts, solved: Solved) -> tuple[np.ndarray, np.ndarray]:
     """Points that carried force in the last program, and those of them that stuck: (n_contacts,) bool arrays."""
-    place, same = matched_contacts(assembly, contacts, solved.contacts)
-    normal = solved.forces[place, 0]
-    carrying = same & (normal > CARRYING_FRACTION * normal.max(initial=0.0))
+    place, same = matched_contacts(contacts, solved.contacts)
+    carrying = same & carries(solved.forces[place], CARRYING_FRACTION)
     return carrying, carrying & solved.sticking[place]
 
 

@@ -6,45 +6,32 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.assembly import measure_contacts
 from solver.geometry.contacts import matched_contacts
-from solver.geometry.planar_contacts import measure_contacts
 from solver.kinematics import Pose, moved, moved_vertices
 from solver.lp.problem import SolveError
+from solver.tolerances import FARTHEST_FALL, GEOMETRY_TOLERANCE, PENETRATION_LEFT, STILL, TOGETHER
 
-from .closing import (
-    GEOMETRY_TOLERANCE,
-    carrying_and_sticking,
-    closed_points,
-    closing_program,
-    contacts_after,
-    drift_and_allowance,
-)
+from .closing import carrying_and_sticking, closed_points, closing_program, contacts_after, drift_and_allowance
 from .increment import Solved, solve_program
 from .macroblocks import MacroBlocks, macro_blocks
-from .model import Model, motion_size
+from .model import Model, largest_movement
 
-#: A pose is an equilibrium when a program at rest moves no block by more than this, in block sizes: friction leaves
-#: a little freedom at the edge of its cone, a structure that has to find another equilibrium moves much further.
-STILL = 1e-5
-
-#: Step of a descent, and the farthest that blocks may fall in one, in block sizes.
-DESCENT_STEP, FARTHEST_FALL = 0.1, 0.5
+#: Step of a descent, in block sizes.
+DESCENT_STEP = 0.1
 
 #: Programs that close gaps one after another before a full program is solved again.
 CLOSINGS = 4
 
 #: Where friction keeps many points on the edge of sliding, corrections converge slowly. After CLOSINGS programs gaps of
 #: this part of the increment's movement may stay (the next program sees them, so they do not add up), and penetration
-#: of this part of the smallest block. In programs too large for vertex solutions, whose interior solutions say less
-#: clearly what sticks, ten times as much of either.
-GAP_LEFT, GAP_LEFT_LARGE, PENETRATION_LEFT = 1e-2, 1e-1, 5e-7
+#: of PENETRATION_LEFT. In programs too large for vertex solutions, whose interior solutions say less clearly what
+#: sticks, ten times as much of either.
+GAP_LEFT, GAP_LEFT_LARGE = 1e-2, 1e-1
 
 #: Exact geometries from which a program still moves on, before it is followed in small steps: friction at the edge of
 #: its cone may lead it round in a circle.
 RESTLESS = 8
-
-#: Blocks whose joint moves by less than this part of the increment's movement are closed up as one.
-TOGETHER = 1e-3
 
 #: Large models are closed up, in so many programs over their macro-blocks, until the contact forces would do less than
 #: this part of the reaction's work on the gaps that are left; the reaction counts as at least this part of the loads.
@@ -101,7 +88,8 @@ def corrected(
     free = model.assembly.free
     pose = _moved_freely(model, predictor.pose, predictor)
     pose = Pose(
-        np.where(free[:, None], pose.positions, supports.positions), np.where(free, pose.rotations, supports.rotations)
+        np.where(free[:, None], pose.positions, supports.positions),
+        np.where(free[:, None], pose.rotations, supports.rotations),
     )
     return _settled(model, pose, predictor, correctors, nudge)
 
@@ -120,7 +108,7 @@ def at_rest(model: Model, pose: Pose, correctors: int, nudge: np.ndarray | None 
     solved = solve_program(model, pose, nudge)
     if solved.falling:
         raise Falls(solved)
-    if motion_size(model, solved.motion) <= STILL * model.length:
+    if largest_movement(model, solved.motion) <= STILL * model.length:
         return pose
     return _settled(model, _moved_freely(model, pose, solved), solved, correctors, nudge)
 
@@ -133,7 +121,7 @@ def _descended(model: Model, start: Pose, deepest: float) -> Pose:
     slow = replace(model, trust=model.length * DESCENT_STEP)
     solved, pose = solve_program(slow, start), start
     for _ in range(round(2.0 / DESCENT_STEP)):
-        if not solved.falling and motion_size(model, solved.motion) <= STILL * model.length:
+        if not solved.falling and largest_movement(model, solved.motion) <= STILL * model.length:
             break
         pose = moved(pose, solved.motion)
         solved = solve_again(slow, pose, solved)
@@ -160,7 +148,7 @@ def _without_penetration(model: Model, pose: Pose, solved: Solved, deepest: floa
 
 def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, nudge: np.ndarray | None) -> Pose:
     tolerance = exact = GEOMETRY_TOLERANCE * model.length
-    enough = max(tolerance, (GAP_LEFT_LARGE if model.large else GAP_LEFT) * motion_size(model, solved.motion))
+    enough = max(tolerance, (GAP_LEFT_LARGE if model.large else GAP_LEFT) * largest_movement(model, solved.motion))
     deepest = PENETRATION_LEFT * float(np.sqrt(model.assembly.areas.min())) * (10.0 if model.large else 1.0)
     if model.large:
         pose, solved, closed = _closed_up(model, pose, solved, deepest)
@@ -187,7 +175,7 @@ def _settled(model: Model, pose: Pose, solved: Solved, correctors: int, nudge: n
         solved = solve_program(model, pose, nudge, contacts, drift, allowance)
         if solved.falling:
             raise Falls(solved)
-        if error <= tolerance and motion_size(model, solved.motion) <= STILL * model.length:
+        if error <= tolerance and largest_movement(model, solved.motion) <= STILL * model.length:
             return pose
         pose = _moved_freely(model, pose, solved)
     if exact_poses > 0:
@@ -204,13 +192,13 @@ def _closed_up(model: Model, pose: Pose, solved: Solved, deepest: float) -> tupl
     next program finds another mechanism, and its reaction is wrong by as much.
     """
     bodies = _macro_blocks(model, solved)
-    movement = motion_size(model, solved.motion)
+    movement = largest_movement(model, solved.motion)
     reaction = abs(float((solved.support_forces * solved.motion).sum()))
     work = WORK_LEFT * max(reaction, LEAST_REACTION * model.total_load * model.force * movement)
     contacts, found, closings = contacts_after(model, pose, solved), True, 0
     while True:
         carrying, _ = carrying_and_sticking(model.assembly, contacts, solved)
-        place, _ = matched_contacts(model.assembly, contacts, solved.contacts)
+        place, _ = matched_contacts(contacts, solved.contacts)
         normal = np.where(carrying, solved.forces[place, 0], 0.0)
         gap, depth = float(np.abs(contacts.gaps[carrying]).max(initial=0.0)), -float(contacts.gaps.min(initial=0.0))
         last = closings == MACRO_CLOSINGS
@@ -232,16 +220,16 @@ def _closed_up(model: Model, pose: Pose, solved: Solved, deepest: float) -> tupl
         pose = _moved_freely(model, pose, solved)
         # A closing moves blocks by a gap: the points are the same, and are measured in a tenth of the time.
         vertices = moved_vertices(model.assembly, pose)
-        contacts = measure_contacts(model.assembly, vertices, contacts.vertex, contacts.edge, contacts.corner)
+        contacts = measure_contacts(model.assembly, vertices, contacts)
         found, closings = False, closings + 1
 
 
 def _macro_blocks(model: Model, solved: Solved) -> MacroBlocks:
     """Blocks that a program moves together, or nearly so: their joints are left as they are."""
     apart = np.maximum(np.abs(solved.opening), np.abs(solved.slip))
-    together = TOGETHER * motion_size(model, solved.motion)
+    together = TOGETHER * largest_movement(model, solved.motion)
     return macro_blocks(
-        model.assembly, solved.pose, solved.contacts, apart, solved.motion[:, 2], model.length, together
+        model.assembly, solved.pose, solved.contacts, apart, solved.motion[:, 2:], model.length, together
     )
 
 

@@ -7,36 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from solver.equilibrium import cone_rays, equilibrium_matrix, with_slack
+from solver.assembly import find_contacts
+from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts
-from solver.geometry.planar_contacts import find_contacts
-from solver.kinematics import Pose, moved_vertices
+from solver.kinematics import Pose, moved_vertices, unit_lengths
 from solver.lp.problem import LinearProgram, LPSolution, SolveError, Unbounded
 from solver.lp.solve import solve_lp
 from solver.results.certificate import Certificate
+from solver.results.increment import carries, used_up
+from solver.tolerances import AT_LIMIT, BALANCE_TOLERANCE, CARRYING_FRACTION, FALLING_FRACTION, LEFT_WEDGED, ROUNDING
 
 from .light_blocks import light_blocks, with_light_blocks
 from .macroblocks import MacroBlocks, free_blocks
 from .model import Model
-
-#: A free block out of balance by less than this fraction of the total load is in balance. Without it the program
-#: may move a block without friction sideways, for nothing, as far as it is allowed to.
-BALANCE_TOLERANCE = 1e-9
-
-#: Unbalanced force that counts as falling, as a fraction of the total load: well above BALANCE_TOLERANCE and
-#: what HiGHS leaves, and within the residual that a certificate promises.
-FALLING_FRACTION = 5e-9
-
-#: Distance from the edge of the friction cone, in units of the program, at which a contact point is on it.
-AT_LIMIT = 1e-9
-
-#: Penetration and drift below this, in units of the program, are rounding: a wedge that friction locks could not
-#: give way to them.
-ROUNDING = 1e-10
-
-#: Where a program has no solution, penetration and drift below this, in units of the program, are left as they are:
-#: blocks wedged against each other cannot give way, and drawings and corrections are off by as much.
-LEFT_WEDGED = 1e-7
 
 
 class Locked(Exception):
@@ -144,12 +127,12 @@ def solve_program(
         support_motion = np.zeros((assembly.n_blocks, 3))
     model.tally.programs += 1
     friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-    matrix = equilibrium_matrix(contacts, pose, model.length)
+    matrix = wrench_matrix(contacts, pose, model.length)
     given = matrix.T @ (support_motion / model.lengths).ravel()
     if allowance is not None:
         given[0::2] += allowance / model.length
     distance = given + distances_of(model, contacts, drift, ROUNDING)
-    rays = cone_rays(friction)
+    rays = friction_rays(friction)
     balance = sp.csc_array(sp.csr_array(matrix)[np.repeat(assembly.free, 3)] @ rays)
     rows = balance.shape[0]
     external = model.scaled_load[assembly.free].ravel()
@@ -174,7 +157,7 @@ def solve_program(
         )
     except Unbounded as ray:
         forces = (rays @ ray.x[: 2 * len(contacts)]).reshape(-1, 2)
-        squeezed = np.unique(contacts.block_a[forces[:, 0] > 1e-6 * forces[:, 0].max(initial=0.0)])
+        squeezed = np.unique(contacts.block_a[carries(forces, CARRYING_FRACTION)])
         raise Locked(tuple(assembly.names[i] for i in squeezed)) from None
     falls = np.full(rows, FALLING_FRACTION * model.total_load)
     light = light_blocks(model)
@@ -196,7 +179,6 @@ def solve_program(
     certificate = _certificate(model, contacts, resultant + level * live, multipliers, room, solution)
     at_limit = room.reshape(-1, 2).min(axis=1) <= AT_LIMIT
     forces = scaled_forces.reshape(-1, 2)
-    used_up = np.abs(forces[:, 1]) >= friction * forces[:, 0] * (1.0 - 1e-6)
     slid = np.abs(approach[1::2])
     sliding = np.where(at_limit & (slid > AT_LIMIT), slid * model.length, 0.0)
     on_supports = np.where(assembly.free[:, None], 0.0, resultant)
@@ -209,10 +191,10 @@ def solve_program(
         opening=relative[0::2] * model.length,
         slip=relative[1::2] * model.length,
         sliding=sliding,
-        sticking=(forces[:, 0] > 0.0) & ~(used_up & (sliding > 0.0)),
+        sticking=(forces[:, 0] > 0.0) & ~(used_up(forces, friction) & (sliding > 0.0)),
         falling=bool((unbalanced > falls).any()),
         certificate=certificate,
-        support_forces=on_supports * model.force * np.array([1.0, 1.0, model.length]),
+        support_forces=on_supports * model.force * unit_lengths(3, model.length),
         multiplier=level / live_size if live_size > 0.0 else 0.0,
     )
 

@@ -9,13 +9,9 @@ import scipy.sparse as sp
 
 from solver.lp.problem import LinearProgram, LPSolution, SolveError, Unbounded
 from solver.lp.solve import solve_lp
+from solver.tolerances import LIGHT_BALANCE, LIGHTEST, ROUNDED_OFF
 
 from .model import Model
-
-#: A block whose weight times size is below this part of the whole is seen badly, or not at all, among the others, whose
-#: balance may be off by BALANCE_TOLERANCE. Its rows are written in its own weight and size, and balance to the second
-#: number; where it carries more, to ROUNDED_OFF of what it carries, which is what is left of double precision.
-LIGHTEST, LIGHT_BALANCE, ROUNDED_OFF = 2e-8, 1e-3, 1e-5
 
 
 def light_blocks(model: Model) -> np.ndarray:

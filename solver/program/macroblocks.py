@@ -61,7 +61,7 @@ def macro_blocks(
     contacts : Contacts
     apart : (n_contacts,) array [m]
         Relative movement of each contact point.
-    rotations : (n_blocks,) array [rad]
+    rotations : (n_blocks, n_rot) array [rad]
     length : float [m]
         Unit of the program.
     together : float [m]

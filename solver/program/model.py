@@ -8,6 +8,7 @@ import numpy as np
 
 from solver.assembly import Assembly
 from solver.interfaces import Interfaces
+from solver.kinematics import motion_size, unit_lengths
 from solver.lp.solve import CROSSOVER_ROWS
 
 
@@ -68,7 +69,7 @@ class Model:
     @property
     def scaled_load(self) -> np.ndarray:
         """(n_blocks, 3) array: the load in units of the program."""
-        return self.load / (self.force * np.array([1.0, 1.0, self.length]))
+        return self.load / (self.force * unit_lengths(self.load.shape[1], self.length))
 
     @property
     def scaled_live(self) -> tuple[np.ndarray, float]:
@@ -76,7 +77,7 @@ class Model:
         free = self.assembly.free
         live = np.zeros((len(free), 3))
         if self.live is not None:
-            live[free] = self.live[free] / (self.force * np.array([1.0, 1.0, self.length]))
+            live[free] = self.live[free] / (self.force * unit_lengths(self.load.shape[1], self.length))
         size = float(np.abs(live).max(initial=0.0))
         return live / (size or 1.0), size
 
@@ -86,5 +87,6 @@ class Model:
         return float(np.abs(self.scaled_load[self.assembly.free, :2]).sum())
 
 
-def motion_size(model: Model, motion: np.ndarray) -> float:
-    return float(np.abs(motion * np.array([1.0, 1.0, model.length])).max(initial=0.0))
+def largest_movement(model: Model, motion: np.ndarray) -> float:
+    """Largest movement of a block [m], rotations times the unit of length."""
+    return float(motion_size(motion, model.length).max(initial=0.0))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum, StrEnum
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
+from solver.tolerances import DILATANCY_SLACK, SMALLEST_FORCE, SMALLEST_RATE, USED_UP
 
 from .certificate import Certificate
 
@@ -36,40 +37,100 @@ class ContactState(IntEnum):
     HINGING = 3
 
 
-#: A contact point carries force from this fraction of the largest normal force on.
-SMALLEST_FORCE = 1e-9
+def carries(forces: np.ndarray, fraction: float = SMALLEST_FORCE) -> np.ndarray:
+    """(n,) bool array: which contact points carry force.
 
-#: A contact point opens or slips where its relative velocity exceeds this fraction of the fastest block.
-SMALLEST_RATE = 1e-6
+    Parameters
+    ----------
+    forces : (n, d) array
+        Normal (compression positive) and shear forces, in any unit.
+    fraction : float
+        Of the largest normal force, from which on it counts.
+    """
+    return np.asarray(forces[:, 0] > fraction * forces[:, 0].max(initial=0.0))
+
+
+def used_up(forces: np.ndarray, friction: np.ndarray) -> np.ndarray:
+    """(n,) bool array: where the shear force is all that friction allows, from (n, d) forces and (n,) coefficients."""
+    return np.linalg.norm(forces[:, 1:], axis=1) >= friction * forces[:, 0] * (1.0 - USED_UP)
+
+
+def slides(slip: np.ndarray, opening: np.ndarray, friction: np.ndarray, slow: float) -> np.ndarray:
+    """(n,) bool array: which points move along their joint, and do not merely come apart.
+
+    Parameters
+    ----------
+    slip, opening : (n,) arrays
+        Relative velocity along the joint, and normal to it: up to friction times slip is the dilatancy of associative
+        friction.
+    friction : (n,) array
+    slow : float
+        Velocity up to which something is at rest.
+    """
+    lift = np.maximum(slow, friction * np.abs(slip) * (1.0 + DILATANCY_SLACK))
+    return ~at_rest(slip, slow) & (opening <= lift)
+
+
+def at_rest(velocity: np.ndarray, slow: float) -> np.ndarray:
+    """Which velocities are none beside a slow one, in the same unit."""
+    return np.abs(velocity) <= slow
 
 
 @dataclass(frozen=True)
-class Increment:
-    """One equilibrium on the path, or one frame of the fall after it.
+class State:
+    """The arrays of an increment: where its blocks are, what their joints carry, and how they move next.
 
     Attributes
     ----------
-    settlement : float [m or rad]
-        Parameter s of the moving supports within its phase; see :attr:`Response.analysis` for other analyses.
-    phase : int
-        Which of several settlements, from 0.
-    load_multiplier : float
-        α of the live loads.
     pose : Pose
     contacts : Contacts
     forces : (n_contacts, 2) array [N]
         Normal (compression positive) and shear force on ``block_a`` at each contact point.
-    displacements : (n_contacts, 2) array [m]
-        Opening and slip of each contact point in the increment that follows, per unit of s; in a fall,
+    displacements : (n_contacts, 2) array
+        Opening and slip of each contact point in the increment that follows, per unit of the parameter; in a fall,
         per frame.
     friction : (n_contacts,) array
         Friction coefficient of each contact point.
     velocity : (n_blocks, 3) array
-        Movement of each block in the increment that follows, per unit of s; in a fall, per frame.
-    reaction : float [N]
-        Force of the structure on the moving supports along their motion [N·m for a rotation].
+        Movement of each block in the increment that follows, per unit of the parameter; in a fall, per frame.
     support_forces : (n_blocks, 3) array [N, N, N·m]
         Resultant of the structure on each support about its centroid; zero for free blocks.
+    """
+
+    pose: Pose
+    contacts: Contacts
+    forces: np.ndarray
+    displacements: np.ndarray
+    friction: np.ndarray
+    velocity: np.ndarray
+    support_forces: np.ndarray
+
+
+class StoredState(Protocol):
+    """A state that is kept elsewhere, in a file, and read whenever it is asked for."""
+
+    def read(self) -> State:
+        """The state."""
+
+
+@dataclass(frozen=True)
+class Increment:
+    """One equilibrium on the path, or one frame of the fall after it: a few numbers, and a state.
+
+    Attributes
+    ----------
+    parameter : float
+        What the analysis runs over (:attr:`Response.parameter`): of a settlement, that of the moving supports within
+        its phase [m or rad]; of a pushover the control displacement [m]; of a load that moves its position x [m].
+    measured : float
+        What the analysis measures there (:attr:`Response.measured`): the reaction [N or N·m] or the load multiplier.
+    phase : int
+        Which of several settlements, from 0.
+    load_multiplier : float
+        α of the live loads.
+    reaction : float [N]
+        Force of the structure on the moving supports along their motion [N·m for a rotation]; of live loads, their
+        resultant at this multiplier.
     certificate : Certificate
     status : Status
         ``EQUILIBRIUM``, or ``FALLING`` for pseudo-time frames: no equilibrium, no dynamics.
@@ -77,6 +138,8 @@ class Increment:
         Linear programs solved for this increment.
     seconds : float
         Time spent on this increment.
+    held : State or StoredState
+        The arrays, in memory or in a file; :attr:`state` has them in any case.
     notes : tuple of str
         What happened on the way to it that forces and poses do not tell: blocks that fell and were caught.
     checkpoint : optional
@@ -84,30 +147,80 @@ class Increment:
         :class:`PushoverCheckpoint` of a pushover. A :class:`Response` keeps none.
     """
 
-    settlement: float
+    parameter: float
+    measured: float
     phase: int
     load_multiplier: float
-    pose: Pose
-    contacts: Contacts
-    forces: np.ndarray
-    displacements: np.ndarray
-    friction: np.ndarray
-    velocity: np.ndarray
     reaction: float
-    support_forces: np.ndarray
     certificate: Certificate
     status: Status
     programs: int
     seconds: float
+    held: State | StoredState = field(repr=False, compare=False)
     notes: tuple[str, ...] = ()
     checkpoint: Any = field(default=None, repr=False, compare=False)
 
     def __repr__(self) -> str:
         """One line; the arrays of a wall fill screens."""
         return (
-            f"<Increment {self.status} at {self.settlement:g}, reaction {self.reaction:.6g}, "
+            f"<Increment {self.status} at {self.parameter:g}, reaction {self.reaction:.6g}, "
             f"load multiplier {self.load_multiplier:.6g}>"
         )
+
+    @property
+    def state(self) -> State:
+        """The arrays, read from their file where they are kept in one."""
+        return self.held if isinstance(self.held, State) else self.held.read()
+
+    def with_arrays(self, **arrays: Any) -> Increment:
+        """The increment in memory, some of its arrays replaced.
+
+        Parameters
+        ----------
+        **arrays
+            Fields of :class:`State`.
+        """
+        return replace(self, held=replace(self.state, **arrays))
+
+    @property
+    def settlement(self) -> float:
+        """The parameter, by the name it has in most analyses."""
+        return self.parameter
+
+    @property
+    def pose(self) -> Pose:
+        """Where the blocks are."""
+        return self.state.pose
+
+    @property
+    def contacts(self) -> Contacts:
+        """The contact points."""
+        return self.state.contacts
+
+    @property
+    def forces(self) -> np.ndarray:
+        """(n_contacts, 2) array [N]: normal and shear force on ``block_a``; see :class:`State`."""
+        return self.state.forces
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """(n_contacts, 2) array: opening and slip per unit of the parameter; see :class:`State`."""
+        return self.state.displacements
+
+    @property
+    def friction(self) -> np.ndarray:
+        """(n_contacts,) array: friction coefficients."""
+        return self.state.friction
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(n_blocks, 3) array: movement of each block per unit of the parameter; see :class:`State`."""
+        return self.state.velocity
+
+    @property
+    def support_forces(self) -> np.ndarray:
+        """(n_blocks, 3) array [N, N, N·m]: resultant of the structure on each support; see :class:`State`."""
+        return self.state.support_forces
 
     @property
     def states(self) -> np.ndarray:
@@ -116,10 +229,10 @@ class Increment:
         Open where no force is carried; hinging where it is and the joint opens at another point; sliding where
         the point moves along the joint with the friction used up; sticking otherwise.
         """
-        normal, shear = self.forces[:, 0], np.abs(self.forces[:, 1])
-        carrying = normal > SMALLEST_FORCE * normal.max(initial=0.0)
-        rate = SMALLEST_RATE * np.abs(self.velocity[:, :2]).max(initial=0.0)
-        sliding = carrying & (np.abs(self.displacements[:, 1]) > rate) & (shear >= self.friction * normal * (1 - 1e-6))
+        carrying = carries(self.forces)
+        rate = SMALLEST_RATE * np.abs(self.velocity[:, : self.forces.shape[1]]).max(initial=0.0)
+        slipping = ~at_rest(np.linalg.norm(self.displacements[:, 1:], axis=1), rate)
+        sliding = carrying & slipping & used_up(self.forces, self.friction)
         low, high = (
             np.minimum(self.contacts.block_a, self.contacts.block_b),
             np.maximum(self.contacts.block_a, self.contacts.block_b),
@@ -128,7 +241,7 @@ class Increment:
         _, joint = np.unique(joint, return_inverse=True)
         opens = np.zeros(joint.max(initial=-1) + 1, dtype=bool)
         opens[joint[self.displacements[:, 0] > rate]] = True
-        states = np.full(len(normal), ContactState.OPEN, dtype=np.uint8)
+        states = np.full(len(carrying), ContactState.OPEN, dtype=np.uint8)
         states[carrying] = ContactState.STICKING
         states[carrying & opens[joint] & (self.displacements[:, 0] <= rate)] = ContactState.HINGING
         states[sliding] = ContactState.SLIDING

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
 
 from solver.geometry.contacts import Contacts
-from solver.kinematics import Pose, point_velocities
+from solver.kinematics import Pose, relative_velocities
 
 from .certificate import Certificate
-from .increment import Increment, Status
+from .increment import Increment, State, Status, StoredState
 
 
 class LimitStatus(StrEnum):
@@ -40,39 +40,62 @@ class LimitLoad:
         Static value, from forces in equilibrium within friction, and kinematic value, from the power balance of the
         mechanism, - dead · velocity / live · velocity (plus friction where it is not associative). For associative
         flow they enclose the limit load.
-    mechanism : (n_blocks, 3) array
-        How the blocks begin to move, largest movement 1 (rotations times block size). Where there is no equilibrium,
-        how they fall; where the multiplier is unbounded, zero.
-    contacts : Contacts
-        The closed contact points.
-    forces : (n_contacts, 2) array [N]
-        Normal (compression positive) and shear force on ``block_a`` at the limit.
     certificate : Certificate
     status : LimitStatus
     flow : str
         "associative" or "non-associative".
-    pose : Pose
-        The geometry.
-    friction : (n_contacts,) array
-        Friction coefficients.
     live_force : float [N]
         Resultant of the live loads on the free blocks at a multiplier of 1.
     programs : int
         Linear programs solved.
+    held : State or StoredState, optional
+        The limit state: pose, closed contact points, their forces at the limit, and the mechanism as its velocity. In
+        memory, or in a file; None where it is kept with the increment that reports the limit load.
     """
 
     multiplier: float
     bounds: tuple[float, float]
-    mechanism: np.ndarray
-    contacts: Contacts
-    forces: np.ndarray
     certificate: Certificate
     status: LimitStatus
     flow: str
-    pose: Pose
-    friction: np.ndarray
     live_force: float
     programs: int
+    held: State | StoredState | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def state(self) -> State:
+        """The limit state, read from its file where it is kept in one."""
+        if self.held is None:
+            raise ValueError("this limit load has only its numbers; its arrays are with the increment that reports it")
+        return self.held if isinstance(self.held, State) else self.held.read()
+
+    @property
+    def pose(self) -> Pose:
+        """The geometry."""
+        return self.state.pose
+
+    @property
+    def contacts(self) -> Contacts:
+        """The closed contact points."""
+        return self.state.contacts
+
+    @property
+    def forces(self) -> np.ndarray:
+        """(n_contacts, 2) array [N]: normal (compression positive) and shear force on ``block_a`` at the limit."""
+        return self.state.forces
+
+    @property
+    def friction(self) -> np.ndarray:
+        """(n_contacts,) array: friction coefficients."""
+        return self.state.friction
+
+    @property
+    def mechanism(self) -> np.ndarray:
+        """(n_blocks, 3) array: how the blocks begin to move, largest movement 1 (rotations times block size).
+
+        Where there is no equilibrium, how they fall; where the multiplier is unbounded, zero.
+        """
+        return self.state.velocity
 
     @property
     def gap(self) -> float:
@@ -82,25 +105,20 @@ class LimitLoad:
     @property
     def increment(self) -> Increment:
         """The state at the limit as an increment, for pictures and tables; its velocity is the mechanism."""
-        contacts, velocity = self.contacts, self.mechanism
-        a, b = (point_velocities(contacts.points, k, self.pose, velocity) for k in (contacts.block_a, contacts.block_b))
+        if self.held is None:
+            raise ValueError("this limit load has only its numbers; its arrays are with the increment that reports it")
         finite = self.multiplier if np.isfinite(self.multiplier) else 0.0
         return Increment(
-            settlement=0.0,
+            parameter=0.0,
+            measured=self.multiplier,
             phase=0,
             load_multiplier=self.multiplier,
-            pose=self.pose,
-            contacts=contacts,
-            forces=self.forces,
-            displacements=np.einsum("kij,kj->ki", contacts.frames, a - b),
-            friction=self.friction,
-            velocity=velocity,
             reaction=finite * self.live_force,
-            support_forces=np.zeros_like(velocity),
             certificate=self.certificate,
             status=Status.FALLING if self.status is LimitStatus.NO_EQUILIBRIUM else Status.EQUILIBRIUM,
             programs=self.programs,
             seconds=0.0,
+            held=self.held,
         )
 
     def __str__(self) -> str:
@@ -111,6 +129,21 @@ class LimitLoad:
             return "unbounded: no live load of this pattern brings the structure down"
         text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction, bounds differ by {self.gap:.1e})"
         return f"{text}, {moving} blocks moving" + ("" if self.status is LimitStatus.FOUND else f", {self.status}")
+
+
+def limit_state(
+    pose: Pose, contacts: Contacts, forces: np.ndarray, friction: np.ndarray, mechanism: np.ndarray
+) -> State:
+    """The arrays of a limit state; parameters as the attributes of :class:`LimitLoad`."""
+    return State(
+        pose=pose,
+        contacts=contacts,
+        forces=forces,
+        displacements=relative_velocities(contacts, pose, mechanism),
+        friction=friction,
+        velocity=mechanism,
+        support_forces=np.zeros_like(mechanism),
+    )
 
 
 @dataclass(frozen=True)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from solver.assembly import Assembly
-from solver.kinematics import moving_together, point_velocities
+from solver.geometry.contacts import Contacts
+from solver.kinematics import motion_size, moving_together, relative_velocities
+from solver.tolerances import CLOSED, NOTICEABLE, TOGETHER
 
-from .increment import ContactState, Increment
-
-#: Blocks belong together where their contact points move apart by less than this fraction of the fastest block.
-TOGETHER = 1e-3
+from .increment import Increment, at_rest, carries, slides
 
 #: Joints that are named one by one in words; of more, their number is told.
 NAMED = 8
@@ -22,14 +21,21 @@ NAMED = 8
 class Mechanism:
     """How a structure moves in the motion that follows an increment.
 
+    Words, pictures, curves, tables and the report all count these hinges and sliding joints: joints, that is pairs of
+    blocks, not contact points, and only those that move noticeably beside the fastest block.
+
     Attributes
     ----------
     parts : (n_blocks,) int array
         Macro-block of each block, largest first; -1 for blocks that stand still.
-    motions : (n_parts, 3) array
+    motions : (n_parts, n_dof) array
         Velocity of the centroid of each macro-block and its angular velocity, in the scale of the increment.
     hinges, sliding : (n, 2) int arrays
         Pairs of blocks between which macro-blocks turn about a point, or slide along a joint.
+    hinge_points : (n_hinges,) int array
+        The contact point about which each hinge turns; of several the one that carries most.
+    sliding_points : (k,) int array
+        The contact points that slide, of all sliding joints.
     names : tuple of str
         Of the blocks.
     """
@@ -38,6 +44,8 @@ class Mechanism:
     motions: np.ndarray
     hinges: np.ndarray
     sliding: np.ndarray
+    hinge_points: np.ndarray
+    sliding_points: np.ndarray
     names: tuple[str, ...]
 
     def __str__(self) -> str:
@@ -59,13 +67,14 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     Part -1 stands still. The others are numbered from 0, the largest area first.
     """
     contacts, n = increment.contacts, assembly.n_blocks
-    fastest = float(np.abs(increment.velocity[:, :2]).max(initial=0.0))
+    d = contacts.points.shape[1]
+    fastest = float(np.abs(increment.velocity[:, :d]).max(initial=0.0))
     if fastest == 0.0 or len(contacts) == 0:
         return np.full(n, -1)
-    turned = increment.velocity[:, 2] * assembly.block_size
-    part = moving_together(n, contacts, np.abs(increment.displacements).max(axis=1), turned, TOGETHER * fastest)
+    spins = increment.velocity[:, d:] * assembly.block_size
+    part = moving_together(n, contacts, np.abs(increment.displacements).max(axis=1), spins, TOGETHER * fastest)
     # Corners, not centroids: a block may turn about its own centroid.
-    moves = np.maximum(np.abs(increment.velocity[:, :2]).max(axis=1), np.abs(turned)) > 10.0 * TOGETHER * fastest
+    moves = motion_size(increment.velocity, assembly.block_size) > NOTICEABLE * fastest
     moves &= assembly.free
     area = np.bincount(part, weights=assembly.areas * moves, minlength=int(part.max()) + 1)
     rank = np.empty(len(area), dtype=int)
@@ -87,37 +96,40 @@ def mechanism_of(assembly: Assembly, increment: Increment) -> Mechanism:
 
     Notes
     -----
-    In a fall the forces of the program are of no use, so that joints are told by their motion alone: a joint slides
-    where a closed contact point moves along it, and hinges where one stays and another point of it opens or closes.
+    Joints are told apart by their motion: one slides where a closed contact point moves along it (and carries force,
+    where any does), and hinges where a point stays while the blocks turn against each other. A hinge may have no other
+    point that opens: of a joint that is wide open already, only the corner it turns about is near enough to touch.
     """
     parts = rigid_parts(assembly, increment)
-    contacts, n = increment.contacts, assembly.n_blocks
+    contacts, velocity = increment.contacts, increment.velocity
+    d = contacts.points.shape[1]
     count = int(parts.max(initial=-1)) + 1
     mass = np.bincount(parts[parts >= 0], weights=assembly.masses[parts >= 0], minlength=count)
-    motions = np.zeros((count, 3))
-    for axis in range(3):
-        momentum = (assembly.masses * increment.velocity[:, axis])[parts >= 0]
+    motions = np.zeros((count, velocity.shape[1]))
+    for axis in range(velocity.shape[1]):
+        momentum = (assembly.masses * velocity[:, axis])[parts >= 0]
         motions[:, axis] = np.bincount(parts[parts >= 0], weights=momentum, minlength=count) / mass
-    fastest = float(np.abs(increment.velocity[:, :2]).max(initial=0.0))
-    slow = 10.0 * TOGETHER * fastest
-    closed = contacts.gaps < TOGETHER * assembly.block_size
+    slow = NOTICEABLE * float(np.abs(velocity[:, :d]).max(initial=0.0))
     between = parts[contacts.block_a] != parts[contacts.block_b]
-    opening, slip = increment.displacements[:, 0], np.abs(increment.displacements[:, 1])
-    stays = closed & between & (np.abs(opening) <= slow)
-    spin = np.abs(increment.velocity[contacts.block_a, 2] - increment.velocity[contacts.block_b, 2])
-    turns = stays & (slip <= slow) & (spin * assembly.block_size > slow)
-    slides = closed & between & (slip > slow) & (opening <= np.maximum(slow, increment.friction * slip * 1.01))
-    states = increment.states
-    if (states != ContactState.OPEN).any():
-        slides &= states != ContactState.OPEN
+    closed = between & (contacts.gaps < CLOSED * assembly.block_size)
+    opening, slip = increment.displacements[:, 0], np.linalg.norm(increment.displacements[:, 1:], axis=1)
+    spin = np.abs(velocity[contacts.block_a, d:] - velocity[contacts.block_b, d:]).max(axis=1, initial=0.0)
+    turns = closed & at_rest(opening, slow) & at_rest(slip, slow) & ~at_rest(spin * assembly.block_size, slow)
+    slips = closed & slides(slip, opening, increment.friction, slow)
+    carrying = carries(increment.forces)
+    if carrying.any():
+        slips &= carrying
+    hinges, hinge_points = _joints(contacts, np.flatnonzero(turns), increment.forces[:, 0])
+    sliding, _ = _joints(contacts, np.flatnonzero(slips), increment.forces[:, 0])
+    return Mechanism(parts, motions, hinges, sliding, hinge_points, np.flatnonzero(slips), assembly.names)
 
-    def pairs(chosen: np.ndarray) -> np.ndarray:
-        low = np.minimum(contacts.block_a, contacts.block_b)[chosen]
-        high = np.maximum(contacts.block_a, contacts.block_b)[chosen]
-        found = np.unique(low.astype(np.int64) * n + high)
-        return np.stack([found // n, found % n], axis=1)
 
-    return Mechanism(parts=parts, motions=motions, hinges=pairs(turns), sliding=pairs(slides), names=assembly.names)
+def _joints(contacts: Contacts, chosen: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of blocks that chosen contact points lie between, (n, 2), and of each the point that carries most."""
+    ends = np.stack([contacts.block_a[chosen], contacts.block_b[chosen]], axis=1)
+    order = np.argsort(-normal[chosen], kind="stable")
+    pairs, first = np.unique(np.sort(ends[order], axis=1), axis=0, return_index=True)
+    return pairs.reshape(-1, 2), chosen[order[first]]
 
 
 def with_motion(increment: Increment, motion: np.ndarray) -> Increment:
@@ -129,7 +141,5 @@ def with_motion(increment: Increment, motion: np.ndarray) -> Increment:
     motion : (n_blocks, 3) array
         Velocity of each centroid and angular velocity, in any scale.
     """
-    contacts, pose = increment.contacts, increment.pose
-
-    a, b = (point_velocities(contacts.points, k, pose, motion) for k in (contacts.block_a, contacts.block_b))
-    return replace(increment, velocity=motion, displacements=np.einsum("kij,kj->ki", contacts.frames, a - b))
+    rates = relative_velocities(increment.contacts, increment.pose, motion)
+    return increment.with_arrays(velocity=motion, displacements=rates)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from solver.loads import GRAVITY, Loads, Settlement
 
 from .increment import Increment, Status
 from .limit import LimitLoad
+from .quantities import REACTION, SETTLEMENT, Quantity
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,8 @@ class Collapse:
     unit : str
     words : str
         How it fails: macro-blocks, hinges and sliding joints.
+    lost : str
+        What there is at the one end of the bracket and not at the other: "equilibrium", or "capacity" for live loads.
     """
 
     displacement: float
@@ -39,6 +44,7 @@ class Collapse:
     mechanism: np.ndarray
     unit: str = "m"
     words: str = ""
+    lost: str = "equilibrium"
 
     def __str__(self) -> str:
         low, high = self.bracket
@@ -47,6 +53,18 @@ class Collapse:
             f"collapse at {self.displacement:.6g} {self.unit} (equilibrium at {low:.6g}, none at {high:.6g}), "
             f"reaction {self.reaction:.6g} {force}, {self.words}"
         )
+
+
+class Control(Protocol):
+    """What drives an analysis that no settlement drives: how far it goes, and in which unit."""
+
+    @property
+    def limit(self) -> float:
+        """Where to stop."""
+
+    @property
+    def unit(self) -> str:
+        """Of the limit."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +86,15 @@ class Response:
         Why it stopped, in words.
     collapse : Collapse or None
     analysis : str
-        "settlement"; "pushover", whose ``settlement`` is a control displacement; or "limit load", whose increments in
-        equilibrium are limit states: after settlements where there are any, else one for each position x [m] of a
-        load that moves, kept in ``settlement``.
+        Name of the kind of analysis: "settlement", "pushover" or "limit load".
     limits : tuple of LimitLoad
-        Of a limit load analysis, one per limit state, in their order.
+        Of increments in equilibrium that are limit states: one each, in their order.
+    parameter : Quantity
+        What the increments run over.
+    measured : Quantity
+        What is measured along them.
+    control : optional
+        What drives the parameter where no settlement does: the ControlDisplacement of a pushover.
     """
 
     assembly: Assembly
@@ -85,6 +107,9 @@ class Response:
     collapse: Collapse | None = field(default=None)
     analysis: str = "settlement"
     limits: tuple[LimitLoad, ...] = ()
+    parameter: Quantity = SETTLEMENT
+    measured: Quantity = REACTION
+    control: Control | None = None
 
     def __repr__(self) -> str:
         """One line: what was analysed, and how it ended."""
@@ -102,9 +127,43 @@ class Response:
         return tuple(note for increment in self.increments for note in increment.notes)
 
     @property
+    def parameters(self) -> np.ndarray:
+        """(n,) array: parameter of each increment in equilibrium, phases one after another."""
+        return path_parameters(self.path)
+
+    @property
+    def values(self) -> np.ndarray:
+        """(n,) array: measured value of each increment in equilibrium, nan where it is not finite."""
+        values = np.array([i.measured for i in self.path])
+        return np.where(np.isfinite(values), values, np.nan)
+
+    @property
+    def governing(self) -> Increment | None:
+        """The increment that decides: of states that stand by themselves the lowest, else the last in equilibrium."""
+        path = self.path
+        if not path:
+            return None
+        if self.parameter.is_path:
+            return path[-1]
+        return path[int(np.argmin(np.nan_to_num([i.measured for i in path], nan=-np.inf, posinf=np.inf)))]
+
+    @property
+    def limit_states(self) -> list[tuple[LimitLoad, Increment]]:
+        """Each limit load with the increment that reports it; one found in an interruption has none yet.
+
+        Limit states come first, in the order of the limit loads; frames of a fall or a mechanism follow.
+        """
+        return list(zip(self.limits, self.increments, strict=False))
+
+    @property
+    def swings(self) -> bool:
+        """Whether its frames without equilibrium show a mechanism that begins at a limit state, not a fall."""
+        return bool(self.limits) and self.collapse is None and bool(self.path)
+
+    @property
     def settlement(self) -> np.ndarray:
-        """(n,) array [m or rad]: settlement of each increment in equilibrium."""
-        return np.array([i.settlement for i in self.path])
+        """(n,) array [m or rad]: parameter of each increment in equilibrium within its phase."""
+        return np.array([i.parameter for i in self.path])
 
     @property
     def reaction(self) -> np.ndarray:
@@ -120,6 +179,16 @@ class Response:
     def total_weight(self) -> float:
         """Weight of the free blocks [N]."""
         return total_weight(self.assembly)
+
+
+def path_parameters(path: Sequence[Increment]) -> np.ndarray:
+    """(n,) array: parameter of each increment, phases one after another."""
+    total, before, last = np.zeros(len(path)), 0.0, 0.0
+    for k, increment in enumerate(path):
+        if k and increment.phase != path[k - 1].phase:
+            before = last
+        last = total[k] = before + increment.parameter
+    return total
 
 
 def total_weight(assembly: Assembly) -> float:

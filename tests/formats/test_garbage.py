@@ -10,8 +10,11 @@ from blockvis.formats.read import read, save_layout
 
 READ = sorted(suffix for suffix, known in FORMATS.items() if known.reads)
 
+#: Read by gmsh in a process of its own; without it all of them are refused.
+CAD = {".geo", ".geo_unrolled", ".step", ".stp", ".brep"}
 
-@pytest.mark.parametrize("suffix", READ)
+
+@pytest.mark.parametrize("suffix", [pytest.param(s, marks=[pytest.mark.cad] if s in CAD else []) for s in READ])
 @pytest.mark.parametrize("content", ["binary", "text", "zeros"])
 def test_garbage_is_refused(tmp_path, suffix, content):
     data = {
@@ -42,5 +45,5 @@ def test_half_a_file_never_gives_the_whole(tmp_path, suffix):
             found = read(path).n_blocks
         except ValueError:
             continue
-        # Drawing programs recover what is whole; it must then be fewer blocks, or all of their outlines.
-        assert found <= 6
+        # Drawing programs recover what is whole. The last tenth may hold nothing of a block.
+        assert found < 6 or share == 0.9

@@ -8,6 +8,7 @@ from blockvis.formats import gmsh_cad
 from blockvis.formats.read import read, read_layout
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is an extra", exc_type=(ImportError, OSError))
+pytestmark = pytest.mark.cad
 
 
 def test_script_with_arcs_becomes_chords_within_the_tolerance(tmp_path):

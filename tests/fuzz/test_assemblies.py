@@ -4,7 +4,10 @@ import pytest
 from judge import tried
 from rubble import KINDS, trial
 
+pytestmark = pytest.mark.path
 
+
+@pytest.mark.fuzz
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_nothing_is_contradicted(kind):
     findings = [tried(kind, seed) for seed in range(10_000, 10_004)]

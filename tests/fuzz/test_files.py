@@ -8,9 +8,6 @@ import pytest
 from hostile import FILES, npz_absurd, npz_bomb, written
 from mutations import MEMORY, READER, SECONDS, fixtures, mutated, read_all
 
-import blockvis
-import solver
-from blockvis import generators
 from blockvis.cli import main
 from blockvis.results.npz import checked_arrays
 
@@ -35,6 +32,7 @@ def test_hostile_files_are_refused_within_bounds(tmp_path):
         assert "outside its folder" in str(outcomes[name]["message"])
 
 
+@pytest.mark.fuzz
 def test_changed_bytes_are_read_or_refused(tmp_path):
     random, paths = np.random.default_rng(2026), []
     for name, data in fixtures(tmp_path).items():
@@ -48,11 +46,9 @@ def test_changed_bytes_are_read_or_refused(tmp_path):
 
 @pytest.mark.parametrize("name", ["assembly.npz", "increments/state_00000.npz"])
 @pytest.mark.parametrize("content", [npz_absurd, npz_bomb, lambda: b"", lambda: bytes(5000)])
-def test_hostile_results_are_refused(tmp_path, capsys, name, content):
-    spread = solver.Settlement(direction=(1, 0), increment=0.05, limit=0.05)
-    folder = blockvis.write(solver.settle(generators.arch(), spread), tmp_path / "out")
-    (folder / name).write_bytes(content())
-    assert main(["render", str(folder)]) == 2
+def test_hostile_results_are_refused(arch_results, capsys, name, content):
+    (arch_results / name).write_bytes(content())
+    assert main(["render", str(arch_results)]) == 2
     assert f"{Path(name).name}' cannot be read" in capsys.readouterr().err
 
 

@@ -30,6 +30,7 @@ import numpy as np
 import pytest
 
 import blockvis
+from blockvis.runs.run import Run
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parent.parent / "examples"
@@ -92,8 +93,28 @@ STUDY_COUNTS = ("increments", "programs")
 SMALLEST_BOUND = 1e-9
 
 
+def ran(name: str, folder: Path) -> Run:
+    """The run of an example; nothing is drawn.
+
+    Parameters
+    ----------
+    name : str
+        A key of ``CASES``.
+    folder : Path
+        Where its results go.
+
+    Returns
+    -------
+    Run
+    """
+    with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patched:
+        warnings.simplefilter("ignore")
+        patched.setattr(sys.modules[blockvis.run_case.__module__], "draw_results", lambda *_, **__: ())
+        return blockvis.run_case(CASES[name], folder)
+
+
 def numbers_of(name: str, folder: Path) -> dict[str, Any]:
-    """Runs a case and picks from its results folder what is to stay the same; nothing is drawn.
+    """Runs a case and picks from its results folder what is to stay the same.
 
     Parameters
     ----------
@@ -107,12 +128,16 @@ def numbers_of(name: str, folder: Path) -> dict[str, Any]:
     dict
         As it is stored, but for residuals, of which bounds are; tables are mappings from column to list.
     """
-    with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patched:
-        warnings.simplefilter("ignore")
-        if name in STUDIES:
+    if name in STUDIES:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             return _study_numbers(name, folder)
-        patched.setattr(sys.modules[blockvis.run_case.__module__], "draw_results", lambda *_, **__: ())
-        run = blockvis.run_case(CASES[name], folder)
+    return numbers_in(ran(name, folder))
+
+
+def numbers_in(run: Run) -> dict[str, Any]:
+    """What is to stay the same of a run, from its results folder; as :func:`numbers_of`."""
+    folder = run.folder
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     limits = [folder / table for table in LIMIT_TABLES if (folder / table).is_file()]
     return {

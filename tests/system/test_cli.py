@@ -41,6 +41,7 @@ def _refused(case, capsys, *words):
     assert not (case.parent / "out").exists(), "nothing may be written for bad input"
 
 
+@pytest.mark.pictures
 def test_run_writes_the_results_folder(case, capsys):
     out = case.parent / "out"
     assert main(["run", str(case), "-o", str(out)]) == 0

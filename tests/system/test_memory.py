@@ -68,13 +68,6 @@ def ran(text, folder):
     return blockvis.run_case(parse_case(ARCH + text, folder / "case.toml"), folder / "out")
 
 
-@pytest.fixture(autouse=True, scope="module")
-def undrawn():
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("blockvis.runs.run.draw_results", lambda *_, **__: ())
-        yield
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Results with more increments than are ever kept."""
@@ -162,7 +155,7 @@ def test_stored_increments_are_what_was_told(tmp_path):
     again = blockvis.write(stored, tmp_path / "again")
     for file in sorted((tmp_path / "out" / "increments").iterdir()):
         assert file.read_bytes() == (again / "increments" / file.name).read_bytes()
-    moved = replace(stored.increments[0], settlement=9.0)
+    moved = replace(stored.increments[0].with_arrays(), parameter=9.0)
     copied = pickle.loads(pickle.dumps(stored.increments[1]))
     assert copied.forces.tobytes() == told.increments[1].forces.tobytes()
     shutil.rmtree(tmp_path / "out")

@@ -48,6 +48,7 @@ def folder(tmp_path_factory):
     return path
 
 
+@pytest.mark.paraview
 @pytest.mark.skipif(PVPYTHON is None, reason="pvpython is not installed (Debian: python3-paraview)")
 def test_paraview_reads_every_increment_and_every_array(folder, tmp_path):
     script = tmp_path / "read.py"
@@ -67,6 +68,7 @@ def test_paraview_reads_every_increment_and_every_array(folder, tmp_path):
     assert told["blocks"][0][2]["Cell"]["name"] == response.assembly.names[-1]
 
 
+@pytest.mark.paraview
 @pytest.mark.skipif(PVPYTHON is None or XVFB is None, reason="pvpython or xvfb-run is not installed")
 def test_paraview_script_runs(folder, tmp_path):
     command = [XVFB, "-a", "-s", "-screen 0 800x600x24", PVPYTHON, folder / "paraview_colours.py"]

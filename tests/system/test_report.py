@@ -21,7 +21,12 @@ from blockvis.report.notebook import show
 from blockvis.report.page import report_html, write_report
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-browser = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
+
+
+def browser(test):
+    """Marks a test that needs Chromium."""
+    return pytest.mark.browser(pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")(test))
+
 
 NASTY = "</script><script>document.title='broken'</script>"
 

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from blockvis.cases.case import parse_case
 from blockvis.cli import main
@@ -42,7 +43,10 @@ def _without_timings(path: Path) -> bytes:
     return re.sub(*TIMINGS[path.name], data) if path.name in TIMINGS else data
 
 
-def test_two_runs_write_the_same_bytes_and_can_be_run_again(tmp_path):
+@pytest.mark.parametrize(
+    "drawn", [pytest.param(True, marks=[pytest.mark.slow, pytest.mark.pictures]), False], ids=["drawn", "undrawn"]
+)
+def test_two_runs_write_the_same_bytes_and_can_be_run_again(tmp_path, drawn):
     assert main(["layout", "arch", "voussoirs=8", "-o", str(tmp_path / "arch.json")]) == 0
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
     one, other = tmp_path / "one", tmp_path / "other"
@@ -51,6 +55,7 @@ def test_two_runs_write_the_same_bytes_and_can_be_run_again(tmp_path):
     names = sorted(str(p.relative_to(one)) for p in one.rglob("*") if p.is_file())
     assert names == sorted(str(p.relative_to(other)) for p in other.rglob("*") if p.is_file())
     assert len(names) > 30
+    assert ("collapse.gif" in names) == drawn
     for name in names:
         assert _without_timings(one / name) == _without_timings(other / name), name
 

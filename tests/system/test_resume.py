@@ -1,7 +1,9 @@
 """A run that is killed goes on to the result it would have had, bit for bit."""
 
 import csv
+import gc
 import io
+import itertools
 import json
 import os
 import re
@@ -10,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 
@@ -73,9 +76,14 @@ OTHERS = {
 }
 
 
+#: Code that has a process draw nothing, as in this one.
+UNDRAWN = "import sys, blockvis; sys.modules[blockvis.run_case.__module__].draw_results = lambda *_, **__: ()"
+
+
 def _command(folder, *arguments, code=""):
     """The command line in a process of its own; ``code`` runs before it."""
-    script = f"{code}\nimport sys; from blockvis.cli import main; sys.exit(main({[str(a) for a in arguments]!r}))"
+    run = f"import sys; from blockvis.cli import main; sys.exit(main({[str(a) for a in arguments]!r}))"
+    script = f"{UNDRAWN}\n{code}\n{run}"
     return subprocess.Popen(
         [sys.executable, "-c", script], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -93,16 +101,32 @@ def _killed_at(number):
     )
 
 
-def _killed_writing(name):
-    """Code that has the process killed, by the real signal, before it puts a file of this name in its place."""
-    return (
-        "import os, signal\n"
-        "replace = os.replace\n"
-        "def lethal(partial, target):\n"
-        f"    if os.path.basename(target) == {name!r}: os.kill(os.getpid(), signal.SIGKILL)\n"
-        "    replace(partial, target)\n"
-        "os.replace = lethal"
-    )
+class Killed(BaseException):
+    """Stands in for the signal."""
+
+
+def _main_until(moment, *arguments):
+    """The command line up to where it replaces a file for the n-th time, or one of this name: it does so no more.
+
+    Nothing changes on the disk after that, as if the process had been killed: half a file stays where it is.
+    """
+    count, dead = itertools.count(1), []
+
+    def lethal(partial, target, replace=os.replace):
+        if dead or moment in (next(count), os.path.basename(target)):
+            dead.append(target)
+            raise Killed
+        replace(partial, target)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(os, "replace", lethal)
+        unlink = Path.unlink
+        patched.setattr(Path, "unlink", lambda self, **options: None if dead else unlink(self, **options))
+        with suppress(Killed):
+            main([str(argument) for argument in arguments])
+        # What the run held, its lock on the folder among it, goes with its last frame.
+        gc.collect()
+    assert dead, f"the run was over before {moment}"
 
 
 def _same_result(one: Path, other: Path) -> None:
@@ -155,14 +179,23 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
-@pytest.mark.parametrize("moments", [(2,), (30, 40), (74,), (200,)])
+def test_run_killed_by_the_signal_goes_on(whole, tmp_path):
+    out = tmp_path / "out"
+    process = _command(tmp_path, "run", whole / "case.toml", "-o", out, code=_killed_at(74))
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == -signal.SIGKILL, said
+    _readable(out)
+    assert main(["run", "--resume", str(out)]) == 0
+    _same_result(whole / "out", out)
+
+
+@pytest.mark.parametrize("moments", [(2,), (30, 40), (75,), (200,)])
 def test_killed_run_goes_on(whole, tmp_path, moments):
     out = tmp_path / "out"
     arguments = ["run", whole / "case.toml", "-o", out]
     for moment in moments:
-        process = _command(tmp_path, *arguments, code=_killed_at(moment))
-        _, said = process.communicate(timeout=120)
-        assert process.returncode == -signal.SIGKILL, said
+        _main_until(moment, *arguments)
+        assert len(list(out.rglob(".*.part*"))) == 1, "half a file is there"
         _readable(out)
         arguments = ["run", "--resume", out]
     if moments == (2,):
@@ -174,7 +207,6 @@ def test_killed_run_goes_on(whole, tmp_path, moments):
     _same_result(whole / "out", out)
 
 
-@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
 @pytest.mark.parametrize(
     ("kind", "moment", "kept"),
     [
@@ -188,11 +220,8 @@ def test_killed_run_goes_on(whole, tmp_path, moments):
 def test_killed_limit_loads_and_pushovers_go_on(tmp_path, monkeypatch, kind, moment, kept):
     case = tmp_path / "case.toml"
     case.write_text(ARCH + OTHERS[kind], encoding="utf-8")
-    monkeypatch.setattr("blockvis.runs.run.draw_results", lambda *_, **__: ())
     assert main(["run", str(case), "-o", str(tmp_path / "whole")]) == 0
-    process = _command(tmp_path, "run", case, "-o", tmp_path / "out", code=_killed_writing(moment))
-    _, said = process.communicate(timeout=120)
-    assert process.returncode == -signal.SIGKILL, said
+    _main_until(moment, "run", case, "-o", tmp_path / "out")
     _readable(tmp_path / "out")
     before = [file.stat().st_mtime_ns for file in sorted((tmp_path / "out" / "increments").glob("state_*"))][:kept]
     assert len(before) == kept
@@ -246,20 +275,21 @@ def test_ctrl_c_ends_cleanly_and_the_run_goes_on(whole, tmp_path, monkeypatch, c
     _same_result(whole / "out", out)
 
 
-def test_finished_run_says_so_and_draws_what_is_missing(whole, capsys):
-    before = (whole / "out" / "response.csv").read_bytes()
-    (whole / "out" / "mechanism.png").unlink()
-    assert main(["run", "--resume", str(whole / "out")]) == 0
+@pytest.mark.pictures
+def test_finished_run_says_so_and_draws_what_is_missing(whole, tmp_path, capsys):
+    out = shutil.copytree(whole / "out", tmp_path / "out")
+    before = (out / "response.csv").read_bytes()
+    assert not (out / "mechanism.png").exists()
+    assert main(["run", "--resume", str(out)]) == 0
     assert "had finished (collapsed)" in capsys.readouterr().err
-    assert (whole / "out" / "mechanism.png").stat().st_size > 500
-    assert (whole / "out" / "response.csv").read_bytes() == before
+    assert (out / "mechanism.png").stat().st_size > 500
+    assert (out / "response.csv").read_bytes() == before
 
 
 def test_files_that_changed_are_named_and_not_read_again(whole, tmp_path, monkeypatch, capsys):
     case, out = tmp_path / "case.toml", tmp_path / "out"
     case.write_text(CASE, encoding="utf-8")
-    process = _command(tmp_path, "run", case, "-o", out, code=_killed_at(30))
-    process.communicate(timeout=120)
+    _main_until(30, "run", case, "-o", out)
     case.write_text(CASE.replace("0.7", "0.3"), encoding="utf-8")
     assert main(["run", "--resume", str(out)]) == 0
     assert "case.toml' has changed" in capsys.readouterr().err

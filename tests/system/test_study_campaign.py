@@ -8,11 +8,11 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from structures import started_cluster
 
 import blockvis
 from blockvis.cli import main
@@ -20,7 +20,7 @@ from blockvis.studies import campaign
 from blockvis.studies.fragility import fragility_of
 from blockvis.studies.run_one import run_once
 from blockvis.studies.study_file import read_study
-from blockvis.studies.study_folder import Ledger, finished_runs
+from blockvis.studies.study_folder import StudyFolder, finished_runs
 
 #: A block 0.5 × 1 on a ground that tilts: it overturns at atan(0.5) or slides at atan(μ), whichever is first.
 TILT = {
@@ -74,13 +74,13 @@ def arches(tmp_path):
 
 def _made_here(study, folder, runs):
     """Some runs of a study, without any cluster."""
-    ledger = Ledger(folder, study)
+    records = StudyFolder(folder, study)
     for run in runs:
-        ledger.add([run_once(study.values, str(study.case_source), study.order(run), study.n_seeded)])
-    return ledger
+        records.add([run_once(study.values, str(study.case_source), study.order(run), study.n_seeded)])
+    return records
 
 
-def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path):
+def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path, scheduler):
     """As in a notebook, where a loop is running; runs that stood up to the limit are no collapse."""
     study = {
         "study": {"case": TILT, "method": "latin hypercube", "runs": 25, "seed": 5},
@@ -90,7 +90,7 @@ def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path)
     }
 
     async def cell():
-        return blockvis.study(study, tmp_path / "out", workers=2)
+        return blockvis.study(study, tmp_path / "out", scheduler=scheduler)
 
     table = asyncio.run(cell())
     assert len(table) == 25
@@ -125,12 +125,12 @@ def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
         "study": {"case": TILT, "method": "grid"},
         "parameters": {"geometry.parameters.blocks": [1, 0], "material.friction_coefficient": [0.3, 0.4]},
     }
-    ledger = _made_here(read_study(given), tmp_path / "out", range(4))
-    table = ledger.write_table()
+    records = _made_here(read_study(given), tmp_path / "out", range(4))
+    table = records.write_table()
     assert table["status"].tolist() == ["collapsed", "collapsed", "failed", "failed"]
     assert table["message"].str.contains("blocks is 0").tolist() == [False, False, True, True]
-    assert ledger.missing() == []
-    assert ledger.missing(retry_failed=True) == [2, 3]
+    assert records.missing() == []
+    assert records.missing(retry_failed=True) == [2, 3]
     impatient = {**given, "study": {**given["study"], "seconds": 1e-9}}
     plan = read_study(impatient)
     row, shape = run_once(plan.values, "case", plan.order(0), 0, plan.seconds)
@@ -139,8 +139,9 @@ def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
     assert shape == b""
 
 
-def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tmp_path, capsys):
-    """Killed without warning by SIGKILL, then by Ctrl-C; a run kept as a folder is a run of the table."""
+@pytest.mark.slow
+def test_a_study_that_is_killed_and_interrupted_goes_on(arches, tmp_path):
+    """Killed without warning by SIGKILL, then by Ctrl-C."""
     out, command = tmp_path / "out", [sys.executable, "-m", "blockvis", "sweep", "study.toml", "-o", "out"]
 
     def stopped(by, after):
@@ -163,8 +164,18 @@ def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tm
     done = (out / "runs.jsonl").read_bytes()
     assert 6 <= done.count(b"\n") < 24
     assert len(pd.read_csv(out / "table.csv")) == done.count(b"\n"), "the table is there too"
+    assert main(["sweep", str(arches), "-o", str(out), "--workers", "2"]) == 0
+    rows = (out / "runs.jsonl").read_bytes()
+    assert rows.startswith(done)
+    assert rows.count(b"\n") == 24, "finished runs are not made again"
 
-    assert main(["sweep", str(arches), "-o", str(out), "--workers", "2", "--keep", "5"]) == 0
+
+def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tmp_path, capsys, scheduler):
+    """A run kept as a folder is a run of the table."""
+    out = tmp_path / "out"
+    _made_here(read_study(arches), out, range(8))
+    done = (out / "runs.jsonl").read_bytes()
+    assert main(["sweep", str(arches), "-o", str(out), "--scheduler", scheduler, "--keep", "5"]) == 0
     printed = capsys.readouterr().out
     assert "24 of 24 runs" in printed
     assert "probability of collapse: 5 %" in printed
@@ -191,7 +202,7 @@ def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tm
     assert "24 finished runs of another study: parameters has changed" in message
     assert "--force" in message
     assert finished_runs(out) == 24
-    assert Ledger(out, read_study(arches), force=True).missing() == list(range(24))
+    assert StudyFolder(out, read_study(arches), force=True).missing() == list(range(24))
 
 
 def test_a_folder_that_is_no_study_is_refused(arches, tmp_path, capsys):
@@ -207,10 +218,10 @@ def test_a_row_half_written_is_made_again(arches, tmp_path):
     _made_here(study, tmp_path / "out", [0, 1])
     file = tmp_path / "out" / "runs.jsonl"
     file.write_bytes(file.read_bytes()[:-40])
-    ledger = Ledger(tmp_path / "out", study)
-    assert ledger.missing() == list(range(1, 24))
-    ledger.add([run_once(study.values, str(study.case_source), study.order(1), study.n_seeded)])
-    assert Ledger(tmp_path / "out", study).missing() == list(range(2, 24)), "half a line spoils none after it"
+    records = StudyFolder(tmp_path / "out", study)
+    assert records.missing() == list(range(1, 24))
+    records.add([run_once(study.values, str(study.case_source), study.order(1), study.n_seeded)])
+    assert StudyFolder(tmp_path / "out", study).missing() == list(range(2, 24)), "half a line spoils none after it"
 
 
 def _deadly(values, source, order, n_seeded, seconds):
@@ -220,6 +231,7 @@ def _deadly(values, source, order, n_seeded, seconds):
     return run_once(values, source, order, n_seeded, seconds)
 
 
+@pytest.mark.slow
 def test_a_run_that_kills_its_workers_is_recorded_and_the_others_are_made(arches, tmp_path, monkeypatch):
     monkeypatch.setattr(campaign, "run_once", _deadly)
     arches.write_text(STUDY.replace("runs = 24", "runs = 8"), encoding="utf-8")
@@ -231,32 +243,12 @@ def test_a_run_that_kills_its_workers_is_recorded_and_the_others_are_made(arches
 
 @pytest.fixture
 def cluster(tmp_path):
-    """A scheduler and two workers as a user starts them, without anybody who restarts what dies."""
-    file = tmp_path / "scheduler.json"
-    path = os.pathsep.join(
-        [str(Path(__file__).parents[2]), str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")]
-    )
-    common = {
-        "env": {**os.environ, "PYTHONPATH": path},
-        "cwd": tmp_path,
-        "stdout": subprocess.DEVNULL,
-        "stderr": subprocess.DEVNULL,
-    }
-    dask = [sys.executable, "-m", "dask"]
-    here = ["--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file), "--no-dashboard"]
-    scheduler = subprocess.Popen([*dask, "scheduler", *here], **common)
-    join = ["worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-    workers = [subprocess.Popen([*dask, *join], **common) for _ in range(2)]
-    deadline = time.monotonic() + 60
-    while not file.exists():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-    yield json.loads(file.read_text(encoding="utf-8"))["address"], scheduler, workers
-    for process in [*workers, scheduler]:
-        process.kill()
-        process.wait(timeout=20)
+    """A scheduler and two workers that a test may kill."""
+    with started_cluster(tmp_path) as started:
+        yield started
 
 
+@pytest.mark.slow
 def test_a_worker_killed_during_the_study_costs_nothing(arches, tmp_path, cluster):
     address, _, workers = cluster
     out = tmp_path / "out"
@@ -278,6 +270,7 @@ def test_a_worker_killed_during_the_study_costs_nothing(arches, tmp_path, cluste
     assert workers[1].poll() is None
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away_leaves_the_finished_runs(arches, tmp_path, cluster):
     address, scheduler, _ = cluster
     out = tmp_path / "out"

@@ -1,7 +1,5 @@
 """Joints, cracks, hinges, resultants and the parts of a mechanism."""
 
-from dataclasses import replace
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -19,7 +17,7 @@ def stacked(shift=(0.0, 0.0), turn=0.0):
     assembly = solver.Assembly.from_outlines(
         [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 1], [1, 2], [0, 2]]], roles=["fixed", "free"]
     )
-    pose = solver.Pose(assembly.centroids + np.array([(0.0, 0.0), shift]), np.array([0.0, turn]))
+    pose = solver.Pose(assembly.centroids + np.array([(0.0, 0.0), shift]), np.array([[0.0], [turn]]))
     return assembly, pose
 
 
@@ -75,7 +73,7 @@ def four_blocks(apart):
         [[[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]] for x, y in corners], roles=["free"] * 3 + ["fixed"]
     )
     away = apart * (2.0 * np.array(corners) - 1.0)
-    return assembly, solver.Pose(assembly.centroids + away, np.zeros(4))
+    return assembly, solver.Pose(assembly.centroids + away, np.zeros((4, 1)))
 
 
 @given(st.floats(0.01, 0.3))
@@ -97,7 +95,7 @@ def test_an_opening_of_the_drawing_is_no_pocket():
     ring = [((0, 0), (2, 1)), ((2, 0), (3, 2)), ((1, 2), (3, 3)), ((0, 1), (1, 3))]
     assembly = solver.Assembly.from_outlines([[low, (high[0], low[1]), high, (low[0], high[1])] for low, high in ring])
     away = 0.05 * np.sign(np.round(assembly.centroids - 1.5, 9))
-    pose = solver.Pose(assembly.centroids + away, np.zeros(4))
+    pose = solver.Pose(assembly.centroids + away, np.zeros((4, 1)))
     found, _, beside = marks._cracks(assembly, marks.drawn_joints(assembly), pose, pose, False)
     assert len(found) == 4
     assert marks._pockets(assembly, found, beside, pose) == ()
@@ -109,7 +107,8 @@ def test_joints_that_hardly_slide_are_not_marked():
     used_up = np.stack([last.forces[:, 0], last.friction * last.forces[:, 0]], axis=1)
     fastest = np.abs(last.velocity[:, :2]).max()
     for slip, drawn in ((0.5, True), (1e-4, False)):
-        sliding = replace(last, forces=used_up, displacements=np.full_like(last.displacements, slip * fastest))
+        along = np.tile([0.0, slip * fastest], (len(last.contacts), 1))
+        sliding = last.with_arrays(forces=used_up, displacements=along)
         assert (sliding.states == solver.ContactState.SLIDING).any()
         assert (len(marks.marks_of(response.assembly, joints, sliding, last.pose).sliding) > 0) is drawn
 
@@ -185,8 +184,8 @@ def test_round_lengths_are_round_and_not_longer(length):
 
 @given(st.floats(-3, 3), st.floats(-10, 10), st.floats(-10, 10))
 def test_carried_there_and_back(turn, x, y):
-    before = solver.Pose(np.array([[1.0, 2.0]]), np.array([0.3]))
-    after = solver.Pose(np.array([[x, y]]), np.array([turn]))
+    before = solver.Pose(np.array([[1.0, 2.0]]), np.array([[0.3]]))
+    after = solver.Pose(np.array([[x, y]]), np.array([[turn]]))
     point = np.array([[0.7, -0.4]])
     there = solver.carried(point, np.array([0]), before, after)
     np.testing.assert_allclose(solver.carried(there, np.array([0]), after, before), point, atol=1e-9)

@@ -95,7 +95,7 @@ def test_density_and_thickness_of_the_file_hold_where_it_has_them():
 
 def test_a_deformed_pose_is_written(tmp_path):
     assembly = assemble(row(2))
-    pose = solver.Pose(assembly.centroids + np.array([0, -0.25]), np.array([0.0, np.pi / 2]))
+    pose = solver.Pose(assembly.centroids + np.array([0, -0.25]), np.array([[0.0], [np.pi / 2]]))
     save_layout(assembly, tmp_path / "moved.json", pose=pose)
     moved = read(tmp_path / "moved.json")
     assert np.allclose(moved.centroids, assembly.centroids + np.array([0, -0.25]))
@@ -146,7 +146,7 @@ def test_halves_of_characters_are_replaced_and_noted(tmp_path):
     assert drawing.names == ("a\ufffdb", "c\u0000d \U0001f9f1")
     assert drawing.materials == ("m\ufffd", "")
     assert [note for note in drawing.notes if "encoding" in note] == [
-        "characters that are none in the file's encoding are shown as \ufffd"
+        "characters that the file's encoding does not have are shown as \ufffd"
     ]
     assembly = assemble(drawing, roles={"a*": "moving"})
     spread = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.01)

@@ -69,7 +69,7 @@ def test_outer_corners_of_supports_stay():
 
 
 def test_too_large_displacements_are_refused():
-    with pytest.raises(ValueError, match=r"by more than a quarter of what lies beside them.*smaller"):
+    with pytest.raises(ValueError, match=r"by more than a quarter of the distance to the next corner.*smaller"):
         moved_corners(generators.arch(), _vertices(0.5))
 
 

@@ -11,7 +11,8 @@ from blockvis.formats import FORMATS
 ROOT = Path(__file__).parents[2]
 
 #: The rooms of both packages, highest first: a room imports itself and rooms below it. A module belongs to the longest
-#: name that it starts with. Outlines lie below the assembly, the search for contact points above it; what plans and
+#: name that it starts with. The kinds of analysis read their own keys of a case file and lie below its reader.
+#: Shapes and how they touch lie below the assembly; what plans and
 #: solves a case lies below the pictures, the run that draws what came out above them.
 ORDER = (
     "blockvis.__main__",
@@ -22,12 +23,19 @@ ORDER = (
     "blockvis.pyvista_plugin",
     "blockvis.pictures",
     "blockvis.runs",
+    "blockvis.cases.case",
+    "blockvis.runs.kinds",
+    "blockvis.runs.pushover",
+    "blockvis.runs.limit_load",
+    "blockvis.runs.settlement",
+    "blockvis.runs.kind",
     "blockvis.results",
     "blockvis.cases",
     "blockvis.generators",
     "blockvis.formats",
     "blockvis.layout",
     "blockvis.suggestions",
+    "blockvis.video_suffixes",
     "blockvis.numbers",
     "blockvis.vtk_files",
     "blockvis.atomic_files",
@@ -40,11 +48,10 @@ ORDER = (
     "solver.loads",
     "solver.equilibrium",
     "solver.kinematics",
-    "solver.geometry",
     "solver.interfaces",
     "solver.assembly",
-    "solver.geometry.polygons",
-    "solver.geometry.broad_phase",
+    "solver.geometry",
+    "solver.tolerances",
 )
 
 #: Beyond the order: rooms that must not know each other although one lies above the other.

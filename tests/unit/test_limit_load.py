@@ -79,7 +79,7 @@ def test_an_open_joint_carries_nothing():
     arm = solver.Pose.initial(assembly).positions[0] - [1.0, 0.0]
     turned = [arm[0] * np.cos(turn) - arm[1] * np.sin(turn), arm[0] * np.sin(turn) + arm[1] * np.cos(turn)]
     initial = solver.Pose.initial(assembly)
-    pose = solver.Pose(np.array([np.add(turned, [1.0, 0.0]), initial.positions[1]]), np.array([turn, 0.0]))
+    pose = solver.Pose(np.array([np.add(turned, [1.0, 0.0]), initial.positions[1]]), np.array([[turn], [0.0]]))
     loads = pushed(assembly, solver.weight_fraction(assembly, (1.0, 0.0), np.array([0])))
     limit = limit_load(assembly, loads=loads, pose=pose)
     assert limit.multiplier == pytest.approx(np.tan(np.arctan(0.5) - 0.01))

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 import solver
 from blockvis import generators
 
+pytestmark = pytest.mark.path
+
 few = settings(max_examples=4, deadline=None, derandomize=True, database=None, phases=[Phase.explicit, Phase.generate])
 
 

@@ -44,7 +44,7 @@ def test_what_is_where(tmp_path):
             return picture[top + y, left + x]
 
     corners = solver.moved_vertices(assembly, last.pose)
-    hinges = last.contacts.points[last.states == solver.ContactState.HINGING]
+    hinges = last.contacts.points[solver.mechanism_of(assembly, last).hinge_points]
     crown = hinges[np.argmax(hinges[:, 1])]
     assert alike(colour_at(crown), palette.HINGE)
     assert alike(colour_at(crown - [0.0, 0.12]), palette.OPEN)
@@ -143,7 +143,7 @@ def test_one_rattling_brick_does_not_hide_the_motion_of_a_wall(tmp_path):
     middle = np.argmin(np.hypot(*(calm.assembly.centroids - [4.8, 0.8]).T))
     assert velocity[middle, 1] < 0.0
     velocity[middle, 0] = 30.0
-    rattling = replace(calm, increments=(*calm.increments[:-1], replace(last, velocity=velocity)))
+    rattling = replace(calm, increments=(*calm.increments[:-1], last.with_arrays(velocity=velocity)))
     one, other = (pixels(draw_mechanism(r, tmp_path / "mechanism.png", size=SMALL))[70:300] for r in (calm, rattling))
     assert alike(one, palette.SETTLEMENT).sum() > 50
     assert (np.abs(one - other).max(axis=2) > 30).mean() < 0.01

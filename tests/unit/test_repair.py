@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis.layout.repair import duplicates, mended, overlaps
+from blockvis.layout.repair import duplicates, overlaps, repaired
 
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
 
@@ -26,7 +26,7 @@ def test_supports_may_overlap_each_other_and_keep_their_place():
     rings = [SQUARE, SQUARE + np.array([0.5, 0.0]), SQUARE + np.array([0.2, 1.0])]
     assembly = solver.Assembly.from_outlines(rings)
     anchored = np.array([True, True, False])
-    outlines, notes = mended(assembly, joint_thickness=0.0, overlap_tolerance=None, anchored=anchored)
+    outlines, notes = repaired(assembly, joint_thickness=0.0, overlap_tolerance=None, anchored=anchored)
     assert all((a == b).all() for a, b in zip(outlines, rings, strict=True))
     assert notes == []
     assert [pair[:2] for pair in overlaps(assembly, 1e-6)] == [(0, 1)]
@@ -36,4 +36,4 @@ def test_supports_may_overlap_each_other_and_keep_their_place():
 def test_tolerance_is_checked(tolerance):
     assembly = solver.Assembly.from_outlines([SQUARE])
     with pytest.raises(ValueError, match="overlap_tolerance is"):
-        mended(assembly, joint_thickness=0.0, overlap_tolerance=tolerance, anchored=np.array([False]))
+        repaired(assembly, joint_thickness=0.0, overlap_tolerance=tolerance, anchored=np.array([False]))

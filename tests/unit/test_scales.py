@@ -17,7 +17,8 @@ GRID = np.array([5e5, 5e6])
 
 def _arch(scale=1.0, place=(0.0, 0.0), density=2000.0):
     arch = generators.arch(voussoirs=12, density=density)
-    return replace(arch, vertices=arch.vertices * scale + np.asarray(place))
+    shapes = replace(arch.polygons, vertices=arch.vertices * scale + np.asarray(place))
+    return replace(arch, shapes=shapes)
 
 
 def _spread(scale=1.0, **more):

@@ -9,7 +9,6 @@ import solver
 from blockvis import generators
 from blockvis.cases.case import parse_case
 from blockvis.cli import main
-from solver.program.strength import contact_areas
 
 WIDTH, HEIGHT, THICKNESS = 0.8, 0.5, 0.3
 AREA = WIDTH * THICKNESS
@@ -89,7 +88,7 @@ def test_faces_are_shared_out_among_their_contact_points():
     """A brick on two: each interface has its own length, and the parts of all points make up the whole face."""
     wall = generators.build("wall", {"bricks": 4, "courses": 3, "depth": 0.2})
     contacts = solver.find_contacts(wall, wall.vertices, 1e-6)
-    areas = contact_areas(wall, contacts)
+    areas = contacts.areas
     for course, bearing in ((0, 4 * 0.25), (1, 4 * 0.25), (2, 4 * 0.25)):
         flat = np.abs(contacts.frames[:, 0, 1]) > 0.5
         at = flat & (np.abs(contacts.points[:, 1] - 0.1 * course) < 1e-9)

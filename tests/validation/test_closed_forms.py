@@ -8,6 +8,8 @@ import pytest
 
 import solver
 
+pytestmark = pytest.mark.path
+
 
 def rectangle(left, low, right, high):
     return [[left, low], [right, low], [right, high], [left, high]]
@@ -59,7 +61,7 @@ def test_flat_arch(height, friction_coefficient):
     assert response.reaction[high_enough] == pytest.approx(thrust[high_enough], rel=1e-4)
 
 
-@pytest.mark.parametrize("tolerance", [1e-5, 1e-6])
+@pytest.mark.parametrize("tolerance", [1e-5, pytest.param(1e-6, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("height", [0.25, 0.5])
 def test_flat_arch_within_a_narrow_bracket(height, tolerance):
     response = flat_arch(height, tolerance=tolerance)

@@ -16,6 +16,8 @@ from solver.analysis.limit_load import limit_load
 from solver.analysis.pushover import ControlDisplacement, pushover
 from solver.results.limit import LimitStatus
 
+pytestmark = pytest.mark.path
+
 BRICK, HEIGHT = 0.4, 0.175
 A, B = [0.5, 1, 1, 1, 1, 0.5], [1, 1, 1, 1, 1]
 FULL, BROKEN = [1, 1, 1, 1], [0.5, 1, 1, 1, 0.5]

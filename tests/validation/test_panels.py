@@ -11,6 +11,8 @@ import pytest
 
 import solver
 
+pytestmark = pytest.mark.path
+
 #: Bricks along the panel, courses, where the settling base begins, R/W for μ = 0.3, 0.6, 0.75.
 PANELS = [
     (3, 4, 3.0, (25 / 218, 25 / 272, 2 / 25)),

@@ -8,6 +8,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,7 @@ def vtu_zip_bomb() -> bytes:
     return _vtu(points=points, content=content, tail=tail, more=' compressor="vtkZLibDataCompressor"').encode()
 
 
+@cache
 def npz_bomb() -> bytes:
     """A megabyte that unpacks to a gigabyte and a half."""
     buffer = io.BytesIO()

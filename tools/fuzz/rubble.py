@@ -77,7 +77,7 @@ def _disguised(random: np.random.Generator, assembly: solver.Assembly) -> tuple[
     if random.random() < 0.2:
         vertices = vertices + np.array([5e5, 5e6]) * min(scale, 1.0)
         words.append("far from the origin")
-    return replace(assembly, vertices=vertices, density=density), ", ".join(words)
+    return replace(assembly, shapes=replace(assembly.polygons, vertices=vertices), density=density), ", ".join(words)
 
 
 def _settlement(random: np.random.Generator, assembly: solver.Assembly) -> solver.Settlement:

@@ -1,10 +1,10 @@
-"""Mortar joints: facing edges found, measured, and closed to the midline between them, so that faces meet.
+"""Mortar joints closed to the midlines between facing edges, so that faces meet.
 
 A joint is a set of edges that face each other across a gap: one head joint, a whole bed joint, the wedge between two
 voussoirs. Where one straight line runs midway between all of them, each moves onto that line, and the new corners
 are where the moved edges meet; so facing edges coincide, T-junctions included, and outer edges keep their line.
-Where no single line serves (the back of an arch under cut bricks), the less covered edge stays straight on its own
-midline and the blocks that face it are extended and cut along it.
+Where no single line fits all of them (the back of an arch under cut bricks), the less covered edge stays straight on
+its own midline, and the blocks that face it are extended to it and cut along it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from .facing_edges import CLOSED, edges_of, facing_edges
 from .midlines import common_lines, moved_outlines
-from .trimming import LONGEST_MITRE, cut_along, parted
+from .trimming import LONGEST_MITRE, extended_to_lines, separated
 
 
 @dataclass(frozen=True)
@@ -29,11 +29,11 @@ class Closing:
     n_joints : int
         Stretches that were open or overlapping.
     n_cut : int
-        Stretches that no common line served; one side was cut along the other.
+        Stretches that no common line fits; one side was extended to the other and cut along it.
     largest_gap : float [m]
         Widest gap that was closed.
     residual : float [m]
-        Widest gap or overlap left along them.
+        Widest remaining gap or overlap along them.
     """
 
     outlines: tuple[np.ndarray, ...]
@@ -50,7 +50,7 @@ def close_joints(
     overlap: float = 0.0,
     anchored: np.ndarray | None = None,
 ) -> Closing:
-    """Moves facing edges onto the line midway between them.
+    """Move facing edges onto the line midway between them.
 
     Parameters
     ----------
@@ -59,9 +59,9 @@ def close_joints(
     thickness : float [m]
         Widest gap that is a joint.
     overlap : float [m]
-        Deepest overlap that is resolved the same way.
+        Deepest overlap that is resolved in the same way.
     anchored : (n_blocks,) bool array, optional
-        Blocks that keep their outline; what faces them comes all the way.
+        Blocks that keep their outline; edges that face them move across the whole gap.
 
     Returns
     -------
@@ -80,10 +80,10 @@ def close_joints(
         return Closing(tuple(outlines), 0, 0, 0.0, 0.0)
     lines, uncommon = common_lines(found, edges, still, closed)
     base = moved_outlines(edges, lines, LONGEST_MITRE * max(thickness, overlap))
-    final = cut_along(base, edges, found, uncommon, lines, still, max(thickness, overlap))
-    final = parted(final, still, max(thickness, overlap), 10.0 * closed)
-    left = facing_edges(final, thickness, max(overlap, closed))
-    residual = float(np.abs(left.gaps).max()) if len(left) else 0.0
+    final = extended_to_lines(base, edges, found, uncommon, lines, still, max(thickness, overlap))
+    final = separated(final, still, max(thickness, overlap), 10.0 * closed)
+    remaining = facing_edges(final, thickness, max(overlap, closed))
+    residual = float(np.abs(remaining.gaps).max()) if len(remaining) else 0.0
     return Closing(
         outlines=tuple(outlines[i] if still[i] else ring + origin for i, ring in enumerate(final)),
         n_joints=n_open,

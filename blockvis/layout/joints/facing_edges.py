@@ -1,4 +1,4 @@
-"""Facing edges: which edges of different blocks look at each other across a gap, and how wide it is."""
+"""Facing edges: which edges of different blocks face each other across a gap, and how wide the gap is."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from blockvis.layout.outlines import ring_width
+
 #: Edges face each other when their outward normals point at each other within acos(0.8) = 37 degrees.
 FACING = -0.8
 
-#: A gap below this fraction of the size of the drawing is no gap: what drawing programs leave of rounding.
+#: Gaps below this fraction of the size of the drawing are rounding errors of drawing programs, and count as closed.
 CLOSED = 1e-9
 
 
@@ -19,7 +21,7 @@ CLOSED = 1e-9
 class Facing:
     """Stretches along which an edge of one block faces an edge of another.
 
-    An edge is named by the flat number of the corner it starts at.
+    The number of an edge is that of the corner at which it starts, counted over all blocks.
 
     Attributes
     ----------
@@ -38,16 +40,25 @@ class Facing:
     lengths: np.ndarray
 
     def __len__(self) -> int:
+        """Return the number of stretches."""
         return len(self.edge_a)
 
     def chosen(self, keep: np.ndarray) -> Facing:
-        """Only these stretches."""
+        """Take only these stretches; ``keep`` is a (n,) bool array."""
         return Facing(self.edge_a[keep], self.edge_b[keep], self.gaps[keep], self.midline[keep], self.lengths[keep])
 
 
 @dataclass(frozen=True)
 class Edges:
-    """All edges of all outlines, counter-clockwise, flat."""
+    """All edges of all outlines, counter-clockwise, block after block.
+
+    Attributes
+    ----------
+    start, end : (n_edges, 2) arrays [m]
+    block : (n_edges,) int array
+    offsets : (n_blocks + 1,) int array
+        First edge of each block.
+    """
 
     start: np.ndarray
     end: np.ndarray
@@ -55,12 +66,14 @@ class Edges:
     offsets: np.ndarray
 
     @property
-    def along(self) -> np.ndarray:
+    def directions(self) -> np.ndarray:
+        """(n_edges, 2) array: unit vector from start to end."""
         d = self.end - self.start
         return d / np.hypot(*d.T)[:, None]
 
 
 def edges_of(outlines: Sequence[np.ndarray]) -> Edges:
+    """List the edges of outlines, (n, 2) arrays [m], counter-clockwise."""
     counts = np.array([len(ring) for ring in outlines])
     offsets = np.concatenate([[0], np.cumsum(counts)])
     start = np.concatenate(outlines)
@@ -70,7 +83,7 @@ def edges_of(outlines: Sequence[np.ndarray]) -> Edges:
 
 
 def facing_edges(outlines: Sequence[np.ndarray], reach: float, overlap: float = 0.0) -> Facing:
-    """Finds the stretches along which edges of different blocks face each other.
+    """Find the stretches along which edges of different blocks face each other.
 
     Parameters
     ----------
@@ -83,7 +96,7 @@ def facing_edges(outlines: Sequence[np.ndarray], reach: float, overlap: float = 
 
     Notes
     -----
-    A pair of edges is measured across the bisector of its two lines, so that both sides see the same midline. Of
+    The gap between two edges is measured across the bisector of their lines, so that both have the same midline. Of
     stretches that lie behind one another only the nearest counts.
     """
     import shapely
@@ -93,13 +106,13 @@ def facing_edges(outlines: Sequence[np.ndarray], reach: float, overlap: float = 
     low, high = np.minimum(edges.start, edges.end) - margin / 2, np.maximum(edges.start, edges.end) + margin / 2
     tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
     a, b = tree.query(tree.geometries)
-    along = edges.along
-    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    directions = edges.directions
+    outward = np.stack([directions[:, 1], -directions[:, 0]], axis=1)
     keep = (a < b) & (edges.block[a] != edges.block[b])
     a, b = a[keep], b[keep]
     keep = (outward[a] * outward[b]).sum(axis=1) < FACING
     a, b = a[keep], b[keep]
-    axis = along[a] - along[b]
+    axis = directions[a] - directions[b]
     axis /= np.maximum(np.hypot(*axis.T), 1e-300)[:, None]
     normal = np.stack([axis[:, 1], -axis[:, 0]], axis=1)
     origin = edges.start[a]
@@ -141,10 +154,10 @@ def facing_edges(outlines: Sequence[np.ndarray], reach: float, overlap: float = 
 
 
 def _nearest(found: Facing, edges: Edges) -> Facing:
-    """Without stretches that are seen through another block: those behind a nearer stretch of the same edge."""
+    """Drop stretches that face each other through another block: those behind a nearer stretch of the same edge."""
     keep = np.ones(len(found), dtype=bool)
     mean = found.gaps.mean(axis=1)
-    along = edges.along
+    directions = edges.directions
     for side in (found.edge_a, found.edge_b):
         order = np.argsort(side, kind="stable")
         starts = np.flatnonzero(np.r_[True, side[order][1:] != side[order][:-1]])
@@ -152,7 +165,8 @@ def _nearest(found: Facing, edges: Edges) -> Facing:
             members = order[first:last]
             if len(members) < 2:
                 continue
-            at = np.sort((found.midline[members] - edges.start[side[members[0]]]) @ along[side[members[0]]], axis=1)
+            edge = side[members[0]]
+            at = np.sort((found.midline[members] - edges.start[edge]) @ directions[edge], axis=1)
             shared = np.minimum(at[:, None, 1], at[None, :, 1]) - np.maximum(at[:, None, 0], at[None, :, 0])
             size = np.minimum(at[:, 1] - at[:, 0], (at[:, 1] - at[:, 0])[:, None])
             behind = (shared > 0.5 * size) & (mean[members][:, None] > mean[members][None, :])
@@ -161,7 +175,7 @@ def _nearest(found: Facing, edges: Edges) -> Facing:
 
 
 def proposed_thickness(outlines: Sequence[np.ndarray]) -> tuple[float, Facing]:
-    """The joint thickness that closes all mortar joints of a drawing, and the stretches it was measured on.
+    """Propose the joint thickness that closes all mortar joints of a drawing.
 
     Parameters
     ----------
@@ -171,22 +185,17 @@ def proposed_thickness(outlines: Sequence[np.ndarray]) -> tuple[float, Facing]:
     Returns
     -------
     thickness : float [m]
-        0 where there are no gaps.
+        0 if there are no gaps.
     open_stretches : Facing
-        Those with a gap.
+        The stretches with a gap.
 
     Notes
     -----
-    Looks as far as half of the width of the usual block (twice its area over its perimeter): a wider gap is an
-    opening. The thickness is the widest gap found, rounded up to two digits.
+    Edges face each other across at most half the width of a typical block (twice its area over its perimeter): a
+    wider gap is an opening. The thickness is the widest gap found, rounded up to two digits.
     """
-    edges = edges_of(outlines)
-    lengths = np.add.reduceat(np.hypot(*(edges.end - edges.start).T), edges.offsets[:-1])
-    cross = edges.start[:, 0] * edges.end[:, 1] - edges.start[:, 1] * edges.end[:, 0]
-    areas = np.add.reduceat(cross, edges.offsets[:-1]) / 2.0
-    reach = 0.5 * float(np.median(2.0 * np.abs(areas) / lengths))
-    found = facing_edges(outlines, reach)
-    scale = float(np.ptp(edges.start, axis=0).max())
+    found = facing_edges(outlines, 0.5 * float(np.median([ring_width(ring) for ring in outlines])))
+    scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
     widest = found.gaps.max(axis=1)
     found = found.chosen(widest > 10 * CLOSED * scale)
     if len(found) == 0:

@@ -1,4 +1,4 @@
-"""The lines that moved edges share: fitted to the midlines of their joints; outlines with their edges on such lines."""
+"""Lines that facing edges share, fitted to the midlines of their joints, and outlines with their edges on them."""
 
 from __future__ import annotations
 
@@ -8,14 +8,23 @@ import numpy as np
 
 from .facing_edges import Edges, Facing
 
-#: One line serves several stretches of a joint where it leaves their midlines by no more than this fraction of the
-#: gap: far enough from a half, at which an edge would have to move backwards or all the way.
+#: One line fits several stretches of a joint if it stays within this fraction of the gap of their midlines: well below
+#: a half, at which an edge would have to move backwards or across the whole gap.
 SHARED_LINE = 0.3
 
 
 @dataclass(frozen=True)
 class Line:
-    """The line n·x = level that the edges of these stretches share."""
+    """The line normal·x = level that the edges of some stretches share.
+
+    Attributes
+    ----------
+    stretches : list of int
+    normal : (2,) array
+    level : float [m]
+    anchored : bool
+        Whether it is the line of an edge that stays.
+    """
 
     stretches: list[int]
     normal: np.ndarray
@@ -23,78 +32,127 @@ class Line:
     anchored: bool = False
 
     def distances(self, points: np.ndarray) -> np.ndarray:
+        """(...) array [m]: distances of (..., 2) points from the line."""
         return np.abs(points @ self.normal - self.level)
 
 
 def common_lines(found: Facing, edges: Edges, still: np.ndarray, closed: float) -> tuple[dict[int, Line], list[int]]:
-    """A line for every edge that moves, shared by as many facing edges as one line serves.
+    """Find a line for every edge that moves, shared by as many facing edges as one line fits.
+
+    Parameters
+    ----------
+    found : Facing
+    edges : Edges
+    still : (n_blocks,) bool array
+        Blocks that keep their outline.
+    closed : float [m]
+        Gap that is a rounding error.
 
     Returns
     -------
     lines : {edge: line}
     uncommon : list of int
-        Stretches whose two edges got different lines.
+        Stretches whose two edges have different lines.
 
     Notes
     -----
-    Stretches are taken longest first; each joins the lines of its two edges into one where a straight fit through
-    all their midlines stays within the fraction SHARED_LINE of every gap.
+    Stretches are taken longest first; each joins the lines of its two edges into one if a straight fit through all
+    their midlines stays within the fraction SHARED_LINE of every gap.
     """
-    fixed = {side: still[edges.block[getattr(found, side)]] for side in ("edge_a", "edge_b")}
-    middle = found.midline.copy()
-    along = edges.along
-    for side, chosen in fixed.items():
-        edge = getattr(found, side)[chosen]
-        t, p = along[edge][:, None, :], edges.start[edge][:, None, :]
-        middle[chosen] = p + ((middle[chosen] - p) * t).sum(axis=2, keepdims=True) * t
+    fixed = np.stack([still[edges.block[found.edge_a]], still[edges.block[found.edge_b]]], axis=1)
+    middle = _midlines_on_anchors(found, edges, fixed)
     gaps = np.abs(found.gaps)
     allowed = SHARED_LINE * gaps + 0.05 * gaps.max(axis=1, keepdims=True) + closed
-    allowed[fixed["edge_a"] | fixed["edge_b"]] = closed
-
-    def fit(stretches: list[int], held: list[Line]) -> Line:
-        for line in held:
-            # A line that serves already stays what it is, to the last digit.
-            if line.anchored or (line.distances(middle[stretches]) <= closed).all():
-                return Line(stretches, line.normal, line.level, line.anchored)
-        points, weights = middle[stretches].reshape(-1, 2), np.repeat(found.lengths[stretches], 2)
-        centre = weights @ points / weights.sum()
-        normal = np.linalg.svd((points - centre) * np.sqrt(weights)[:, None], full_matrices=False)[2][-1]
-        return Line(stretches, normal, float(normal @ centre))
-
-    owner: dict[int, Line] = {}
+    allowed[fixed.any(axis=1)] = closed
+    line_of: dict[int, Line] = {}
     uncommon = []
     for k in np.argsort(-found.lengths, kind="stable"):
         pair = int(found.edge_a[k]), int(found.edge_b[k])
-        held = [owner[edge] for edge in pair if edge in owner]
+        held = [line_of[edge] for edge in pair if edge in line_of]
         if len(held) == 2 and held[0] is held[1]:
             continue
-        for side, edge in zip(("edge_a", "edge_b"), pair, strict=True):
-            if fixed[side][k] and edge not in owner:
-                normal = np.array([along[edge][1], -along[edge][0]])
-                held.append(Line([], normal, float(normal @ edges.start[edge]), True))
+        held += [
+            _anchored_line(edges, edge)
+            for edge, anchored in zip(pair, fixed[k], strict=True)
+            if anchored and edge not in line_of
+        ]
         held.sort(key=lambda line: not line.anchored)
-        line = fit([*(s for line in held for s in line.stretches), int(k)], held)
+        line = _fitted(found, middle, [*(s for line in held for s in line.stretches), int(k)], held, closed)
         if (line.distances(middle[line.stretches]) <= allowed[line.stretches]).all():
             for s in line.stretches:
-                owner[int(found.edge_a[s])] = owner[int(found.edge_b[s])] = line
+                line_of[int(found.edge_a[s])] = line_of[int(found.edge_b[s])] = line
         else:
             uncommon.append(int(k))
-    lonely: dict[int, list[int]] = {}
-    for k in uncommon:
-        for edge in (int(found.edge_a[k]), int(found.edge_b[k])):
-            if edge not in owner and not still[edges.block[edge]]:
-                lonely.setdefault(edge, []).append(k)
-    owner.update({edge: fit(stretches, []) for edge, stretches in lonely.items()})
+    line_of.update(_own_lines(found, edges, still, middle, uncommon, line_of, closed))
     lines = {
         edge: line
-        for edge, line in owner.items()
+        for edge, line in line_of.items()
         if (gaps[line.stretches] > closed).any() and not still[edges.block[edge]]
     }
     return lines, uncommon
 
 
+def _midlines_on_anchors(found: Facing, edges: Edges, fixed: np.ndarray) -> np.ndarray:
+    """(n, 2, 2) array [m]: midlines, those beside an edge that stays moved onto this edge."""
+    middle = found.midline.copy()
+    for edge_of, chosen in ((found.edge_a, fixed[:, 0]), (found.edge_b, fixed[:, 1])):
+        edge = edge_of[chosen]
+        t, p = edges.directions[edge][:, None, :], edges.start[edge][:, None, :]
+        middle[chosen] = p + ((middle[chosen] - p) * t).sum(axis=2, keepdims=True) * t
+    return middle
+
+
+def _anchored_line(edges: Edges, edge: int) -> Line:
+    direction = edges.directions[edge]
+    normal = np.array([direction[1], -direction[0]])
+    return Line([], normal, float(normal @ edges.start[edge]), True)
+
+
+def _fitted(found: Facing, middle: np.ndarray, stretches: list[int], held: list[Line], closed: float) -> Line:
+    """One line for stretches: a line that the edges have already if it fits, else the best fit to the midlines."""
+    for line in held:
+        # A line that fits already is kept to the last digit.
+        if line.anchored or (line.distances(middle[stretches]) <= closed).all():
+            return Line(stretches, line.normal, line.level, line.anchored)
+    points, weights = middle[stretches].reshape(-1, 2), np.repeat(found.lengths[stretches], 2)
+    centre = weights @ points / weights.sum()
+    normal = np.linalg.svd((points - centre) * np.sqrt(weights)[:, None], full_matrices=False)[2][-1]
+    return Line(stretches, normal, float(normal @ centre))
+
+
+def _own_lines(
+    found: Facing,
+    edges: Edges,
+    still: np.ndarray,
+    middle: np.ndarray,
+    uncommon: list[int],
+    line_of: dict[int, Line],
+    closed: float,
+) -> dict[int, Line]:
+    """Lines of edges that share none: fitted to the midlines of the edge alone."""
+    alone: dict[int, list[int]] = {}
+    for k in uncommon:
+        for edge in (int(found.edge_a[k]), int(found.edge_b[k])):
+            if edge not in line_of and not still[edges.block[edge]]:
+                alone.setdefault(edge, []).append(k)
+    return {edge: _fitted(found, middle, stretches, [], closed) for edge, stretches in alone.items()}
+
+
 def moved_outlines(edges: Edges, lines: dict[int, Line], longest: float) -> list[np.ndarray]:
-    """Outlines whose edges lie on the given lines; corners where consecutive edges meet."""
+    """Move edges onto lines; the corners are where consecutive edges then meet.
+
+    Parameters
+    ----------
+    edges : Edges
+    lines : {edge: line}
+        Edges without a line stay.
+    longest : float [m]
+        A corner moves at most this far; beyond it the mitre is cut off.
+
+    Returns
+    -------
+    list of (n, 2) arrays [m]
+    """
     rings = []
     for first, last in zip(edges.offsets[:-1], edges.offsets[1:], strict=True):
         members = list(range(first, last))
@@ -105,7 +163,7 @@ def moved_outlines(edges: Edges, lines: dict[int, Line], longest: float) -> list
             ring, turned = _moved_ring(edges, lines, members, longest)
             if not turned or len(members) - len(turned) < 3:
                 break
-            # An edge shorter than what its neighbours move vanishes between them.
+            # An edge that turns around, because its neighbours move farther than it is long, is dropped.
             members = [edge for edge in members if edge not in turned]
         rings.append(ring)
     return rings
@@ -138,6 +196,7 @@ def _moved_ring(
 
 
 def normal_form(edges: Edges, lines: dict[int, Line], edge: int) -> tuple[np.ndarray, float]:
+    """Give the normal and the level [m] of an edge's line, or of the edge itself if it has none."""
     if edge in lines:
         return lines[edge].normal, lines[edge].level
     along = edges.end[edge] - edges.start[edge]

@@ -1,4 +1,4 @@
-"""Joints that no common line serves: one side extended and cut along the other, corners left close together welded."""
+"""Joints that no common line fits: one side extended to the other and cut along it, close corners merged."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from blockvis.layout.outlines import without_collinear
 from .facing_edges import CLOSED, Edges, Facing
 from .midlines import Line, moved_outlines, normal_form
 
-#: Corners closer than this fraction of the joint thickness become one where blocks were cut along each other.
-WELD = 0.2
+#: Corners closer than this fraction of the joint thickness are merged where blocks were cut along each other.
+MERGED = 0.2
 
-#: A moved corner farther than this many joint thicknesses from the drawn one is cut off: its edges are nearly parallel.
+#: A corner that would move by more than this many joint thicknesses is cut off: its edges are nearly parallel.
 LONGEST_MITRE = 3.0
 
 
-def cut_along(
+def extended_to_lines(
     base: list[np.ndarray],
     edges: Edges,
     found: Facing,
@@ -28,7 +28,26 @@ def cut_along(
     still: np.ndarray,
     thickness: float,
 ) -> list[np.ndarray]:
-    """Along stretches without a common line, extends the shorter edge and cuts it along the other one."""
+    """Extend one edge of each stretch without a common line to the other one, and cut its block along it.
+
+    Parameters
+    ----------
+    base : list of (n, 2) arrays [m]
+        Outlines with the common lines applied.
+    edges : Edges
+    found : Facing
+    uncommon : list of int
+        Stretches without a common line.
+    lines : {edge: line}
+    still : (n_blocks,) bool array
+        Blocks that keep their outline.
+    thickness : float [m]
+        Of the joints.
+
+    Returns
+    -------
+    list of (n, 2) arrays [m]
+    """
     import shapely
 
     overshoot: dict[int, float] = {}
@@ -70,11 +89,13 @@ def cut_along(
             shapes[block] = shapely.Polygon(max(pieces, key=lambda piece: piece.area).exterior)
             final[block] = np.array(shapely.orient_polygons(shapes[block]).exterior.coords)[:-1]
     involved = {int(edges.block[edge]) for k in uncommon for edge in (found.edge_a[k], found.edge_b[k])}
-    return welded(final, sorted(involved), still, WELD * thickness, CLOSED * float(np.ptp(edges.start, axis=0).max()))
+    return merge_close_corners(
+        final, sorted(involved), still, MERGED * thickness, CLOSED * float(np.ptp(edges.start, axis=0).max())
+    )
 
 
-def parted(rings: list[np.ndarray], still: np.ndarray, thickness: float, closed: float) -> list[np.ndarray]:
-    """Outlines whose corners at junctions of several joints do not reach into each other.
+def separated(rings: list[np.ndarray], still: np.ndarray, thickness: float, closed: float) -> list[np.ndarray]:
+    """Remove the overlaps that closing joints leaves at the junctions of several joints.
 
     Parameters
     ----------
@@ -85,19 +106,25 @@ def parted(rings: list[np.ndarray], still: np.ndarray, thickness: float, closed:
     thickness : float [m]
         Of the joints.
     closed : float [m]
-        Overlap that is rounding.
+        Overlap that is a rounding error.
+
+    Returns
+    -------
+    list of (n, 2) arrays [m]
 
     Notes
     -----
-    Where the joints of a crossing miss each other a little, its corners are drawn to one point; where blocks still
-    overlap afterwards, the larger one, or the one that keeps its outline, cuts the other.
+    Where the joints of a crossing miss each other a little, its corners are merged; where blocks still overlap
+    afterwards, the smaller one is cut, or the one that may change its outline.
     """
     import shapely
 
     first, second, _ = _overlaps(rings, closed)
     if len(first) == 0:
         return rings
-    rings = welded(rings, sorted({*map(int, first), *map(int, second)}), still, WELD * thickness, closed / 10.0)
+    rings = merge_close_corners(
+        rings, sorted({*map(int, first), *map(int, second)}), still, MERGED * thickness, closed / 10.0
+    )
     result = list(rings)
     for i, j, _ in zip(*_overlaps(rings, closed), strict=True):
         shapes = {int(k): shapely.Polygon(result[k]).buffer(0) for k in (i, j)}
@@ -118,7 +145,7 @@ def _overlaps(rings: list[np.ndarray], closed: float) -> tuple[np.ndarray, np.nd
 
 
 def _outward_form(edges: Edges, lines: dict[int, Line], edge: int) -> tuple[np.ndarray, float]:
-    """The line of an edge with its normal out of the block."""
+    """Give the normal, out of the block, and the level [m] of the line of an edge."""
     normal, level = normal_form(edges, lines, edge)
     along = edges.end[edge] - edges.start[edge]
     sign = 1.0 if normal @ np.array([along[1], -along[0]]) >= 0 else -1.0
@@ -126,7 +153,7 @@ def _outward_form(edges: Edges, lines: dict[int, Line], edge: int) -> tuple[np.n
 
 
 def _strip(edges: Edges, edge: int, stretch: np.ndarray, thickness: float, distance: float) -> Any:
-    """The ground that an extended edge may take: before its stretch, and on to its ends where little is left over."""
+    """Bound the area that an extended edge may take: in front of its stretch, and up to its ends if these are near."""
     import shapely
 
     start, along = edges.start[edge], edges.end[edge] - edges.start[edge]
@@ -144,10 +171,10 @@ def _strip(edges: Edges, edge: int, stretch: np.ndarray, thickness: float, dista
     )
 
 
-def welded(
+def merge_close_corners(
     rings: list[np.ndarray], involved: list[int], still: np.ndarray, reach: float, closed: float
 ) -> list[np.ndarray]:
-    """Draws corners that cutting has left close together to one point, in all blocks that share them.
+    """Merge corners that cutting leaves close together, in all blocks that share them.
 
     Parameters
     ----------
@@ -157,14 +184,18 @@ def welded(
     still : (n_blocks,) bool array
         Blocks whose corners stay.
     reach : float [m]
-        Corners closer than this become one.
+        Corners closer than this are merged.
     closed : float [m]
         A corner closer than this to an edge lies on it.
 
+    Returns
+    -------
+    list of (n, 2) arrays [m]
+
     Notes
     -----
-    Steps far smaller than a block are no masonry and mislead the search for contacts. Every corner that lies on an
-    edge of a neighbour is given to that neighbour first, so that both sides move alike.
+    Steps far smaller than a block are artefacts of cutting and mislead the search for contacts. Every corner that lies
+    on an edge of a neighbour is added to that neighbour first, so that both sides move alike.
     """
     import shapely
     from scipy.cluster.hierarchy import fcluster, linkage
@@ -196,7 +227,7 @@ def welded(
         apart = np.hypot(*(moved - np.roll(moved, 1, axis=0)).T) > closed
         extent = float(np.ptp(moved, axis=0).max())
         if extent <= closed:
-            # Joints wider than the block: it keeps its outline, and the overlap is refused by name.
+            # The joints are wider than the block: it keeps its outline, and the overlap is refused later, by name.
             continue
         ring = without_collinear(moved[apart], 10 * closed / extent)
         if len(ring) >= 3 and shapely.Polygon(ring).is_valid:
@@ -205,7 +236,7 @@ def welded(
 
 
 def _with_corners_on_edges(ring: np.ndarray, points: np.ndarray, index: Any, closed: float) -> np.ndarray:
-    """The ring with every given point that lies on one of its edges as a corner."""
+    """Add every given point that lies on an edge of the ring to its corners."""
     result = []
     for start, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
         along = end - start

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blockvis.formats.triangles import cells_of_ring, triangles_of_ring
 from blockvis.layout.outlines import ring_area
+from blockvis.layout.triangulation import cells_of_ring, triangles_of_ring
 
 
 @given(st.integers(3, 40), st.integers(0, 1000))

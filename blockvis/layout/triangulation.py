@@ -1,4 +1,4 @@
-"""An outline cut into triangles, for the files that know nothing else."""
+"""Outlines cut into triangles, for files and pictures that know nothing else."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def cells_of_ring(ring: np.ndarray) -> list[tuple[int, ...]]:
-    """Cells that cover a counter-clockwise ring: itself where it has three corners or four convex ones."""
+    """Cover a counter-clockwise ring with cells: the ring itself if it has three corners or four convex ones."""
     n = len(ring)
     if n == 3 or (n == 4 and (_turns(ring) > 0).all()):
         return [tuple(range(n))]
@@ -28,10 +28,10 @@ def triangles_of_ring(ring: np.ndarray) -> np.ndarray:
     """
     x, y = (ring - ring[0]).T
     sign = 1.0 if x @ np.roll(y, -1) >= y @ np.roll(x, -1) else -1.0
-    left = list(range(len(ring)))
+    remaining = list(range(len(ring)))
     triangles = []
-    while len(left) > 3:
-        points = ring[left]
+    while len(remaining) > 3:
+        points = ring[remaining]
         turn = sign * _turns(points)
         before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
         longest = np.max(
@@ -40,11 +40,11 @@ def triangles_of_ring(ring: np.ndarray) -> np.ndarray:
         quality = turn / np.maximum(longest, 1e-300)
         ear = next((int(k) for k in np.argsort(-quality) if turn[k] > 0 and _is_ear(points, int(k), sign)), None)
         if ear is None:
-            # Only a corner on the line of its neighbours is left to cut, or the ring is not simple.
+            # No ear has an area: cut a corner that lies on the line of its neighbours; or the ring is not simple.
             ear = int(np.argmin(np.abs(turn)))
-        triangles.append((left[ear - 1], left[ear], left[(ear + 1) % len(left)]))
-        del left[ear]
-    triangles.append((left[0], left[1], left[2]))
+        triangles.append((remaining[ear - 1], remaining[ear], remaining[(ear + 1) % len(remaining)]))
+        del remaining[ear]
+    triangles.append((remaining[0], remaining[1], remaining[2]))
     return np.array(triangles)
 
 

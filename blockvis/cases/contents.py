@@ -1,0 +1,56 @@
+"""Case: what a case file says, read and checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import solver
+
+from .imperfections import Imperfection
+from .loads import LoadCase
+
+
+@dataclass(frozen=True)
+class Case:
+    """A checked case file. The keys are those of the file; see the README.
+
+    Attributes
+    ----------
+    source : Path
+        The case file; paths in it are relative to its folder.
+    text : str
+        The case file as it was read.
+    analysis : str
+        Name of the kind of analysis.
+    settings : optional
+        What that kind has read from its own keys; see :meth:`blockvis.runs.kind.AnalysisKind.read`.
+    """
+
+    source: Path
+    text: str
+    file: Path | None = None
+    layout: str | None = None
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    unit: str | None = None
+    thickness: float | None = None
+    joint_thickness: float | str = 0.0
+    overlap_tolerance: float | None = None
+    roles: Mapping[str, str] = field(default_factory=dict)
+    supports: tuple[Mapping[str, Any], ...] = ()
+    density: float | None = None
+    densities: Mapping[str, float] = field(default_factory=dict)
+    friction_coefficient: float = 0.6
+    cohesion: float = 0.0
+    compressive_strength: float = math.inf
+    interfaces: Mapping[tuple[str, str], solver.InterfaceLaw] = field(default_factory=dict)
+    imperfections: tuple[Imperfection, ...] = ()
+    settlements: tuple[solver.Settlement, ...] = ()
+    loads: tuple[LoadCase, ...] = ()
+    analysis: str = "settlement"
+    settings: Any = None
+    controls: solver.Controls = field(default_factory=solver.Controls)
+    animation: str | None = "collapse.mp4"

@@ -1,0 +1,281 @@
+"""A kind of analysis: what it runs over, what it measures, its keys, its increments, and its words.
+
+A new kind is an object of :class:`AnalysisKind` in a file of its own, with a row in :mod:`blockvis.runs.kinds`. What it
+does not say in its own words is said in those of its quantities.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import NoneType
+from typing import Any
+
+import solver
+from blockvis.cases.contents import Case
+from blockvis.cases.toml_table import Table
+
+Steps = Generator[solver.Increment, None, solver.Ending]
+
+
+@dataclass(frozen=True)
+class Course:
+    """What the increments of an analysis run over and what is measured along them.
+
+    Attributes
+    ----------
+    parameter, measured : solver.Quantity
+    settlements : tuple of solver.Settlement
+        Whose phases the parameter belongs to.
+    control : solver.Control, optional
+        What drives the parameter where no settlement does.
+    """
+
+    parameter: solver.Quantity
+    measured: solver.Quantity
+    settlements: tuple[solver.Settlement, ...] = ()
+    control: solver.Control | None = None
+
+    @property
+    def drivers(self) -> tuple[solver.Control, ...]:
+        """How far the parameter goes in each phase; empty where nobody knows."""
+        return self.settlements if self.control is None else (self.control,)
+
+
+@dataclass(frozen=True)
+class RunInput:
+    """What an analysis starts from."""
+
+    case: Case
+    assembly: solver.Assembly
+    interfaces: solver.Interfaces
+    loads: solver.Loads
+
+
+@dataclass
+class AnalysisRun:
+    """An analysis that is ready to run.
+
+    Attributes
+    ----------
+    analysis : str
+        Name of the kind.
+    given : RunInput
+    course : Course
+    steps : generator of solver.Increment
+        Returns a solver.Ending. None by default, for steps that fill in the other fields as they go.
+    limits : list of solver.LimitLoad
+        Filled as the steps go, one per limit state.
+    """
+
+    analysis: str
+    given: RunInput
+    course: Course
+    steps: Steps = field(default_factory=lambda: _ended(solver.Ending(solver.Status.LIMIT_REACHED)))
+    limits: list[solver.LimitLoad] = field(default_factory=list)
+
+    def recorded(self, increments: Sequence[solver.Increment]) -> None:
+        """Let the last limit load share the written arrays of the increment that reports it.
+
+        Parameters
+        ----------
+        increments : sequence of solver.Increment
+            Written so far.
+        """
+        if len(self.limits) == len(increments):
+            self.limits[-1] = replace(self.limits[-1], held=increments[-1].held)
+
+    def response(self, increments: Sequence[solver.Increment], ending: solver.Ending) -> solver.Response:
+        """Make a response of the increments so far and how they ended."""
+        return solver.Response(
+            assembly=self.given.assembly,
+            settlements=self.course.settlements,
+            interfaces=self.given.interfaces,
+            loads=self.given.loads,
+            increments=tuple(increments),
+            stop=ending.stop,
+            message=ending.message,
+            collapse=ending.collapse,
+            analysis=self.analysis,
+            limits=tuple(self.limits),
+            parameter=self.course.parameter,
+            measured=self.course.measured,
+            control=self.course.control,
+        )
+
+
+class AnalysisKind(ABC):
+    """A kind of analysis.
+
+    Attributes
+    ----------
+    name : str
+        As ``[analysis] kind`` has it.
+    parameter, measured : solver.Quantity
+    checkpoint : type
+        Dataclass from which its increments go on; NoneType where they start again.
+    lost : str
+        What is lost at collapse: "equilibrium" or "capacity".
+    in_studies : bool
+        Whether studies repeat it.
+    """
+
+    name: str
+    parameter: solver.Quantity
+    measured: solver.Quantity
+    checkpoint: type[Any] = NoneType
+    lost: str = "equilibrium"
+    in_studies: bool = False
+
+    @abstractmethod
+    def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
+        """Prepare the analysis of a case, its input checked.
+
+        Parameters
+        ----------
+        given : RunInput
+        resume : of type ``checkpoint``, optional
+            Where to go on.
+        found : sequence of solver.Increment
+            Found up to there.
+
+        Raises
+        ------
+        ValueError
+            For input that cannot be analysed.
+        """
+
+    def read(self, top: Table, analysis: Table) -> Any:
+        """Read the keys of this kind from the case file; the same keys give values that compare equal.
+
+        Parameters
+        ----------
+        top : Table
+            The whole file.
+        analysis : Table
+            Its [analysis].
+        """
+        return None
+
+    def refuse(self, settings: Any, case: Case) -> None:
+        """Raise ValueError where a case of another kind gives keys of this one.
+
+        Parameters
+        ----------
+        settings
+            As :meth:`read` gives them.
+        case : Case
+            Of another kind.
+        """
+        return
+
+    def checked(self, case: Case) -> Case:
+        """Check that the keys of a case of this kind fit together; returns the case, completed.
+
+        Parameters
+        ----------
+        case : Case
+        """
+        return case
+
+    def course(self, case: Case) -> Course:
+        """Say what the increments of a case run over and measure."""
+        return Course(self.parameter, self.measured)
+
+    def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:
+        """Complete the response of a results folder by what this kind has put into the summary."""
+        collapse = None if response.collapse is None else replace(response.collapse, lost=self.lost)
+        return replace(response, parameter=self.parameter, measured=self.measured, collapse=collapse)
+
+    def summary(self, response: solver.Response) -> dict[str, Any]:
+        """Keys of summary.json beside those of every analysis."""
+        return {}
+
+    def tables(self, response: solver.Response) -> dict[str, str]:
+        """Tables for the results folder beside response.csv: text by file name."""
+        return {}
+
+    def headline(self, response: solver.Response) -> str:
+        """How it ended, for the command line."""
+        return f"{response.stop} after {len(response.path)} increments"
+
+    def tells_message(self, response: solver.Response) -> bool:
+        """Whether :meth:`lines` say what the message of the response says."""
+        return response.collapse is not None
+
+    def lines(self, response: solver.Response) -> list[str]:
+        """Numbers for the command line."""
+        lines = []
+        if response.path:
+            for name, increment in (("first", response.path[0]), ("last", response.path[-1])):
+                lines.append(f"{f'{name} {self.measured.name}':<21}{_with_unit(increment.measured, response.measured)}")
+            last = _with_unit(response.path[-1].parameter, response.parameter)
+            lines.append(f"{f'last {self.parameter.name}':<21}{last}")
+        if response.collapse is not None:
+            low, high = response.collapse.bracket
+            place = f"{response.collapse.displacement:12.6g} {response.collapse.unit}"
+            lines.append(f"{'collapse at':<21}{place}   between {low:.6g} and {high:.6g}")
+            lines.append(f"mechanism: {response.collapse.words}")
+        return lines
+
+    def title(self, response: solver.Response) -> str:
+        """Title of the report."""
+        if response.collapse is None:
+            return f"{self.name.capitalize()}: {response.stop}"
+        where = f"{response.collapse.displacement:.5g} {response.collapse.unit}"
+        return f"Collapse at {response.parameter.name} {where}"
+
+    def rows(self, response: solver.Response) -> list[tuple[str, str]]:
+        """Numbers for the report, in words and with units."""
+        rows, path = [], response.path
+        if response.collapse is not None:
+            c = response.collapse
+            rows.append((f"collapse at {self.parameter.name}", f"{c.displacement:.6g} {c.unit}"))
+            rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))
+        if path:
+            first, last = (_with_unit(i.measured, response.measured).strip() for i in (path[0], path[-1]))
+            rows.append((f"{self.measured.name}, first and last", f"{first}, {last}"))
+        return rows
+
+
+def _with_unit(value: float, quantity: solver.Quantity) -> str:
+    return f"{value:12.6g} {quantity.unit}".rstrip()
+
+
+def begun(steps: Steps) -> Steps:
+    """Take the first of the steps at once: what it refuses is refused before anything is written."""
+    try:
+        first = next(steps)
+    except StopIteration as stop:
+        return _ended(stop.value)
+    return _following(first, steps)
+
+
+def _ended(ending: solver.Ending) -> Steps:
+    return ending
+    yield
+
+
+def _following(first: solver.Increment, steps: Steps) -> Steps:
+    yield first
+    return (yield from steps)
+
+
+def needs_live_load(case: Case) -> None:
+    """Raise ValueError where no load of a case is live."""
+    if not any(load.kind == "live" for load in case.loads):
+        raise ValueError(
+            f'{case.source}: [analysis] kind is "{case.analysis}", but no load is live; add [[loads]] with kind = '
+            '"live", for instance weight_fraction = [1.0, 0.0]'
+        )
+
+
+def needs_dry_joints(case: Case) -> None:
+    """Raise ValueError where a joint of a case has cohesion or finite strength."""
+    laws = [solver.InterfaceLaw(case.friction_coefficient, case.cohesion, case.compressive_strength)]
+    if not all(law.dry for law in [*laws, *case.interfaces.values()]):
+        raise ValueError(
+            f"{case.source}: cohesion and compressive_strength are for limit loads without a settlement; settlements "
+            "and pushovers follow dry joints"
+        )

@@ -1,0 +1,467 @@
+"""Limit loads: the largest multiplier of live loads, along a settlement or over the positions of a load that moves."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.cases.contents import Case
+from blockvis.cases.loads import moving_loads
+from blockvis.cases.toml_table import Table
+from blockvis.numbers import force_text
+
+from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, begun, needs_dry_joints, needs_live_load
+from .settlement import not_reached, settlement_course, settlement_steps, stored_settlements
+
+#: How sliding joints of a limit load behave.
+FLOWS = ("associative", "non-associative")
+
+#: Frames in which the mechanism of a limit load is swung, and how far its fastest block gets, in extents of the
+#: structure.
+SWINGING_FRAMES, SWING = 30, 0.05
+
+#: Displacement within which joints that a settlement has opened may close, in block sizes. An arch whose hinges have
+#: opened does not notice it; a wall of many bricks needs more, lest its capacity be that of its loosest brick.
+CLOSING = 1e-3
+
+
+@dataclass(frozen=True)
+class LimitLoadSettings:
+    """Keys of the case file that limit loads have for themselves.
+
+    Attributes
+    ----------
+    flow : str
+        One of ``FLOWS``.
+    capacity_at : tuple of float, optional [m or rad]
+        Settlements at which limit loads are wanted; all by default.
+    displacement : float, optional [m]
+        Within which joints that a settlement has opened may close.
+    """
+
+    flow: str = "associative"
+    capacity_at: tuple[float, ...] | None = None
+    displacement: float | None = None
+
+
+@dataclass(frozen=True)
+class LimitLoadCheckpoint:
+    """Where limit loads go on from, after one of them, to the same bits.
+
+    Attributes
+    ----------
+    limits : tuple of solver.LimitLoad
+        Found so far, in the order of the increments that report them; numbers alone.
+    settlement : solver.Checkpoint, optional
+        Where the settlement stands along which they are asked for.
+    pose : solver.Pose, optional
+        Where the settlement ended that comes before the places of a load.
+    """
+
+    limits: tuple[solver.LimitLoad, ...]
+    settlement: solver.Checkpoint | None = None
+    pose: solver.Pose | None = None
+
+
+class LimitLoadKind(AnalysisKind):
+    """Limit loads: one as drawn, one at each settlement that is wanted, or one for each position of a load."""
+
+    name = "limit load"
+    parameter = solver.LOAD_POSITION
+    measured = solver.LOAD_MULTIPLIER
+    checkpoint = LimitLoadCheckpoint
+
+    def read(self, top: Table, analysis: Table) -> LimitLoadSettings:
+        """Read the keys ``flow``, ``capacity_at`` and ``displacement``."""
+        flow = analysis.text("flow", "associative", among=FLOWS)
+        capacity_at = analysis.numbers("capacity_at")
+        displacement = analysis.number("displacement")
+        if displacement is not None and displacement < 0.0:
+            raise analysis.error("displacement", f"is {displacement:g}; give a length in m of at least 0")
+        return LimitLoadSettings(flow, capacity_at, displacement)
+
+    def refuse(self, settings: LimitLoadSettings, case: Case) -> None:
+        """Refuse keys of limit loads."""
+        if settings.flow != "associative":
+            raise ValueError(
+                f'{case.source}: [analysis] flow "{settings.flow}" belongs to kind = "{self.name}"; a {case.analysis} '
+                "follows the geometry, in which friction never dilates"
+            )
+        if settings.displacement is not None:
+            raise _displacement_without_settlement(case)
+        if settings.capacity_at is not None:
+            raise _capacity_at_without_settlement(case)
+
+    def checked(self, case: Case) -> Case:
+        """Check the keys, and let the last settlement stop where limit loads are wanted."""
+        needs_live_load(case)
+        if case.settlements:
+            needs_dry_joints(case)
+        settings: LimitLoadSettings = case.settings
+        if settings.displacement is not None and not case.settlements:
+            raise _displacement_without_settlement(case)
+        if settings.capacity_at is None:
+            return case
+        if not case.settlements or any(load.positions for load in case.loads):
+            raise _capacity_at_without_settlement(case)
+        try:
+            stopping = replace(case.settlements[-1], stops=settings.capacity_at)
+        except ValueError as error:
+            raise ValueError(f"{case.source}: [analysis] capacity_at: {error}") from None
+        return replace(case, settlements=(*case.settlements[:-1], stopping))
+
+    def course(self, case: Case) -> Course:
+        """Run over the positions of a load that moves, else over the settlements of a case."""
+        if any(load.positions for load in case.loads) or not case.settlements:
+            return Course(self.parameter, self.measured)
+        return replace(settlement_course(case.settlements), measured=self.measured)
+
+    def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
+        """Prepare limit loads along the settlements of a case or after them, and report a fall in these."""
+        places, live = moving_loads(given.case.loads, given.assembly, given.case.source)
+        run = AnalysisRun(self.name, given, self.course(given.case))
+        if resume is not None:
+            pairs = zip(resume.limits, found, strict=True)
+            run.limits = [replace(limit, held=increment.held) for limit, increment in pairs]
+        steps = _over_places(run, places, live, resume, found) if len(places) else _along_settlement(run, resume, found)
+        run.steps = begun(steps)
+        return run
+
+    def summary(self, response: solver.Response) -> dict[str, Any]:
+        """List the limit loads; of the one that governs its bounds, flow and status, too."""
+        chosen, states = response.governing, response.limit_states
+        limit = next((limit for limit, state in states if state is chosen), states[0][0] if states else None)
+        summary: dict[str, Any] = {
+            "settlements": [asdict(settlement) for settlement in response.settlements],
+            "limit_load_multiplier": None if limit is None else _finite(limit.multiplier),
+            "limit_load_bounds": None if limit is None else [_finite(bound) for bound in limit.bounds],
+            "limit_load_flow": None if limit is None else limit.flow,
+            "limit_load_status": None if limit is None else str(limit.status),
+            "live_load": None if limit is None else limit.live_force,
+            "limit_loads": [
+                {
+                    "increment": number,
+                    "multiplier": _finite(limit.multiplier),
+                    "bounds": [_finite(bound) for bound in limit.bounds],
+                    "status": str(limit.status),
+                    "flow": limit.flow,
+                    "live_load": limit.live_force,
+                    "programs": limit.programs,
+                }
+                for number, (limit, _) in enumerate(states)
+            ],
+        }
+        if chosen is not None and response.collapse is None:
+            moves = chosen.velocity.any()
+            summary["mechanism"] = str(solver.mechanism_of(response.assembly, chosen)) if moves else None
+        if not response.parameter.is_path and len(response.limits) > 1:
+            summary["governing_position"] = None if chosen is None else chosen.parameter
+        return summary
+
+    def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:
+        """Complete the response by the settlements and limit loads of the summary."""
+        response = super().restored(response, summary)
+        settlements = stored_settlements(summary)
+        if settlements:
+            parameter = settlement_course(settlements).parameter
+            response = replace(response, settlements=settlements, parameter=parameter)
+        return replace(response, limits=_stored_limits(summary, response.increments))
+
+    def tables(self, response: solver.Response) -> dict[str, str]:
+        """Make either envelope.csv, a row per position, or capacity.csv, a row per settlement."""
+        over_settlement = response.parameter.is_path
+        if not over_settlement and len(response.limits) < 2:
+            return {}
+        rows = io.StringIO()
+        table = csv.writer(rows, lineterminator="\n")
+        first = ["phase", "settlement"] if over_settlement else ["position"]
+        table.writerow([*first, "load_multiplier", "static", "kinematic", "status", "flow", "mechanism"])
+        for limit, state in response.limit_states:
+            place = [repr(float(state.parameter))]
+            numbers = [repr(float(v)) for v in (limit.multiplier, *limit.bounds)]
+            words = str(solver.mechanism_of(response.assembly, state)) if limit.mechanism.any() else ""
+            where = [str(state.phase), *place] if over_settlement else place
+            table.writerow([*where, *numbers, str(limit.status), limit.flow, words])
+        return {"capacity.csv" if over_settlement else "envelope.csv": rows.getvalue()}
+
+    def headline(self, response: solver.Response) -> str:
+        """Count the limit loads."""
+        number = len(response.limits)
+        return f"{number} limit load{'' if number == 1 else 's'}"
+
+    def tells_message(self, response: solver.Response) -> bool:
+        """Whether there is a limit load, which its own lines tell."""
+        return response.collapse is not None or response.stop is solver.Status.COLLAPSED
+
+    def lines(self, response: solver.Response) -> list[str]:
+        """Describe the limit load that governs, and where it is."""
+        path, state, said = response.path, response.governing, self.summary(response)
+        if state is None or said["limit_load_multiplier"] is None:
+            return []
+        low, high = said["limit_load_bounds"]
+        kind = "bounds" if said["limit_load_flow"] == "associative" else "values, no bounds,"
+        lines = [
+            f"load multiplier      {state.load_multiplier:12.6g}     {said['limit_load_flow']} friction, static and "
+            f"kinematic {kind} differ by {high - low:.1e}",
+            f"live load            {state.reaction:12.6g} N   {state.reaction / response.total_weight:.6f} W",
+        ]
+        if said["limit_load_status"] != solver.LimitStatus.FOUND:
+            lines.append(f"status: {said['limit_load_status']}")
+        if not response.parameter.is_path and len(path) > 1:
+            lines.append(f"the lowest of {len(path)} positions: load at x = {state.parameter:.6g} m")
+        elif response.settlements:
+            place = f"{state.parameter:12.6g} {response.settlements[-1].unit}"
+            lines.append(f"after a settlement of{place}   before it {path[0].load_multiplier:.6g}")
+        if response.collapse is not None:
+            lines.append(response.message)
+        else:
+            lines.append(f"mechanism: {said['mechanism']}")
+        return lines
+
+    def title(self, response: solver.Response) -> str:
+        """Name the limit load that governs."""
+        state = response.governing
+        if state is None or not np.isfinite(state.load_multiplier):
+            return response.message or f"Limit load: {response.stop}"
+        where = ""
+        if len(response.path) > 1:
+            where = f" at {response.parameter.name} {state.parameter:.5g} {response.parameter.unit}"
+        return f"Limit load: α = {state.load_multiplier:.5g}{where}"
+
+    def rows(self, response: solver.Response) -> list[tuple[str, str]]:
+        """Describe the limit load that governs: its values, and where it is."""
+        rows, path, state, c = [], response.path, response.governing, response.collapse
+        if c is not None:
+            place = f"{c.displacement:.6g} {c.unit}, between {c.bracket[0]:.6g} and {c.bracket[1]:.6g}"
+            rows.append(("settlement alone: collapse at", place))
+        if state is None or not np.isfinite(state.load_multiplier):
+            return rows
+        limit = next((limit for limit, found in response.limit_states if found is state), None)
+        rows.append(("load multiplier α", f"{state.load_multiplier:.6g}"))
+        if limit is not None:
+            rows.append(("static, kinematic value", f"{limit.bounds[0]:.7g}, {limit.bounds[1]:.7g}"))
+            rows.append(("friction", limit.flow))
+            rows.append(("live load at α = 1", force_text(limit.live_force)))
+        if not response.parameter.is_path and len(path) > 1:
+            rows.append(("lowest of", f"{len(path)} positions, at x = {state.parameter:.5g} m"))
+        elif response.settlements:
+            rows.append(("after a settlement of", f"{state.parameter:.6g} {response.settlements[-1].unit}"))
+            rows.append(("before it", f"{path[0].load_multiplier:.6g}"))
+        return rows
+
+
+def _displacement_without_settlement(case: Case) -> ValueError:
+    return ValueError(
+        f"{case.source}: [analysis] displacement is that of a limit load after a settlement, in which open joints may "
+        "close"
+    )
+
+
+def _capacity_at_without_settlement(case: Case) -> ValueError:
+    return ValueError(
+        f'{case.source}: [analysis] capacity_at asks for limit loads (kind = "limit load") of loads that stand still, '
+        "along a [settlement]"
+    )
+
+
+def _stored_limits(summary: Mapping[str, Any], increments: Sequence[solver.Increment]) -> tuple[solver.LimitLoad, ...]:
+    limits = []
+    for stored in summary.get("limit_loads", []):
+        state = increments[stored["increment"]]
+        status = solver.LimitStatus(stored["status"])
+        nothing = math.inf if status is solver.LimitStatus.UNBOUNDED else math.nan
+        low, high = (nothing if bound is None else bound for bound in stored["bounds"])
+        limits.append(
+            solver.LimitLoad(
+                multiplier=nothing if stored["multiplier"] is None else stored["multiplier"],
+                bounds=(low, high),
+                certificate=state.certificate,
+                status=status,
+                flow=stored["flow"],
+                live_force=stored["live_load"],
+                programs=stored["programs"],
+                held=state.held,
+            )
+        )
+    return tuple(limits)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, found: Sequence[solver.Increment]) -> Steps:
+    """Limit states at each wanted settlement, or as drawn where there is none; then the last one's mechanism."""
+    case = run.given.case
+    shown = found[-1] if found else None
+    if not case.settlements and shown is None:
+        shown = _limit_state(run, run.given.loads, None, None, 0)
+        yield replace(shown, checkpoint=_checkpoint(run))
+    before = None if resume is None else resume.settlement
+    steps = settlement_steps(run.given, before)
+    programs = 0
+    while True:
+        try:
+            increment = next(steps)
+        except StopIteration as stop:
+            ending: solver.Ending = stop.value
+            break
+        programs += increment.programs
+        if increment.status == solver.Status.FALLING:
+            yield _read_for_multipliers(increment)
+        elif _wanted(case, increment):
+            # In equilibrium under the dead load: the settlement has proved it.
+            state = _limit_state(run, run.given.loads, increment.pose, increment, programs)
+            shown, programs = replace(state, status=solver.Status.EQUILIBRIUM), 0
+            reached = increment.checkpoint
+            yield replace(shown, checkpoint=None if reached is None else _checkpoint(run, settlement=reached))
+    if ending.stop is not solver.Status.LIMIT_REACHED:
+        if ending.stop is solver.Status.COLLAPSED and shown is not None:
+            return replace(ending, message=f"the settlement alone brings it down: {ending.message}")
+        return not_reached(ending, "it carries no live load")
+    assert shown is not None
+    yield from _swinging(run.given.assembly, shown)
+    return _limit_ending(run.limits[-1])
+
+
+def _over_places(
+    run: AnalysisRun,
+    places: np.ndarray,
+    live: Callable[[int], np.ndarray],
+    resume: LimitLoadCheckpoint | None,
+    found: Sequence[solver.Increment],
+) -> Steps:
+    """Limit states for each place of a moving load at the end of the settlements; then the mechanism of the lowest."""
+    standing, programs = run.given.loads, 0
+    pose = None if resume is None else resume.pose
+    steps = settlement_steps(run.given)
+    while resume is None:
+        try:
+            increment = next(steps)
+        except StopIteration as stop:
+            if stop.value.stop is not solver.Status.LIMIT_REACHED:
+                return not_reached(stop.value, "it carries no live load")
+            break
+        programs += increment.programs
+        pose = increment.pose
+        if increment.status == solver.Status.FALLING:
+            yield _read_for_multipliers(increment)
+    chosen, shown, least = 0, None, np.inf
+    for number, x in enumerate(places):
+        if number < len(found):
+            state = found[number]
+        elif run.limits and run.limits[-1].status is solver.LimitStatus.NO_EQUILIBRIUM:
+            # Nor is there one with the load elsewhere.
+            break
+        else:
+            loads = replace(standing, live=standing.live + live(number))
+            state = replace(_limit_state(run, loads, pose, None, programs), parameter=float(x))
+            programs = 0
+        multiplier = float(np.nan_to_num(state.load_multiplier, nan=-np.inf, posinf=np.inf))
+        if shown is None or multiplier < least:
+            chosen, shown, least = number, state, multiplier
+        if number >= len(found):
+            yield replace(state, checkpoint=_checkpoint(run, pose=pose))
+    # A load that moves is kept at the place that governs.
+    run.given = replace(run.given, loads=replace(standing, live=standing.live + live(chosen)))
+    assert shown is not None
+    yield from _swinging(run.given.assembly, shown)
+    return _limit_ending(run.limits[chosen])
+
+
+def _read_for_multipliers(increment: solver.Increment) -> solver.Increment:
+    """Measure the load multiplier of an increment of the settlement."""
+    return replace(increment, measured=increment.load_multiplier)
+
+
+def _checkpoint(
+    run: AnalysisRun, *, settlement: solver.Checkpoint | None = None, pose: solver.Pose | None = None
+) -> LimitLoadCheckpoint:
+    return LimitLoadCheckpoint(tuple(replace(limit, held=None) for limit in run.limits), settlement, pose)
+
+
+def _wanted(case: Case, increment: solver.Increment) -> bool:
+    """Whether the capacity is asked for at an increment of the settlement."""
+    last = len(case.settlements) - 1
+    if case.settings.capacity_at is None:
+        return True
+    reach = 2e-9 * case.settlements[last].increment
+    return increment.phase == last and any(abs(increment.parameter - s) <= reach for s in case.settings.capacity_at)
+
+
+def _limit_state(
+    run: AnalysisRun,
+    loads: solver.Loads,
+    pose: solver.Pose | None,
+    at: solver.Increment | None,
+    programs: int,
+) -> solver.Increment:
+    case, assembly = run.given.case, run.given.assembly
+    started = time.perf_counter()
+    try:
+        limit = solver.limit_load(
+            assembly,
+            loads=loads,
+            interfaces=run.given.interfaces,
+            pose=pose,
+            flow=case.settings.flow,
+            displacement=_displacement(case, assembly),
+            overlap_tolerance=case.controls.overlap_tolerance,
+        )
+    except ValueError as error:
+        raise ValueError(f"{case.source}: {error}") from None
+    run.limits.append(limit)
+    state = limit.increment
+    return replace(
+        state,
+        parameter=0.0 if at is None else at.parameter,
+        phase=0 if at is None else at.phase,
+        programs=state.programs + programs,
+        seconds=time.perf_counter() - started + (0.0 if at is None else at.seconds),
+    )
+
+
+def _displacement(case: Case, assembly: solver.Assembly) -> float:
+    """Within which joints that a settlement has opened may close [m]."""
+    if not case.settlements:
+        return 0.0
+    return CLOSING * assembly.block_size if case.settings.displacement is None else case.settings.displacement
+
+
+def _limit_ending(limit: solver.LimitLoad) -> solver.Ending:
+    stops = {
+        solver.LimitStatus.UNBOUNDED: solver.Status.LIMIT_REACHED,
+        solver.LimitStatus.NO_EQUILIBRIUM: solver.Status.NO_INITIAL_EQUILIBRIUM,
+        solver.LimitStatus.NOT_CONVERGED: solver.Status.SOLVER_FAILED,
+    }
+    return solver.Ending(stops.get(limit.status, solver.Status.COLLAPSED), str(limit))
+
+
+def _swinging(assembly: solver.Assembly, state: solver.Increment) -> Iterator[solver.Increment]:
+    """Pseudo-motion: the mechanism of a limit state, followed to first order, out of scale."""
+    block, free = assembly.block_of_vertex, assembly.free
+    corners = solver.moved_vertices(assembly, state.pose)
+    velocity = solver.point_velocities(corners, block, state.pose, state.velocity)
+    fastest = float(np.hypot(*velocity.T)[free[block]].max(initial=0.0))
+    if fastest == 0.0:
+        return
+    reach = SWING * float(np.ptp(corners[free[block]], axis=0).max())
+    contacts = state.contacts
+    for part in np.linspace(0.0, 1.0, SWINGING_FRAMES + 1)[1:]:
+        pose = solver.swung(state.pose, state.velocity * (part * reach / fastest))
+        sides = [solver.carried(contacts.points, k, state.pose, pose) for k in (contacts.block_a, contacts.block_b)]
+        yield replace(
+            state.with_arrays(pose=pose, contacts=replace(contacts, points=(sides[0] + sides[1]) / 2.0)),
+            status=solver.Status.FALLING,
+            programs=0,
+            seconds=0.0,
+            checkpoint=None,
+        )

@@ -1,0 +1,175 @@
+"""Pushovers: live loads follow a growing control displacement from the limit load down to zero capacity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.cases.contents import Case
+from blockvis.cases.toml_table import Table
+from blockvis.suggestions import nearest
+
+from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, begun, needs_dry_joints, needs_live_load
+from .settlement import not_reached, settlement_steps
+
+
+class PushoverKind(AnalysisKind):
+    """The load multiplier over a control displacement, after settlements where there are any."""
+
+    name = "pushover"
+    parameter = solver.CONTROL_DISPLACEMENT
+    measured = solver.LOAD_MULTIPLIER
+    checkpoint = solver.PushoverCheckpoint
+    lost = "capacity"
+
+    def read(self, top: Table, analysis: Table) -> solver.ControlDisplacement | None:
+        """Read the control displacement, of [control]."""
+        table = top.table("control")
+        if not table.values:
+            return None
+        keys = {
+            "direction": table.pair("direction", (1.0, 0.0)),
+            "point": table.pair("point"),
+            "increment": table.number("increment", 0.01, positive=True),
+            "limit": table.number("limit", 1.0, positive=True),
+            "tolerance": table.number("tolerance", positive=True),
+        }
+        block = table.text("block")
+        table.finish()
+        if block is None:
+            raise table.error("block", "is missing; name the block whose displacement grows")
+        try:
+            return solver.ControlDisplacement(block, **keys)
+        except ValueError as error:
+            raise ValueError(f"{table.source}: [{table.where}] {error}") from None
+
+    def refuse(self, settings: Any, case: Case) -> None:
+        """Refuse a [control] that controls nothing."""
+        if settings is not None:
+            raise ValueError(
+                f'{case.source}: [control] belongs to [analysis] kind = "{self.name}", not "{case.analysis}"'
+            )
+
+    def checked(self, case: Case) -> Case:
+        """Check that the keys of a case fit together."""
+        needs_live_load(case)
+        needs_dry_joints(case)
+        if case.settings is None:
+            raise ValueError(
+                f'{case.source}: [control] is missing; a pushover needs the displacement that grows, block = "..." and '
+                "direction = [1, 0]"
+            )
+        for number, load in enumerate(case.loads, start=1):
+            if load.positions:
+                raise ValueError(f'{case.source}: [loads {number}] positions belong to [analysis] kind = "limit load"')
+        return case
+
+    def course(self, case: Case) -> Course:
+        """Run over the control displacement of a case."""
+        return Course(self.parameter, self.measured, control=case.settings)
+
+    def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
+        """Prepare the settlements of a case, of which only a fall is reported, and the pushover."""
+        control = _checked_control(given.case, given.assembly)
+        return AnalysisRun(self.name, given, self.course(given.case), begun(_steps(given, control, resume)))
+
+    def summary(self, response: solver.Response) -> dict[str, Any]:
+        """Give the control displacement, and the multiplier at the start and where it is largest."""
+        values, control = response.values, response.control
+        largest = int(np.nanargmax(values)) if np.isfinite(values).any() else None
+        return {
+            "control": asdict(control) if isinstance(control, solver.ControlDisplacement) else None,
+            "limit_load_multiplier": float(values[0]) if len(values) and math.isfinite(values[0]) else None,
+            "largest_load_multiplier": None if largest is None else float(values[largest]),
+            "largest_load_multiplier_at": None if largest is None else response.path[largest].parameter,
+        }
+
+    def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:
+        """Complete the response by the control displacement of the summary."""
+        control = solver.ControlDisplacement(**summary["control"]) if summary.get("control") else None
+        return replace(super().restored(response, summary), control=control)
+
+    def lines(self, response: solver.Response) -> list[str]:
+        """Describe the first, the largest and the last multiplier, and where the capacity is lost."""
+        path, weight = response.path, response.total_weight
+        lines = []
+        if path:
+            largest = max(path, key=lambda i: i.load_multiplier)
+            for name, i in (("first", path[0]), ("largest", largest), ("last", path[-1])):
+                load = f"live load {i.reaction:.6g} N = {i.reaction / weight:.6f} W"
+                name = f"{name} multiplier"
+                lines.append(f"{name:<21}{i.load_multiplier:12.6g}     at {i.parameter:.6g} m, {load}")
+        if response.collapse is not None:
+            low, high = response.collapse.bracket
+            lines += [
+                f"zero capacity at     {response.collapse.displacement:12.6g} m   between {low:.6g} and {high:.6g}",
+                f"mechanism: {response.collapse.words}",
+            ]
+        return lines
+
+    def title(self, response: solver.Response) -> str:
+        """Say how it ended."""
+        if response.collapse is not None:
+            return f"No capacity left at a control displacement of {response.collapse.displacement:.5g} m"
+        return f"Pushover: {response.stop}"
+
+    def rows(self, response: solver.Response) -> list[tuple[str, str]]:
+        """Say where the capacity is lost, and the multipliers."""
+        rows, c = [], response.collapse
+        if c is not None:
+            place = f"{c.displacement:.6g} {c.unit}, between {c.bracket[0]:.6g} and {c.bracket[1]:.6g}"
+            rows.append(("zero capacity at", place))
+        if response.path:
+            values = response.values
+            rows.append(("load multiplier α at the start", f"{values[0]:.6g}"))
+            rows.append(("largest, last", f"{np.nanmax(values):.6g}, {values[-1]:.6g}"))
+        return rows
+
+
+def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDisplacement:
+    control: solver.ControlDisplacement = case.settings
+    free = [name for name, is_free in zip(assembly.names, assembly.free, strict=True) if is_free]
+    if control.block not in free:
+        what = "is a support" if control.block in assembly.names else "is no block of the layout"
+        raise ValueError(
+            f"{case.source}: [control] block '{control.block}' {what}{nearest(control.block, free)}; name a free "
+            f"block, for instance {', '.join(free[:6])}"
+        )
+    return control
+
+
+def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.PushoverCheckpoint | None) -> Steps:
+    case = given.case
+    pose, steps = None, settlement_steps(given)
+    # A pushover that has begun has its settlement behind it.
+    before = solver.Ending(solver.Status.LIMIT_REACHED)
+    while resume is None:
+        try:
+            increment = next(steps)
+        except StopIteration as stop:
+            before = stop.value
+            break
+        if increment.status == solver.Status.FALLING:
+            yield replace(increment, parameter=0.0, measured=increment.load_multiplier, phase=0)
+        pose = increment.pose
+    if before.stop is not solver.Status.LIMIT_REACHED:
+        return not_reached(before, "nothing is left to push over")
+    try:
+        return (
+            yield from solver.pushover_increments(
+                given.assembly,
+                control,
+                loads=given.loads,
+                interfaces=given.interfaces,
+                controls=case.controls,
+                pose=pose,
+                resume=resume,
+            )
+        )
+    except ValueError as error:
+        raise ValueError(f"{case.source}: {error}") from None

@@ -1,0 +1,156 @@
+"""Settlements: supports move until the structure loses equilibrium."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import solver
+from blockvis.cases.contents import Case
+from blockvis.numbers import force_text
+
+from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, needs_dry_joints
+
+
+class SettlementKind(AnalysisKind):
+    """Settlements, one after another, and the reaction of the supports."""
+
+    name = "settlement"
+    parameter = solver.SETTLEMENT
+    measured = solver.REACTION
+    checkpoint = solver.Checkpoint
+    in_studies = True
+
+    def checked(self, case: Case) -> Case:
+        """Check that the keys of a case fit together."""
+        if not case.settlements:
+            raise ValueError(
+                f"{case.source}: [settlement] is missing; say how the moving supports move, direction = [1, 0]"
+            )
+        if any(load.kind == "live" for load in case.loads):
+            warnings.warn(
+                f"{case.source}: a settlement analysis leaves the live loads out; give loads that act during it kind = "
+                '"dead"',
+                stacklevel=5,
+            )
+        needs_dry_joints(case)
+        return case
+
+    def course(self, case: Case) -> Course:
+        """Run over the settlements of a case."""
+        return settlement_course(case.settlements)
+
+    def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
+        """Prepare the settlements of a case under its dead loads."""
+        return AnalysisRun(self.name, given, self.course(given.case), settlement_steps(given, resume))
+
+    def summary(self, response: solver.Response) -> dict[str, Any]:
+        """List the settlements."""
+        return {"settlements": [asdict(settlement) for settlement in response.settlements]}
+
+    def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:
+        """Complete the response by the settlements of the summary."""
+        course = settlement_course(stored_settlements(summary))
+        response = super().restored(response, summary)
+        return replace(response, settlements=course.settlements, parameter=course.parameter, measured=course.measured)
+
+    def lines(self, response: solver.Response) -> list[str]:
+        """Give the first and last reaction, and the settlement at collapse."""
+        path, weight, unit = response.path, response.total_weight, response.settlements[-1].unit
+        lines = []
+        if path:
+            lines.append(f"first reaction       {path[0].reaction:12.6g} N   {path[0].reaction / weight:.6f} W")
+        if response.collapse is not None:
+            low, high = response.collapse.bracket
+            last, at = response.collapse.reaction, response.collapse.displacement
+            lines += [
+                f"last reaction        {last:12.6g} N   {last / weight:.6f} W",
+                f"collapse displacement{at:12.6g} {unit}   between {low:.6g} and {high:.6g}",
+                f"mechanism: {response.collapse.words}",
+            ]
+        elif len(path) > 1:
+            lines.append(f"last reaction        {path[-1].reaction:12.6g} N   {path[-1].reaction / weight:.6f} W")
+            lines.append(f"last settlement      {path[-1].parameter:12.6g} {unit}")
+        return lines
+
+    def title(self, response: solver.Response) -> str:
+        """Say how it ended."""
+        if response.collapse is not None:
+            return f"Collapse at a settlement of {response.collapse.displacement:.5g} {response.collapse.unit}"
+        return {
+            solver.Status.LIMIT_REACHED: "Standing at the end of the settlement",
+            solver.Status.NO_INITIAL_EQUILIBRIUM: "No equilibrium before any settlement",
+            solver.Status.SOLVER_FAILED: "The solver failed; the path up to there",
+        }.get(response.stop, "Settling masonry")
+
+    def rows(self, response: solver.Response) -> list[tuple[str, str]]:
+        """Give the settlement at collapse, first and last reaction."""
+        path, weight, c = response.path, response.total_weight, response.collapse
+        moment = response.parameter.unit == "rad"
+
+        def reaction(value: float) -> str:
+            over = "" if moment or weight <= 0 else f" = {value / weight:.4f} W"
+            return force_text(value, moment) + over
+
+        rows = []
+        if c is not None:
+            rows.append(("collapse displacement", f"{c.displacement:.6g} {c.unit}"))
+            rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))
+        if path:
+            rows.append(("first reaction", reaction(path[0].reaction)))
+            rows.append(("last reaction", reaction(path[-1].reaction)))
+        return rows
+
+
+def settlement_course(settlements: tuple[solver.Settlement, ...]) -> Course:
+    """Run over settlements and measure the reaction to them, in their unit."""
+    unit = settlements[0].unit if settlements else "m"
+    return Course(solver.settlement_in(unit), solver.reaction_to(unit), settlements)
+
+
+def stored_settlements(summary: Mapping[str, Any]) -> tuple[solver.Settlement, ...]:
+    """Read the settlements of a stored summary."""
+    motions = [dict(motion) for motion in summary.get("settlements", [])]
+    for motion in motions:
+        motion["blocks"] = None if motion["blocks"] is None else tuple(motion["blocks"])
+    return tuple(solver.Settlement(**motion) for motion in motions)
+
+
+def settlement_steps(given: RunInput, resume: solver.Checkpoint | None = None) -> Steps:
+    """Follow the settlements of a case under the dead load alone; without settlements there are no increments.
+
+    Parameters
+    ----------
+    given : RunInput
+    resume : solver.Checkpoint, optional
+    """
+    case = given.case
+    if not case.settlements:
+        return solver.Ending(solver.Status.LIMIT_REACHED)
+    return (
+        yield from solver.settlement_increments(
+            given.assembly,
+            case.settlements,
+            interfaces=given.interfaces,
+            loads=given.loads,
+            controls=case.controls,
+            resume=resume,
+        )
+    )
+
+
+def not_reached(before: solver.Ending, what: str) -> solver.Ending:
+    """Say how an analysis ends whose settlement did not reach its limit.
+
+    Parameters
+    ----------
+    before : solver.Ending
+        Of the settlement.
+    what : str
+        What that means for the analysis.
+    """
+    if before.stop is solver.Status.COLLAPSED:
+        return solver.Ending(solver.Status.NO_INITIAL_EQUILIBRIUM, f"the settlement alone: {before.message}; {what}")
+    return solver.Ending(before.stop, f"during the settlement: {before.message}")

@@ -1,0 +1,53 @@
+"""Shapes: what the mechanics ask of the blocks' geometry, in the plane or in space."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from .contacts import Contacts
+
+
+class Shapes(Protocol):
+    """The shapes of all blocks: how large they are, and where they touch.
+
+    The mechanics know the number of dimensions d from the shape of the arrays. They never look into
+    ``Contacts.features``, which say which corners, edges and faces meet: only the geometry that found them does.
+    """
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """(n_vertices, d) array [m]: corners of all blocks as drawn."""
+
+    @property
+    def block_of_vertex(self) -> np.ndarray:
+        """(n_vertices,) int array: the block each corner belongs to."""
+
+    @property
+    def volumes(self) -> np.ndarray:
+        """(n_blocks,) array [m³]."""
+
+    @property
+    def centroids(self) -> np.ndarray:
+        """(n_blocks, d) array [m] as drawn."""
+
+    @property
+    def widths(self) -> np.ndarray:
+        """(n_blocks,) array [m]: how thick each block is where it is thin."""
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """(n_blocks,) array [m]: edge of the square or cube as large as each block."""
+
+    def size(self, chosen: np.ndarray) -> float:
+        """Edge of the square or cube as large as the mean of the chosen blocks, (n_blocks,) bool, [m]."""
+
+    def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
+        """Contact points with a gap up to ``reach`` [m] between blocks one of which is useful, (n_blocks,) bool."""
+
+    def measure(self, vertices: np.ndarray, contacts: Contacts) -> Contacts:
+        """The contact points between the same features, with the corners (n_vertices, d) [m] elsewhere."""
+
+    def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Pairs of blocks that overlap by more than ``tolerance`` [m]: two (n_pairs,) int arrays, and the depths."""

@@ -1,0 +1,49 @@
+"""Quantities: what the increments of an analysis run over and what is measured along them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A parameter or a measured value of an analysis.
+
+    Attributes
+    ----------
+    name : str
+        In words, for captions and tables.
+    symbol : str
+        For formulas.
+    unit : str
+        Of its numbers; empty for a number without unit.
+    is_path : bool
+        Of a parameter: whether its increments follow one another. Otherwise each stands by itself, and the one with
+        the smallest measured value governs.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    is_path: bool = True
+
+    @property
+    def is_force(self) -> bool:
+        """Whether it is a force or a moment."""
+        return self.unit in ("N", "N·m")
+
+
+SETTLEMENT, REACTION = Quantity("settlement", "s", "m"), Quantity("reaction", "R", "N")
+CONTROL_DISPLACEMENT = Quantity("control displacement", "d", "m")
+LOAD_POSITION = Quantity("load position", "x", "m", is_path=False)
+LOAD_MULTIPLIER = Quantity("load multiplier", "α", "")
+
+
+def settlement_in(unit: str) -> Quantity:
+    """The parameter of supports that move [m], or rotate [rad]."""
+    return replace(SETTLEMENT, unit=unit)
+
+
+def reaction_to(unit: str) -> Quantity:
+    """The reaction of supports whose settlement has a unit: the force of a distance [m], the moment of a rotation."""
+    return replace(REACTION, unit="N·m" if unit == "rad" else "N")

@@ -1,0 +1,56 @@
+"""What tests share: solved structures, their results folders, a Dask cluster; and pictures only where a test looks."""
+
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import structures
+
+import blockvis
+import solver
+
+_RUN = sys.modules[blockvis.run_case.__module__]
+_DRAW_RESULTS = _RUN.draw_results
+
+
+@pytest.fixture(scope="session", autouse=True)
+def undrawn() -> Iterator[None]:
+    """Runs write no pictures and no report: most tests look at numbers, and pictures take longer than the solution."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(_RUN, "draw_results", lambda *_, **__: ())
+        yield
+
+
+@pytest.fixture(autouse=True)
+def drawn_where_marked(request: pytest.FixtureRequest, undrawn: None) -> Iterator[None]:
+    """Runs draw all they draw in a test that is marked ``pictures``."""
+    with pytest.MonkeyPatch.context() as patched:
+        if request.node.get_closest_marker("pictures"):
+            patched.setattr(_RUN, "draw_results", _DRAW_RESULTS)
+        yield
+
+
+@pytest.fixture(scope="session")
+def arch() -> solver.Response:
+    """The reference arch: 12 voussoirs, friction coefficient 0.6, its right springer spreads until it collapses."""
+    return structures.arch_response()
+
+
+@pytest.fixture(scope="session")
+def _arch_written(arch: solver.Response, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return blockvis.write(arch, tmp_path_factory.mktemp("arch") / "out")
+
+
+@pytest.fixture
+def arch_results(_arch_written: Path, tmp_path: Path) -> Path:
+    """The results folder of the reference arch: a copy that the test may spoil."""
+    return shutil.copytree(_arch_written, tmp_path / "out")
+
+
+@pytest.fixture(scope="module")
+def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Address of a Dask scheduler with two workers, for studies that kill neither; idle ones would cost time, too."""
+    with structures.started_cluster(tmp_path_factory.mktemp("dask")) as (address, _, _):
+        yield address

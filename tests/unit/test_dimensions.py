@@ -1,0 +1,171 @@
+"""The core without a dimension: the same functions for blocks in the plane and in space."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import solver
+from solver.equilibrium import friction_rays, wrench_matrix
+from solver.geometry.contacts import Contacts, matched_contacts
+from solver.geometry.shapes import Shapes
+from solver.kinematics import (
+    Pose,
+    carried,
+    composed_rotations,
+    cross_rows,
+    dimension_of,
+    motion_size,
+    moved,
+    point_velocities,
+    relative_velocities,
+    rotation_count,
+    rotation_matrices,
+    swung,
+)
+
+RANDOM = np.random.default_rng(7)
+ROTATIONS = RANDOM.normal(size=(20, 3)) * np.geomspace(1e-9, 1.0, 20)[:, None]
+
+
+def poses(d, n=20):
+    return Pose(RANDOM.normal(size=(n, d)), RANDOM.normal(size=(n, rotation_count(d))))
+
+
+def test_cross_rows_give_moments():
+    arms, forces = RANDOM.normal(size=(2, 20, 3))
+    moments = np.einsum("nij,nj->ni", cross_rows(arms), forces)
+    np.testing.assert_allclose(moments, np.cross(arms, forces), rtol=1e-13)
+    flat = np.einsum("nij,nj->ni", cross_rows(arms[:, :2]), forces[:, :2])
+    np.testing.assert_allclose(flat[:, 0], arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0], rtol=1e-13)
+
+
+def test_rotations_in_space_are_rotations_about_their_vector():
+    """Proper, they leave their vector alone and turn by its length; about the third axis they are the plane's."""
+    matrices = rotation_matrices(ROTATIONS)
+    np.testing.assert_allclose(matrices @ matrices.transpose(0, 2, 1), np.tile(np.eye(3), (20, 1, 1)), atol=1e-14)
+    np.testing.assert_allclose(np.linalg.det(matrices), 1.0, rtol=1e-14)
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", matrices, ROTATIONS), ROTATIONS, rtol=1e-12)
+    traces = np.trace(matrices, axis1=1, axis2=2)
+    np.testing.assert_allclose(traces, 1.0 + 2.0 * np.cos(np.linalg.norm(ROTATIONS, axis=1)), rtol=1e-14)
+    angles = np.linspace(-3.0, 3.0, 7)[:, None]
+    about_z = rotation_matrices(angles * np.array([0.0, 0.0, 1.0]))[:, :2, :2]
+    np.testing.assert_allclose(about_z, rotation_matrices(angles), atol=1e-15)
+
+
+def test_composed_rotations_are_products_of_matrices():
+    first, then = RANDOM.normal(size=(2, 200, 3)) * 1.5
+    both = composed_rotations(first, then)
+    np.testing.assert_allclose(rotation_matrices(both), rotation_matrices(then) @ rotation_matrices(first), atol=1e-13)
+    assert np.linalg.norm(both, axis=1).max() <= np.pi + 1e-12
+    np.testing.assert_allclose(composed_rotations(ROTATIONS, 0.0 * ROTATIONS), ROTATIONS, rtol=1e-13)
+    np.testing.assert_allclose(composed_rotations(ROTATIONS, -ROTATIONS), 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_velocities_are_the_limit_of_small_movements(d):
+    pose, block = poses(d), np.arange(20)
+    points, motion = RANDOM.normal(size=(20, d)), RANDOM.normal(size=(20, d + rotation_count(d)))
+    velocity = point_velocities(points, block, pose, motion)
+    for move in (moved, swung):
+        small = carried(points, block, pose, move(pose, 1e-7 * motion))
+        np.testing.assert_allclose((small - points) / 1e-7, velocity, atol=1e-5)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_swung_blocks_of_one_rigid_motion_stay_together(d):
+    pose = poses(d, 2)
+    spin = RANDOM.normal(size=rotation_count(d))
+    rows = cross_rows(pose.positions)
+    travel = RANDOM.normal(size=d) + np.einsum("nri,r->ni", rows, spin)
+    motion = np.concatenate([travel, np.tile(spin, (2, 1))], axis=1)
+    points = RANDOM.normal(size=(5, d))
+    after = swung(pose, motion)
+    on_each = [carried(points, np.full(5, k), pose, after) for k in (0, 1)]
+    np.testing.assert_allclose(on_each[0], on_each[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_size_of_a_motion(d):
+    motion = np.zeros((2, d + rotation_count(d)))
+    motion[0, 0], motion[1, -1] = -0.3, 0.2
+    np.testing.assert_allclose(motion_size(motion, 2.0), [0.3, 0.4])
+    assert dimension_of(motion.shape[1]) == d
+
+
+@pytest.mark.parametrize("facets", [4, 8, 16])
+def test_pyramid_lies_in_the_cone_and_touches_it(facets):
+    mu = np.array([0.0, 0.4, 3.0])
+    rays = friction_rays(mu, 3, facets).toarray()
+    assert rays.shape == (9, 3 * facets)
+    for k in range(3):
+        own = rays[3 * k : 3 * k + 3, k * facets : (k + 1) * facets]
+        np.testing.assert_allclose(np.hypot(own[1], own[2]), mu[k] * own[0], rtol=1e-14)
+        np.testing.assert_allclose(np.linalg.norm(own, axis=0), 1.0, rtol=1e-14)
+
+
+def block_on_a_plane(d, width, height):
+    """The contact points of a free block (0) on a support (1), normal up, at the corners of its base."""
+    corners = np.array([[*place, 0.0] for place in product((0.0, width), repeat=d - 1)])
+    n = len(corners)
+    up = np.eye(d)[-1]
+    tangents = np.eye(d)[:-1] * (-1.0 if d == 2 else 1.0)
+    zero = np.zeros(n)
+    contacts = Contacts(
+        features=np.stack([zero, np.arange(n), zero, zero - 1], axis=1).astype(int),
+        block_a=np.zeros(n, dtype=int),
+        block_b=np.ones(n, dtype=int),
+        points=corners,
+        frames=np.tile(np.vstack([up, tangents]), (n, 1, 1)),
+        gaps=zero,
+        slip=np.zeros((n, d - 1)),
+        areas=zero,
+    )
+    middle = np.array([*[width / 2.0] * (d - 1), height / 2.0])
+    return contacts, Pose(np.stack([middle, -middle]), np.zeros((2, rotation_count(d))))
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize(("mu", "slender"), [(0.3, 2.0), (0.7, 2.0), (0.7, 1.0)])
+def test_block_on_a_plane_slides_or_overturns(d, mu, slender):
+    """Pushed sideways with α times its weight it fails at the smaller of μ and b/h."""
+    contacts, pose = block_on_a_plane(d, 1.0, slender)
+    n_dof = d + rotation_count(d)
+    balance = (wrench_matrix(contacts, pose) @ friction_rays(np.full(len(contacts), mu), d)).toarray()[:n_dof]
+    weight, push = np.zeros(n_dof), np.zeros(n_dof)
+    weight[d - 1], push[0] = -1.0, 1.0
+    found = linprog(
+        [*np.zeros(balance.shape[1]), -1.0], A_eq=np.column_stack([balance, push]), b_eq=-weight, method="highs"
+    )
+    assert -found.fun == pytest.approx(min(mu, 1.0 / slender), rel=1e-9)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_wrench_matrix_is_the_transpose_of_the_relative_velocities(d):
+    contacts, pose = block_on_a_plane(d, 0.7, 1.3)
+    motion = RANDOM.normal(size=(2, d + rotation_count(d)))
+    rates = (wrench_matrix(contacts, pose).T @ motion.ravel()).reshape(-1, d)
+    np.testing.assert_allclose(rates, relative_velocities(contacts, pose, motion), atol=1e-14)
+
+
+def test_contact_points_are_known_by_their_first_three_features():
+    """Found again in any order, whatever the fourth says; the kind tells two of the same features apart."""
+    contacts, _ = block_on_a_plane(3, 1.0, 1.0)
+    other = contacts.features.copy()
+    other[:, 3] = 9
+    other[0, 0] = 1
+    before = Contacts(other[::-1], *(getattr(contacts, name)[::-1] for name in list(contacts.__dict__)[1:]))
+    place, same = matched_contacts(contacts, before)
+    assert same.tolist() == [False, True, True, True]
+    assert place[1:].tolist() == [2, 1, 0]
+
+
+def test_polygons_have_what_shapes_ask_for():
+    shapes: Shapes = solver.Assembly.from_outlines([[(0, 0), (2, 0), (2, 1), (0, 1)]], thickness=0.5).shapes
+    assert shapes.volumes.tolist() == [1.0]
+    assert shapes.centroids.tolist() == [[1.0, 0.5]]
+    assert shapes.size(np.array([True])) == pytest.approx(np.sqrt(2.0))
+    assert shapes.sizes == pytest.approx([np.sqrt(2.0)])
+    assert len(shapes.find(shapes.vertices, 0.1, np.array([True]))) == 0
+    assert len(shapes.overlaps(shapes.vertices, 0.0)[0]) == 0

@@ -1,0 +1,182 @@
+"""Kinds of analysis: no module but their own asks which it is, and a new one is an object, its solver and a test."""
+
+import ast
+import csv
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import blockvis
+import solver
+from blockvis.cases.case import parse_case
+from blockvis.cli import _in_words
+from blockvis.pictures.captions import state_text
+from blockvis.pictures.curves import draw_curve
+from blockvis.report.page import report_html
+from blockvis.runs.kind import AnalysisKind, AnalysisRun, RunInput, Steps
+from blockvis.runs.kinds import KINDS
+from blockvis.runs.progress import Progress
+
+ROOT = Path(__file__).parents[2]
+
+#: What may know the kinds by their names.
+HOME = ROOT / "blockvis" / "runs"
+
+
+def _compared_names(path: Path) -> list[tuple[int, str]]:
+    """Lines of a module where a name of a kind is compared with something, or looked up in a match."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Compare | ast.MatchValue):
+            for part in ast.walk(node):
+                if isinstance(part, ast.Constant) and part.value in KINDS:
+                    found.append((node.lineno, part.value))
+    return found
+
+
+def test_the_search_for_comparisons_finds_them(tmp_path):
+    module = tmp_path / "module.py"
+    module.write_text('if kind in ("pushover", "other"):\n    pass\nanalysis = "settlement"\nx != "limit load"\n')
+    assert sorted(_compared_names(module)) == [(1, "pushover"), (4, "limit load")]
+
+
+@pytest.mark.parametrize("package", ["solver", "blockvis"])
+def test_only_the_kinds_know_their_names(package):
+    modules = [path for path in sorted((ROOT / package).rglob("*.py")) if path.parent != HOME]
+    found = {str(path.relative_to(ROOT)): _compared_names(path) for path in modules}
+    assert {path: lines for path, lines in found.items() if lines} == {}
+
+
+def test_the_runs_ask_their_kind_too():
+    kinds = {"kind.py", "kinds.py", *(f"{name.replace(' ', '_')}.py" for name in KINDS)}
+    for path in sorted(HOME.glob("*.py")):
+        if path.name not in kinds:
+            assert _compared_names(path) == [], path.name
+
+
+class TiltKind(AnalysisKind):
+    """Gravity turns about the structure in equal steps until its limit load at that tilt is used up."""
+
+    name = "tilt"
+    parameter = solver.Quantity("tilt", "θ", "rad")
+    measured = solver.Quantity("reserve", "r", "")
+
+    def read(self, top: Any, analysis: Any) -> float:
+        return analysis.number("tilt_step", 0.02, positive=True)
+
+    def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
+        return AnalysisRun(self.name, given, self.course(given.case), _tilted(given, given.case.settings))
+
+    def summary(self, response: solver.Response) -> dict[str, Any]:
+        return {"tilt_step": float(np.diff(response.parameters)[0])}
+
+
+def _tilted(given: RunInput, step: float) -> Steps:
+    weight, previous = given.loads.dead[:, 1], None
+    for number in range(1000):
+        angle = number * step
+        push = np.zeros_like(given.loads.dead)
+        push[:, 0] = -weight
+        dead = np.stack([-weight * np.sin(angle), weight * np.cos(angle), np.zeros(len(weight))], axis=1)
+        limit = solver.limit_load(given.assembly, loads=solver.Loads(dead=dead, live=push), interfaces=given.interfaces)
+        state = replace(limit.increment, parameter=angle, measured=limit.multiplier)
+        if previous is not None and not limit.multiplier > 0.0:
+            last = previous.parameter
+            words = str(solver.mechanism_of(given.assembly, previous))
+            collapse = solver.Collapse((last + angle) / 2, (last, angle), 0.0, previous.velocity, "rad", words)
+            return solver.Ending(solver.Status.COLLAPSED, str(collapse), collapse)
+        previous = state
+        yield state
+    return solver.Ending(solver.Status.LIMIT_REACHED)
+
+
+TILT = """
+[geometry]
+layout = "column"
+[geometry.parameters]
+blocks = 1
+width = 0.2
+block_height = 1.0
+[material]
+friction_coefficient = 0.7
+[analysis]
+kind = "tilt"
+tilt_step = 0.03
+"""
+
+
+def test_a_new_kind_is_an_object_of_its_own(tmp_path, monkeypatch):
+    """A block of b × h on ground that tilts turns over at tan θ = b/h."""
+    monkeypatch.setitem(KINDS, "tilt", TiltKind())
+    monkeypatch.setattr("blockvis.runs.run.draw_results", lambda *_, **__: ())
+    case = parse_case(TILT, tmp_path / "tilt.toml")
+    run = blockvis.run_case(case, tmp_path / "out")
+    low, high = run.summary["collapse_bracket"]
+    assert low < np.arctan(0.2) < high == pytest.approx(low + 0.03)
+    stored = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert (stored["analysis"], stored["parameter"], stored["tilt_step"]) == ("tilt", "tilt", pytest.approx(0.03))
+    rows = list(csv.DictReader((tmp_path / "out" / "response.csv").open(encoding="utf-8")))
+    assert [float(row["tilt"]) for row in rows] == pytest.approx(0.03 * np.arange(7))
+    # Turned by θ, the block is held by tan(arctan(b/h) - θ) of its weight beside it, times cos θ.
+    again = blockvis.open_results(tmp_path / "out")
+    assert again.parameter == TiltKind.parameter
+    assert again.measured == TiltKind.measured
+    assert again.values == pytest.approx(0.2 * np.cos(again.parameters) - np.sin(again.parameters), abs=1e-7)
+    assert again.collapse.bracket == (low, high)
+    assert draw_curve(again, tmp_path / "curve.png").stat().st_size > 10_000
+    assert state_text(again.path[1], again) == f"Tilt 0.0300 rad   ·   Reserve r = {again.values[1]:.5g}"
+    assert "Collapse at tilt 0.195 rad" in report_html(again)
+    assert "first reserve                 0.2" in _in_words(again, tmp_path)
+    assert "collapse at                 0.195 rad   between 0.18 and 0.21" in _in_words(again, tmp_path)
+
+
+def test_keys_of_a_kind_belong_to_it(tmp_path):
+    with pytest.raises(ValueError, match="kind is 'tilt'"):
+        parse_case(TILT, tmp_path / "tilt.toml")
+    settling = TILT.replace('kind = "tilt"', 'kind = "settlement"') + "[settlement]\ndirection = [0, -1]\n"
+    with pytest.raises(ValueError, match="tilt_step is not a key here"):
+        parse_case(settling, tmp_path / "tilt.toml")
+
+
+class Terminal(io.StringIO):
+    """A stream that somebody watches."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(
+    ("analysis", "extra", "line"),
+    [
+        ("settlement", "", "settlement 0.05 of at most 0.4 m, reaction 7 N, 1 increments"),
+        (
+            "settlement",
+            "rotation_centre = [0, 0]\n",
+            "settlement 0.05 of at most 0.4 rad, reaction 7 N·m, 1 incr",
+        ),
+        ("limit load", "", "settlement 0.05 of at most 0.4 m, load multiplier 7, 1 increments"),
+        ("pushover", "", "control displacement 0.05 of at most 1 m, load multiplier 7, 1 increments"),
+    ],
+)
+def test_the_bar_shows_the_quantities_of_the_kind(analysis, extra, line, tmp_path, monkeypatch):
+    monkeypatch.setattr("blockvis.runs.progress.REDRAW", -1.0)
+    direction = "" if extra else "direction = [0, -1]\n"
+    text = TILT.replace('"tilt"\ntilt_step = 0.03', f'"{analysis}"') + f"[settlement]\n{direction}limit = 0.4\n{extra}"
+    if analysis != "settlement":
+        text += '[[loads]]\nkind = "live"\nweight_fraction = [1.0, 0.0]\n'
+    if analysis == "pushover":
+        text += '[control]\nblock = "block 1"\n'
+    course = KINDS[analysis].course(parse_case(text, tmp_path / "case.toml"))
+    stream = Terminal()
+    certificate = solver.Certificate(0.0, 0.0, 0.0, 0.0, 0.0)
+    nothing = np.zeros((0, 2))
+    state = solver.State(None, None, nothing, nothing, nothing, nothing, nothing)
+    standing = solver.Increment(0.05, 7.0, 0, 7.0, 7.0, certificate, solver.Status.EQUILIBRIUM, 1, 0.1, state)
+    Progress(course, stream).increment(standing)
+    assert f"] {line}" in stream.getvalue()
