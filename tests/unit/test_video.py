@@ -8,7 +8,8 @@ import pytest
 from PIL import Image
 
 from blockvis.pictures import video
-from blockvis.pictures.video import FILM_SUFFIXES, write_film
+from blockvis.pictures.video import write_film
+from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 SIZE = (128, 72)
 
@@ -24,7 +25,7 @@ def frames(seen=None):
         yield picture
 
 
-@pytest.mark.parametrize("suffix", FILM_SUFFIXES)
+@pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)
 def test_a_film_holds_its_frames_in_order(tmp_path, suffix):
     path = write_film(frames(), tmp_path / f"film{suffix}", size=SIZE, fps=10.0)
     with imageio.get_reader(path) as film:
@@ -37,7 +38,7 @@ def test_a_film_holds_its_frames_in_order(tmp_path, suffix):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
-@pytest.mark.parametrize("suffix", FILM_SUFFIXES)
+@pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)
 def test_frames_are_forgotten_when_they_are_written(tmp_path, suffix):
     seen, alive = [], []
 
@@ -51,7 +52,7 @@ def test_frames_are_forgotten_when_they_are_written(tmp_path, suffix):
     assert max(alive) <= 2, alive
 
 
-@pytest.mark.parametrize("suffix", FILM_SUFFIXES)
+@pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)
 def test_a_film_without_its_end_is_not_kept(tmp_path, monkeypatch, suffix):
     """An encoder that the system ends, or that finds the disk full at the end, does not say so to imageio."""
     encode = video._encode
@@ -70,7 +71,7 @@ def test_a_film_without_its_end_is_not_kept(tmp_path, monkeypatch, suffix):
     assert [p.read_bytes() for p in tmp_path.iterdir()] == [b"the film before"]
 
 
-@pytest.mark.parametrize("suffix", FILM_SUFFIXES)
+@pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)
 def test_what_fails_while_drawing_leaves_no_half_film(tmp_path, suffix):
     def failing():
         yield from frames()
