@@ -48,7 +48,8 @@ def require(extra: str, needed_by: str) -> None:
     missing = [name for name in EXTRAS[extra] if not _is_installed(name)]
     if missing:
         raise MissingExtra(
-            f"{needed_by} need {', '.join(missing)}, which this environment lacks; install with: {install_command(extra)}"
+            f"{needed_by} need {', '.join(missing)}, which this environment lacks; "
+            f"install with: {install_command(extra)}"
         )
 
 
