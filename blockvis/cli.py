@@ -14,9 +14,10 @@ import numpy as np
 
 import solver
 
+from .extras import MissingExtra
 from .generators import LAYOUTS
 
-#: Exit codes: bad input, a solver failure, everything written but the pictures, Ctrl-C.
+#: Exit codes: bad input or a missing extra, a solver failure, everything written but the pictures, Ctrl-C.
 BAD_INPUT, SOLVER_FAILED, NO_PICTURES, INTERRUPTED = 2, 3, 4, 130
 
 
@@ -32,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = _show_warning
     try:
         code: int = options.verb(options)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, MissingExtra) as error:
         print(f"blockvis: {error}", file=sys.stderr)
         return BAD_INPUT
     except MemoryError:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from blockvis.extras import install_command
 from blockvis.layout.layout import Layout
 
 from . import gmsh_mesh
@@ -54,8 +55,8 @@ def read(path: Path, reading: Reading) -> Layout:
             raise ValueError(f"'{path}': gmsh did not finish within {LONGEST_SECONDS} s; give it as .msh") from None
         if done.returncode == NO_LIBRARY:
             raise ValueError(
-                f"'{path}' needs gmsh, which could not be loaded ({done.stderr.strip()}); pip install 'blockvis[cad]' "
-                f"and, on Debian, apt-get install {_PACKAGES}"
+                f"'{path}' needs gmsh, which could not be loaded ({done.stderr.strip()}); install with: "
+                f"{install_command('cad')} and, on Debian, apt-get install {_PACKAGES}"
             )
         if done.returncode:
             reason = " ".join(done.stderr.split())[-300:] or f"it ended with code {done.returncode}"

@@ -2,17 +2,49 @@
 
 from __future__ import annotations
 
+import errno
 import os
-from collections.abc import Iterable, Iterator
+import shutil
+from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from PIL import Image
 
 from blockvis.atomic_files import whole_file
 from blockvis.video_suffixes import VIDEO_SUFFIXES
 
-#: Quality of x264 (0 lossless, 51 worst): line drawings show ringing from about 22 on.
-CRF = "19"
+#: What imageio's writer is given for each format. Quality of x264 is 0 lossless, 51 worst: line drawings show ringing
+#: from about 22 on. A gif has a palette per frame: one of the first frame lacks the colours of cracks that open later.
+_ENCODERS: dict[str, dict[str, Any]] = {
+    ".mp4": {
+        "codec": "libx264",
+        "pixelformat": "yuv420p",
+        "output_params": ["-crf", "19", "-preset", "veryfast", "-movflags", "+faststart", "-f", "mp4"],
+    },
+    ".gif": {
+        "codec": "gif",
+        "pixelformat": "pal8",
+        "output_params": [
+            "-vf",
+            "split[a][b];[a]palettegen=stats_mode=single[palette];[b][palette]paletteuse=new=1:dither=none",
+            *("-loop", "0", "-f", "gif"),
+        ],
+    },
+    ".webp": {
+        "codec": "libwebp_anim",
+        "pixelformat": "bgra",
+        "output_params": ["-quality", "85", "-compression_level", "2", "-loop", "0", "-f", "webp"],
+    },
+}
+
+#: Frames per second of a gif at most: browsers play one of shorter frames at ten per second.
+FASTEST_GIF = 50.0
+
+#: Free bytes below which a disk counts as full: the encoder writes in pieces of less.
+FULL_DISK = 2**20
 
 
 def write_film(
@@ -23,7 +55,7 @@ def write_film(
     Parameters
     ----------
     frames : iterable of PIL.Image.Image
-        Drawn one at a time, as they are asked for.
+        RGB; drawn one at a time, as they are asked for.
     path : path
         Ending in .mp4, .gif or .webp.
     size : (int, int)
@@ -44,45 +76,55 @@ def write_film(
     if size[0] % 2 or size[1] % 2:
         raise ValueError(f"an animation of {size[0]} × {size[1]} pixels cannot be encoded; both must be even")
     with whole_file(path) as partial:
-        if suffix == ".mp4":
-            _write_mp4(frames, partial, size, fps)
-        else:
-            _write_pillow(frames, partial, fps)
+        try:
+            _encode(frames, partial, min(fps, FASTEST_GIF) if suffix == ".gif" else fps)
+        except OSError as error:
+            raise _not_written(path, error) from None
+        if partial.is_file() and not _reaches_its_end(partial):
+            raise _not_written(path, None)
     return path
 
 
-def _write_mp4(frames: Iterable[Image.Image], path: Path, size: tuple[int, int], fps: float) -> None:
-    import imageio_ffmpeg
+def _encode(frames: Iterable[Image.Image], path: Path, fps: float) -> None:
+    import imageio.v2 as imageio
 
-    stream = imageio_ffmpeg.write_frames(
-        str(path),
-        size,
+    writer = imageio.get_writer(
+        str(path.absolute()),
+        # imageio writes a gif or webp by a writer that holds all frames in memory; its writer of videos holds one.
+        format=".mp4",
+        mode="I",
         fps=fps,
-        codec="libx264",
-        pix_fmt_out="yuv420p",
-        quality=None,
         macro_block_size=2,
-        output_params=["-crf", CRF, "-preset", "veryfast", "-movflags", "+faststart"],
+        ffmpeg_log_level="error",
+        **_ENCODERS[path.suffix.lower()],
     )
-    stream.send(None)
-    try:
+    with closing(writer):
         for frame in frames:
-            stream.send(frame.tobytes())
-    finally:
-        stream.close()
+            writer.append_data(np.asarray(frame))
 
 
-def _write_pillow(frames: Iterable[Image.Image], path: Path, fps: float) -> None:
-    duration = max(20, round(100.0 / fps) * 10)
-    pictures: Iterator[Image.Image] = iter(frames)
-    options: dict[str, object] = {"save_all": True, "duration": duration, "loop": 0}
-    if path.suffix.lower() == ".gif":
-        # One palette per frame: a shared one of the first frame lacks the colours of cracks that open later.
-        pictures = (
-            picture.quantize(method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE) for picture in pictures
-        )
-        options["optimize"] = False
-    else:
-        options |= {"quality": 80, "method": 2}
-    first = next(pictures)
-    first.save(path, append_images=pictures, **options)
+def _reaches_its_end(path: Path) -> bool:
+    """Whether a film ends where its format says it does: imageio does not hear of an encoder that stops at the end."""
+    size = path.stat().st_size
+    with path.open("rb") as film:
+        if path.suffix.lower() == ".gif":
+            film.seek(max(size - 1, 0))
+            return film.read() == b";"
+        if path.suffix.lower() == ".webp":
+            return int.from_bytes(film.read(8)[4:], "little") + 8 == size
+        # The boxes of an mp4, of which "moov" says where the frames are.
+        at, boxes = 0, set()
+        while at < size:
+            film.seek(at)
+            length, name = int.from_bytes(film.read(4), "big"), film.read(4)
+            at += int.from_bytes(film.read(8), "big") if length == 1 else max(length, 8)
+            boxes.add(name)
+    return at == size and b"moov" in boxes
+
+
+def _not_written(path: Path, error: OSError | None) -> OSError:
+    """What to say of a film that could not be written; the encoder itself tells only that it stopped."""
+    if shutil.disk_usage(path.parent).free < FULL_DISK:
+        return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+    reason = str(error).strip().partition("\n")[0] if error else "the encoder stopped before its end"
+    return OSError(f"'{path}' could not be written: {reason}")

@@ -15,6 +15,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from blockvis.extras import require
 from blockvis.runs.progress import StudyProgress
 
 from .run_one import failed_row, run_once
@@ -77,6 +78,8 @@ def study(
         For bad input or a scheduler that does not answer, before anything is started.
     ConnectionError
         If the scheduler or all workers are lost; finished runs are kept, and the same call continues.
+    MissingExtra
+        If the packages of the extra ``studies`` are not installed, before anything is started.
 
     Notes
     -----
@@ -119,6 +122,7 @@ def run_study(
     """
     if "__mp_main__" in sys.modules and multiprocessing.parent_process() is not None:
         raise SystemExit('blockvis: in a script, call blockvis.study under: if __name__ == "__main__":')
+    require("studies", "studies")
     plan = source if isinstance(source, Study) else read_study(source)
     if workers is not None and workers < 1:
         raise ValueError(f"workers is {workers}; give at least 1")

@@ -36,6 +36,7 @@ ORDER = (
     "blockvis.layout",
     "blockvis.suggestions",
     "blockvis.video_suffixes",
+    "blockvis.extras",
     "blockvis.numbers",
     "blockvis.vtk_files",
     "blockvis.atomic_files",

@@ -1,0 +1,60 @@
+"""Packages that only some verbs need, and the command that installs them."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+#: What each extra of pyproject.toml makes importable.
+EXTRAS: dict[str, tuple[str, ...]] = {
+    "studies": ("dask", "distributed", "pandas", "pyarrow", "SALib", "tomli_w"),
+    "cad": ("gmsh",),
+}
+
+
+class MissingExtra(ImportError):
+    """Packages of an extra are not installed; the message names them and the command that installs them."""
+
+
+def install_command(extra: str) -> str:
+    """Name the command that adds an extra to an installed blockvis.
+
+    Parameters
+    ----------
+    extra : str
+        A key of :data:`EXTRAS`.
+
+    Returns
+    -------
+    str
+    """
+    return f"pip install 'blockvis[{extra}]'"
+
+
+def require(extra: str, needed_by: str) -> None:
+    """Check that the packages of an extra are installed, without importing them.
+
+    Parameters
+    ----------
+    extra : str
+        A key of :data:`EXTRAS`.
+    needed_by : str
+        Subject of the message, in the plural.
+
+    Raises
+    ------
+    MissingExtra
+        If a package is not installed.
+    """
+    missing = [name for name in EXTRAS[extra] if not _is_installed(name)]
+    if missing:
+        raise MissingExtra(
+            f"{needed_by} need {', '.join(missing)}, which this environment lacks; "
+            f"install with: {install_command(extra)}"
+        )
+
+
+def _is_installed(name: str) -> bool:
+    try:
+        return find_spec(name) is not None
+    except ImportError:
+        return False

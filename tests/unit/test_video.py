@@ -1,0 +1,82 @@
+"""Films: their frames, their memory, and what is said and left where one cannot be written."""
+
+import weakref
+
+import imageio.v2 as imageio
+import numpy as np
+import pytest
+from PIL import Image
+
+from blockvis.pictures import video
+from blockvis.pictures.video import write_film
+from blockvis.video_suffixes import VIDEO_SUFFIXES
+
+SIZE = (128, 72)
+
+#: The colours of the frames, one after another.
+COLOURS = [(250, 250, 250), (200, 30, 30), (30, 160, 60), (40, 60, 200), (10, 10, 10)]
+
+
+def frames(seen=None):
+    for colour in COLOURS:
+        picture = Image.new("RGB", SIZE, colour)
+        if seen is not None:
+            seen.append(weakref.ref(picture))
+        yield picture
+
+
+@pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)
+def test_a_film_holds_its_frames_in_order(tmp_path, suffix):
+    path = write_film(frames(), tmp_path / f"film{suffix}", size=SIZE, fps=10.0)
+    with imageio.get_reader(path) as film:
+        found = [np.asarray(frame)[..., :3] for frame in film]
+    assert len(found) == len(COLOURS)
+    for frame, colour in zip(found, COLOURS, strict=True):
+        assert frame.shape == (SIZE[1], SIZE[0], 3)
+        # mp4 and webp keep brightness and colour apart, rounded each.
+        assert np.abs(frame.astype(int) - colour).max() <= 6, colour
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)
+def test_frames_are_forgotten_when_they_are_written(tmp_path, suffix):
+    seen, alive = [], []
+
+    def watched():
+        for picture in frames(seen):
+            alive.append(sum(ref() is not None for ref in seen))
+            yield picture
+
+    write_film(watched(), tmp_path / f"film{suffix}", size=SIZE, fps=10.0)
+    assert len(alive) == len(COLOURS)
+    assert max(alive) <= 2, alive
+
+
+@pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)
+def test_a_film_without_its_end_is_not_kept(tmp_path, monkeypatch, suffix):
+    """An encoder that the system ends, or that finds the disk full at the end, does not say so to imageio."""
+    encode = video._encode
+
+    def cut_off(given, path, fps):
+        encode(given, path, fps)
+        path.write_bytes(path.read_bytes()[:-5])
+
+    (tmp_path / f"film{suffix}").write_bytes(b"the film before")
+    monkeypatch.setattr(video, "_encode", cut_off)
+    with pytest.raises(OSError, match=r"could not be written: the encoder stopped before its end"):
+        write_film(frames(), tmp_path / f"film{suffix}", size=SIZE, fps=10.0)
+    monkeypatch.setattr(video, "FULL_DISK", float("inf"))
+    with pytest.raises(OSError, match=r"No space left on device"):
+        write_film(frames(), tmp_path / f"film{suffix}", size=SIZE, fps=10.0)
+    assert [p.read_bytes() for p in tmp_path.iterdir()] == [b"the film before"]
+
+
+@pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)
+def test_what_fails_while_drawing_leaves_no_half_film(tmp_path, suffix):
+    def failing():
+        yield from frames()
+        raise ValueError("this frame cannot be drawn")
+
+    with pytest.raises(ValueError, match="this frame cannot be drawn"):
+        write_film(failing(), tmp_path / f"film{suffix}", size=SIZE, fps=10.0)
+    assert not list(tmp_path.iterdir())
