@@ -50,7 +50,7 @@ FULL_DISK = 2**20
 def write_film(
     frames: Iterable[Image.Image], path: str | os.PathLike[str], *, size: tuple[int, int], fps: float
 ) -> Path:
-    """Writes frames as a film, whole or not at all.
+    """Write frames as a film, whole or not at all.
 
     Parameters
     ----------
@@ -66,6 +66,13 @@ def write_film(
     Returns
     -------
     pathlib.Path
+
+    Raises
+    ------
+    ValueError
+        For a suffix or a size that cannot be written.
+    OSError
+        If the disk is full, or the encoder stops before its end.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -104,7 +111,7 @@ def _encode(frames: Iterable[Image.Image], path: Path, fps: float) -> None:
 
 
 def _reaches_its_end(path: Path) -> bool:
-    """Whether a film ends where its format says it does: imageio does not hear of an encoder that stops at the end."""
+    """Whether a film ends where its format says it does: imageio gets no error of an encoder that stops at the end."""
     size = path.stat().st_size
     with path.open("rb") as film:
         if path.suffix.lower() == ".gif":
@@ -123,7 +130,7 @@ def _reaches_its_end(path: Path) -> bool:
 
 
 def _not_written(path: Path, error: OSError | None) -> OSError:
-    """What to say of a film that could not be written; the encoder itself tells only that it stopped."""
+    """Make the error for a film that could not be written; the encoder itself only says that it stopped."""
     if shutil.disk_usage(path.parent).free < FULL_DISK:
         return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
     reason = str(error).strip().partition("\n")[0] if error else "the encoder stopped before its end"
