@@ -19,9 +19,17 @@ import solver
 if TYPE_CHECKING:
     from .cases.case import Case as Case
     from .cases.case import read_case as read_case
+    from .formats.read import inspect as inspect
     from .formats.read import read as read
+    from .formats.read import read_layout as read_layout
     from .formats.read import save_layout as save_layout
+    from .formats.read import write_layout as write_layout
+    from .pictures.curves import draw_curve as draw_curve
     from .pictures.render import animate as animate
+    from .pictures.render import draw_mechanism as draw_mechanism
+    from .pictures.render import draw_still as draw_still
+    from .report.notebook import show as show
+    from .report.page import write_report as write_report
     from .runs.reopen import open_results as open_results
     from .runs.run import run_case as run_case
     from .runs.write import write as write

@@ -75,7 +75,7 @@ class BlockvisAccessor:
         direction: tuple[float, float] = (0.0, -1.0),
         increment: float = 0.01,
         limit: float = 0.5,
-        friction_coefficient: float = 0.6,
+        friction_coefficient: float = solver.InterfaceLaw.friction_coefficient,
         **options: Any,
     ) -> solver.Response:
         """Move the moving supports until the structure collapses.

@@ -162,7 +162,7 @@ def _checked(case: Case, settings: Mapping[str, Any]) -> Case:
     return KINDS[case.analysis].checked(case)
 
 
-def _friction(table: Table, default: float | None = 0.6) -> float:
+def _friction(table: Table, default: float | None = solver.InterfaceLaw.friction_coefficient) -> float:
     value = table.number("friction_coefficient", default)
     if value is None:
         raise table.error("friction_coefficient", "is missing")

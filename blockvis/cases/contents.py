@@ -43,7 +43,7 @@ class Case:
     supports: tuple[Mapping[str, Any], ...] = ()
     density: float | None = None
     densities: Mapping[str, float] = field(default_factory=dict)
-    friction_coefficient: float = 0.6
+    friction_coefficient: float = solver.InterfaceLaw.friction_coefficient
     cohesion: float = 0.0
     compressive_strength: float = math.inf
     interfaces: Mapping[tuple[str, str], solver.InterfaceLaw] = field(default_factory=dict)

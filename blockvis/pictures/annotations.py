@@ -20,7 +20,7 @@ WIDEST_STANDING, WIDEST_FALLING, STEEPEST_FALLING = 1.5, 0.6, 1.0
 #: (what is smaller is rounding) up to that: where several cracks meet.
 SMALLEST_POCKET, LARGEST_POCKET = 1e-5, 2.0
 
-#: Faces count as one joint of the drawing when they are apart by at most this fraction of the block size.
+#: Faces count as one initial joint when they are apart by at most this fraction of the block size.
 TOUCHING = 2e-3
 
 #: Faces count as parallel up to this sine.
@@ -59,16 +59,16 @@ def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndar
 
 
 @dataclass(frozen=True)
-class DrawnJoints:
-    """Pairs of faces that touch in the drawing.
+class InitialJoints:
+    """Pairs of faces that touch in the layout.
 
     Attributes
     ----------
     block_a, block_b : (n_joints,) int arrays
     ends : (n_joints, 2, 2) array [m]
-        Both ends of the common length, where the drawing has them.
+        Both ends of the common length, where the layout has them.
     normals : (n_joints, 2) array
-        Unit normal in the drawing, from ``block_b`` into ``block_a``.
+        Unit normal in the layout, from ``block_b`` into ``block_a``.
     """
 
     block_a: np.ndarray
@@ -101,8 +101,8 @@ class Marks:
     hinges: np.ndarray
 
 
-def drawn_joints(assembly: solver.Assembly) -> DrawnJoints:
-    """Find the faces that touch in the drawing; where they part later there is a crack."""
+def initial_joints(assembly: solver.Assembly) -> InitialJoints:
+    """Find the faces that touch in the layout; where they part later there is a crack."""
     tolerance = TOUCHING * assembly.block_size
     contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * tolerance)
     touching = np.abs(contacts.gaps) <= tolerance
@@ -126,16 +126,18 @@ def drawn_joints(assembly: solver.Assembly) -> DrawnJoints:
     keep &= (lean < PARALLEL) & (across.min(axis=1) <= 2.0 * tolerance) & (along[:, 0] > along[:, 1])
     ends = np.stack([start + low[:, None] * tangent, start + high[:, None] * tangent], axis=1)
     owner = assembly.block_of_vertex
-    return DrawnJoints(owner[a][keep], owner[b][keep], ends[keep], normal[keep])
+    return InitialJoints(owner[a][keep], owner[b][keep], ends[keep], normal[keep])
 
 
-def marks_of(assembly: solver.Assembly, joints: DrawnJoints, increment: solver.Increment, shown: solver.Pose) -> Marks:
+def marks_of(
+    assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment, shown: solver.Pose
+) -> Marks:
     """Cracks, sliding joints and hinges of an increment, on blocks shown at a pose.
 
     Parameters
     ----------
     assembly : solver.Assembly
-    joints : DrawnJoints
+    joints : InitialJoints
     increment : solver.Increment
         Its mechanism has the hinges and sliding joints.
     shown : solver.Pose
@@ -197,14 +199,14 @@ def length_per_force(sizes: np.ndarray, largest: float, usual_length: float, ext
 
 
 def _cracks(
-    assembly: solver.Assembly, joints: DrawnJoints, pose: solver.Pose, shown: solver.Pose, falling: bool
+    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, shown: solver.Pose, falling: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Quadrilaterals of the open joints, their openings [m], and the blocks beside them."""
-    drawn = solver.Pose.initial(assembly)
+    initial = solver.Pose.initial(assembly)
 
     def sides(at: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
-        on_a = np.stack([solver.carried(joints.ends[:, k], joints.block_a, drawn, at) for k in (0, 1)], axis=1)
-        on_b = np.stack([solver.carried(joints.ends[:, k], joints.block_b, drawn, at) for k in (0, 1)], axis=1)
+        on_a = np.stack([solver.carried(joints.ends[:, k], joints.block_a, initial, at) for k in (0, 1)], axis=1)
+        on_b = np.stack([solver.carried(joints.ends[:, k], joints.block_b, initial, at) for k in (0, 1)], axis=1)
         return on_a, on_b
 
     on_a, on_b = sides(pose)
@@ -248,13 +250,13 @@ def _pockets(
     ]
     if not holes:
         return ()
-    # Openings of the drawing are no pockets, nor are places where blocks without a crack stand.
+    # Openings of the layout are no pockets, nor are places where blocks without a crack stand.
     tree = shapely.STRtree([shapely.Polygon(outline) for outline in blocks])
-    drawn = shapely.STRtree([shapely.Polygon(assembly.outline(b)) for b in range(assembly.n_blocks)])
+    laid_out = shapely.STRtree([shapely.Polygon(assembly.outline(b)) for b in range(assembly.n_blocks)])
     pockets = []
     for hole in holes:
         inside = hole.representative_point()
-        if len(tree.query(inside, predicate="intersects")) == 0 and len(drawn.query(inside, predicate="intersects")):
+        if len(tree.query(inside, predicate="intersects")) == 0 and len(laid_out.query(inside, predicate="intersects")):
             pockets.append(shapely.get_coordinates(hole)[:-1])
     return tuple(pockets)
 

@@ -14,7 +14,15 @@ import solver
 from blockvis.numbers import force_text, rounded_length
 
 from . import palette
-from .annotations import SMALLEST_RESULTANT, Marks, drawn_joints, length_per_force, marks_of, part_outlines, resultants
+from .annotations import (
+    SMALLEST_RESULTANT,
+    Marks,
+    initial_joints,
+    length_per_force,
+    marks_of,
+    part_outlines,
+    resultants,
+)
 from .captions import badge_of, matters, state_text
 from .curves import CurvePanel
 from .flat_scene import Scene, magnified
@@ -137,7 +145,7 @@ class Drawer:
             look = replace(look, forces="thrust" if few else "none")
         self.response, self.look, self.increments = response, look, increments
         assembly = self.assembly = response.assembly
-        self.joints = drawn_joints(assembly)
+        self.joints = initial_joints(assembly)
         self._seen = _Seen(sampled=_sampled([k for k, i in enumerate(increments) if matters(i, response)]))
         frame = framed(assembly, chain([solver.Pose.initial(assembly)], self._surveyed(), extra))
         self.largest = self._seen.largest

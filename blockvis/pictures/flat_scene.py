@@ -26,7 +26,7 @@ DEPTHS = {
 
 
 def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:
-    """Multiply the displacements and rotations of a pose since the drawing."""
+    """Multiply the displacements and rotations of a pose since the layout."""
     if magnification == 1.0:
         return pose
     start = assembly.centroids

@@ -290,7 +290,7 @@ def framed(
     margin : float
         Empty border, as a fraction of the larger dimension.
     supports : float
-        Supports are shown as far as this fraction of the larger dimension beyond the free blocks; drawings have
+        Supports are shown as far as this fraction of the larger dimension beyond the free blocks; layouts have
         supports of any extent.
     """
     free = assembly.free[assembly.block_of_vertex]

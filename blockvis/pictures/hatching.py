@@ -53,7 +53,7 @@ def hatch_lines(
     Returns
     -------
     ends : (2 n, 2) array [m]
-        Both ends of each line, in the drawing.
+        Both ends of each line, as laid out.
     blocks : (2 n,) int array
         The support of each end.
     """

@@ -57,7 +57,7 @@ def draw_inspection(inspection: Inspection, path: str | Path) -> Path:
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
-    axes.set_title(Path(layout.source).name or "drawing")
+    axes.set_title(Path(layout.source).name or "layout")
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.06), ncols=5, frameon=False)
     figure.savefig(path, dpi=150)
     return Path(path)

@@ -26,7 +26,7 @@ from blockvis.pictures.annotations import (
     STEEPEST_FALLING,
     WIDEST_FALLING,
     WIDEST_STANDING,
-    drawn_joints,
+    initial_joints,
     joint_places,
     length_per_force,
     resultants,
@@ -199,7 +199,7 @@ def _rounded(values: np.ndarray, unit: float) -> np.ndarray:
 
 
 def _packed_geometry(assembly: solver.Assembly, origin: np.ndarray, unit: float) -> dict[str, Any]:
-    joints = drawn_joints(assembly)
+    joints = initial_joints(assembly)
     n = len(joints.block_a)
     return {
         "vertices": _deflated(_rounded(assembly.vertices - origin, unit), len(assembly.vertices)),

@@ -22,7 +22,7 @@ def block_dataset(assembly: solver.Assembly, increment: solver.Increment | None 
     ----------
     assembly : solver.Assembly
     increment : solver.Increment, optional
-        The drawing by default.
+        The blocks as laid out by default.
 
     Returns
     -------

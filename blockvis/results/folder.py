@@ -258,7 +258,7 @@ def _stored_assembly(folder: Path) -> solver.Assembly:
     try:
         stored = checked_arrays(folder / "assembly.npz")
         offsets = stored["offsets"].tolist()
-        # Checked like a drawing: the file may come from anywhere.
+        # Checked like a layout: the file may come from anywhere.
         return solver.Assembly.from_outlines(
             [stored["vertices"][first:last] for first, last in pairwise(offsets)],
             names=list(map(str, stored["names"])),

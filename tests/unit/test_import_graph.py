@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+import blockvis
 from blockvis.formats import FORMATS
 
 ROOT = Path(__file__).parents[2]
@@ -149,3 +150,12 @@ def test_solver_never_imports_blockvis_and_blockvis_takes_public_names_of_solver
             assert not [name for name in names if name.startswith("blockvis")], module
         else:
             assert not [name for name in names if name.startswith("solver.")], module
+
+
+def test_type_checkers_see_every_public_name_where_it_lives():
+    seen = {}
+    for node in ast.parse(FILES["blockvis"].read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.If):
+            seen |= {alias.asname: part.module for part in ast.walk(node) if isinstance(part, ast.ImportFrom)
+                     for alias in part.names}  # fmt: skip
+    assert seen == blockvis._HOMES
