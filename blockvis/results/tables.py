@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -55,6 +56,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
     """
     path, collapse = response.path, response.collapse
     worst = solver.worst_of(i.certificate for i in path)
+    residuals = {f.name: getattr(worst, f.name, math.nan) for f in fields(solver.Certificate)}
     return {
         "status": str(response.stop),
         "message": response.message,
@@ -77,7 +79,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "n_increments": len(path),
         "n_falling_frames": len(response.increments) - len(path),
         "n_programs": sum(i.programs for i in response.increments),
-        "largest_residuals": {f.name: getattr(worst, f.name, None) for f in fields(solver.Certificate)},
+        "largest_residuals": {name: value if math.isfinite(value) else None for name, value in residuals.items()},
         "seconds": seconds,
         "finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "versions": record.versions,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
@@ -32,8 +33,11 @@ class Certificate:
 
 
 def worst_of(certificates: Iterable[Certificate]) -> Certificate | None:
-    """Largest of each measure over some increments; None where there are none."""
+    """Largest of each measure over some increments, nan where none has it; None without an increment."""
     found = tuple(certificates)
     if not found:
         return None
-    return Certificate(*(max(getattr(one, field.name) for one in found) for field in fields(Certificate)))
+    measures = ((getattr(one, field.name) for one in found) for field in fields(Certificate))
+    return Certificate(
+        *(max((value for value in values if not math.isnan(value)), default=math.nan) for values in measures)
+    )

@@ -62,3 +62,13 @@ def test_no_results(tmp_path):
 def test_refuses_to_overwrite(response, folder):
     with pytest.raises(ValueError, match="holds results already"):
         blockvis.write(response, folder)
+
+
+def test_the_worst_of_some_certificates_passes_over_what_was_not_worked_out():
+    first = solver.Certificate(1e-9, 3e-8, np.nan, np.nan, 0.0)
+    second = solver.Certificate(2e-9, 1e-8, 4e-12, np.nan, 0.0)
+    for pair in ((first, second), (second, first)):
+        worst = solver.worst_of(pair)
+        assert (worst.equilibrium_residual, worst.largest_penetration, worst.duality_gap) == (2e-9, 3e-8, 4e-12)
+        assert np.isnan(worst.complementarity)
+    assert solver.worst_of([]) is None
