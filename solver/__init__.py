@@ -13,9 +13,11 @@ This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 """
 
 from .analysis.checkpoint import Checkpoint, PushoverCheckpoint
+from .analysis.controls import INCREMENTS, Controls, Ending
+from .analysis.drivers import ControlDisplacement
 from .analysis.limit_load import limit_load, limit_load_envelope
-from .analysis.pushover import ControlDisplacement, pushover, pushover_increments
-from .analysis.settlement import Controls, Ending, check_settlement, settle, settlement_increments
+from .analysis.pushover import pushover, pushover_increments
+from .analysis.settlement import check_settlement, settle, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly, find_contacts, measure_contacts
 from .equilibrium import block_forces
 from .geometry.contacts import Contacts
@@ -49,6 +51,7 @@ __all__ = [
     "FIXED",
     "FREE",
     "GRAVITY",
+    "INCREMENTS",
     "LOAD_MULTIPLIER",
     "LOAD_POSITION",
     "MOVING",

@@ -53,7 +53,23 @@ ROUNDED_OFF = 1e-5
 #: Balance of a light block, of its own weight.
 LIGHT_BALANCE = 1e-3
 
+# Of forces along the path: fractions of a block's weight.
+
+#: A load along the movement of the supports: symmetric structures leave their unstable, symmetric path by it and not by
+#: rounding. Far above rounding, far below what anything notices.
+IMPERFECTION = 1e-7
+
+#: Drag: what resists a block that moves as fast as the supports. It makes the motion of a wall unique: of several
+#: mechanisms that would do, the one that moves least weight. Forces are reported without it. With a tenth of it the
+#: give of the joints chooses between the hinges of the portal in ``examples``; reactions of walls stay the same.
+DRAG = 1e-2
+
 # Of positions: fractions of the block size.
+
+#: Elastic give of a contact point under the mean block weight, across the joint and along it: what makes the forces of
+#: a wall unique and gives them a memory. It is taken back within each step, so that it stays out of the geometry. With
+#: a third or three times of the second, α of a settled wall moved by one per cent, its reaction by a thousandth.
+GIVE_ACROSS, GIVE = 3e-7, 3e-5
 
 #: Coordinates, added up and taken off again.
 COORDINATE_ROUNDING = 1e-12

@@ -298,5 +298,11 @@ def _controls(table: Table, overlap_tolerance: float | None) -> solver.Controls:
         if value > MOST_STEPS:
             raise table.error(key, f"is {value:g}; give at most {MOST_STEPS}")
         counts[key] = int(value)
-    trust_region = table.number("trust_region", positive=True)
-    return solver.Controls(trust_region=trust_region, overlap_tolerance=overlap_tolerance, **counts)
+    return solver.Controls(
+        increments=table.text("increments", default.increments, among=solver.INCREMENTS),
+        overlap_tolerance=overlap_tolerance,
+        falling_frames=counts["falling_frames"],
+        trust_region=table.number("trust_region", positive=True),
+        event_refinement=counts["event_refinement"],
+        correctors=counts["correctors"],
+    )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,9 +13,7 @@ from solver.kinematics import (
     Pose,
     motion_size,
     moved,
-    point_velocities,
     relative_velocities,
-    rotation_matrices,
     unit_lengths,
 )
 from solver.loads import Loads
@@ -30,8 +28,11 @@ from solver.results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER
 from solver.results.response import Collapse, Response
 
 from .checkpoint import PushoverCheckpoint, PushoverPlace
+from .controls import COULOMB, Controls, Ending
+from .coulomb_path import pushover_path
+from .drivers import ControlDisplacement
 from .limit_load import checked_live
-from .settlement import Controls, Ending, drained, timed
+from .settlement import drained, timed
 
 #: The mechanism has changed within an increment when its velocities, weighted by mass and taken as a unit vector,
 #: differ by this much. With 0.05 the curve of a wall of 33 bricks that rocks depended on the increment by 0.2 %, with
@@ -50,77 +51,6 @@ LONGEST_RETREAT = 100
 #: Steps by which the end of an increment is brought to the wanted control displacement, and the accuracy wanted, in
 #: block sizes.
 AIMS, AIM_TOLERANCE = 6, 1e-10
-
-
-@dataclass(frozen=True)
-class ControlDisplacement:
-    """The displacement that is made to grow in a pushover analysis.
-
-    Attributes
-    ----------
-    block : str
-        Name of a free block.
-    direction : (2,) sequence
-        Direction in which the displacement counts; only its direction matters.
-    point : (2,) sequence, optional [m]
-        A point of the block, in the drawing; its centroid by default.
-    increment : float [m]
-        Largest step.
-    limit : float [m]
-        Where to stop if capacity is left.
-    tolerance : float, optional [m]
-        Width of the bracket of the displacement at zero capacity; a hundredth of the increment by default.
-    """
-
-    block: str
-    direction: Sequence[float] = (1.0, 0.0)
-    point: Sequence[float] | None = None
-    increment: float = 0.01
-    limit: float = 1.0
-    tolerance: float | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("direction", "point"):
-            value = getattr(self, name)
-            if value is None:
-                continue
-            pair = np.asarray(value, dtype=float)
-            if pair.shape != (2,) or not np.isfinite(pair).all():
-                raise ValueError(f"control {name} is {value!r}; give two finite numbers [x, y]")
-            object.__setattr__(self, name, (float(pair[0]), float(pair[1])))
-        length = float(np.hypot(self.direction[0], self.direction[1]))
-        if length == 0.0:
-            raise ValueError("control direction is [0, 0]; give the direction in which the displacement counts")
-        object.__setattr__(self, "direction", (self.direction[0] / length, self.direction[1] / length))
-        if self.tolerance is None:
-            object.__setattr__(self, "tolerance", self.increment / 100.0)
-        for name in ("increment", "limit", "tolerance"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ValueError(f"control {name} is {value:g}; it must be a positive number")
-
-    @property
-    def unit(self) -> str:
-        """Unit of the control displacement."""
-        return "m"
-
-    def displacement(self, assembly: Assembly, pose: Pose) -> float:
-        """Control displacement at a pose [m]."""
-        block, arm = self._place(assembly)
-        turned = rotation_matrices(pose.rotations[[block]])[0] @ arm
-        moved_by = pose.positions[block] + turned - assembly.centroids[block] - arm
-        return float(moved_by @ np.asarray(self.direction))
-
-    def speed(self, assembly: Assembly, pose: Pose, velocity: np.ndarray) -> float:
-        """Rate of the control displacement in a velocity (n_blocks, 3) of the blocks."""
-        block, arm = self._place(assembly)
-        point = pose.positions[[block]] + arm @ rotation_matrices(pose.rotations[[block]])[0].T
-        return float((point_velocities(point, np.array([block]), pose, velocity) @ np.asarray(self.direction))[0])
-
-    def _place(self, assembly: Assembly) -> tuple[int, np.ndarray]:
-        block = assembly.index(self.block)
-        arm = np.zeros(2) if self.point is None else np.asarray(self.point) - assembly.centroids[block]
-        return block, arm
 
 
 def pushover(
@@ -234,6 +164,10 @@ def pushover_increments(
             f"the checkpoint has {len(resume.here.pose.rotations)} blocks, the assembly {assembly.n_blocks}: it "
             "belongs to another run"
         )
+    if controls.increments == COULOMB:
+        if resume is not None:
+            raise ValueError("increments = 'coulomb' cannot go on from a checkpoint; start the analysis again")
+        return (yield from timed(pushover_path(assembly, control, loads, interfaces, controls, pose)))
     model = _model(assembly, control, interfaces, loads, controls)
     return (yield from timed(_increments(model, control, controls, pose, resume)))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,6 +31,8 @@ from solver.results.response import Collapse, Response
 from solver.tolerances import FARTHEST_FALL, JUMP, OVERLAP
 
 from .checkpoint import Checkpoint, Note, Place
+from .controls import COULOMB, Controls, Ending
+from .coulomb_path import settlement_path
 from .local_fall import jump_words, snapped
 from .local_origin import at_origin, told_from, without_origin
 
@@ -52,40 +54,6 @@ SNAPS = 100
 
 #: Step by which a reaction is read off at the last equilibrium, in block sizes.
 PROBE = 1e-6
-
-
-@dataclass(frozen=True)
-class Controls:
-    """How the increment loop proceeds; the defaults suit everything we have tried.
-
-    Attributes
-    ----------
-    trust_region : float, optional [m]
-        Largest movement of a block in one program; the block size, or ten increments where that is more.
-    overlap_tolerance : float, optional [m]
-        Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
-    event_refinement : int
-        Where the mechanism changes, the increment is taken again in steps down to one part in so many.
-    correctors : int
-        Largest number of corrections within an increment.
-    falling_frames : int
-        Frames of the fall after collapse.
-    """
-
-    trust_region: float | None = None
-    overlap_tolerance: float | None = None
-    event_refinement: int = 8
-    correctors: int = 25
-    falling_frames: int = 40
-
-
-@dataclass(frozen=True)
-class Ending:
-    """How an increment loop ended: the value its generator returns."""
-
-    stop: Status
-    message: str = ""
-    collapse: Collapse | None = None
 
 
 class _NotHere(Falls):
@@ -199,6 +167,12 @@ def settlement_increments(
             f"{len(phases)} phases and {assembly.n_blocks} blocks: it belongs to another run"
         )
     origin = at_origin(assembly)
+    if controls.increments == COULOMB:
+        if resume is not None:
+            raise ValueError("increments = 'coulomb' cannot go on from a checkpoint; start the analysis again")
+        near, local = (assembly, phases) if not origin.any() else without_origin(origin, assembly, phases)
+        steps = timed(settlement_path(near, local, interfaces, loads, controls))
+        return (yield from (told_from(steps, origin) if origin.any() else steps))
     if not origin.any():
         model = _model(assembly, phases, interfaces, loads, controls)
         return (yield from timed(_increments(model, phases, controls, resume)))

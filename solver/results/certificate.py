@@ -23,6 +23,10 @@ class Certificate:
         Σ force · distance from sliding or opening over all contact points, relative like the gap.
     kinematic_violation : float
         Largest violation of N + g ≥ μ|T|, relative to the block size.
+    energy_residual : float
+        Work of the loads since the start of the phase, less the work done on the supports and that of friction,
+        relative to the three: what drag, give and the steps have taken. 0 where it was not worked out: in falls, and by
+        the linear program.
     """
 
     equilibrium_residual: float
@@ -30,6 +34,7 @@ class Certificate:
     duality_gap: float
     complementarity: float
     kinematic_violation: float
+    energy_residual: float = 0.0
 
 
 def worst_of(certificates: Iterable[Certificate]) -> Certificate | None:

@@ -140,6 +140,11 @@ class Increment:
         Time spent on this increment.
     held : State or StoredState
         The arrays, in memory or in a file; :attr:`state` has them in any case.
+    least, largest : float
+        Bounds of what is measured over all forces in equilibrium within friction at this pose; infinite where friction
+        sets none, nan where they were not worked out.
+    at_rest, onset : float [N or N·m]
+        Of the first increment of a settlement: reaction of the structure at rest, and once it has begun to move.
     notes : tuple of str
         Events on the way to it that forces and poses do not show: blocks that fell and were caught.
     checkpoint : optional
@@ -157,6 +162,10 @@ class Increment:
     programs: int
     seconds: float
     held: State | StoredState = field(repr=False, compare=False)
+    least: float = field(default=np.nan, compare=False)
+    largest: float = field(default=np.nan, compare=False)
+    at_rest: float = field(default=np.nan, compare=False)
+    onset: float = field(default=np.nan, compare=False)
     notes: tuple[str, ...] = ()
     checkpoint: Any = field(default=None, repr=False, compare=False)
 

@@ -141,7 +141,8 @@ def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_a_study_that_is_killed_and_interrupted_goes_on(arches, tmp_path):
-    """Killed without warning by SIGKILL, then by Ctrl-C."""
+    """Killed without warning by SIGKILL, then by Ctrl-C; so many runs that none of both comes after the last."""
+    arches.write_text(STUDY.replace("runs = 24", "runs = 120"), encoding="utf-8")
     out, command = tmp_path / "out", [sys.executable, "-m", "blockvis", "sweep", "study.toml", "-o", "out"]
 
     def stopped(by, after):
@@ -160,14 +161,14 @@ def test_a_study_that_is_killed_and_interrupted_goes_on(arches, tmp_path):
     assert code == -signal.SIGKILL
     code, message = stopped(signal.SIGINT, 6)
     assert code == 130
-    assert re.fullmatch(r"blockvis: interrupted; \d+ of 24 runs are kept, .* goes on with the others\n", message)
+    assert re.fullmatch(r"blockvis: interrupted; \d+ of 120 runs are kept, .* goes on with the others\n", message)
     done = (out / "runs.jsonl").read_bytes()
-    assert 6 <= done.count(b"\n") < 24
+    assert 6 <= done.count(b"\n") < 120
     assert len(pd.read_csv(out / "table.csv")) == done.count(b"\n"), "the table is there too"
     assert main(["sweep", str(arches), "-o", str(out), "--workers", "2"]) == 0
     rows = (out / "runs.jsonl").read_bytes()
     assert rows.startswith(done)
-    assert rows.count(b"\n") == 24, "finished runs are not made again"
+    assert rows.count(b"\n") == 120, "finished runs are not made again"
 
 
 def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tmp_path, capsys, scheduler):

@@ -1,0 +1,60 @@
+"""How an increment loop proceeds, and how it ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from solver.results.increment import Status
+from solver.results.response import Collapse
+
+#: How increments are found: along the path that Coulomb friction leaves, or by the paper's linear program.
+COULOMB, LINEAR_PROGRAM = "coulomb", "linear program"
+INCREMENTS = (LINEAR_PROGRAM, COULOMB)
+
+
+@dataclass(frozen=True)
+class Controls:
+    """How the increment loop proceeds; the defaults suit everything we have tried.
+
+    Attributes
+    ----------
+    increments : {"linear program", "coulomb"}
+        The method of Portioli & Cascini (2017), a linear program per increment, or the path that Coulomb friction
+        leaves, which depends on neither description nor rounding where many joints slide. A path is not resumed.
+    overlap_tolerance : float, optional [m]
+        Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
+    falling_frames : int
+        Frames of the fall after collapse.
+    trust_region : float, optional [m]
+        Of the linear program: largest movement of a block; the block size, or ten increments where that is more.
+    event_refinement : int
+        Of the linear program: where the mechanism changes, the increment is taken again in steps down to one part in so
+        many.
+    correctors : int
+        Of the linear program: largest number of corrections within an increment.
+
+    Raises
+    ------
+    ValueError
+        For an unknown way to find increments.
+    """
+
+    increments: str = LINEAR_PROGRAM
+    overlap_tolerance: float | None = None
+    falling_frames: int = 40
+    trust_region: float | None = None
+    event_refinement: int = 8
+    correctors: int = 25
+
+    def __post_init__(self) -> None:
+        if self.increments not in INCREMENTS:
+            raise ValueError(f"increments is '{self.increments}'; it is 'linear program' or 'coulomb'")
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How an increment loop ended: the value its generator returns."""
+
+    stop: Status
+    message: str = ""
+    collapse: Collapse | None = None

@@ -1,0 +1,221 @@
+"""What drives a path: supports that move, or a control displacement that grows under a live load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from solver.assembly import Assembly
+from solver.kinematics import Pose, moved_vertices, point_velocities, rotation_matrices
+from solver.loads import Settlement
+
+
+class Driver(Protocol):
+    """The one parameter of a path: what it moves, how far, and in which steps."""
+
+    @property
+    def increment(self) -> float: ...
+    @property
+    def limit(self) -> float: ...
+    @property
+    def tolerance(self) -> float: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def what(self) -> str:
+        """The parameter in words."""
+        ...
+
+    def lever(self) -> float:
+        """Largest displacement that the parameter prescribes, per unit of it."""
+        ...
+
+    def stops(self) -> tuple[float, ...]:
+        """Values that have an increment of their own."""
+        ...
+
+    def supports(self, s: float) -> Pose:
+        """Where the supports are; free blocks are not looked at."""
+        ...
+
+    def rate(self, s: float) -> np.ndarray:
+        """(n_blocks, 3) array: velocity of the supports per unit of the parameter."""
+        ...
+
+    def gone(self, pose: Pose) -> float:
+        """Control displacement at a pose; 0 where supports drive."""
+        ...
+
+    def control(self, pose: Pose) -> np.ndarray | None:
+        """(n_blocks, 3) array whose product with a movement is its control displacement; None where supports drive."""
+        ...
+
+    def misdirected(self) -> str:
+        """What to say where a multiplier has to turn around for the parameter to grow."""
+        ...
+
+
+class SupportMotion:
+    """Supports that follow a settlement, from where they stand."""
+
+    what = "settlement"
+
+    def __init__(self, assembly: Assembly, phase: Settlement, start: Pose) -> None:
+        self.assembly, self.phase, self.start = assembly, phase, start
+        self.increment, self.limit, self.unit = phase.increment, phase.limit, phase.unit
+        self.tolerance = float(phase.tolerance or phase.increment / 100.0)
+
+    def lever(self) -> float:
+        """1 for a translation, the largest radius for a rotation."""
+        points, block = moved_vertices(self.assembly, self.start), self.assembly.block_of_vertex
+        return float(np.hypot(*point_velocities(points, block, self.start, self.rate(0.0)).T).max())
+
+    def stops(self) -> tuple[float, ...]:
+        """The settlement's own."""
+        return self.phase.stops
+
+    def supports(self, s: float) -> Pose:
+        """On their way along the settlement."""
+        return self.phase.displaced(self.assembly, self.start, s)
+
+    def rate(self, s: float) -> np.ndarray:
+        """Of the settlement."""
+        return self.phase.rate(self.assembly, self.start, s)
+
+    def gone(self, pose: Pose) -> float:
+        """No control displacement."""
+        return 0.0
+
+    def control(self, pose: Pose) -> None:
+        """No control displacement."""
+        return
+
+    def misdirected(self) -> str:
+        """No multiplier."""
+        return ""
+
+
+@dataclass(frozen=True)
+class ControlDisplacement:
+    """The displacement that is made to grow in a pushover analysis.
+
+    Attributes
+    ----------
+    block : str
+        Name of a free block.
+    direction : (2,) sequence
+        Direction in which the displacement counts; only its direction matters.
+    point : (2,) sequence, optional [m]
+        A point of the block, in the drawing; its centroid by default.
+    increment : float [m]
+        Largest step.
+    limit : float [m]
+        Where to stop if capacity is left.
+    tolerance : float, optional [m]
+        Width of the bracket of the displacement at zero capacity; a hundredth of the increment by default.
+    """
+
+    block: str
+    direction: Sequence[float] = (1.0, 0.0)
+    point: Sequence[float] | None = None
+    increment: float = 0.01
+    limit: float = 1.0
+    tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("direction", "point"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            pair = np.asarray(value, dtype=float)
+            if pair.shape != (2,) or not np.isfinite(pair).all():
+                raise ValueError(f"control {name} is {value!r}; give two finite numbers [x, y]")
+            object.__setattr__(self, name, (float(pair[0]), float(pair[1])))
+        length = float(np.hypot(self.direction[0], self.direction[1]))
+        if length == 0.0:
+            raise ValueError("control direction is [0, 0]; give the direction in which the displacement counts")
+        object.__setattr__(self, "direction", (self.direction[0] / length, self.direction[1] / length))
+        if self.tolerance is None:
+            object.__setattr__(self, "tolerance", self.increment / 100.0)
+        for name in ("increment", "limit", "tolerance"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ValueError(f"control {name} is {value:g}; it must be a positive number")
+
+    @property
+    def unit(self) -> str:
+        """Unit of the control displacement."""
+        return "m"
+
+    def displacement(self, assembly: Assembly, pose: Pose) -> float:
+        """Control displacement at a pose [m]."""
+        block, arm = self._place(assembly)
+        turned = rotation_matrices(pose.rotations[[block]])[0] @ arm
+        moved_by = pose.positions[block] + turned - assembly.centroids[block] - arm
+        return float(moved_by @ np.asarray(self.direction))
+
+    def speed(self, assembly: Assembly, pose: Pose, velocity: np.ndarray) -> float:
+        """Rate of the control displacement in a velocity (n_blocks, 3) of the blocks."""
+        block, arm = self._place(assembly)
+        point = pose.positions[[block]] + arm @ rotation_matrices(pose.rotations[[block]])[0].T
+        return float((point_velocities(point, np.array([block]), pose, velocity) @ np.asarray(self.direction))[0])
+
+    def weights(self, assembly: Assembly, pose: Pose) -> np.ndarray:
+        """(n_blocks, 3) array whose product with a movement of the blocks is that of the control point."""
+        block, arm = self._place(assembly)
+        turned = rotation_matrices(pose.rotations[[block]])[0] @ arm
+        weights = np.zeros((assembly.n_blocks, 3))
+        x, y = self.direction
+        weights[block] = x, y, turned[0] * y - turned[1] * x
+        return weights
+
+    def _place(self, assembly: Assembly) -> tuple[int, np.ndarray]:
+        block = assembly.index(self.block)
+        arm = np.zeros(2) if self.point is None else np.asarray(self.point) - assembly.centroids[block]
+        return block, arm
+
+
+class ControlledLoad:
+    """A live load whose multiplier makes a control displacement grow; all supports stand still."""
+
+    what = "control displacement"
+
+    def __init__(self, assembly: Assembly, chosen: ControlDisplacement, start: Pose) -> None:
+        self.assembly, self.chosen, self.start = assembly, chosen, start
+        self.increment, self.limit, self.unit = chosen.increment, chosen.limit, chosen.unit
+        self.tolerance = float(chosen.tolerance or chosen.increment / 100.0)
+        self.offset = chosen.displacement(assembly, start)
+
+    def lever(self) -> float:
+        """The control displacement counts as it is."""
+        return 1.0
+
+    def stops(self) -> tuple[float, ...]:
+        """None."""
+        return ()
+
+    def supports(self, s: float) -> Pose:
+        """Where they were."""
+        return self.start
+
+    def rate(self, s: float) -> np.ndarray:
+        """Nothing moves."""
+        return np.zeros((self.assembly.n_blocks, 3))
+
+    def gone(self, pose: Pose) -> float:
+        """Since the start [m]."""
+        return self.chosen.displacement(self.assembly, pose) - self.offset
+
+    def control(self, pose: Pose) -> np.ndarray:
+        """Of the control point at the pose."""
+        return self.chosen.weights(self.assembly, pose)
+
+    def misdirected(self) -> str:
+        """Names the block and the direction."""
+        return (
+            f"the mechanism does not move block '{self.chosen.block}' along {self.chosen.direction}; choose another "
+            "control block, point or direction"
+        )

@@ -1,0 +1,799 @@
+"""The equilibrium path: from one place to the next under a driver, to collapse, to its limit, or until it locks."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.assembly import find_contacts, measure_contacts
+from solver.equilibrium import wrench_matrix
+from solver.geometry.contacts import Contacts, matched_contacts
+from solver.kinematics import Pose, moved, moved_vertices, relative_velocities, unit_lengths
+from solver.program.admissible import Admissible, admissible
+from solver.program.coulomb import NotSolved, Step, solve_step
+from solver.program.model import Model
+from solver.results.certificate import Certificate
+from solver.results.increment import Increment, State, Status
+from solver.results.mechanism import mechanism_of
+from solver.results.response import Collapse
+from solver.tolerances import COMPUTED_GAP, DRAG, FARTHEST_FALL, GIVE, GIVE_ACROSS, IMPERFECTION, JUMP, USED_UP
+
+from .controls import Ending
+from .drivers import Driver
+
+#: Largest step inside an increment: movement of the supports in block sizes. The smallest, in the same measure, ends
+#: the analysis where no step is solved.
+LARGEST_STEP, SMALLEST_STEP = 0.05, 1e-9
+
+#: First step, and movement by which a structure has begun to move, in elastic gives.
+FIRST_STEP, ONSET = 0.1, 100.0
+
+#: Geometries at which a step is linearised; movement from one to the next, in block sizes, at which it is exact, and
+#: from which on it is not accepted: its square is what is left of gaps. What falls need not be exact.
+LINEARISATIONS, EXACT, ACCEPTED = 6, 1e-6, 1e-4
+
+#: The structure falls where a block moves so many times as fast as the drag alone would let it sink under this part of
+#: its weight.
+FALLING_FORCE = 1.0
+
+#: Part of the drag that is left where a collapse is being enclosed.
+CARE = 1e-3
+
+#: Where a block moves so many times as fast as the supports, the place is proved before the path goes on.
+FAST = 10.0
+
+#: A fall is followed in steps of this movement of a block, in block sizes.
+FALL_STEP = 0.05
+FALL_STEPS, CREEPS = 60, 16
+
+#: Unbalanced force, in block weights, under which what creeps may have come to rest.
+CREEPING = 1e-2
+
+#: Movement from which a mechanism is read, in block sizes: large against the give of the joints, small enough for
+#: rotations to be velocities.
+MECHANISM = 1e-3
+
+#: At rest: movement of a block in a step of a fall whose drag is that of a step of a block size.
+AT_REST = 1e-7
+
+#: Force, in total loads, beyond which blocks wedged between supports count as locked.
+LOCKED_FORCE = 1e3
+
+#: Blocks that a message names.
+NAMED = 4
+
+
+class Falls(Exception):
+    """Blocks move far faster than the supports: no equilibrium near."""
+
+
+class Wedged(Exception):
+    """Blocks are wedged between the supports: forces grow without limit."""
+
+    def __init__(self, place: Place) -> None:
+        super().__init__("wedged")
+        self.place = place
+
+
+class NoStep(Exception):
+    """No step, however small, is solved."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a path stands: everything that the next step remembers.
+
+    Attributes
+    ----------
+    s : float [m or rad]
+        Parameter of the driver.
+    pose : Pose
+    contacts : Contacts, optional
+        The contact points that carry forces; None where none are remembered.
+    forces : (n_contacts, 2) array
+        Their normal and shear forces, in units of the program.
+    multiplier : float
+        Of the live load.
+    """
+
+    s: float
+    pose: Pose
+    contacts: Contacts | None
+    forces: np.ndarray
+    multiplier: float = 0.0
+
+
+@dataclass(frozen=True)
+class Note:
+    """What happened at a place of the path: parameter s [m or rad], and words."""
+
+    s: float
+    words: str
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """Everything a path remembers when an increment is reported: given back, it goes on bit for bit.
+
+    Attributes
+    ----------
+    phase : int
+        Number of the settlement, from 0; behind the last increment of a phase that of the next, which may not exist.
+    start : Pose
+        Where the phase began.
+    place : Place
+        Reported.
+    step : float [m or rad]
+        To try next.
+    first_without : float [m or rad]
+        Smallest parameter known to have no equilibrium; infinite where none is known.
+    works : tuple of float
+        Of loads, on supports and of friction since the start of the phase, in units of the program.
+    """
+
+    phase: int
+    start: Pose
+    place: Place
+    step: float
+    first_without: float
+    works: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Proved:
+    """A place with what equilibrium says of it."""
+
+    place: Place
+    contacts: Contacts
+    friction: np.ndarray
+    bounds: Admissible
+    forces: np.ndarray
+    measured: float
+
+
+def drag_of(model: Model) -> np.ndarray:
+    """(n_blocks, 3) array: weights, and weights times the square of the polar radius, in units of the program."""
+    assembly = model.assembly
+    weight = np.hypot(*model.load[:, :2].T) / model.force
+    weight = np.maximum(weight, 1e-3 * assembly.masses / max(float(assembly.masses[assembly.free].mean()), 1e-300))
+    corner = assembly.vertices - assembly.centroids[assembly.block_of_vertex]
+    following = corner[assembly.next_vertex]
+    cross = corner[:, 0] * following[:, 1] - following[:, 0] * corner[:, 1]
+    squares = (corner**2).sum(axis=1) + (corner * following).sum(axis=1) + (following**2).sum(axis=1)
+    first = assembly.offsets[:-1]
+    radius = np.add.reduceat(cross * squares, first) / (6.0 * np.add.reduceat(cross, first))
+    return np.stack([weight, weight, weight * radius / model.length**2], axis=1)
+
+
+class Path:
+    """The path of one phase under a driver.
+
+    Parameters
+    ----------
+    model : Model
+        Units, loads, interfaces.
+    driver : Driver
+    number : int
+        Of the phase.
+    falling_frames : int
+        Frames of the fall after collapse.
+    """
+
+    def __init__(self, model: Model, driver: Driver, number: int = 0, falling_frames: int = 0) -> None:
+        self.model, self.driver, self.number, self.falling_frames = model, driver, number, falling_frames
+        self.drag = drag_of(model)
+        self.lever = driver.lever()
+        self.longest = min(driver.increment, LARGEST_STEP * model.length / self.lever)
+        self.programs, self.works, self.care = 0, (0.0, 0.0, 0.0), 1.0
+        self.notes: list[Note] = []
+        rate = driver.rate(0.0)
+        sideways = rate[model.assembly.moving, :2].sum(axis=0) if model.assembly.moving.any() else np.zeros(2)
+        size = float(np.hypot(*sideways))
+        self.imperfection = np.zeros((model.assembly.n_blocks, 3))
+        if size > 0.0:
+            self.imperfection[:, :2] = IMPERFECTION * self.drag[:, :1] * sideways / size
+
+    # Steps ----------------------------------------------------------------------------------------------------------
+
+    def at_start(self, pose: Pose) -> Place:
+        """The place of a pose that remembers no forces."""
+        return Place(0.0, pose, None, np.zeros((0, 2)))
+
+    def rested(self, pose: Pose) -> Place:
+        """The place in which a pose comes to rest from no forces at all.
+
+        Where the pose itself is in equilibrium it stays as it is, with the forces found; otherwise what the drawing has
+        left open closes.
+
+        Raises
+        ------
+        NotSolved
+        Falls
+        """
+        place = self.at_start(pose)
+        for _ in range(2):
+            place, _ = self.step(place, self.model.length / self.lever, still=True)
+        unmoved = replace(place, pose=pose)
+        return unmoved if self.proved(unmoved).bounds.exists else place
+
+    def _remembered(self, place: Place, contacts: Contacts) -> np.ndarray:
+        """(n_contacts, 2) array: forces of the place at these contact points; zero at new ones."""
+        if place.contacts is None or len(place.contacts) == 0 or len(contacts) == 0:
+            return np.zeros((len(contacts), 2))
+        number, same = matched_contacts(contacts, place.contacts)
+        return np.where(same[:, None], place.forces[number], 0.0)
+
+    def step(self, place: Place, length: float, *, still: bool = False) -> tuple[Place, np.ndarray]:
+        """One step of the driver, or one with the supports at rest whose drag is that of such a step.
+
+        Parameters
+        ----------
+        place : Place
+        length : float [m or rad]
+        still : bool
+            The driver stands still: what is not in equilibrium moves.
+
+        Returns
+        -------
+        place : Place
+        motion : (n_blocks, 3) array
+            In units of the program; supports included.
+
+        Raises
+        ------
+        NotSolved
+        Falls
+        """
+        model, assembly, driver = self.model, self.model.assembly, self.driver
+        free, scales = assembly.free, model.lengths
+        s = place.s if still else place.s + length
+        supports, size = driver.supports(s), length * self.lever / model.length
+        start = find_contacts(assembly, moved_vertices(assembly, place.pose), model.reach)
+        memory = self._remembered(place, start)
+        normal, shear = memory.T
+        friction = model.interfaces.friction(assembly, start.block_a, start.block_b)
+        rows = np.repeat(free, 3)
+        load = (model.scaled_load + self.imperfection)[free].ravel()
+        drag = DRAG * (1.0 if still else self.care) / size * self.drag[free].ravel()
+        live, live_size = model.scaled_live
+        gone = np.zeros(len(load))
+        multiplier = place.multiplier * live_size
+        pose = self._with_supports(place.pose, supports)
+        way, near = 0.0, None
+        for _ in range(LINEARISATIONS):
+            contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
+            control = driver.control(pose) if model.live is not None else None
+            linear = Step(
+                matrix=wrench_matrix(contacts, pose, model.length),
+                free=rows,
+                load=load,
+                drag=drag,
+                gap=contacts.gaps / model.length,
+                slip=(contacts.slip - start.slip)[:, 0] / model.length,
+                normal=normal,
+                shear=shear,
+                friction=friction,
+                give=(GIVE_ACROSS, GIVE),
+                size=size,
+                live=live[free].ravel() if control is not None else None,
+                control=None if control is None else (control * scales / model.length)[free].ravel(),
+                wanted=0.0 if control is None else (s - driver.gone(pose)) / model.length,
+            )
+            self.programs += 1
+            found = solve_step(linear, gone, multiplier, near)
+            near = found
+            # The give is taken back: the next linearisation starts from the forces it has reached.
+            normal, shear, multiplier = found.normal, found.shear, found.multiplier
+            gone = gone + found.motion
+            full = np.zeros((assembly.n_blocks, 3))
+            full[free] = gone.reshape(-1, 3) * scales
+            pose = self._with_supports(moved(place.pose, full), supports)
+            way = float(np.abs(found.motion).max(initial=0.0))
+            if np.abs(gone).max(initial=0.0) > FARTHEST_FALL:
+                raise Falls
+            if way <= (ACCEPTED if still else EXACT):
+                break
+        if way > ACCEPTED:
+            raise NotSolved(f"the geometry still moves by {way:.1e} block sizes")
+        motion = full + np.where(free[:, None], 0.0, 1.0) * self._between(place.pose, pose)
+        if not still and np.abs(gone).max(initial=0.0) > max(FALLING_FORCE / DRAG * size, 1e3 * GIVE):
+            raise Falls
+        forces = np.stack([normal, shear], axis=1)
+        return (
+            Place(s, pose, contacts, forces, multiplier / (live_size or 1.0)),
+            motion / scales,
+        )
+
+    def _with_supports(self, pose: Pose, supports: Pose) -> Pose:
+        free = self.model.assembly.free
+        return Pose(
+            np.where(free[:, None], pose.positions, supports.positions),
+            np.where(free[:, None], pose.rotations, supports.rotations),
+        )
+
+    def _between(self, before: Pose, after: Pose) -> np.ndarray:
+        return np.column_stack([after.positions - before.positions, after.rotations - before.rotations])
+
+    def advanced(self, place: Place, target: float, step: float) -> tuple[Place, float]:
+        """Goes towards a parameter in steps that suit the path, and stops early where blocks are fast.
+
+        Returns
+        -------
+        place : Place
+        step : float
+            To try next.
+
+        Raises
+        ------
+        Falls
+        NoStep
+        """
+        smallest = SMALLEST_STEP * self.model.length / self.lever
+        failed = False
+        while target - place.s > 1e-12 * max(abs(target), smallest):
+            ahead = target - place.s
+            # Two equal steps rather than a long one and a sliver.
+            length = ahead if ahead <= step * 1.000001 else min(step, ahead / 2.0)
+            try:
+                new, motion = self.step(place, length)
+            except (NotSolved, Falls) as error:
+                step, failed = length / 2.0, True
+                if isinstance(error, Falls) and step < self.driver.tolerance / 4.0:
+                    raise
+                if step < smallest:
+                    raise NoStep(f"at {place.s:.6g} {self.driver.unit}: {error}") from None
+                continue
+            if float(new.forces[:, 0].max(initial=0.0)) > LOCKED_FORCE * self.model.total_load:
+                raise Wedged(new)
+            self.works = self._works(place, new, motion)
+            place = replace(new, s=target) if length == ahead else new
+            step = length if failed else max(step, min(self.longest, 2.0 * length))
+            failed = False
+            moved_by = float(np.abs(motion[self.model.assembly.free]).max(initial=0.0))
+            if moved_by > max(FAST * length * self.lever / self.model.length, 1e2 * GIVE):
+                break
+        return place, step
+
+    def _works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float]:
+        """Works of loads, on supports and of friction so far, with the forces at the end of the step."""
+        model, contacts = self.model, after.contacts
+        assert contacts is not None
+        live, live_size = model.scaled_live
+        free = model.assembly.free[:, None]
+        load = (model.scaled_load + after.multiplier * live_size * live) * free
+        resultant = (wrench_matrix(contacts, after.pose, model.length) @ after.forces.ravel()).reshape(-1, 3)
+        started = measure_contacts(model.assembly, moved_vertices(model.assembly, before.pose), contacts)
+        slipped = (contacts.slip - started.slip)[:, 0] / model.length
+        done = (
+            float((load * motion).sum()),
+            float((np.where(free, 0.0, resultant) * motion).sum()),
+            -float((after.forces[:, 1] * slipped).sum()),
+        )
+        return tuple(np.add(self.works, done).tolist())
+
+    # Proof ----------------------------------------------------------------------------------------------------------
+
+    def proved(self, place: Place) -> Proved:
+        """What equilibrium within friction says of a place, and balanced forces near those of the path."""
+        model, assembly = self.model, self.model.assembly
+        contacts = find_contacts(assembly, moved_vertices(assembly, place.pose), model.reach)
+        friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
+        rate = None if model.live is not None else self.driver.rate(place.s)
+        bounds = admissible(model, place.pose, contacts, friction, rate)
+        self.programs += bounds.programs
+        remembered = self._remembered(place, contacts)
+        if not bounds.exists:
+            return Proved(place, contacts, friction, bounds, remembered, place.multiplier)
+        if place.s == 0.0:
+            # Nothing has moved: what the first movement has to overcome, least reaction or largest multiplier.
+            forces, multiplier = bounds.forces, bounds.high
+        else:
+            forces, multiplier = self._balanced(place, contacts, friction, remembered)
+        if model.live is None:
+            multiplier = float((self._on_supports(contacts, place.pose, forces) * self.driver.rate(place.s)).sum())
+        return Proved(place, contacts, friction, bounds, forces, multiplier)
+
+    def _on_supports(self, contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarray:
+        """(n_blocks, 3) array [N, N, N·m]: what the structure does to each support; zero for free blocks."""
+        model = self.model
+        resultant = (wrench_matrix(contacts, pose) @ forces.ravel()).reshape(-1, 3) * model.force
+        return np.where(model.assembly.free[:, None], 0.0, resultant)
+
+    def _balanced(
+        self, place: Place, contacts: Contacts, friction: np.ndarray, remembered: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        """Forces in equilibrium without the drag, near those remembered; open points carry none."""
+        model, free = self.model, self.model.assembly.free
+        closed = np.flatnonzero(contacts.gaps <= COMPUTED_GAP * model.length)
+        columns = np.stack([2 * closed, 2 * closed + 1], axis=1).ravel()
+        live, live_size = model.scaled_live
+        load = model.scaled_load[free].ravel()
+        none = np.zeros(len(closed))
+        # What has used up its friction goes on doing so: where it slides, forces are no matter of choice.
+        mu, (normal, shear) = friction[closed], remembered[closed].T
+        used_up = (normal > 0.0) & (np.abs(shear) >= mu * normal * (1.0 - USED_UP))
+        on = np.where(used_up, -np.sign(shear) * 1e2 * (1.0 + normal), 0.0)
+        still = Step(
+            matrix=wrench_matrix(contacts, place.pose, model.length)[:, columns],
+            free=np.repeat(free, 3),
+            load=load,
+            drag=np.full(len(load), 1e-12),
+            gap=none,
+            slip=on,
+            normal=normal,
+            shear=shear,
+            friction=mu,
+            give=(1.0, 1.0),
+            size=1.0,
+            live=live[free].ravel() if model.live is not None else None,
+            control=live[free].ravel() if model.live is not None else None,
+        )
+        forces = remembered.copy()
+        for step in (still, replace(still, slip=none)):
+            try:
+                found = solve_step(step, np.zeros(len(load)), place.multiplier * live_size)
+                break
+            except NotSolved:
+                continue
+        else:
+            return forces, place.multiplier
+        forces[:] = 0.0
+        forces[closed] = np.stack([found.normal, found.shear], axis=1)
+        return forces, found.multiplier / (live_size or 1.0)
+
+    # The loop -------------------------------------------------------------------------------------------------------
+
+    def follow(self, start: Place, resume: Checkpoint | None = None) -> Generator[Increment, None, Ending]:
+        """Yields the increments of the phase, returns how it ended and leaves the last place in ``self.last``."""
+        driver, tolerance = self.driver, self.driver.tolerance
+        self.last, self.start = start, start.pose
+        step, first_without = FIRST_STEP * GIVE * self.model.length / self.lever, np.inf
+        if resume is not None:
+            start, step, first_without = resume.place, resume.step, resume.first_without
+            self.start, self.works = resume.start, resume.works
+        proved = self.proved(start)
+        if resume is None and not proved.bounds.exists:
+            motion = next((motion for _, motion, _ in self._sinking(start, 1)), self.drag)
+            yield self._falling(start, motion * self.model.lengths, start.s)
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, self._no_equilibrium(motion))
+        if resume is None and self.model.live is not None and not 0.0 < proved.measured < np.inf:
+            if proved.measured > 0.0:
+                return Ending(
+                    Status.LOCKED, "at a control displacement of 0 m no live load of this pattern moves the structure"
+                )
+            yield self._falling(start, np.zeros((self.model.assembly.n_blocks, 3)), start.s)
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
+        reported, without, spent = resume is not None, None, None
+        while True:
+            place = proved.place
+            self.last = place
+            if not reported:
+                at_limit = place.s >= driver.limit * (1.0 - 1e-12)
+                motion = self._next_motion(place)
+                number = self.number + 1 if at_limit else self.number
+                checkpoint = Checkpoint(number, self.start, place, step, first_without, self.works)
+                found = replace(self._increment(proved, motion), checkpoint=checkpoint)
+                if place.s == 0.0 and self.model.live is None:
+                    at_rest, onset = self._at_first(proved)
+                    found = replace(found, at_rest=at_rest, onset=onset)
+                yield found
+                reported = True
+                if at_limit:
+                    return self._reached()
+            if first_without - place.s <= tolerance * (1.0 + 1e-9):
+                # A hair beyond the last equilibrium: what loses its hold may come to rest nearby.
+                without = without or self._beyond(place)
+                settled = self._settles(without)
+                if settled is not None:
+                    proved, reported, first_without, without, spent = settled, False, np.inf, None, None
+                    continue
+                if not self._is_stop(place.s) and place.s > 0.0:
+                    yield self._increment(proved, self._next_motion(place))
+                return (yield from self._collapse(proved, without, first_without, spent))
+            ahead = min(self._next_stop(place.s), 0.5 * (place.s + first_without))
+            # Where equilibrium is about to be lost, the drag would lose it early.
+            self.care = CARE if np.isfinite(first_without) else 1.0
+            try:
+                new, step = self.advanced(place, ahead, step)
+            except Falls:
+                first_without, without, spent, step = min(first_without, ahead), None, None, 0.5 * (ahead - place.s)
+                continue
+            except Wedged as wedged:
+                return Ending(Status.LOCKED, self._locked(wedged.place))
+            except NoStep as reason:
+                if not self._is_stop(place.s) and place.s > 0.0:
+                    yield self._increment(proved, self._next_motion(place))
+                return Ending(Status.SOLVER_FAILED, self._no_step(str(reason)))
+            reached = self.proved(new)
+            crept: Proved | None = reached
+            if place.s == 0.0 and self.model.live is not None and reached.measured <= 0.0:
+                raise ValueError(self.driver.misdirected())
+            lost = reached.measured if reached.bounds.exists else None
+            if not self._holds(reached) and lost is None:
+                # What the drag holds back may only have to creep on.
+                crept = self._settles(new, CREEPS, JUMP)
+            if self._holds(crept):
+                assert crept is not None
+                proved, reported = crept, not self._is_stop(new.s)
+            else:
+                first_without, without, spent, step = new.s, new, lost, min(step, 0.5 * (new.s - place.s))
+
+    def _beyond(self, place: Place) -> Place:
+        """A place just beyond one from which the structure falls: reached by the longest step that is solved."""
+        length = self.driver.tolerance / 4.0
+        for _ in range(20):
+            try:
+                return self.step(place, length)[0]
+            except (NotSolved, Falls):
+                length /= 4.0
+        return place
+
+    def _at_first(self, proved: Proved) -> tuple[float, float]:
+        """The reaction at rest, and once the structure has begun to move: far beyond the give of the joints."""
+        place, works = proved.place, self.works
+        rate = self.driver.rate(0.0)
+        remembered = self._remembered(place, proved.contacts)
+        at_rest = float((self._on_supports(proved.contacts, place.pose, remembered) * rate).sum())
+        onset = np.nan
+        give = GIVE * self.model.length / self.lever
+        try:
+            begun, _ = self.advanced(place, ONSET * give, FIRST_STEP * give)
+            begun_there = self.proved(begun)
+            onset = begun_there.measured if begun_there.bounds.exists else np.nan
+        except (Falls, NoStep, Wedged):
+            pass
+        self.works = works
+        return at_rest, onset
+
+    def _is_stop(self, s: float) -> bool:
+        near = 1e-9 * self.driver.increment
+        return abs(s - self._next_stop(s - 2.0 * near)) <= near
+
+    def _next_stop(self, s: float) -> float:
+        """Next parameter that has an increment: a multiple of the driver's increment, a stop of its own, the limit."""
+        near = 1e-9 * self.driver.increment
+        number = np.floor(s / self.driver.increment + 1e-9) + 1.0
+        stops = [number * self.driver.increment, self.driver.limit, *self.driver.stops()]
+        return float(
+            min(stop for stop in stops if stop > s + near) if s < self.driver.limit - near else self.driver.limit
+        )
+
+    def _holds(self, proved: Proved | None) -> bool:
+        return proved is not None and proved.bounds.exists and (self.model.live is None or proved.measured > 0.0)
+
+    def _next_motion(self, place: Place) -> np.ndarray:
+        """(n_blocks, 3) array: velocity in the movement that follows, per unit of the parameter."""
+        length = MECHANISM * self.model.length / self.lever
+        for _ in range(4):
+            try:
+                _, motion = self.step(place, length)
+            except (NotSolved, Falls):
+                length /= 3.0
+            else:
+                return motion * self.model.lengths / length
+        return self.driver.rate(place.s)
+
+    def _settles(self, place: Place, steps: int = FALL_STEPS, farthest: float = FARTHEST_FALL) -> Proved | None:
+        """The equilibrium in which a structure that falls comes to rest, where it does so soon and near."""
+        model, start = self.model, place.pose
+        for sunk, motion, length in self._sinking(place, steps):
+            place = sunk
+            if float(np.abs(self._between(start, place.pose)[:, :2]).max()) > farthest * model.length:
+                return None
+            # As slow as what creeps under a millionth of its weight.
+            speed = float(np.abs(motion[model.assembly.free]).max(initial=0.0)) * model.length / (length * self.lever)
+            if speed * DRAG > CREEPING:
+                continue
+            found = self.proved(place)
+            if self._holds(found):
+                way = float(np.abs(self._between(start, place.pose)[:, :2]).max())
+                if way > JUMP * model.length:
+                    self.notes.append(Note(place.s, self._jump(start, place.pose)))
+                return found
+        return None
+
+    def _sinking(self, place: Place, steps: int) -> Generator[tuple[Place, np.ndarray, float], None, None]:
+        """Steps in which what falls sinks against the drag, the driver at rest; each moves blocks by a little."""
+        length = self.model.length / self.lever * MECHANISM * DRAG
+        failures = 0
+        while steps > 0 and failures < 30:
+            try:
+                new, motion = self.step(place, length, still=True)
+            except (NotSolved, Falls):
+                length, failures = length / 3.0, failures + 1
+                continue
+            moved_by = float(np.abs(motion[self.model.assembly.free]).max(initial=0.0))
+            if moved_by > 2.0 * FALL_STEP:
+                length, failures = length / 3.0, failures + 1
+                continue
+            place, steps = new, steps - 1
+            yield place, motion, length
+            length = min(length * (1.5 if moved_by > 0.5 * FALL_STEP else 2.5), 10.0 * self.model.length / self.lever)
+
+    def _collapse(
+        self, last: Proved, without: Place, first_without: float, spent: float | None
+    ) -> Generator[Increment, None, Ending]:
+        driver, model = self.driver, self.model
+        # What falls, falls under its dead load alone.
+        alone = (
+            self if model.live is None else Path(replace(model, live=None), driver, self.number, self.falling_frames)
+        )
+        frames = list(alone._fall(without))
+        if not frames:
+            frames = [self._falling(without, np.zeros((model.assembly.n_blocks, 3)), without.s)]
+        # The first movement that is large against the give of the joints, and small enough to be one of velocities.
+        sizes = [float(np.abs(frame.velocity * unit_lengths(3, model.length)).max()) for frame in frames]
+        chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))
+        velocity, first, largest = frames[chosen].velocity, frames[chosen], max(sizes[chosen], 1e-300)
+        # Where a multiplier reaches zero, it does so in between; an equilibrium that is lost, somewhere.
+        part = 0.5 if spent is None else last.measured / (last.measured - spent)
+        reaction = last.measured
+        if model.live is not None:
+            reaction *= float(np.hypot(*model.live[:, :2].sum(axis=0)))
+        collapse = Collapse(
+            displacement=last.place.s + part * (first_without - last.place.s),
+            bracket=(last.place.s, first_without),
+            reaction=reaction,
+            mechanism=velocity / largest,
+            unit=driver.unit,
+            words=str(mechanism_of(model.assembly, first)),
+            lost="equilibrium" if spent is None else "capacity",
+        )
+        if self.falling_frames:
+            yield from frames[: self.falling_frames]
+        if model.live is None:
+            return Ending(Status.COLLAPSED, str(collapse), collapse)
+        what = "equilibrium is lost" if spent is None else "no capacity is left"
+        return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)
+
+    def _fall(self, place: Place) -> Generator[Increment, None, None]:
+        """Pseudo-time frames: what falls sinks against the drag until it rests."""
+        frames, start, total = 0, place, np.zeros((self.model.assembly.n_blocks, 3))
+        for new, motion, length in self._sinking(place, 4 * max(self.falling_frames, 4)):
+            total = total + motion
+            moved_by = float(np.abs(total).max())
+            at_rest = length >= self.model.length and float(np.abs(motion).max()) < AT_REST
+            if (frames == 0 and moved_by > MECHANISM) or moved_by > 2.0 * FALL_STEP or at_rest:
+                yield self._falling(start, total * self.model.lengths, start.s)
+                frames, start, total = frames + 1, new, np.zeros_like(total)
+            if at_rest or frames == self.falling_frames:
+                return
+
+    # What is reported -----------------------------------------------------------------------------------------------
+
+    def _increment(self, proved: Proved, velocity: np.ndarray) -> Increment:
+        model, place, contacts = self.model, proved.place, proved.contacts
+        resultant = (wrench_matrix(contacts, place.pose, model.length) @ proved.forces.ravel()).reshape(-1, 3)
+        live, live_size = model.scaled_live
+        measured = proved.measured
+        balance = (
+            resultant + model.scaled_load + (proved.measured * live_size if model.live is not None else 0.0) * live
+        )[model.assembly.free]
+        gaps = contacts.gaps / model.length
+        carried = np.where(gaps > COMPUTED_GAP, proved.forces[:, 0] * gaps, 0.0).sum()
+        certificate = Certificate(
+            equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
+            largest_penetration=float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)),
+            duality_gap=proved.bounds.gap,
+            complementarity=float(carried),
+            kinematic_violation=0.0,
+            energy_residual=abs(self.works[0] - self.works[1] - self.works[2]) / max(sum(map(abs, self.works)), 1e-12),
+        )
+        on_supports = self._on_supports(contacts, place.pose, proved.forces)
+        notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
+        self.notes = []
+        return self._reported(
+            place,
+            contacts,
+            proved.forces,
+            proved.friction,
+            velocity,
+            measured,
+            on_supports,
+            certificate,
+            Status.EQUILIBRIUM,
+            notes,
+            (proved.bounds.low, proved.bounds.high),
+        )
+
+    def _falling(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
+        model, assembly = self.model, self.model.assembly
+        contacts = find_contacts(assembly, moved_vertices(assembly, place.pose), model.reach)
+        friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
+        none = Certificate(0.0, float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)), 0.0, 0.0, 0.0)
+        return self._reported(
+            replace(place, s=s),
+            contacts,
+            self._remembered(place, contacts),
+            friction,
+            velocity,
+            0.0,
+            np.zeros((assembly.n_blocks, 3)),
+            none,
+            Status.FALLING,
+            (),
+        )
+
+    def _reported(
+        self,
+        place: Place,
+        contacts: Contacts,
+        forces: np.ndarray,
+        friction: np.ndarray,
+        velocity: np.ndarray,
+        measured: float,
+        on_supports: np.ndarray,
+        certificate: Certificate,
+        status: Status,
+        notes: tuple[str, ...],
+        bounds: tuple[float, float] = (np.nan, np.nan),
+    ) -> Increment:
+        pushed = self.model.live is not None
+        resultant = float(np.hypot(*self.model.live[:, :2].sum(axis=0))) if self.model.live is not None else 1.0
+        programs, self.programs = self.programs, 0
+        return Increment(
+            parameter=place.s,
+            measured=measured,
+            phase=self.number,
+            load_multiplier=measured if pushed else 0.0,
+            reaction=measured * resultant if pushed else measured,
+            certificate=certificate,
+            status=status,
+            programs=programs,
+            seconds=0.0,
+            held=State(
+                pose=place.pose,
+                contacts=contacts,
+                forces=forces * self.model.force,
+                displacements=relative_velocities(contacts, place.pose, velocity),
+                friction=friction,
+                velocity=velocity,
+                support_forces=on_supports,
+            ),
+            least=bounds[0],
+            largest=bounds[1],
+            notes=notes,
+        )
+
+    def _reached(self) -> Ending:
+        driver = self.driver
+        return Ending(Status.LIMIT_REACHED, f"the {driver.what} reached its limit of {driver.limit:g} {driver.unit}")
+
+    def _locked(self, place: Place) -> str:
+        assembly, contacts, normal = self.model.assembly, place.contacts, place.forces[:, 0]
+        assert contacts is not None
+        pressed = normal > 0.1 * normal.max()
+        blocks = np.unique(np.concatenate([contacts.block_a[pressed], contacts.block_b[pressed]]))
+        blocks = blocks[assembly.free[blocks]]
+        return f"the supports cannot move on: {len(blocks)} blocks are wedged ({self._named(blocks)})"
+
+    def _no_equilibrium(self, motion: np.ndarray) -> str:
+        assembly = self.model.assembly
+        size = np.abs(motion[:, :2]).max(axis=1)
+        falling = np.flatnonzero(assembly.free & (size > 0.5 * size.max()))
+        shown = ", ".join(f"'{assembly.names[i]}'" for i in falling[:8])
+        more = f" and {len(falling) - 8} more" if len(falling) > 8 else ""
+        return (
+            f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
+            f"({shown}{more}); look for gaps between blocks (joint_thickness), a missing support or too little friction"
+        )
+
+    def _no_step(self, reason: str) -> str:
+        return (
+            f"no step of the {self.driver.what} was solved, however small, {reason}; repeat the analysis with another "
+            "increment, and send the case to the developers if it stays"
+        )
+
+    def _jump(self, start: Pose, end: Pose) -> str:
+        assembly = self.model.assembly
+        way = np.hypot(*(moved_vertices(assembly, end) - moved_vertices(assembly, start)).T)
+        way = np.where(assembly.free, np.maximum.reduceat(way, assembly.offsets[:-1]), 0.0)
+        fell = np.flatnonzero(way > 0.1 * way.max())
+        return f"{self._named(fell)} moved by up to {way.max():.2g} m at once to the next equilibrium"
+
+    def _named(self, blocks: np.ndarray) -> str:
+        shown = ", ".join(f"'{self.model.assembly.names[i]}'" for i in blocks[:NAMED])
+        more = f" and {len(blocks) - NAMED} more" if len(blocks) > NAMED else ""
+        return f"block{'' if len(blocks) == 1 else 's'} {shown}{more}"

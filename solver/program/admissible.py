@@ -1,0 +1,125 @@
+"""What equilibrium allows at a pose: whether one within friction exists, and what bounds a reaction or multiplier."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from solver.equilibrium import friction_rays, with_slack, wrench_matrix
+from solver.geometry.contacts import Contacts
+from solver.kinematics import Pose
+from solver.lp.problem import LinearProgram, Unbounded
+from solver.lp.solve import solve_lp
+from solver.tolerances import BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
+
+from .increment import along_structure
+from .macroblocks import free_blocks
+from .model import Model
+
+#: Cost of unbalanced force, against that of the reaction: above the speed of any block per speed of the supports.
+UNBALANCED_COST = 1e4
+
+
+@dataclass(frozen=True)
+class Admissible:
+    """Bounds over all forces in equilibrium within friction at a pose.
+
+    Attributes
+    ----------
+    unbalanced : float
+        Least sum of unbalanced forces over the total load: zero where an equilibrium exists.
+    low, high : float
+        Of the reaction [N or N·m], or of the live loads' multiplier; infinite where friction bounds neither.
+    gap : float
+        Largest relative difference of the two objectives of the programs.
+    programs : int
+    forces : (n_contacts, 2) array
+        Normal and shear forces of the least reaction or largest multiplier, in units of the program.
+    """
+
+    unbalanced: float
+    low: float
+    high: float
+    gap: float
+    programs: int
+    forces: np.ndarray
+
+    @property
+    def exists(self) -> bool:
+        """Whether an equilibrium exists."""
+        return self.unbalanced <= FALLING_FRACTION
+
+
+def admissible(
+    model: Model, pose: Pose, contacts: Contacts, friction: np.ndarray, rate: np.ndarray | None = None
+) -> Admissible:
+    """Whether an equilibrium within friction exists at a pose, and what it leaves free.
+
+    Parameters
+    ----------
+    model : Model
+        Where it has a live load, its multiplier is bounded.
+    pose : Pose
+    contacts : Contacts
+        At the pose; points that are open carry nothing.
+    friction : (n_contacts,) array
+    rate : (n_blocks, 3) array, optional
+        Movement of the supports along which the reaction is bounded.
+
+    Raises
+    ------
+    SolveError
+
+    Notes
+    -----
+    Two linear programs over the multipliers of the friction cones' rays: the least and the largest reaction (or
+    multiplier). The least is that of Portioli & Cascini (2017) at this geometry. What neither program can balance, at
+    a cost above that of any mechanism, is what is out of balance.
+    """
+    free = np.repeat(model.assembly.free, 3)
+    closed = np.flatnonzero(contacts.gaps <= COMPUTED_GAP * model.length)
+    matrix = sp.csr_array(wrench_matrix(contacts, pose, model.length))
+    rays = friction_rays(friction)[:, np.repeat(2 * closed, 2) + np.tile([0, 1], len(closed))]
+    balance = sp.csc_array(matrix[free] @ rays)
+    rows, n = balance.shape
+    load, tolerance = model.scaled_load.ravel()[free], BALANCE_TOLERANCE * model.total_load
+    live, live_size = model.scaled_live
+    columns, objective = [balance], np.zeros(n)
+    unit = 1.0
+    if live_size > 0.0:
+        column = sp.csc_array(live[model.assembly.free].reshape(-1, 1))
+        columns += [column, -column]
+        objective, unit = np.concatenate([objective, np.zeros(2 * rows), [1.0, -1.0]]), 1.0 / live_size
+    else:
+        along = np.zeros(3 * model.assembly.n_blocks) if rate is None else (rate / model.lengths).ravel()
+        objective = np.concatenate([rays.T @ (matrix.T @ np.where(free, 0.0, along)), np.zeros(2 * rows)])
+        unit = model.force * model.length
+    values, gaps, unbalanced = [], [0.0], np.inf
+    forces = np.zeros(2 * len(contacts))
+    for sign in (1.0, -1.0):
+        cost = sign * objective
+        cost[n : n + 2 * rows] = UNBALANCED_COST
+        program = LinearProgram(
+            cost=cost,
+            matrix=with_slack(*columns),
+            lower=-load - tolerance,
+            upper=-load + tolerance,
+            along=along_structure(free_blocks(model.assembly), pose),
+        )
+        try:
+            solution = solve_lp(program)
+        except Unbounded:
+            values.append(-sign * np.inf)
+            continue
+        slack = solution.x[n : n + 2 * rows]
+        unbalanced = min(unbalanced, float(slack.sum()) / model.total_load)
+        values.append(float(objective @ solution.x) * unit)
+        gaps.append(solution.gap)
+        if sign == (1.0 if live_size == 0.0 else -1.0):
+            forces = rays @ solution.x[:n]
+    # Where both run away, forces without limit balance everything.
+    return Admissible(
+        0.0 if np.isinf(unbalanced) else unbalanced, values[0], values[1], max(gaps), 2, forces.reshape(-1, 2)
+    )

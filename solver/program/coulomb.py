@@ -1,0 +1,324 @@
+"""One step of the path: Coulomb friction without lift, at a linearised geometry, by an interior method.
+
+Over the movements q of the free blocks in a step h of the supports, with the contact forces N (compression) and T::
+
+    balance     f + Aᵀ (N, T) = (η / h) W q                      the drag W: weights, and weights times radius squared
+    normal      0 ≤ N  ⊥  y = gap + c (N - N⁰) ≥ 0              the gap after the movement
+    friction    T = μ (λ⁺ - λ⁻), N = λ⁺ + λ⁻, 0 ≤ λ± ⊥ σ± ≥ 0     with  σ⁺ - σ⁻ = slip + c (T - T⁰)
+
+N⁰ and T⁰ are the forces of the step before: joints give a little, elastically, and remember what they carried. A point
+that slides takes all of its friction and does not lift. Without the give the forces of a wall are not unique, without
+the drag its motion is not; both are small, see :mod:`solver.tolerances`.
+
+The complementarity problem is linear, but friction without lift makes it no convex program. An interior method follows
+its central path all the same: λσ = yN = β with β to zero, Newton's method with one sparse factorisation an iteration,
+predictor and corrector (Mehrotra 1992, https://doi.org/10.1137/0802028). Where long steps leave the path, a second try
+takes short ones; where that fails, too, the caller takes a smaller step of the supports, for which the drag dominates.
+
+The friction law is the linear complementarity form of Stewart & Trinkle (1996) and of Anitescu & Potra (1997),
+https://doi.org/10.1023/A:1008292328909, here for quasi-static steps.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sla
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+#: Iterations, and part of the way to the nearest bound that is gone.
+ITERATIONS, FRACTION = 60, 0.99
+
+#: The solution counts when balance, the linear equations in parts of a step and an elastic give, and the largest
+#: product in elastic gives across are below these. A point that neither carries nor is open keeps a force of the last
+#: one's root.
+BALANCE, EQUATIONS, PRODUCT = 1e-9, 1e-8, 1e-9
+
+#: Start: distances in parts of a step and an elastic give, forces in mean block weights.
+FIRST_DISTANCE, FIRST_FORCE = 0.1, 0.05
+
+#: Start near a known solution: least forces, and least distances in parts of a step and an elastic give.
+NEAR = 1e-3
+
+#: Up to so many freedoms a dense factorisation is the faster.
+DENSE = 150
+
+#: A step this short calls for centring; so many of them within the last few, twice over, and the path is lost.
+SHORT, LOST, LOOK_BACK = 0.2, 4, 8
+
+#: Corrections of second order are cut off at so many times the mean product.
+CORRECTION = 10.0
+
+#: Centring at least of the second try, which also leaves corrections of second order out.
+CAREFUL = 0.5
+
+
+class NotSolved(Exception):
+    """The interior method did not come to a solution: the step is to be made smaller."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What a step is made of, in units of the program: lengths in block sizes, forces in mean block weights.
+
+    Attributes
+    ----------
+    matrix : (n_blocks * dof, 2 n_contacts) sparse array, by columns
+        Forces and moments on all blocks from normal and shear forces, as :func:`equilibrium_matrix` has them.
+    free : (n_blocks * dof,) bool array
+        Rows of free blocks; ``n_dof`` of them.
+    load : (n_dof,) array
+    drag : (n_dof,) array
+        Resisting force per movement in this step.
+    gap, slip : (n_contacts,) arrays
+        Of each contact point where the free blocks now are, with the supports at the end of the step; slip counts from
+        the start of the step.
+    normal, shear : (n_contacts,) arrays
+        Remembered forces N⁰, T⁰.
+    friction : (n_contacts,) array
+    give : (float, float)
+        Elastic give of a contact point across the joint and along it: movement per force.
+    size : float
+        Movement of the supports in the step.
+    live : (n_dof,) array, optional
+        Load whose multiplier is unknown.
+    control : (n_dof,) array, optional
+        Weights of the movements that make up the control displacement.
+    wanted : float
+        Control displacement still to be gone.
+    """
+
+    matrix: sp.csc_array
+    free: np.ndarray
+    load: np.ndarray
+    drag: np.ndarray
+    gap: np.ndarray
+    slip: np.ndarray
+    normal: np.ndarray
+    shear: np.ndarray
+    friction: np.ndarray
+    give: tuple[float, float]
+    size: float
+    live: np.ndarray | None = None
+    control: np.ndarray | None = None
+    wanted: float = 0.0
+
+
+@dataclass(frozen=True)
+class Moved:
+    """The solution of a :class:`Step`: further movement of the free blocks, forces, and the live load's multiplier."""
+
+    motion: np.ndarray
+    normal: np.ndarray
+    shear: np.ndarray
+    multiplier: float
+    iterations: int
+    forces: np.ndarray
+    distances: np.ndarray
+
+
+def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Moved | None = None) -> Moved:
+    """Solves a step.
+
+    Parameters
+    ----------
+    step : Step
+    gone : (n_dof,) array
+        Movement since the start of the step, which the drag resists, too.
+    multiplier : float
+        Of the live load, to start from.
+    near : Moved, optional
+        The solution at a geometry very near, with the same contact points.
+
+    Raises
+    ------
+    NotSolved
+    """
+    if len(step.gap) == 0:
+        # Nothing touches anything: the drag alone holds.
+        none = np.zeros((3, 0))
+        return Moved(step.load / step.drag - gone, none[0], none[0], multiplier, 0, none, none)
+    pattern = _Pattern(step)
+    scale = step.size + step.give[1]
+    if near is not None:
+        rays = np.maximum(near.forces[1:], NEAR)
+        distances = np.maximum(near.distances, NEAR * scale)
+        try:
+            return _followed(step, pattern, gone, multiplier, np.stack([rays[0] + rays[1], *rays]), distances)
+        except NotSolved:
+            pass
+    # Rows of forces: N, λ⁺, λ⁻; of distances: y, σ⁺, σ⁻.
+    steep = np.maximum(step.friction, 1e-12)
+    rays = [np.maximum(0.5 * (step.normal + side * step.shear / steep), FIRST_FORCE) for side in (1.0, -1.0)]
+    forces = np.stack([rays[0] + rays[1], *rays])
+    distances = np.stack([np.maximum(x, 0.0) + FIRST_DISTANCE * scale for x in (step.gap, step.slip, -step.slip)])
+    try:
+        return _followed(step, pattern, gone, multiplier, forces, distances)
+    except NotSolved:
+        return _followed(step, pattern, gone, multiplier, forces, distances, careful=True)
+
+
+class _Pattern:
+    """Where the contact points' stiffness goes in the matrix of a step: worked out once, filled at every iteration."""
+
+    def __init__(self, step: Step) -> None:
+        n, n_dof = len(step.gap), len(step.load)
+        number = np.full(len(step.free), -1)
+        number[step.free] = np.arange(n_dof)
+        # A column holds the rows of the two blocks, the same for a point's normal and shear force.
+        self.blocks = step.matrix.data.reshape(n, 2, -1)
+        dof = number[step.matrix.indices.reshape(n, 2, -1)[:, 0]]
+        self.both = (dof[:, :, None] >= 0) & (dof[:, None, :] >= 0)
+        row, column = (
+            np.broadcast_to(dof[:, :, None], self.both.shape),
+            np.broadcast_to(dof[:, None, :], self.both.shape),
+        )
+        diagonal = np.arange(n_dof)
+        place = np.concatenate([column[self.both] * n_dof + row[self.both], diagonal * n_dof + diagonal])
+        filled, self.place = np.unique(place, return_inverse=True)
+        self.dense = n_dof <= DENSE
+        self.raw = place
+        self.indices, counts = filled % n_dof, np.bincount(filled // n_dof, minlength=n_dof)
+        self.pointers = np.concatenate([[0], np.cumsum(counts)])
+        self.drag = step.drag
+        self.to_blocks = sp.csr_array(sp.csr_array(step.matrix)[step.free])
+        self.to_contacts = sp.csr_array(self.to_blocks.T)
+
+    def stiffness(self, local: np.ndarray) -> np.ndarray | sp.csc_array:
+        """The matrix with the drag, for (n_contacts, 2, 2) answers of the contact points."""
+        each = np.matmul(self.blocks.transpose(0, 2, 1), np.matmul(local, self.blocks))
+        n = len(self.drag)
+        if self.dense:
+            return np.bincount(self.raw, np.concatenate([each[self.both], self.drag]), n * n).reshape(n, n).T
+        data = np.bincount(self.place, np.concatenate([each[self.both], self.drag]), len(self.indices))
+        return sp.csc_array((data, self.indices, self.pointers), shape=(n, n))
+
+
+def _followed(
+    step: Step,
+    pattern: _Pattern,
+    gone: np.ndarray,
+    multiplier: float,
+    forces: np.ndarray,
+    distances: np.ndarray,
+    careful: bool = False,
+) -> Moved:
+    mu, (across, along) = step.friction, step.give
+    scale = step.size + along
+    gap, slip = step.gap, step.slip
+    motion, short, recent, lost = np.zeros(len(step.load)), False, [1.0] * LOOK_BACK, 0
+    for iteration in range(ITERATIONS):
+        normal, shear = forces[0], mu * (forces[1] - forces[2])
+        gap_error = distances[0] - (gap + across * (normal - step.normal))
+        slip_error = distances[1] - distances[2] - (slip + along * (shear - step.shear))
+        unbalanced = step.load + pattern.to_blocks @ np.stack([normal, shear], 1).ravel() - step.drag * (gone + motion)
+        behind = 0.0
+        if step.live is not None and step.control is not None:
+            unbalanced = unbalanced + multiplier * step.live
+            behind = step.wanted - float(step.control @ motion)
+        products = forces * distances
+        mean = float(products.mean())
+        out = float(np.abs(unbalanced).max(initial=0.0))
+        wrong = max(float(np.abs(e).max(initial=0.0)) for e in (gap_error, slip_error, np.array([behind])))
+        if out < BALANCE and wrong < EQUATIONS * scale and float(products.max(initial=0.0)) < PRODUCT * across:
+            return Moved(motion, normal, shear, multiplier, iteration, forces, distances)
+        if sum(part < SHORT for part in recent[-LOOK_BACK:]) >= LOST:
+            lost, recent = lost + 1, [1.0] * LOOK_BACK
+            if lost > 1:
+                break
+        newton = _Newton(step, pattern, forces, distances)
+        errors = (gap_error, slip_error, unbalanced, behind)
+        found = newton.direction(-products, *errors)
+        part = _longest(forces, distances, found)
+        after = float(((forces + part * found.forces) * (distances + part * found.distances)).mean())
+        centring = min(max((after / mean) ** 3, 1e-3), 0.8)
+        second = np.clip(found.forces * found.distances, -CORRECTION * mean, CORRECTION * mean)
+        if careful or short:
+            centring, second = 1.0 if short else max(centring, CAREFUL), 0.0
+        found = newton.direction(centring * mean - products - second, *errors)
+        part = FRACTION * _longest(forces, distances, found)
+        short = part < SHORT and not short
+        recent.append(part)
+        motion, multiplier = motion + part * found.motion, multiplier + part * found.multiplier
+        gap, slip = gap + part * found.relative[:, 0], slip + part * found.relative[:, 1]
+        forces, distances = forces + part * found.forces, distances + part * found.distances
+        forces[0] = forces[1] + forces[2]
+    raise NotSolved(f"balance {out:.1e}, distances {wrong:.1e}, product {mean:.1e} after {iteration} iterations")
+
+
+def _longest(forces: np.ndarray, distances: np.ndarray, change: _Direction) -> float:
+    """Largest part of a change that keeps all forces and distances positive, at most 1."""
+    steepest = max(
+        float((-change.forces / forces).max(initial=0.0)), float((-change.distances / distances).max(initial=0.0))
+    )
+    return 1.0 / max(steepest, 1.0)
+
+
+def _factorised(matrix: np.ndarray | sp.csc_array) -> Callable[[np.ndarray], np.ndarray]:
+    """What solves with a matrix; a sparse one's pattern is symmetric, its values are not."""
+    if isinstance(matrix, np.ndarray):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", sla.LinAlgWarning)
+            factors = sla.lu_factor(matrix, overwrite_a=True, check_finite=False)
+        return lambda right: sla.lu_solve(factors, right, check_finite=False)
+    try:
+        # Minimum degree of the pattern, pivots near the diagonal.
+        solve: Callable[[np.ndarray], np.ndarray] = spl.splu(
+            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options={"SymmetricMode": True}
+        ).solve
+    except RuntimeError as error:
+        raise NotSolved(str(error)) from None
+    return solve
+
+
+@dataclass(frozen=True)
+class _Direction:
+    """A change of everything: (3, n_contacts) arrays of forces and distances, (n_contacts, 2) of relative movement."""
+
+    motion: np.ndarray
+    relative: np.ndarray
+    multiplier: float
+    forces: np.ndarray
+    distances: np.ndarray
+
+
+class _Newton:
+    """Newton's equations at one point of the central path, factorised once for several right-hand sides."""
+
+    def __init__(self, step: Step, pattern: _Pattern, forces: np.ndarray, distances: np.ndarray) -> None:
+        self.step, self.pattern, self.forces, self.distances = step, pattern, forces, distances
+        mu, n = step.friction, len(step.friction)
+        self.k_normal = distances[0] / forces[0] + step.give[0]
+        self.k_plus, self.k_minus = distances[1:] / forces[1:] + step.give[1] * mu
+        self.k_shear = self.k_plus + self.k_minus
+        # What a contact point answers: normal force to gap; shear force to gap, through friction, and to slip.
+        through = mu * (self.k_minus - self.k_plus) / (self.k_shear * self.k_normal)
+        local = np.zeros((n, 2, 2))
+        local[:, 0, 0], local[:, 1, 0], local[:, 1, 1] = 1.0 / self.k_normal, through, 2.0 * mu / self.k_shear
+        self.solve = _factorised(pattern.stiffness(local))
+        self.by_live = None if step.live is None else self.solve(step.live)
+
+    def direction(
+        self, aims: np.ndarray, gap_error: np.ndarray, slip_error: np.ndarray, unbalanced: np.ndarray, behind: float
+    ) -> _Direction:
+        """The change that alters each product by its aim and takes the errors away."""
+        step, (normal, plus, minus) = self.step, self.forces
+        for_normal = aims[0] / normal + gap_error
+        for_shear = aims[1] / plus - aims[2] / minus + slip_error
+        at_once = for_normal / self.k_normal
+        shear = step.friction * ((self.k_minus - self.k_plus) * at_once + 2.0 * for_shear) / self.k_shear
+        motion = self.solve(unbalanced + self.pattern.to_blocks @ np.stack([at_once, shear], 1).ravel())
+        multiplier = 0.0
+        if self.by_live is not None and step.control is not None:
+            multiplier = (behind - float(step.control @ motion)) / float(step.control @ self.by_live)
+            motion = motion + multiplier * self.by_live
+        relative = (self.pattern.to_contacts @ motion).reshape(-1, 2)
+        d_normal = (for_normal - relative[:, 0]) / self.k_normal
+        rest = for_shear - relative[:, 1]
+        d_rays = np.stack([self.k_minus * d_normal + rest, self.k_plus * d_normal - rest]) / self.k_shear
+        forces = np.stack([d_normal, *d_rays])
+        return _Direction(motion, relative, multiplier, forces, (aims - self.distances * forces) / self.forces)
