@@ -17,13 +17,25 @@ class Driver(Protocol):
     """The one parameter of a path: what it moves, how far, and in which steps."""
 
     @property
-    def increment(self) -> float: ...
+    def increment(self) -> float:
+        """Largest step that is reported."""
+        ...
+
     @property
-    def limit(self) -> float: ...
+    def limit(self) -> float:
+        """Where the path ends if nothing has collapsed."""
+        ...
+
     @property
-    def tolerance(self) -> float: ...
+    def tolerance(self) -> float:
+        """Width of the bracket of a collapse."""
+        ...
+
     @property
-    def unit(self) -> str: ...
+    def unit(self) -> str:
+        """Of the parameter: m or rad."""
+        ...
+
     @property
     def what(self) -> str:
         """The parameter in words."""
@@ -126,6 +138,7 @@ class ControlDisplacement:
     tolerance: float | None = None
 
     def __post_init__(self) -> None:
+        """Check what was given; directions come to unit length."""
         for name in ("direction", "point"):
             value = getattr(self, name)
             if value is None:
