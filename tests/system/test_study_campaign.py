@@ -141,34 +141,38 @@ def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_a_study_that_is_killed_and_interrupted_goes_on(arches, tmp_path):
-    """Killed without warning by SIGKILL, then by Ctrl-C; so many runs that none of both comes after the last."""
-    arches.write_text(STUDY.replace("runs = 24", "runs = 120"), encoding="utf-8")
+    """Killed without warning by SIGKILL, then by Ctrl-C, each time once it has made a run of its own."""
+    runs = 60
+    arches.write_text(STUDY.replace("runs = 24", f"runs = {runs}"), encoding="utf-8")
     out, command = tmp_path / "out", [sys.executable, "-m", "blockvis", "sweep", "study.toml", "-o", "out"]
 
-    def stopped(by, after):
+    def stopped(by):
+        # On a busy machine many runs are recorded at once: how many there will be, nobody knows beforehand.
+        before = finished_runs(out)
         process = subprocess.Popen(
             [*command, "--workers", "1"], cwd=tmp_path, start_new_session=True, stderr=subprocess.PIPE, text=True
         )
         deadline = time.monotonic() + 120
-        while finished_runs(out) < after and process.poll() is None:
+        while finished_runs(out) == before and process.poll() is None:
             assert time.monotonic() < deadline
             time.sleep(0.02)
         # As a terminal does: Ctrl-C reaches the workers too.
         (os.killpg if by == signal.SIGINT else os.kill)(process.pid, by)
         return process.wait(timeout=60), process.stderr.read()
 
-    code, _ = stopped(signal.SIGKILL, 3)
+    code, _ = stopped(signal.SIGKILL)
     assert code == -signal.SIGKILL
-    code, message = stopped(signal.SIGINT, 6)
+    killed = finished_runs(out)
+    code, message = stopped(signal.SIGINT)
     assert code == 130
-    assert re.fullmatch(r"blockvis: interrupted; \d+ of 120 runs are kept, .* goes on with the others\n", message)
+    assert re.fullmatch(rf"blockvis: interrupted; \d+ of {runs} runs are kept, .* goes on with the others\n", message)
     done = (out / "runs.jsonl").read_bytes()
-    assert 6 <= done.count(b"\n") < 120
+    assert 0 < killed < done.count(b"\n") < runs
     assert len(pd.read_csv(out / "table.csv")) == done.count(b"\n"), "the table is there too"
     assert main(["sweep", str(arches), "-o", str(out), "--workers", "2"]) == 0
     rows = (out / "runs.jsonl").read_bytes()
     assert rows.startswith(done)
-    assert rows.count(b"\n") == 120, "finished runs are not made again"
+    assert rows.count(b"\n") == runs, "finished runs are not made again"
 
 
 def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tmp_path, capsys, scheduler):
