@@ -142,12 +142,12 @@ def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
 @pytest.mark.slow
 def test_a_study_that_is_killed_and_interrupted_goes_on(arches, tmp_path):
     """Killed without warning by SIGKILL, then by Ctrl-C, each time once it has made a run of its own."""
-    runs = 60
+    runs = 40
     arches.write_text(STUDY.replace("runs = 24", f"runs = {runs}"), encoding="utf-8")
     out, command = tmp_path / "out", [sys.executable, "-m", "blockvis", "sweep", "study.toml", "-o", "out"]
 
     def stopped(by):
-        # On a busy machine many runs are recorded at once: how many there will be, nobody knows beforehand.
+        # On a busy machine many runs are recorded at once: their number is not known beforehand.
         before = finished_runs(out)
         process = subprocess.Popen(
             [*command, "--workers", "1"], cwd=tmp_path, start_new_session=True, stderr=subprocess.PIPE, text=True
