@@ -150,7 +150,13 @@ def test_a_study_that_is_killed_and_interrupted_goes_on(arches, tmp_path):
         # On a busy machine many runs are recorded at once: their number is not known beforehand.
         before = finished_runs(out)
         process = subprocess.Popen(
-            [*command, "--workers", "1"], cwd=tmp_path, start_new_session=True, stderr=subprocess.PIPE, text=True
+            [*command, "--workers", "1"],
+            cwd=tmp_path,
+            start_new_session=True,
+            # Tests that a shell has started in the background ignore Ctrl-C, and so would this process.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+            stderr=subprocess.PIPE,
+            text=True,
         )
         deadline = time.monotonic() + 120
         while finished_runs(out) == before and process.poll() is None:
