@@ -36,6 +36,11 @@ def facade():
 
 RESPONSES = {"portal frame": portal, "semicircular arch": arch_response, "small façade": facade}
 
+#: The façade takes as long as all others together.
+EACH = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "small façade" else name for name in RESPONSES]
+)
+
 
 def counted(response, increment):
     mechanism = solver.mechanism_of(response.assembly, increment)
@@ -57,7 +62,7 @@ def unpacked(table):
     return np.cumsum(steps, axis=0)
 
 
-@pytest.mark.parametrize("name", RESPONSES)
+@EACH
 def test_every_increment_has_one_count(name, tmp_path):
     response = RESPONSES[name]()
     expected = [counted(response, increment) for increment in response.increments]
@@ -82,7 +87,7 @@ def test_every_increment_has_one_count(name, tmp_path):
     assert [((k == 1).sum(), (k == 2).sum()) for k in frames] == expected
 
 
-@pytest.mark.parametrize("name", RESPONSES)
+@EACH
 def test_curve_names_the_count_it_changes_to(name):
     response = RESPONSES[name]()
     events = events_of(response)
