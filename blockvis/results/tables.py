@@ -22,11 +22,14 @@ COLUMNS = (
     "reaction",
     "reaction_over_weight",
     "load_multiplier",
+    "least_admissible",
+    "largest_admissible",
     "equilibrium_residual",
     "largest_penetration",
     "duality_gap",
     "complementarity",
     "kinematic_violation",
+    "energy_residual",
     "contacts_open",
     "contacts_sticking",
     "contacts_sliding",
@@ -65,6 +68,8 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "collapse_bracket": list(collapse.bracket) if collapse else None,
         "settlement_unit": response.settlements[-1].unit if response.settlements else response.parameter.unit,
         "initial_reaction": path[0].reaction if path else None,
+        "reaction_at_rest": _known(path[0].at_rest) if path else None,
+        "onset_reaction": _known(path[0].onset) if path else None,
         "collapse_reaction": collapse.reaction if collapse else None,
         "mechanism": collapse.words if collapse else None,
         **_joint_counts(response),
@@ -86,6 +91,11 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "inputs": record.inputs(),
         "case": record.case,
     }
+
+
+def _known(value: float) -> float | None:
+    """Give a number, or None where it was not worked out."""
+    return float(value) if np.isfinite(value) else None
 
 
 def _joint_counts(response: solver.Response) -> dict[str, int | None]:
@@ -129,11 +139,14 @@ def row_of_increment(
         repr(float(increment.reaction)),
         repr(float(increment.reaction) / solver.total_weight(assembly)),
         repr(float(increment.load_multiplier)),
+        repr(float(increment.least)),
+        repr(float(increment.largest)),
         f"{certificate.equilibrium_residual:.3e}",
         f"{certificate.largest_penetration:.3e}",
         f"{certificate.duality_gap:.3e}",
         f"{certificate.complementarity:.3e}",
         f"{certificate.kinematic_violation:.3e}",
+        f"{certificate.energy_residual:.3e}",
         *(int(counts[state]) for state in (0, 1, 2, 3)),
         len(mechanism.hinges),
         len(mechanism.sliding),

@@ -24,7 +24,7 @@ class PushoverKind(AnalysisKind):
     name = "pushover"
     parameter = solver.CONTROL_DISPLACEMENT
     measured = solver.LOAD_MULTIPLIER
-    checkpoint = solver.PushoverCheckpoint
+    checkpoint = solver.Checkpoint
     lost = "capacity"
 
     def read(self, top: Table, analysis: Table) -> solver.ControlDisplacement | None:
@@ -143,7 +143,7 @@ def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDis
     return control
 
 
-def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.PushoverCheckpoint | None) -> Steps:
+def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.Checkpoint | None) -> Steps:
     case = given.case
     pose, steps = None, settlement_steps(given)
     # A pushover that has begun has its settlement behind it.

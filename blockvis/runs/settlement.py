@@ -13,6 +13,9 @@ from blockvis.numbers import force_text
 
 from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, needs_dry_joints
 
+#: Difference of two reactions, in weights, that is worth a line.
+NOTABLE = 1e-3
+
 
 class SettlementKind(AnalysisKind):
     """Settlements, one after another, and the reaction of the supports."""
@@ -62,6 +65,12 @@ class SettlementKind(AnalysisKind):
         lines = []
         if path:
             lines.append(f"first reaction       {path[0].reaction:12.6g} N   {path[0].reaction / weight:.6f} W")
+            onset = path[0].onset
+            if abs(onset - path[0].reaction) > NOTABLE * weight:
+                lines[-1] += "   the least that equilibrium allows"
+                lines.append(
+                    f"reaction at onset    {onset:12.6g} N   {onset / weight:.6f} W   where friction leaves it"
+                )
         if response.collapse is not None:
             low, high = response.collapse.bracket
             last, at = response.collapse.reaction, response.collapse.displacement

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
+from itertools import count, islice
 
 import numpy as np
 
@@ -38,15 +39,19 @@ LINEARISATIONS, EXACT, ACCEPTED = 6, 1e-6, 1e-4
 #: its weight.
 FALLING_FORCE = 1.0
 
-#: Part of the drag that is left where a collapse is being enclosed.
-CARE = 1e-3
+#: Part of the drag that is left where a collapse is being enclosed: within so many tolerances of it.
+CARE, ENCLOSED = 1e-3, 8.0
 
-#: Where a block moves so many times as fast as the supports, the place is proved before the path goes on.
-FAST = 10.0
+#: Where a block moves so many times as fast as the supports, the place is proved before the path goes on; and after so
+#: many steps.
+FAST, STEPS_UNPROVED = 10.0, 16
+
+#: Growth of the steps after one that was not solved.
+SLOW_GROWTH = 1.25
 
 #: A fall is followed in steps of this movement of a block, in block sizes.
-FALL_STEP = 0.05
-FALL_STEPS, CREEPS = 60, 16
+FALL_STEP = 0.1
+FALL_STEPS, CREEPS, FALL_FAILURES = 60, 16, 30
 
 #: Unbalanced force, in block weights, under which what creeps may have come to rest.
 CREEPING = 1e-2
@@ -131,6 +136,8 @@ class Checkpoint:
         Smallest parameter known to have no equilibrium; infinite where none is known.
     works : tuple of float
         Of loads, on supports and of friction since the start of the phase, in units of the program.
+    careful_until : float [m or rad]
+        Parameter up to which a collapse is being enclosed.
     """
 
     phase: int
@@ -139,6 +146,7 @@ class Checkpoint:
     step: float
     first_without: float
     works: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    careful_until: float = -np.inf
 
 
 @dataclass(frozen=True)
@@ -187,7 +195,11 @@ class Path:
         self.lever = driver.lever()
         self.longest = min(driver.increment, LARGEST_STEP * model.length / self.lever)
         self.programs, self.works, self.care = 0, (0.0, 0.0, 0.0), 1.0
+        self.barrier, self.careful_until = np.inf, -np.inf
         self.notes: list[Note] = []
+        self.velocity = driver.rate(0.0)
+        self.sunk: tuple[Place, list[tuple[Place, np.ndarray, float]], Iterator[tuple[Place, np.ndarray, float]]] | None
+        self.sunk = None
         rate = driver.rate(0.0)
         sideways = rate[model.assembly.moving, :2].sum(axis=0) if model.assembly.moving.any() else np.zeros(2)
         size = float(np.hypot(*sideways))
@@ -317,7 +329,10 @@ class Path:
         return np.column_stack([after.positions - before.positions, after.rotations - before.rotations])
 
     def advanced(self, place: Place, target: float, step: float) -> tuple[Place, float]:
-        """Goes towards a parameter in steps that suit the path, and stops early where blocks are fast.
+        """Goes towards a parameter in steps that suit the path, and stops early where a place is worth a proof.
+
+        Where blocks fall in a step, shorter ones look for the place from which they do; where they are short, with less
+        drag. What has been gone is kept: ``self.barrier`` is then the nearest parameter that was not reached, and close.
 
         Returns
         -------
@@ -327,32 +342,51 @@ class Path:
 
         Raises
         ------
-        Falls
         NoStep
+        Wedged
         """
         smallest = SMALLEST_STEP * self.model.length / self.lever
-        failed = False
-        while target - place.s > 1e-12 * max(abs(target), smallest):
+        tolerance, started = self.driver.tolerance, place.s
+        grow = 2.0
+        for _ in range(STEPS_UNPROVED):
             ahead = target - place.s
-            # Two equal steps rather than a long one and a sliver.
-            length = ahead if ahead <= step * 1.000001 else min(step, ahead / 2.0)
+            if ahead <= 1e-12 * max(abs(target), smallest):
+                break
+            careful = place.s < self.careful_until
+            length = min(step, ahead)
+            if np.isfinite(self.barrier):
+                # Nearer than half-way only in the end, where it is tried once more.
+                rest = self.barrier - place.s
+                length = min(length, rest if rest <= tolerance / 4.0 else rest / 2.0)
+            elif ahead > step * 1.000001:
+                # Two equal steps rather than a long one and a sliver.
+                length = min(step, ahead / 2.0)
+            self.care = CARE if careful else 1.0
             try:
                 new, motion = self.step(place, length)
-            except (NotSolved, Falls) as error:
-                step, failed = length / 2.0, True
-                if isinstance(error, Falls) and step < self.driver.tolerance / 4.0:
-                    raise
+            except NotSolved as error:
+                step, grow = length / 2.0, SLOW_GROWTH
                 if step < smallest:
                     raise NoStep(f"at {place.s:.6g} {self.driver.unit}: {error}") from None
+                continue
+            except Falls:
+                # The drag may lose its hold early.
+                if self._falls_within(place, length):
+                    step = length / 2.0
+                    if careful and length <= tolerance / 4.0:
+                        break
+                grow = SLOW_GROWTH
                 continue
             if float(new.forces[:, 0].max(initial=0.0)) > LOCKED_FORCE * self.model.total_load:
                 raise Wedged(new)
             self.works = self._works(place, new, motion)
+            self.velocity = motion * self.model.lengths / length
             place = replace(new, s=target) if length == ahead else new
-            step = length if failed else max(step, min(self.longest, 2.0 * length))
-            failed = False
+            if place.s >= self.barrier:
+                self.barrier = np.inf
+            step = min(self.longest, max(step, grow * length)) if length >= 0.99 * step else step
             moved_by = float(np.abs(motion[self.model.assembly.free]).max(initial=0.0))
-            if moved_by > max(FAST * length * self.lever / self.model.length, 1e2 * GIVE):
+            if moved_by > max(FAST * length * self.lever / self.model.length, 1e2 * GIVE) and place.s > started:
                 break
         return place, step
 
@@ -381,7 +415,7 @@ class Path:
         contacts = find_contacts(assembly, moved_vertices(assembly, place.pose), model.reach)
         friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         rate = None if model.live is not None else self.driver.rate(place.s)
-        bounds = admissible(model, place.pose, contacts, friction, rate)
+        bounds = admissible(model, place.pose, contacts, friction, rate, vertex=place.s == 0.0)
         self.programs += bounds.programs
         remembered = self._remembered(place, contacts)
         if not bounds.exists:
@@ -449,13 +483,13 @@ class Path:
         """Yields the increments of the phase, returns how it ended and leaves the last place in ``self.last``."""
         driver, tolerance = self.driver, self.driver.tolerance
         self.last, self.start = start, start.pose
-        step, first_without = FIRST_STEP * GIVE * self.model.length / self.lever, np.inf
+        step = FIRST_STEP * GIVE * self.model.length / self.lever
         if resume is not None:
-            start, step, first_without = resume.place, resume.step, resume.first_without
-            self.start, self.works = resume.start, resume.works
+            start, step, self.barrier = resume.place, resume.step, resume.first_without
+            self.start, self.works, self.careful_until = resume.start, resume.works, resume.careful_until
         proved = self.proved(start)
         if resume is None and not proved.bounds.exists:
-            motion = next((motion for _, motion, _ in self._sinking(start, 1)), self.drag)
+            motion = next((motion for _, motion, _ in self._sinking(start)), self.drag)
             yield self._falling(start, motion * self.model.lengths, start.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, self._no_equilibrium(motion))
         if resume is None and self.model.live is not None and not 0.0 < proved.measured < np.inf:
@@ -473,7 +507,7 @@ class Path:
                 at_limit = place.s >= driver.limit * (1.0 - 1e-12)
                 motion = self._next_motion(place)
                 number = self.number + 1 if at_limit else self.number
-                checkpoint = Checkpoint(number, self.start, place, step, first_without, self.works)
+                checkpoint = Checkpoint(number, self.start, place, step, self.barrier, self.works, self.careful_until)
                 found = replace(self._increment(proved, motion), checkpoint=checkpoint)
                 if place.s == 0.0 and self.model.live is None:
                     at_rest, onset = self._at_first(proved)
@@ -482,43 +516,52 @@ class Path:
                 reported = True
                 if at_limit:
                     return self._reached()
-            if first_without - place.s <= tolerance * (1.0 + 1e-9):
+            if self.barrier - place.s <= tolerance * (1.0 + 1e-9):
                 # A hair beyond the last equilibrium: what loses its hold may come to rest nearby.
                 without = without or self._beyond(place)
                 settled = self._settles(without)
                 if settled is not None:
-                    proved, reported, first_without, without, spent = settled, False, np.inf, None, None
+                    proved, reported, self.barrier, without, spent = settled, False, np.inf, None, None
                     continue
                 if not self._is_stop(place.s) and place.s > 0.0:
                     yield self._increment(proved, self._next_motion(place))
-                return (yield from self._collapse(proved, without, first_without, spent))
-            ahead = min(self._next_stop(place.s), 0.5 * (place.s + first_without))
-            # Where equilibrium is about to be lost, the drag would lose it early.
-            self.care = CARE if np.isfinite(first_without) else 1.0
+                return (yield from self._collapse(proved, without, self.barrier, spent))
             try:
-                new, step = self.advanced(place, ahead, step)
-            except Falls:
-                first_without, without, spent, step = min(first_without, ahead), None, None, 0.5 * (ahead - place.s)
-                continue
+                new, step = self.advanced(place, min(self._next_stop(place.s), 0.5 * (place.s + self.barrier)), step)
             except Wedged as wedged:
                 return Ending(Status.LOCKED, self._locked(wedged.place))
             except NoStep as reason:
                 if not self._is_stop(place.s) and place.s > 0.0:
                     yield self._increment(proved, self._next_motion(place))
                 return Ending(Status.SOLVER_FAILED, self._no_step(str(reason)))
+            if new is place:
+                without, spent = None, None
+                continue
             reached = self.proved(new)
             crept: Proved | None = reached
             if place.s == 0.0 and self.model.live is not None and reached.measured <= 0.0:
                 raise ValueError(self.driver.misdirected())
             lost = reached.measured if reached.bounds.exists else None
-            if not self._holds(reached) and lost is None:
+            if not self._holds(reached) and lost is None and new.s > self.careful_until:
                 # What the drag holds back may only have to creep on.
                 crept = self._settles(new, CREEPS, JUMP)
             if self._holds(crept):
                 assert crept is not None
-                proved, reported = crept, not self._is_stop(new.s)
+                proved, reported, without, spent = crept, not self._is_stop(new.s), None, None
             else:
-                first_without, without, spent, step = new.s, new, lost, min(step, 0.5 * (new.s - place.s))
+                length = new.s - place.s
+                step = min(step, 0.5 * length)
+                if self._falls_within(place, length):
+                    without, spent = new, lost
+
+    def _falls_within(self, place: Place, length: float) -> bool:
+        """Notes that no equilibrium was reached so far beyond a place; False where less drag is to be tried first."""
+        near = ENCLOSED * self.driver.tolerance
+        if place.s >= self.careful_until and length <= near:
+            self.careful_until, self.barrier = place.s + 2.0 * near, np.inf
+            return False
+        self.barrier = place.s + length
+        return True
 
     def _beyond(self, place: Place) -> Place:
         """A place just beyond one from which the structure falls: reached by the longest step that is solved."""
@@ -532,7 +575,7 @@ class Path:
 
     def _at_first(self, proved: Proved) -> tuple[float, float]:
         """The reaction at rest, and once the structure has begun to move: far beyond the give of the joints."""
-        place, works = proved.place, self.works
+        place, works, barrier, careful_until = proved.place, self.works, self.barrier, self.careful_until
         rate = self.driver.rate(0.0)
         remembered = self._remembered(place, proved.contacts)
         at_rest = float((self._on_supports(proved.contacts, place.pose, remembered) * rate).sum())
@@ -542,9 +585,9 @@ class Path:
             begun, _ = self.advanced(place, ONSET * give, FIRST_STEP * give)
             begun_there = self.proved(begun)
             onset = begun_there.measured if begun_there.bounds.exists else np.nan
-        except (Falls, NoStep, Wedged):
+        except (NoStep, Wedged):
             pass
-        self.works = works
+        self.works, self.barrier, self.careful_until = works, barrier, careful_until
         return at_rest, onset
 
     def _is_stop(self, s: float) -> bool:
@@ -564,41 +607,57 @@ class Path:
         return proved is not None and proved.bounds.exists and (self.model.live is None or proved.measured > 0.0)
 
     def _next_motion(self, place: Place) -> np.ndarray:
-        """(n_blocks, 3) array: velocity in the movement that follows, per unit of the parameter."""
+        """(n_blocks, 3) array: velocity in the movement that follows, per unit of the parameter.
+
+        Where no step is solved, as near a collapse, that in the movement that led here.
+        """
         length = MECHANISM * self.model.length / self.lever
-        for _ in range(4):
-            try:
-                _, motion = self.step(place, length)
-            except (NotSolved, Falls):
-                length /= 3.0
-            else:
-                return motion * self.model.lengths / length
-        return self.driver.rate(place.s)
+        try:
+            _, motion = self.step(place, length)
+        except (NotSolved, Falls):
+            return self.velocity
+        return motion * self.model.lengths / length
 
     def _settles(self, place: Place, steps: int = FALL_STEPS, farthest: float = FARTHEST_FALL) -> Proved | None:
         """The equilibrium in which a structure that falls comes to rest, where it does so soon and near."""
         model, start = self.model, place.pose
-        for sunk, motion, length in self._sinking(place, steps):
-            place = sunk
-            if float(np.abs(self._between(start, place.pose)[:, :2]).max()) > farthest * model.length:
+        for number, (sunk, motion, length) in enumerate(islice(self._sinking(place), steps), start=1):
+            way = float(np.abs(self._between(start, sunk.pose)[:, :2]).max())
+            if way > farthest * model.length:
                 return None
-            # As slow as what creeps under a millionth of its weight.
-            speed = float(np.abs(motion[model.assembly.free]).max(initial=0.0)) * model.length / (length * self.lever)
-            if speed * DRAG > CREEPING:
+            # As slow as what creeps under a small part of its weight.
+            fastest = float(np.abs(motion[model.assembly.free]).max(initial=0.0))
+            speed = fastest * model.length / (length * self.lever)
+            often = number & (number - 1) == 0 or number == steps or fastest < AT_REST
+            if speed * DRAG > CREEPING or not often:
                 continue
-            found = self.proved(place)
+            found = self.proved(sunk)
             if self._holds(found):
-                way = float(np.abs(self._between(start, place.pose)[:, :2]).max())
                 if way > JUMP * model.length:
-                    self.notes.append(Note(place.s, self._jump(start, place.pose)))
+                    self.notes.append(Note(sunk.s, self._jump(start, sunk.pose)))
                 return found
+            if fastest < AT_REST:
+                return None
         return None
 
-    def _sinking(self, place: Place, steps: int) -> Generator[tuple[Place, np.ndarray, float], None, None]:
-        """Steps in which what falls sinks against the drag, the driver at rest; each moves blocks by a little."""
-        length = self.model.length / self.lever * MECHANISM * DRAG
+    def _sinking(self, place: Place) -> Iterator[tuple[Place, np.ndarray, float]]:
+        """Steps in which what falls sinks against the drag, the driver at rest; remembered for who asks once more."""
+        if self.sunk is None or self.sunk[0] is not place:
+            self.sunk = (place, [], self._sink(place))
+        _, steps, more = self.sunk
+        for number in count():
+            if number == len(steps):
+                try:
+                    steps.append(next(more))
+                except StopIteration:
+                    return
+            yield steps[number]
+
+    def _sink(self, place: Place) -> Iterator[tuple[Place, np.ndarray, float]]:
+        """Work out the steps of :meth:`_sinking`; each moves blocks by a little."""
+        length, largest = (part * self.model.length / self.lever for part in (MECHANISM * DRAG, 10.0))
         failures = 0
-        while steps > 0 and failures < 30:
+        while failures < FALL_FAILURES:
             try:
                 new, motion = self.step(place, length, still=True)
             except (NotSolved, Falls):
@@ -606,11 +665,11 @@ class Path:
                 continue
             moved_by = float(np.abs(motion[self.model.assembly.free]).max(initial=0.0))
             if moved_by > 2.0 * FALL_STEP:
-                length, failures = length / 3.0, failures + 1
+                length, failures = length * FALL_STEP / moved_by, failures + 1
                 continue
-            place, steps = new, steps - 1
+            place = new
             yield place, motion, length
-            length = min(length * (1.5 if moved_by > 0.5 * FALL_STEP else 2.5), 10.0 * self.model.length / self.lever)
+            length = min(length * min(2.5, max(FALL_STEP / max(moved_by, 1e-300), 0.5)), largest)
 
     def _collapse(
         self, last: Proved, without: Place, first_without: float, spent: float | None
@@ -651,11 +710,11 @@ class Path:
     def _fall(self, place: Place) -> Generator[Increment, None, None]:
         """Pseudo-time frames: what falls sinks against the drag until it rests."""
         frames, start, total = 0, place, np.zeros((self.model.assembly.n_blocks, 3))
-        for new, motion, length in self._sinking(place, 4 * max(self.falling_frames, 4)):
+        for new, motion, length in islice(self._sinking(place), 4 * max(self.falling_frames, 4)):
             total = total + motion
             moved_by = float(np.abs(total).max())
             at_rest = length >= self.model.length and float(np.abs(motion).max()) < AT_REST
-            if (frames == 0 and moved_by > MECHANISM) or moved_by > 2.0 * FALL_STEP or at_rest:
+            if (frames == 0 and moved_by > MECHANISM) or moved_by > FALL_STEP or at_rest:
                 yield self._falling(start, total * self.model.lengths, start.s)
                 frames, start, total = frames + 1, new, np.zeros_like(total)
             if at_rest or frames == self.falling_frames:
