@@ -28,6 +28,10 @@ from .drivers import Driver
 #: the analysis where no step is solved.
 LARGEST_STEP, SMALLEST_STEP = 0.05, 1e-9
 
+#: Change of the velocities, as a part of them, from which on a step is taken again in shorter ones, down to this part of
+#: the largest.
+EVENT_CHANGE, EVENT_REFINEMENT = 0.1, 8.0
+
 #: First step, and movement by which a structure has begun to move, in elastic gives.
 FIRST_STEP, ONSET = 0.1, 100.0
 
@@ -41,6 +45,9 @@ FALLING_FORCE = 1.0
 
 #: Part of the drag that is left where a collapse is being enclosed: within so many tolerances of it.
 CARE, ENCLOSED = 1e-3, 8.0
+
+#: Part of the give of the joints that is left there, where forces grow without limit before a snap.
+STIFF = 1e-2
 
 #: Where a block moves so many times as fast as the supports, the place is proved before the path goes on; and after so
 #: many steps.
@@ -194,6 +201,7 @@ class Path:
         self.drag = drag_of(model)
         self.lever = driver.lever()
         self.longest = min(driver.increment, LARGEST_STEP * model.length / self.lever)
+        self.finest = LARGEST_STEP / EVENT_REFINEMENT * model.length / self.lever
         self.programs, self.works, self.care = 0, (0.0, 0.0, 0.0), 1.0
         self.barrier, self.careful_until = np.inf, -np.inf
         self.notes: list[Note] = []
@@ -274,6 +282,7 @@ class Path:
         multiplier = place.multiplier * live_size
         pose = self._with_supports(place.pose, supports)
         way, near = 0.0, None
+        stiff = 1.0 if still or self.care == 1.0 else STIFF
         for _ in range(LINEARISATIONS):
             contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
             control = driver.control(pose) if model.live is not None else None
@@ -287,7 +296,7 @@ class Path:
                 normal=normal,
                 shear=shear,
                 friction=friction,
-                give=(GIVE_ACROSS, GIVE),
+                give=(GIVE_ACROSS * stiff, GIVE * stiff),
                 size=size,
                 live=live[free].ravel() if control is not None else None,
                 control=None if control is None else (control * scales / model.length)[free].ravel(),
@@ -310,7 +319,7 @@ class Path:
         if way > ACCEPTED:
             raise NotSolved(f"the geometry still moves by {way:.1e} block sizes")
         motion = full + np.where(free[:, None], 0.0, 1.0) * self._between(place.pose, pose)
-        if not still and np.abs(gone).max(initial=0.0) > max(FALLING_FORCE / DRAG * size, 1e3 * GIVE):
+        if not still and np.abs(gone).max(initial=0.0) > max(FALLING_FORCE / (DRAG * self.care) * size, 1e3 * GIVE):
             raise Falls
         forces = np.stack([normal, shear], axis=1)
         return (
@@ -379,6 +388,9 @@ class Path:
                 continue
             if float(new.forces[:, 0].max(initial=0.0)) > LOCKED_FORCE * self.model.total_load:
                 raise Wedged(new)
+            if length > self.finest * 1.000001 and self._turns(motion / length):
+                step = max(length / 2.0, self.finest)
+                continue
             self.works = self._works(place, new, motion)
             self.velocity = motion * self.model.lengths / length
             place = replace(new, s=target) if length == ahead else new
@@ -389,6 +401,12 @@ class Path:
             if moved_by > max(FAST * length * self.lever / self.model.length, 1e2 * GIVE) and place.s > started:
                 break
         return place, step
+
+    def _turns(self, velocity: np.ndarray) -> bool:
+        """Whether blocks move otherwise than in the step before: hinges have jumped, joints begun to slide or closed."""
+        weight = np.sqrt(self.drag)
+        new, old = velocity * weight, self.velocity / self.model.lengths * weight
+        return bool(np.linalg.norm(new - old) > EVENT_CHANGE * np.linalg.norm(old))
 
     def _works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float]:
         """Works of loads, on supports and of friction so far, with the forces at the end of the step."""
@@ -500,6 +518,7 @@ class Path:
             yield self._falling(start, np.zeros((self.model.assembly.n_blocks, 3)), start.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
         reported, without, spent = resume is not None, None, None
+        self.reported = start.s
         while True:
             place = proved.place
             self.last = place
@@ -513,7 +532,7 @@ class Path:
                     at_rest, onset = self._at_first(proved)
                     found = replace(found, at_rest=at_rest, onset=onset)
                 yield found
-                reported = True
+                reported, self.reported = True, place.s
                 if at_limit:
                     return self._reached()
             if self.barrier - place.s <= tolerance * (1.0 + 1e-9):
@@ -523,7 +542,7 @@ class Path:
                 if settled is not None:
                     proved, reported, self.barrier, without, spent = settled, False, np.inf, None, None
                     continue
-                if not self._is_stop(place.s) and place.s > 0.0:
+                if place.s > self.reported:
                     yield self._increment(proved, self._next_motion(place))
                 return (yield from self._collapse(proved, without, self.barrier, spent))
             try:
@@ -531,7 +550,7 @@ class Path:
             except Wedged as wedged:
                 return Ending(Status.LOCKED, self._locked(wedged.place))
             except NoStep as reason:
-                if not self._is_stop(place.s) and place.s > 0.0:
+                if place.s > self.reported:
                     yield self._increment(proved, self._next_motion(place))
                 return Ending(Status.SOLVER_FAILED, self._no_step(str(reason)))
             if new is place:
@@ -656,12 +675,12 @@ class Path:
     def _sink(self, place: Place) -> Iterator[tuple[Place, np.ndarray, float]]:
         """Work out the steps of :meth:`_sinking`; each moves blocks by a little."""
         length, largest = (part * self.model.length / self.lever for part in (MECHANISM * DRAG, 10.0))
-        failures = 0
+        failures, grow = 0, 2.5
         while failures < FALL_FAILURES:
             try:
                 new, motion = self.step(place, length, still=True)
             except (NotSolved, Falls):
-                length, failures = length / 3.0, failures + 1
+                length, failures, grow = length / 3.0, failures + 1, SLOW_GROWTH
                 continue
             moved_by = float(np.abs(motion[self.model.assembly.free]).max(initial=0.0))
             if moved_by > 2.0 * FALL_STEP:
@@ -669,7 +688,7 @@ class Path:
                 continue
             place = new
             yield place, motion, length
-            length = min(length * min(2.5, max(FALL_STEP / max(moved_by, 1e-300), 0.5)), largest)
+            length = min(length * min(grow, max(FALL_STEP / max(moved_by, 1e-300), 0.5)), largest)
 
     def _collapse(
         self, last: Proved, without: Place, first_without: float, spent: float | None
@@ -717,7 +736,7 @@ class Path:
             if (frames == 0 and moved_by > MECHANISM) or moved_by > FALL_STEP or at_rest:
                 yield self._falling(start, total * self.model.lengths, start.s)
                 frames, start, total = frames + 1, new, np.zeros_like(total)
-            if at_rest or frames == self.falling_frames:
+            if at_rest or frames >= max(self.falling_frames, 1):
                 return
 
     # What is reported -----------------------------------------------------------------------------------------------
