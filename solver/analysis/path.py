@@ -77,6 +77,14 @@ LOCKED_FORCE = 1e3
 NAMED = 4
 
 
+#: A corner that carries this force, in block weights, may slip past the end of its edge, or come into another block from
+#: the side, in steps that move blocks by no more than this, in block sizes.
+SLIPPED_OFF_FORCE, SLIP_OFF = 1e-3, 1e-4
+
+#: Contact points of two blocks no farther apart than this, in block sizes, are one, by whichever corner and edge.
+SAME_PLACE = 1e-2
+
+
 class Falls(Exception):
     """Blocks move far faster than the supports: no equilibrium near."""
 
@@ -108,6 +116,8 @@ class Place:
         Their normal and shear forces, in units of the program.
     multiplier : float
         Of the live load.
+    velocity : (n_blocks, 3) array, optional
+        In the step that led here, per unit of the parameter; None where nothing moved with it.
     """
 
     s: float
@@ -115,6 +125,7 @@ class Place:
     contacts: Contacts | None
     forces: np.ndarray
     multiplier: float = 0.0
+    velocity: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -206,6 +217,7 @@ class Path:
         self.barrier, self.careful_until = np.inf, -np.inf
         self.notes: list[Note] = []
         self.velocity = driver.rate(0.0)
+        self.around: tuple[Pose, Contacts] | None = None
         self.sunk: tuple[Place, list[tuple[Place, np.ndarray, float]], Iterator[tuple[Place, np.ndarray, float]]] | None
         self.sunk = None
         rate = driver.rate(0.0)
@@ -270,13 +282,16 @@ class Path:
         free, scales = assembly.free, model.lengths
         s = place.s if still else place.s + length
         supports, size = driver.supports(s), length * self.lever / model.length
-        start = find_contacts(assembly, moved_vertices(assembly, place.pose), model.reach)
+        start = self._around(place.pose)
         memory = self._remembered(place, start)
         normal, shear = memory.T
         friction = model.interfaces.friction(assembly, start.block_a, start.block_b)
         rows = np.repeat(free, 3)
         load = (model.scaled_load + self.imperfection)[free].ravel()
         drag = DRAG * (1.0 if still else self.care) / size * self.drag[free].ravel()
+        if place.velocity is not None and not still:
+            # The drag resists changes of the velocity: what moves on as before is not held back.
+            load = load + drag * (place.velocity / scales * length)[free].ravel()
         live, live_size = model.scaled_live
         gone = np.zeros(len(load))
         multiplier = place.multiplier * live_size
@@ -321,11 +336,46 @@ class Path:
         motion = full + np.where(free[:, None], 0.0, 1.0) * self._between(place.pose, pose)
         if not still and np.abs(gone).max(initial=0.0) > max(FALLING_FORCE / (DRAG * self.care) * size, 1e3 * GIVE):
             raise Falls
+        if np.abs(gone).max(initial=0.0) > SLIP_OFF:
+            self._refuse_beyond(contacts, normal, pose)
         forces = np.stack([normal, shear], axis=1)
         return (
-            Place(s, pose, contacts, forces, multiplier / (live_size or 1.0)),
+            Place(s, pose, contacts, forces, multiplier / (live_size or 1.0), None if still else motion / length),
             motion / scales,
         )
+
+    def _around(self, pose: Pose) -> Contacts:
+        """The contact points at a pose; those at the last one asked for are remembered."""
+        if self.around is None or self.around[0] is not pose:
+            model = self.model
+            self.around = pose, find_contacts(model.assembly, moved_vertices(model.assembly, pose), model.reach)
+        return self.around[1]
+
+    def _refuse_beyond(self, contacts: Contacts, normal: np.ndarray, pose: Pose) -> None:
+        """Refuse a step at whose end a corner stands on no edge any more, or in a block that it did not see before.
+
+        Raises
+        ------
+        NotSolved
+        """
+        length, end = self.model.length, self._around(pose)
+        _, there = matched_contacts(contacts, end) if len(end) else (None, np.zeros(len(contacts), dtype=bool))
+        off = np.flatnonzero(~there & (normal > SLIPPED_OFF_FORCE))
+        if (~self._near(contacts, off, end, np.flatnonzero(end.gaps < SLIP_OFF * length))).any():
+            raise NotSolved("a corner slips off its edge")
+        _, seen = matched_contacts(end, contacts) if len(contacts) else (None, np.zeros(len(end), dtype=bool))
+        inside = np.flatnonzero(~seen & (end.gaps < -SLIP_OFF * length))
+        if (~self._near(end, inside, contacts, np.arange(len(contacts)))).any():
+            raise NotSolved("a corner meets a block from the side")
+
+    def _near(self, some: Contacts, which: np.ndarray, others: Contacts, those: np.ndarray) -> np.ndarray:
+        """(len(which),) bool array: whether another contact point joins the same two blocks at the same place."""
+        pair, other = (
+            np.sort(np.stack([c.block_a[k], c.block_b[k]], axis=1), axis=1) for c, k in ((some, which), (others, those))
+        )
+        same = (pair[:, None] == other[None]).all(axis=2)
+        apart = np.linalg.norm(some.points[which][:, None] - others.points[those][None], axis=2)
+        return np.asarray((same & (apart < SAME_PLACE * self.model.length)).any(axis=1))
 
     def _with_supports(self, pose: Pose, supports: Pose) -> Pose:
         free = self.model.assembly.free
@@ -430,7 +480,7 @@ class Path:
     def proved(self, place: Place) -> Proved:
         """What equilibrium within friction says of a place, and balanced forces near those of the path."""
         model, assembly = self.model, self.model.assembly
-        contacts = find_contacts(assembly, moved_vertices(assembly, place.pose), model.reach)
+        contacts = self._around(place.pose)
         friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         rate = None if model.live is not None else self.driver.rate(place.s)
         bounds = admissible(model, place.pose, contacts, friction, rate, vertex=place.s == 0.0)
@@ -778,7 +828,7 @@ class Path:
 
     def _falling(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
         model, assembly = self.model, self.model.assembly
-        contacts = find_contacts(assembly, moved_vertices(assembly, place.pose), model.reach)
+        contacts = self._around(place.pose)
         friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         none = Certificate(0.0, float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)), 0.0, 0.0, 0.0)
         return self._reported(
