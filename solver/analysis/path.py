@@ -30,7 +30,7 @@ LARGEST_STEP, SMALLEST_STEP = 0.05, 1e-9
 
 #: Change of the velocities, as a part of them, from which on a step is taken again in shorter ones, down to this part of
 #: the largest.
-EVENT_CHANGE, EVENT_REFINEMENT = 0.1, 8.0
+EVENT_CHANGE, EVENT_REFINEMENT = 0.03, 8.0
 
 #: First step, and movement by which a structure has begun to move, in elastic gives.
 FIRST_STEP, ONSET = 0.1, 100.0
