@@ -78,8 +78,9 @@ NAMED = 4
 
 
 #: A corner that carries this force, in block weights, may slip past the end of its edge, or come into another block from
-#: the side, in steps that move blocks by no more than this, in block sizes.
-SLIPPED_OFF_FORCE, SLIP_OFF = 1e-3, 1e-4
+#: the side, in steps of the supports, and of blocks, no larger than this, in block sizes; what falls, in steps whose drag
+#: is that of the second.
+SLIPPED_OFF_FORCE, SLIP_OFF, SHORTEST_FALL = 1e-3, 1e-4, 1e-6
 
 #: Contact points of two blocks no farther apart than this, in block sizes, are one, by whichever corner and edge.
 SAME_PLACE = 1e-2
@@ -288,7 +289,7 @@ class Path:
         friction = model.interfaces.friction(assembly, start.block_a, start.block_b)
         rows = np.repeat(free, 3)
         load = (model.scaled_load + self.imperfection)[free].ravel()
-        drag = DRAG * (1.0 if still else self.care) / size * self.drag[free].ravel()
+        drag = DRAG * self.care / size * self.drag[free].ravel()
         if place.velocity is not None and not still:
             # The drag resists changes of the velocity: what moves on as before is not held back.
             load = load + drag * (place.velocity / scales * length)[free].ravel()
@@ -297,7 +298,7 @@ class Path:
         multiplier = place.multiplier * live_size
         pose = self._with_supports(place.pose, supports)
         way, near = 0.0, None
-        stiff = 1.0 if still or self.care == 1.0 else STIFF
+        stiff = 1.0 if self.care == 1.0 else STIFF
         for _ in range(LINEARISATIONS):
             contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
             control = driver.control(pose) if model.live is not None else None
@@ -336,7 +337,7 @@ class Path:
         motion = full + np.where(free[:, None], 0.0, 1.0) * self._between(place.pose, pose)
         if not still and np.abs(gone).max(initial=0.0) > max(FALLING_FORCE / (DRAG * self.care) * size, 1e3 * GIVE):
             raise Falls
-        if np.abs(gone).max(initial=0.0) > SLIP_OFF:
+        if size > (SHORTEST_FALL if still else SLIP_OFF) and np.abs(gone).max(initial=0.0) > SLIP_OFF:
             self._refuse_beyond(contacts, normal, pose)
         forces = np.stack([normal, shear], axis=1)
         return (
@@ -420,9 +421,8 @@ class Path:
             elif ahead > step * 1.000001:
                 # Two equal steps rather than a long one and a sliver.
                 length = min(step, ahead / 2.0)
-            self.care = CARE if careful else 1.0
             try:
-                new, motion = self.step(place, length)
+                new, motion = self._careful_step(place, length) if careful else self.step(place, length)
             except NotSolved as error:
                 step, grow = length / 2.0, SLOW_GROWTH
                 if step < smallest:
@@ -448,9 +448,23 @@ class Path:
                 self.barrier = np.inf
             step = min(self.longest, max(step, grow * length)) if length >= 0.99 * step else step
             moved_by = float(np.abs(motion[self.model.assembly.free]).max(initial=0.0))
-            if moved_by > max(FAST * length * self.lever / self.model.length, 1e2 * GIVE) and place.s > started:
-                break
+            if moved_by > FAST * length * self.lever / self.model.length:
+                # What jumps does not go on like that.
+                place = replace(place, velocity=None)
+                if moved_by > 1e2 * GIVE and place.s > started:
+                    break
         return place, step
+
+    def _careful_step(self, place: Place, length: float) -> tuple[Place, np.ndarray]:
+        """Take a step with less drag and stiffer joints, or an ordinary one where that is not solved."""
+        self.care = CARE
+        try:
+            return self.step(place, length)
+        except NotSolved:
+            self.care = 1.0
+            return self.step(place, length)
+        finally:
+            self.care = 1.0
 
     def _turns(self, velocity: np.ndarray) -> bool:
         """Whether blocks move otherwise than in the step before: hinges have jumped, joints begun to slide or closed."""

@@ -166,7 +166,17 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
     try:
         return _followed(step, pattern, gone, multiplier, forces, distances)
     except NotSolved:
+        pass
+    try:
         return _followed(step, pattern, gone, multiplier, forces, distances, careful=True)
+    except NotSolved:
+        # In steps so short that nothing moves all is as it was.
+        remembered = np.stack([step.normal, *rays]), np.maximum(np.stack([step.gap, step.slip, -step.slip]), 0.0)
+        before = Moved(np.zeros(len(gone)), step.normal, step.shear, multiplier, 0, *remembered)
+        found = _in_states(step, pattern, gone, multiplier, before)
+        if found is None:
+            raise
+        return found
 
 
 class _Pattern:
