@@ -144,7 +144,7 @@ class Checkpoint:
     Attributes
     ----------
     phase : int
-        Number of the settlement, from 0; behind the last increment of a phase that of the next, which may not exist.
+        Number of the settlement, from 0.
     start : Pose
         Where the phase began.
     place : Place
@@ -157,6 +157,8 @@ class Checkpoint:
         Of loads, on supports and of friction since the start of the phase, in units of the program.
     careful_until : float [m or rad]
         Parameter up to which a collapse is being enclosed.
+    ended : bool
+        The phase has reached its limit.
     """
 
     phase: int
@@ -166,6 +168,7 @@ class Checkpoint:
     first_without: float
     works: tuple[float, float, float] = (0.0, 0.0, 0.0)
     careful_until: float = -np.inf
+    ended: bool = False
 
 
 @dataclass(frozen=True)
@@ -217,7 +220,6 @@ class Path:
         self.programs, self.works, self.care = 0, (0.0, 0.0, 0.0), 1.0
         self.barrier, self.careful_until = np.inf, -np.inf
         self.notes: list[Note] = []
-        self.velocity = driver.rate(0.0)
         self.around: tuple[Pose, Contacts] | None = None
         self.sunk: tuple[Place, list[tuple[Place, np.ndarray, float]], Iterator[tuple[Place, np.ndarray, float]]] | None
         self.sunk = None
@@ -438,11 +440,10 @@ class Path:
                 continue
             if float(new.forces[:, 0].max(initial=0.0)) > LOCKED_FORCE * self.model.total_load:
                 raise Wedged(new)
-            if length > self.finest * 1.000001 and self._turns(motion / length):
+            if length > self.finest * 1.000001 and self._turns(place, new):
                 step = max(length / 2.0, self.finest)
                 continue
             self.works = self._works(place, new, motion)
-            self.velocity = motion * self.model.lengths / length
             place = replace(new, s=target) if length == ahead else new
             if place.s >= self.barrier:
                 self.barrier = np.inf
@@ -466,11 +467,13 @@ class Path:
         finally:
             self.care = 1.0
 
-    def _turns(self, velocity: np.ndarray) -> bool:
+    def _turns(self, before: Place, after: Place) -> bool:
         """Whether blocks move otherwise than in the step before: hinges have jumped, joints begun to slide or closed."""
-        weight = np.sqrt(self.drag)
-        new, old = velocity * weight, self.velocity / self.model.lengths * weight
-        return bool(np.linalg.norm(new - old) > EVENT_CHANGE * np.linalg.norm(old))
+        if before.velocity is None or after.velocity is None:
+            return False
+        size = np.sqrt(self.drag) / self.model.lengths
+        change = np.linalg.norm((after.velocity - before.velocity) * size)
+        return bool(change > EVENT_CHANGE * np.linalg.norm(before.velocity * size))
 
     def _works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float]:
         """Works of loads, on supports and of friction so far, with the forces at the end of the step."""
@@ -570,6 +573,10 @@ class Path:
             start, step, self.barrier = resume.place, resume.step, resume.first_without
             self.start, self.works, self.careful_until = resume.start, resume.works, resume.careful_until
         proved = self.proved(start)
+        if resume is not None:
+            self.programs = 0
+            if resume.ended:
+                return self._reached()
         if resume is None and not proved.bounds.exists:
             motion = next((motion for _, motion, _ in self._sinking(start)), self.drag)
             yield self._falling(start, motion * self.model.lengths, start.s)
@@ -589,13 +596,13 @@ class Path:
             if not reported:
                 at_limit = place.s >= driver.limit * (1.0 - 1e-12)
                 motion = self._next_motion(place)
-                number = self.number + 1 if at_limit else self.number
-                checkpoint = Checkpoint(number, self.start, place, step, self.barrier, self.works, self.careful_until)
-                found = replace(self._increment(proved, motion), checkpoint=checkpoint)
-                if place.s == 0.0 and self.model.live is None:
-                    at_rest, onset = self._at_first(proved)
-                    found = replace(found, at_rest=at_rest, onset=onset)
-                yield found
+                checkpoint = Checkpoint(
+                    self.number, self.start, place, step, self.barrier, self.works, self.careful_until, at_limit
+                )
+                first = place.s == 0.0 and self.model.live is None
+                at_rest, onset = self._at_first(proved) if first else (np.nan, np.nan)
+                found = self._increment(proved, motion)
+                yield replace(found, checkpoint=checkpoint, at_rest=at_rest, onset=onset)
                 reported, self.reported = True, place.s
                 if at_limit:
                     return self._reached()
@@ -698,7 +705,7 @@ class Path:
         try:
             _, motion = self.step(place, length)
         except (NotSolved, Falls):
-            return self.velocity
+            return self.driver.rate(place.s) if place.velocity is None else place.velocity
         return motion * self.model.lengths / length
 
     def _settles(self, place: Place, steps: int = FALL_STEPS, farthest: float = FARTHEST_FALL) -> Proved | None:

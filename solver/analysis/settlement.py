@@ -23,7 +23,7 @@ from .controls import LINEAR_PROGRAM, Controls, Ending
 from .drivers import SupportMotion
 from .linear_program import linear_program_increments
 from .local_origin import at_origin, told_from, without_origin
-from .path import Checkpoint, Falls, Path
+from .path import Checkpoint, Falls, Path, Place
 
 
 def settle(
@@ -129,7 +129,7 @@ def settlement_increments(
     interfaces.refuse_strength("a settlement")
     if resume is not None and controls.increments == LINEAR_PROGRAM:
         raise ValueError("increments by linear program cannot go on from a checkpoint; start them again")
-    if resume is not None and (resume.phase > len(phases) or len(resume.start.rotations) != assembly.n_blocks):
+    if resume is not None and (resume.phase >= len(phases) or len(resume.start.rotations) != assembly.n_blocks):
         raise ValueError(
             f"the checkpoint is of phase {resume.phase + 1} with {len(resume.start.rotations)} blocks; there are "
             f"{len(phases)} phases and {assembly.n_blocks} blocks: it belongs to another run"
@@ -152,29 +152,34 @@ def _increments(
     resume: Checkpoint | None,
 ) -> Generator[Increment, None, Ending]:
     first = 0 if resume is None else resume.phase
-    place, pose = None, Pose.initial(assembly) if resume is None else resume.start
+    place: Place | None = None
     ending = Ending(Status.LIMIT_REACHED, "the settlement has reached its limit")
     for number, phase in enumerate(phases[first:], start=first):
-        going_on = resume if number == first and resume is not None and resume.place.s > 0.0 else None
-        if resume is not None and number == first and going_on is None:
-            place = replace(resume.place, s=0.0)
-        driver = SupportMotion(assembly, phase, place.pose if place is not None and going_on is None else pose)
+        start = Pose.initial(assembly) if place is None else place.pose
+        if resume is not None:
+            start = resume.start
+        driver = SupportMotion(assembly, phase, start)
         path = Path(model_of(assembly, loads, interfaces), driver, number, controls.falling_frames)
-        if place is None:
+        if resume is not None:
+            place = resume.place
+        elif place is None:
             try:
-                place = path.rested(pose)
+                place = path.rested(start)
             except (NotSolved, Falls):
-                place = path.at_start(pose)
+                place = path.at_start(start)
             except SolveError as error:
                 return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
+        else:
+            # Joints remember what they carried in the phase before; the way they moved is another.
+            place = replace(place, s=0.0, velocity=None)
         try:
-            ending = yield from path.follow(replace(place, s=0.0), going_on)
+            ending = yield from path.follow(place, resume)
         except SolveError as error:
             return Ending(Status.SOLVER_FAILED, f"at a settlement of {path.last.s:.6g} {phase.unit}: {error}")
+        resume = None
         if ending.stop is not Status.LIMIT_REACHED:
             return ending
         place = path.last
-        pose = place.pose
     return ending
 
 
