@@ -47,6 +47,7 @@ class Controls:
     correctors: int = 25
 
     def __post_init__(self) -> None:
+        """Refuse an unknown way to find increments."""
         if self.increments not in INCREMENTS:
             raise ValueError(f"increments is '{self.increments}'; it is 'coulomb' or 'linear program'")
 

@@ -28,8 +28,8 @@ from .drivers import Driver
 #: the analysis where no step is solved.
 LARGEST_STEP, SMALLEST_STEP = 0.05, 1e-9
 
-#: Change of the velocities, as a part of them, from which on a step is taken again in shorter ones, down to this part of
-#: the largest.
+#: Change of the velocities, as a part of them, from which on a step is taken again in shorter ones, down to this part
+#: of the largest.
 EVENT_CHANGE, EVENT_REFINEMENT = 0.03, 8.0
 
 #: First step, and movement by which a structure has begun to move, in elastic gives.
@@ -77,9 +77,9 @@ LOCKED_FORCE = 1e3
 NAMED = 4
 
 
-#: A corner that carries this force, in block weights, may slip past the end of its edge, or come into another block from
-#: the side, in steps of the supports, and of blocks, no larger than this, in block sizes; what falls, in steps whose drag
-#: is that of the second.
+#: A corner that carries this force, in block weights, may slip past the end of its edge, or come into another block
+#: from the side, in steps of the supports, and of blocks, no larger than this, in block sizes; what falls, in steps
+#: whose drag is that of the second.
 SLIPPED_OFF_FORCE, SLIP_OFF, SHORTEST_FALL = 1e-3, 1e-4, 1e-6
 
 #: Contact points of two blocks no farther apart than this, in block sizes, are one, by whichever corner and edge.
@@ -394,7 +394,7 @@ class Path:
         """Goes towards a parameter in steps that suit the path, and stops early where a place is worth a proof.
 
         Where blocks fall in a step, shorter ones look for the place from which they do; where they are short, with less
-        drag. What has been gone is kept: ``self.barrier`` is then the nearest parameter that was not reached, and close.
+        drag. What has been gone is kept; ``self.barrier`` is then the nearest parameter that was not reached.
 
         Returns
         -------
@@ -468,7 +468,7 @@ class Path:
             self.care = 1.0
 
     def _turns(self, before: Place, after: Place) -> bool:
-        """Whether blocks move otherwise than in the step before: hinges have jumped, joints begun to slide or closed."""
+        """Whether blocks move otherwise than in the step before: a hinge has jumped, a joint slides or has closed."""
         if before.velocity is None or after.velocity is None:
             return False
         size = np.sqrt(self.drag) / self.model.lengths

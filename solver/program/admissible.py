@@ -74,7 +74,7 @@ def admissible(
     rate : (n_blocks, 3) array, optional
         Movement of the supports along which the reaction is bounded.
     vertex : bool
-        Forces at a vertex of the program, as few as there are; otherwise, in larger models, whichever are found fastest.
+        Forces at a vertex of the program, as few as there are; otherwise, in larger models, those found fastest.
 
     Raises
     ------

@@ -254,9 +254,9 @@ def _in_states(step: Step, pattern: _Pattern, gone: np.ndarray, multiplier: floa
         stops = closed & (way * slipped > no_way)
         if not (opens | closes | starts | stops).any():
             normal = np.maximum(normal, 0.0)
-            rays = np.maximum(0.5 * (normal + np.divide(shear, mu, out=np.zeros_like(shear), where=mu > 0.0) * np.array([[1.0], [-1.0]])), 0.0)
+            lean = np.divide(shear, mu, out=np.zeros_like(shear), where=mu > 0.0)
+            forces = np.maximum(np.stack([normal, 0.5 * (normal + lean), 0.5 * (normal - lean)]), 0.0)
             distances = np.maximum(np.stack([distance, slipped, -slipped]), 0.0)
-            forces = np.stack([normal, *rays])
             return Moved(motion, normal, shear, found_multiplier, iteration, forces, distances, pattern)
         is_open = (is_open | opens) & ~closes
         way = np.where(starts, np.sign(shear), np.where(stops | closes, 0.0, way))
