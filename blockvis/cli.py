@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import tomllib
 import warnings
@@ -17,8 +18,15 @@ import solver
 from .extras import MissingExtra
 from .generators import LAYOUTS
 
-#: Exit codes: bad input or a missing extra, a solver failure, everything written but the pictures, Ctrl-C.
-BAD_INPUT, SOLVER_FAILED, NO_PICTURES, INTERRUPTED = 2, 3, 4, 130
+#: Exit codes: bad input or a missing extra, a solver failure, everything written but the pictures, no equilibrium to
+#: start from, Ctrl-C.
+BAD_INPUT, SOLVER_FAILED, NO_PICTURES, NO_EQUILIBRIUM, INTERRUPTED = 2, 3, 4, 5, 130
+
+EXIT_CODES = (
+    f"exit codes: 0 done, also when the structure collapses; {BAD_INPUT} bad input or a missing package; "
+    f"{SOLVER_FAILED} the solver failed; {NO_PICTURES} everything is written but the pictures; {NO_EQUILIBRIUM} no "
+    f"initial equilibrium: the structure does not stand as drawn; {INTERRUPTED} interrupted"
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,6 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = _show_warning
     try:
         code: int = options.verb(options)
+    except BrokenPipeError:
+        raise
     except (ValueError, OSError, MissingExtra) as error:
         print(f"blockvis: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -50,15 +60,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def entry() -> None:
     """Console script."""
-    sys.exit(main())
+    try:
+        code = main()
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whatever reads the output, such as head, has enough of it; Python would complain again as it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 0
+    sys.exit(code)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="blockvis", description="How dry-jointed masonry cracks on settling supports, and how far it can go."
+        prog="blockvis",
+        description="How dry-jointed masonry cracks on settling supports, and how far it can go.",
+        epilog=EXIT_CODES,
     )
     verbs = parser.add_subparsers(required=True, metavar="VERB")
-    run = verbs.add_parser("run", help="solve a case, write everything, draw")
+    run = verbs.add_parser("run", help="solve a case, write everything, draw", epilog=EXIT_CODES)
     run.add_argument("case", metavar="CASE.toml", nargs="?")
     run.add_argument("-o", "--output", metavar="OUT", help="results folder (default: <case>-results)")
     run.add_argument("--force", action="store_true", help="replace results that are there already")
@@ -173,6 +192,8 @@ def _run(options: argparse.Namespace) -> int:
         return INTERRUPTED
     if stop is solver.Status.SOLVER_FAILED:
         return SOLVER_FAILED
+    if stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
+        return NO_EQUILIBRIUM
     return NO_PICTURES if run.missing else 0
 
 

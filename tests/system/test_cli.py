@@ -145,3 +145,22 @@ def test_overlapping_support_names_both_blocks_and_the_depth(case, capsys):
     with open(case, "a", encoding="utf-8") as file:
         file.write('\n[[supports]]\nname = "prop"\noutline = [[-0.2, 0.9], [0.2, 0.9], [0.2, 1.0], [-0.2, 1.0]]\n')
     _refused(case, capsys, "prop", "overlaps", "voussoir")
+
+
+def test_no_initial_equilibrium_has_its_own_exit_code(case, capsys):
+    """A row of voussoirs whose springer is moving only: the other end has nothing to stand on."""
+    _changed(case, '"left springer" = "fixed"', '"left springer" = "free"')
+    assert main(["run", str(case), "-o", str(case.parent / "out")]) == 5
+    summary = json.loads((case.parent / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["status"] == "no initial equilibrium"
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "5 no initial equilibrium" in " ".join(capsys.readouterr().out.split())
+
+
+def test_output_that_nobody_reads_to_its_end_is_no_error(case):
+    command = f"{sys.executable} -m blockvis info {case.parent / 'arch.msh'} | true"
+    done = subprocess.run(
+        ["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert (done.returncode, done.stderr) == (0, "")
