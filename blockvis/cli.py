@@ -17,6 +17,7 @@ import solver
 
 from .extras import MissingExtra
 from .generators import LAYOUTS
+from .layout.views import VIEWS
 
 #: Exit codes: bad input or a missing extra, a solver failure, everything written but the pictures, no equilibrium to
 #: start from, Ctrl-C.
@@ -86,14 +87,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.set_defaults(verb=_run)
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
-    info.add_argument("file", metavar="FILE")
+    info.add_argument("file", metavar="FILE", help="or a folder or a pattern of files, one per stone")
     info.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    _add_view(info)
     info.add_argument("--picture", metavar="PNG", help="draw what was found")
     info.set_defaults(verb=_info)
     convert = verbs.add_parser("convert", help="any layout file to any other")
-    convert.add_argument("source", metavar="IN")
+    convert.add_argument("source", metavar="IN", help="or a folder or a pattern of files, one per stone")
     convert.add_argument("target", metavar="OUT")
     convert.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    _add_view(convert)
     convert.add_argument(
         "--joint-thickness", default="0", metavar="M", help='close mortar joints up to this, or "auto"'
     )
@@ -118,6 +121,10 @@ def _parser() -> argparse.ArgumentParser:
     render.set_defaults(verb=_render)
     _add_sweep(verbs)
     return parser
+
+
+def _add_view(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("--view", choices=tuple(VIEWS), help="coordinates to take, of a drawing in space")
 
 
 def _add_sweep(verbs: Any) -> None:
@@ -201,7 +208,7 @@ def _info(options: argparse.Namespace) -> int:
     from .formats.read import inspect
     from .pictures.inspection import draw_inspection
 
-    found = inspect(options.file, unit=options.unit)
+    found = inspect(options.file, unit=options.unit, view=options.view)
     print(found)
     if options.picture:
         print(f"drawn in {draw_inspection(found, options.picture)}")
@@ -213,7 +220,7 @@ def _convert(options: argparse.Namespace) -> int:
     from .layout.assemble import assemble
 
     target = _new_file(options.target, options.force)
-    layout = read_layout(options.source, unit=options.unit)
+    layout = read_layout(options.source, unit=options.unit, view=options.view)
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)
     joint = options.joint_thickness

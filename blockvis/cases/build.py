@@ -90,7 +90,7 @@ def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
 
 def _case_layout(case: Case) -> layout.Layout:
     if case.file is not None:
-        return read_layout(case.file, unit=case.unit)
+        return read_layout(case.file, unit=case.unit, view=case.view)
     assert case.layout is not None
     try:
         sketch = layout.layout_of(generators.build(case.layout, case.parameters))

@@ -13,6 +13,7 @@ import numpy as np
 import solver
 from blockvis import generators
 from blockvis.formats import FORMATS
+from blockvis.layout.views import VIEWS
 from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import files_like
 from blockvis.video_suffixes import VIDEO_SUFFIXES
@@ -82,6 +83,8 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         raise geometry.error("file", problem + f", or a layout: {', '.join(generators.LAYOUTS)}" * (file is None))
     if file is not None and parameters:
         raise geometry.error("parameters", "belong to a layout, not to a file")
+    if layout is not None and geometry.take("view") is not None:
+        raise geometry.error("view", "belongs to a file, not to a layout")
     joint = geometry.take("joint_thickness", 0.0)
     if joint != "auto":
         joint = geometry.number("joint_thickness", 0.0)
@@ -119,6 +122,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         layout=layout,
         parameters=dict(parameters),
         unit=geometry.text("unit"),
+        view=geometry.text("view", among=tuple(VIEWS)),
         thickness=geometry.number("thickness", positive=True),
         joint_thickness=joint,
         overlap_tolerance=geometry.number("overlap_tolerance", positive=True),

@@ -36,6 +36,7 @@ class Case:
     layout: str | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     unit: str | None = None
+    view: str | None = None
     thickness: float | None = None
     joint_thickness: float | str = 0.0
     overlap_tolerance: float | None = None

@@ -36,6 +36,7 @@ FORMATS = {
     ".vtp": Format("pyvista_files", writes=True),
     ".vtk": Format("pyvista_files", writes=True),
     ".vtm": _PYVISTA,
+    ".vtmb": _PYVISTA,
     ".pvd": _PYVISTA,
     ".stl": _SOLID,
     ".obj": _SOLID,

@@ -12,10 +12,19 @@ import numpy as np
 import solver
 from blockvis.layout.block_table import with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import flattened, outlines_of_cells
+from blockvis.layout.outlines import UPRIGHT, flattened, outlines_of_cells
+
+from .bodies import Bodies, Body
 
 #: Names of the cell array that numbers the blocks, in order of preference.
 BLOCK_ARRAYS = ("block_id", "BlockId", "block", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags")
+
+
+def block_array(data: Mapping[str, np.ndarray]) -> str | None:
+    """Name of the cell array that numbers the blocks; None if there is none."""
+    numbered = [name for name in BLOCK_ARRAYS if name in data and np.ndim(data[name]) == 1]
+    # An array with one value everywhere, as some programs write by default, does not distinguish blocks.
+    return next((name for name in numbered if name == "block_id" or (data[name] != data[name][0]).any()), None)
 
 
 def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
@@ -31,7 +40,11 @@ def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
 
 
 def layout_of_cells(
-    points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray], path: Path | str
+    points: np.ndarray,
+    rings: Sequence[np.ndarray],
+    data: Mapping[str, np.ndarray],
+    path: Path | str,
+    view: str | None = None,
 ) -> Layout:
     """Make a layout of surface cells.
 
@@ -46,6 +59,8 @@ def layout_of_cells(
         ``thickness`` and ``density`` are optional.
     path : Path or str
         Named in messages.
+    view : {"xy", "xz", "yz"}, optional
+        As of :func:`blockvis.layout.outlines.flattened`.
 
     Raises
     ------
@@ -54,13 +69,11 @@ def layout_of_cells(
     """
     if not rings:
         raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
-    flat, note = flattened(points, f"'{path}'")
+    flat, note = flattened(points, f"'{path}'", view)
     used = np.unique(np.concatenate(list(rings)))
     if used.min() < 0 or used.max() >= len(points):
         raise ValueError(f"'{path}': a cell uses point {int(used.max())}, but there are {len(points)}; export it again")
-    numbered = [name for name in BLOCK_ARRAYS if name in data and np.ndim(data[name]) == 1]
-    # An array with one value everywhere, as some programs write by default, does not distinguish blocks.
-    key = next((name for name in numbered if name == "block_id" or (data[name] != data[name][0]).any()), None)
+    key = block_array(data)
     if key is not None:
         ids, owner = np.unique(np.asarray(data[key]), return_inverse=True)
         names = [f"block {value}" for value in ids.tolist()]
@@ -110,26 +123,63 @@ def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, An
     return row
 
 
-def merged(layouts: Sequence[Layout], labels: Sequence[str], path: Path | str) -> Layout:
-    """Join layouts to one; blocks without a name of their own are named after their part of the file.
+def merged(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path | str) -> Layout | Bodies:
+    """Join the parts of a file to one; blocks without a name of their own are named after their part.
 
     Parameters
     ----------
-    layouts : sequence of Layout
+    found : sequence of Layout or Bodies
     labels : sequence of str
-        Names of the parts of the file, "" for none.
+        Names of the parts, "" for none.
     path : Path or str
         Named in messages.
+
+    Raises
+    ------
+    ValueError
+        If there are none, if some are flat and others are bodies in space, and if flat ones lie in different planes.
     """
-    if not layouts:
+    if not found:
         raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
-    if len(layouts) == 1:
-        return layouts[0]
-    named = []
-    for layout, label in zip(layouts, labels, strict=True):
-        plain = all(name.startswith("block ") for name in layout.names)
-        own = (label,) if layout.n_blocks == 1 else tuple(f"{label} {k + 1}" for k in range(layout.n_blocks))
-        named.append(replace(layout, names=own if plain and label else layout.names))
+    if len(found) == 1:
+        return found[0]
+    flat = [(part, label) for part, label in zip(found, labels, strict=True) if isinstance(part, Layout)]
+    solid = [(part, label) for part, label in zip(found, labels, strict=True) if isinstance(part, Bodies)]
+    if flat and solid:
+        raise ValueError(
+            f"'{path}' has flat blocks ('{flat[0][1] or 'the first'}') and bodies in space "
+            f"('{solid[0][1] or 'the first'}'); give one kind"
+        )
+    return _merged_bodies(solid) if solid else _merged_layouts(flat, path)
+
+
+def _own_names(names: Sequence[str], label: str) -> tuple[str, ...]:
+    """Name the blocks of a part after it, unless they have names of their own."""
+    if not label or not all(name.startswith("block ") for name in names):
+        return tuple(names)
+    return (label,) if len(names) == 1 else tuple(f"{label} {k + 1}" for k in range(len(names)))
+
+
+def _merged_bodies(parts: Sequence[tuple[Bodies, str]]) -> Bodies:
+    bodies: list[Body] = []
+    rows: list[dict[str, Any]] = []
+    for part, label in parts:
+        names = _own_names(
+            [str(row.get("name", body.name)) for body, row in zip(part.bodies, part.rows, strict=True)], label
+        )
+        bodies += [replace(body, name=name) for body, name in zip(part.bodies, names, strict=True)]
+        group = {"group": label} if label else {}
+        rows += [{**group, **row, "name": name} for row, name in zip(part.rows, names, strict=True)]
+    notes = tuple(dict.fromkeys(note for part, _ in parts for note in part.notes))
+    return Bodies(tuple(bodies), tuple(rows), parts[0][0].unit, notes)
+
+
+def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> Layout:
+    upright = {note for part, _ in parts for note in part.notes if note.startswith(UPRIGHT)}
+    lying = any(not any(note.startswith(UPRIGHT) for note in part.notes) for part, _ in parts)
+    if len(upright) + lying > 1:
+        raise ValueError(f"'{path}' has flat parts that lie in different planes; draw them in one")
+    named = [replace(part, names=_own_names(part.names, label)) for part, label in parts]
 
     def joined(key: str) -> tuple[Any, ...]:
         return tuple(value for layout in named for value in getattr(layout, key))
@@ -143,7 +193,7 @@ def merged(layouts: Sequence[Layout], labels: Sequence[str], path: Path | str) -
     return Layout(
         outlines=joined("outlines"),
         names=joined("names"),
-        groups=tuple(group or label for d, label in zip(named, labels, strict=True) for group in d.groups),
+        groups=tuple(group or label for d, (_, label) in zip(named, parts, strict=True) for group in d.groups),
         roles=joined("roles"),
         materials=joined("materials"),
         thickness=numbers("thickness"),
@@ -151,3 +201,30 @@ def merged(layouts: Sequence[Layout], labels: Sequence[str], path: Path | str) -
         unit=named[0].unit,
         notes=tuple(dict.fromkeys(joined("notes"))),
     )
+
+
+def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path | str) -> Layout | Bodies:
+    """Join what several files hold; the block of a file that holds one is named after it.
+
+    Raises
+    ------
+    ValueError
+        If the files state different units, and as of :func:`merged`.
+    """
+    units = {part.unit: file for part, file in zip(found, files, strict=True)}
+    if len(units) > 1:
+        listed = ", ".join(f"'{file.name}' {unit or 'none'}" for unit, file in units.items())
+        raise ValueError(f"'{path}': its files state different units ({listed}); export them in one")
+    parts, labels = [], []
+    for part, file in zip(found, files, strict=True):
+        if isinstance(part, Bodies):
+            alone = len(part.bodies) == 1
+            if alone:
+                row = {**part.rows[0], "name": file.stem}
+                part = replace(part, bodies=(replace(part.bodies[0], name=file.stem),), rows=(row,))
+        else:
+            alone = part.n_blocks == 1
+            part = replace(part, names=(file.stem,)) if alone else part
+        parts.append(part)
+        labels.append("" if alone else file.stem)
+    return merged(parts, labels, path)

@@ -6,6 +6,7 @@ import math
 import re
 import warnings
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.parsers import expat
@@ -16,16 +17,18 @@ import numpy as np
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 
-from .cells import layout_of_cells, merged, row_of
+from .bodies import Bodies, Body, body_of_polygons, layout_of_bodies
+from .cells import block_array, layout_of_cells, merged, row_of
 from .node_order import VTK, ring_of_nodes
 from .reading import Reading
+from .volumes import VTK_SOLIDS, bodies_of_cells
 from .vtk_arrays import largest_number
 
 if TYPE_CHECKING:
     import pyvista
 
-#: VTK's types of cells with a volume.
-SOLID_CELLS = {10, 11, 12, 13, 14, 15, 16, 24, 25, 26, 27, 29, 41, 42, 71, 72}
+#: VTK's types of cells with a volume whose faces do not follow from the type alone: prisms, hulls, polyhedra.
+FACETED = (15, 16, 41, 42)
 
 #: zlib compresses at most 1032 to 1: a file cannot hold more than this many numbers per byte.
 MOST_PER_BYTE = 1100
@@ -37,13 +40,13 @@ MOST_NUMBERS = 50_000_000
 DEEPEST = 64
 
 
-def read(path: Path, reading: Reading) -> Layout:
+def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a file of VTK, which states no unit."""
     import pyvista
     from vtkmodules.vtkCommonCore import vtkObject
 
     _check_counts(path)
-    if path.suffix.lower() in (".pvd", ".vtm"):
+    if path.suffix.lower() in (".pvd", ".vtm", ".vtmb"):
         _check_parts(path)
     try:
         # VTK would print every fault of a file to the terminal as well; the message below has the reason.
@@ -58,7 +61,7 @@ def read(path: Path, reading: Reading) -> Layout:
         raise ValueError(f"'{path}' cannot be read as {path.suffix} ({error}); export it again") from None
     finally:
         vtkObject.GlobalWarningDisplayOn()
-    return layout_of_dataset(data, path)
+    return found_in_dataset(data, path, reading.view)
 
 
 def _check_counts(path: Path) -> None:
@@ -216,16 +219,16 @@ def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
         target = path.parent / name
         if Path(name).is_absolute() or not target.resolve().is_relative_to(path.parent.resolve()):
             raise ValueError(f"'{path}' names '{name}', which is outside its folder; keep the files together")
-        if target.suffix.lower() not in (".vtu", ".vtp", ".vtk", ".vtm"):
-            raise ValueError(f"'{path}' names '{name}', which is no .vtu, .vtp, .vtk or .vtm; export it again")
+        if target.suffix.lower() not in (".vtu", ".vtp", ".vtk", ".vtm", ".vtmb"):
+            raise ValueError(f"'{path}' names '{name}', which is no .vtu, .vtp, .vtk, .vtm or .vtmb; export it again")
         if not target.is_file():
             raise ValueError(f"'{path}' names '{name}', which does not exist; keep the files together")
         _check_counts(target)
-        if target.suffix.lower() == ".vtm":
+        if target.suffix.lower() in (".vtm", ".vtmb"):
             _check_parts(target, (*seen, path))
 
 
-def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
+def layout_of_dataset(data: Any, path: Path | str = "dataset", view: str | None = None) -> Layout:
     """Make a layout of a pyvista dataset: a mesh, or a multiblock of meshes.
 
     Parameters
@@ -233,22 +236,23 @@ def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
     data : pyvista.DataSet or pyvista.MultiBlock
     path : Path or str
         Named in messages.
+    view : {"xy", "xz", "yz"}, optional
+        As of :func:`blockvis.read_layout`.
     """
+    found = found_in_dataset(data, path, view)
+    return layout_of_bodies(found, path, view) if isinstance(found, Bodies) else found
+
+
+def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | Bodies:
+    """Read the blocks of a pyvista dataset, flat or in space; the parameters are those of ``layout_of_dataset``."""
     import pyvista
 
     if isinstance(data, pyvista.MultiBlock):
-        parts, labels = [], []
-        for k, part in enumerate(data):
-            if part is None or (isinstance(part, pyvista.DataSet) and part.n_cells == 0):
-                continue
-            parts.append(layout_of_dataset(part, path))
-            name = data.get_block_name(k) or ""
-            labels.append("" if re.fullmatch(r"Block-\d+", name) else name)
-        return merged(parts, labels, path)
+        return _found_in_parts(data, path, view)
     grid = _as_cells(data, path)
     types = np.asarray(grid.celltypes)
-    if np.isin(types, list(SOLID_CELLS)).any():
-        return _layout_of_solids(grid, path)
+    if np.isin(types, [*VTK_SOLIDS, *FACETED]).any():
+        return _bodies_of_solids(grid, path)
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
     surface = np.flatnonzero(np.isin(types, list(VTK)))
     rings = []
@@ -256,7 +260,42 @@ def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
         nodes = connectivity[offset[cell] : offset[cell + 1]].astype(np.int64)
         rings.append(ring_of_nodes(nodes, VTK[int(types[cell])]))
     cell_data = {str(key): np.asarray(grid.cell_data[key])[surface] for key in grid.cell_data}
-    return layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path)
+    return layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path, view)
+
+
+def _found_in_parts(data: Any, path: Path | str, view: str | None) -> Layout | Bodies:
+    """Read the parts of a multiblock; those that hold no blocks, such as centres and contact points, are left out."""
+    import pyvista
+
+    flat: list[tuple[Layout | Bodies, str]] = []
+    solid: list[tuple[Layout | Bodies, str]] = []
+    left_out = []
+    for k, part in enumerate(data):
+        if part is None or (isinstance(part, pyvista.DataSet) and part.n_cells == 0):
+            continue
+        name = data.get_block_name(k) or ""
+        name = "" if re.fullmatch(r"Block-\d+", name) else name
+        if not _has_blocks(part):
+            left_out.append(f"'{name or k}'")
+            continue
+        found = found_in_dataset(part, path, view)
+        (solid if isinstance(found, Bodies) else flat).append((found, name))
+    if solid and flat:
+        # Flat cells beside bodies are faces in contact, as LMGC90 writes them.
+        left_out += [f"'{name or 'a flat part'}'" for _, name in flat]
+    chosen = solid or flat
+    joined = merged([found for found, _ in chosen], [name for _, name in chosen], path)
+    note = (f"left out: {', '.join(left_out)}, which draw no blocks",) if left_out else ()
+    return replace(joined, notes=joined.notes + note)
+
+
+def _has_blocks(part: Any) -> bool:
+    import pyvista
+
+    if isinstance(part, pyvista.MultiBlock):
+        return any(one is not None and _has_blocks(one) for one in part)
+    types = np.asarray(part.cast_to_unstructured_grid().celltypes) if part.n_cells else np.zeros(0)
+    return bool(np.isin(types, [*VTK, *VTK_SOLIDS, *FACETED]).any())
 
 
 def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
@@ -269,22 +308,63 @@ def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
     return data.cast_to_unstructured_grid()
 
 
-def _layout_of_solids(grid: Any, path: Path | str) -> Layout:
-    from .solids import Body, layout_of_bodies
+def _bodies_of_solids(grid: Any, path: Path | str) -> Bodies:
+    """Read the bodies of the cells with a volume; surface cells beside them are their skin."""
+    types = np.asarray(grid.celltypes)
+    solid = np.flatnonzero(np.isin(types, [*VTK_SOLIDS, *FACETED]))
+    data = {str(key): np.asarray(grid.cell_data[key])[solid] for key in grid.cell_data}
+    key = block_array(data)
+    if key is not None:
+        values, owner = np.unique(data[key], return_inverse=True)
+        names = [f"block {value}" for value in values.tolist()]
+        note = f"one per value of the cell array '{key}'"
+    elif np.isin(types[solid], FACETED).all():
+        owner, names = np.arange(len(solid)), [f"block {k}" for k in range(len(solid))]
+        note = "one per cell: no cell array 'block_id' says which cells are one block"
+    else:
+        owner, names = np.zeros(len(solid), dtype=np.int64), ["block"]
+        note = "one per piece that hangs together: no cell array 'block_id' says which cells are one block"
+    faceted = np.isin(types[solid], FACETED)
+    if faceted.any() and not faceted.all() and key is None:
+        raise ValueError(f"'{path}' has polyhedra beside other cells; number the blocks by a cell array 'block_id'")
+    found = _faceted_bodies if faceted.any() else _bodies_by_shape
+    bodies, owners = found(grid, np.asarray(grid.points, dtype=float), solid, owner, names)
+    first = np.unique(owner, return_index=True)[1]
+    rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, {note}",))
 
-    rows: list[dict[str, Any]] = []
-    bodies = []
-    ids = np.asarray(grid.cell_data["block_id"]) if "block_id" in grid.cell_data else None
-    if ids is None:
-        ids = np.asarray(grid.connectivity().cell_data["RegionId"])
-    for value in np.unique(ids):
-        cells = np.flatnonzero(ids == value)
-        surface = grid.extract_cells(cells).extract_surface(algorithm="dataset_surface").triangulate()
-        faces = np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
-        bodies.append(Body(f"block {value}", np.asarray(surface.points, dtype=float), faces))
-        named = {key: np.asarray(grid.cell_data[key])[cells] for key in grid.cell_data}
-        rows.append(row_of(named, 0, f"block {value}"))
-    return layout_of_bodies(bodies, path, rows)
+
+def _bodies_by_shape(
+    grid: Any, points: np.ndarray, solid: np.ndarray, owner: np.ndarray, names: list[str]
+) -> tuple[list[Body], np.ndarray]:
+    """Find the bodies of cells whose faces follow from their type."""
+    types = np.asarray(grid.celltypes)
+    offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
+    cells, owners = [], []
+    for kind in np.unique(types[solid]).tolist():
+        chosen = np.flatnonzero(types[solid] == kind)
+        corners = 1 + max(corner for face in VTK_SOLIDS[kind] for corner in face)
+        nodes = connectivity[offset[solid[chosen]][:, None] + np.arange(corners)]
+        cells.append((VTK_SOLIDS[kind], nodes.astype(np.int64)))
+        owners.append(owner[chosen])
+    return bodies_of_cells(points, cells, np.concatenate(owners), names)
+
+
+def _faceted_bodies(
+    grid: Any, points: np.ndarray, solid: np.ndarray, owner: np.ndarray, names: list[str]
+) -> tuple[list[Body], np.ndarray]:
+    """Find the bodies of cells that have to be asked for their faces."""
+    faces: list[dict[tuple[int, ...], list[int]]] = [{} for _ in names]
+    for cell, whose in zip(solid.tolist(), owner.tolist(), strict=True):
+        asked = grid.GetCell(cell)
+        for k in range(asked.GetNumberOfFaces()):
+            face = asked.GetFace(k)
+            ring = [face.GetPointId(j) for j in range(face.GetNumberOfPoints())]
+            # A face that two cells of one body share is inside it.
+            if faces[whose].pop(tuple(sorted(ring)), None) is None:
+                faces[whose][tuple(sorted(ring))] = ring
+    bodies = [body_of_polygons(name, points, list(mine.values())) for name, mine in zip(names, faces, strict=True)]
+    return bodies, np.arange(len(names))
 
 
 def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:

@@ -18,8 +18,12 @@ from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of
 from blockvis.layout.outlines import ring_area, without_collinear
 from blockvis.layout.units import chosen_unit, metres_per
-from blockvis.suggestions import files_like
+from blockvis.layout.views import checked_view
 
+from .bodies import Bodies, layout_of_bodies
+from .cells import of_files
+from .files import MissingFile as MissingFile
+from .files import files_of
 from .reading import Reading
 
 #: Largest coordinate [m], larger than the Earth; double precision resolves 1e-8 m there.
@@ -29,21 +33,26 @@ LARGEST_COORDINATE = 1e8
 MOST_CORNERS = 2000
 
 
-class MissingFile(FileNotFoundError, ValueError):
-    """There is no file of that name."""
-
-
-def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: float | None = None) -> Layout:
+def read_layout(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    chord_tolerance: float | None = None,
+    view: str | None = None,
+) -> Layout:
     """Read the blocks of a layout file.
 
     Parameters
     ----------
     path : str or Path
-        The suffix chooses the format; see :data:`blockvis.formats.FORMATS`.
+        The suffix chooses the format; see :data:`blockvis.formats.FORMATS`. A folder, or a pattern such as
+        ``"stones/*.stl"``, stands for files of one format, as of one stone each.
     unit : str, optional
         Unit of the file's lengths; it replaces the one that the file states.
     chord_tolerance : float, optional [m]
         Largest distance of an arc from the chords that replace it; by default a thousandth of its radius.
+    view : {"xy", "xz", "yz"}, optional
+        Coordinates that become x and y, of drawings in space; by default those in which the blocks lie side by side.
 
     Returns
     -------
@@ -56,17 +65,13 @@ def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: f
         With the reason and the remedy, for a file that is missing, damaged or no layout.
     """
     path = Path(path)
-    if not path.exists():
-        near = files_like(path)
-        hint = f"; did you mean {' or '.join(near)}?" if near else "; check the path"
-        raise MissingFile(f"there is no file '{path}'{hint}")
-    if path.is_dir():
-        raise ValueError(f"'{path}' is a folder; give a layout file")
-    if path.stat().st_size == 0:
-        raise ValueError(f"'{path}' is empty (0 bytes); export it again")
     if unit is not None:
         metres_per(unit)
-    layout = _read_by_suffix(path, Reading(unit=unit, chord_tolerance=chord_tolerance))
+    reading = Reading(unit=unit, chord_tolerance=chord_tolerance, view=checked_view(view))
+    files = files_of(path)
+    found = [_read_by_suffix(file, reading) for file in files]
+    content = found[0] if files == [path] else of_files(found, files, path)
+    layout = layout_of_bodies(content, path, view) if isinstance(content, Bodies) else content
     if layout.n_blocks == 0:
         raise ValueError(f"'{path}' draws no block; draw each block as one closed outline or meshed surface")
     for i, ring in enumerate(layout.outlines):
@@ -114,6 +119,7 @@ def read(
     joint_thickness: float | str = 0.0,
     overlap_tolerance: float | None = None,
     chord_tolerance: float | None = None,
+    view: str | None = None,
 ) -> solver.Assembly:
     """Read a layout file into an assembly.
 
@@ -122,14 +128,14 @@ def read(
     path : str or Path
     roles, supports, density, thickness, joint_thickness, overlap_tolerance
         As of :func:`blockvis.layout.assemble.assemble`.
-    unit, chord_tolerance
+    unit, chord_tolerance, view
         As of :func:`read_layout`.
 
     Returns
     -------
     solver.Assembly
     """
-    layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance)
+    layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance, view=view)
     return assemble(
         layout,
         roles=roles,
@@ -146,7 +152,7 @@ def save_layout(assembly: solver.Assembly, path: str | Path, *, pose: solver.Pos
     write_layout(layout_of(assembly, pose=pose), path)
 
 
-def inspect(path: str | Path, *, unit: str | None = None) -> Inspection:
+def inspect(path: str | Path, *, unit: str | None = None, view: str | None = None) -> Inspection:
     """Read a layout file and measure it.
 
     Parameters
@@ -154,13 +160,18 @@ def inspect(path: str | Path, *, unit: str | None = None) -> Inspection:
     path : str or Path
     unit : str, optional
         Unit of the file's lengths; it replaces the one that the file states.
+    view : {"xy", "xz", "yz"}, optional
+        As of :func:`read_layout`.
     """
-    return inspected(read_layout(path, unit=unit))
+    return inspected(read_layout(path, unit=unit, view=view))
 
 
-def _read_by_suffix(path: Path, reading: Reading) -> Layout:
+def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a file with the module of its suffix."""
-    return _module_of(path, "read").read(path, reading)
+    if path.stat().st_size == 0:
+        raise ValueError(f"'{path}' is empty (0 bytes); export it again")
+    found: Layout | Bodies = _module_of(path, "read").read(path, reading)
+    return found
 
 
 def _write_by_suffix(layout: Layout, path: Path) -> None:

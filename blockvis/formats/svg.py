@@ -68,6 +68,8 @@ class _Where:
 
 def read(path: Path, reading: Reading) -> Layout:
     """Read a .svg drawing; its unit follows from its width and its viewBox."""
+    if reading.view not in (None, "xy"):
+        raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
     text = path.read_bytes()
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise ValueError(f"'{path}' is not in UTF-8; save it as plain SVG")

@@ -7,12 +7,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .views import VIEWS, axis_across
+
 #: A point this close to the line between its neighbours, as a fraction of the size of the block, lies on it: in files
 #: of single precision (VTK, STL) a coordinate is accurate to 6e-8 of its size.
 COLLINEAR = 1e-6
 
 #: Spread of the third coordinate, as a fraction of the size of the drawing, that still counts as flat.
 FLAT = 1e-6
+
+#: Beginning of the note on a flat drawing that does not lie in the plane of x and y.
+UPRIGHT = "the drawing stands upright"
 
 #: Largest angle of a chord, whatever the tolerance: twelve chords make a circle.
 LARGEST_CHORD = math.pi / 6.0
@@ -34,7 +39,7 @@ def ring_width(ring: np.ndarray) -> float:
     return 2.0 * abs(ring_area(ring)) / float(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).sum())
 
 
-def flattened(points: np.ndarray, where: str) -> tuple[np.ndarray, str]:
+def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[np.ndarray, str]:
     """Take the two coordinates in which a flat drawing extends.
 
     Parameters
@@ -42,6 +47,8 @@ def flattened(points: np.ndarray, where: str) -> tuple[np.ndarray, str]:
     points : (n, 2) or (n, 3) array
     where : str
         The file, for messages.
+    view : {"xy", "xz", "yz"}, optional
+        The coordinates to take; by default those in which the drawing extends.
 
     Returns
     -------
@@ -53,22 +60,27 @@ def flattened(points: np.ndarray, where: str) -> tuple[np.ndarray, str]:
     Raises
     ------
     ValueError
-        For coordinates that are not finite, and for points that are not in a plane.
+        For coordinates that are not finite, and for points that are not in a plane, or not in that of the view.
     """
-    if points.shape[1] == 2 or len(points) == 0:
+    if points.shape[1] == 2 and len(points):
+        points = np.column_stack([points, np.zeros(len(points))])
+    if len(points) == 0:
         return points[:, :2], ""
     if not np.isfinite(points).all():
         bad = points[~np.isfinite(points).all(axis=1)][0]
         raise ValueError(f"{where} has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
     spread = np.ptp(points, axis=0)
-    for axis, (kept, names) in {2: ((0, 1), ""), 1: ((0, 2), "(x, z)"), 0: ((1, 2), "(y, z)")}.items():
-        if spread[axis] <= FLAT * spread.max():
-            note = f"the drawing stands upright: its {names} were read as (x, y)" if names else ""
-            return points[:, kept], note
-    raise ValueError(
-        f"{where} is not flat: its points spread over {spread[0]:.4g} × {spread[1]:.4g} × {spread[2]:.4g}; "
-        "draw the blocks in the plane, or give closed prismatic bodies"
-    )
+    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
+    if not flat:
+        raise ValueError(
+            f"{where} is not flat: its points spread over {spread[0]:.4g} × {spread[1]:.4g} × {spread[2]:.4g}; "
+            "draw the blocks in the plane, or give closed prismatic bodies"
+        )
+    if view is not None and view not in flat:
+        raise ValueError(f'{where} lies in {flat[0]}: seen as {view} it has no area; give view = "{flat[0]}", or none')
+    chosen = view or flat[0]
+    note = "" if chosen == "xy" else f"{UPRIGHT}: its ({chosen[0]}, {chosen[1]}) were read as (x, y)"
+    return points[:, VIEWS[chosen]], note
 
 
 def outlines_of_cells(

@@ -14,6 +14,7 @@ import solver
 from blockvis.atomic_files import PARTIAL
 from blockvis.cases.build import case_assembly
 from blockvis.cases.case import Case, parse_case, read_case
+from blockvis.formats.files import checksum_of_files
 from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
 
@@ -35,7 +36,7 @@ def record_of(case: Case) -> Record:
         case_file=str(case.source.resolve()) if case.source.is_file() else "",
         case_sha256=checksum_of(case.source) if case.source.is_file() else "",
         layout_file="" if case.file is None else str(case.file.resolve()),
-        layout_sha256="" if case.file is None else checksum_of(case.file),
+        layout_sha256="" if case.file is None else checksum_of_files(case.file),
         versions=versions(),
     )
 
@@ -135,7 +136,7 @@ def resume_run(folder: str | Path) -> Run:
         if not all((folder / name).is_file() for name in _drawn(case)):
             missing = draw_results(response, folder, animation=case.animation, case_text=case.text)
         return Run(response, folder, finished, missing, had_finished=True)
-    for note in record.changes():
+    for note in record.changes(checksum_of_files):
         warnings.warn(note, stacklevel=2)
     kind = KINDS[case.analysis]
     results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint)
