@@ -6,7 +6,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,9 @@ import numpy as np
 
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import arc_points
+from blockvis.layout.outlines import FLAT, UPRIGHT, arc_points
 from blockvis.layout.units import metres_per
+from blockvis.layout.views import VIEWS, axis_across
 
 from .loose_lines import Line, faces_of_lines
 from .reading import Reading
@@ -88,6 +89,7 @@ def read(path: Path, reading: Reading) -> Layout:
             _add_curve(entity, handle, found, tolerance)
         else:
             found.skipped[entity.dxftype()] += 1
+    upright = _turned(found, reading.view, path)
     notes = _with_loose(found, path)
     if not found.rings:
         seen = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items()) or "nothing"
@@ -98,8 +100,10 @@ def read(path: Path, reading: Reading) -> Layout:
         notes.append("skipped: " + ", ".join(f"{n} {kind}" for kind, n in found.skipped.items()))
     if found.hidden:
         notes.append("skipped on layers that are off or frozen: " + _listed(found.hidden))
-    if any(abs(ring[:, 2]).max() > 0 for ring in found.rings):
-        notes.append("elevations were ignored: the drawing was read as seen from above")
+    if upright:
+        notes.append(upright)
+    if any(abs(ring[:, 2] - (ring[0, 2] if upright else 0.0)).max() > 0 for ring in found.rings):
+        notes.append(f"elevations were ignored: the drawing was read as seen {_seen_from(reading.view)}")
     layout = Layout(
         outlines=tuple(ring[:, :2] for ring in found.rings),
         names=tuple(found.names),
@@ -111,6 +115,33 @@ def read(path: Path, reading: Reading) -> Layout:
         for layer, name, row in zip(found.layers, found.names, found.rows, strict=True)
     ]
     return with_rows(layout, rows)
+
+
+def _turned(found: _Found, view: str | None, path: Path) -> str:
+    """Turn a drawing that stands upright into the plane of x and y, and return the note on it.
+
+    Of a drawing that lies in no plane, that of x and y is taken unless the caller asks for another.
+    """
+    every = [*found.rings, *(line.points for line in found.loose)]
+    if not every or not all(np.isfinite(points).all() for points in every):
+        return ""
+    spread = np.ptp(np.concatenate(every), axis=0)
+    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
+    if view is not None and flat and view not in flat:
+        raise ValueError(
+            f"'{path}' lies in {flat[0]}: seen as {view} it has no area; give view = \"{flat[0]}\", or none"
+        )
+    chosen = view or (flat[0] if flat else "xy")
+    if chosen == "xy":
+        return ""
+    order = [*VIEWS[chosen], axis_across(chosen)]
+    found.rings = [ring[:, order] for ring in found.rings]
+    found.loose = [replace(line, points=line.points[:, order]) for line in found.loose]
+    return f"{UPRIGHT}: its ({chosen[0]}, {chosen[1]}) were read as (x, y)"
+
+
+def _seen_from(view: str | None) -> str:
+    return "from above" if view in (None, "xy") else f"along {'xyz'[axis_across(view)]}"
 
 
 def _flat(entities: Any, depth: int, path: Path, parent: str = "") -> Iterator[tuple[Any, str]]:
@@ -130,6 +161,9 @@ def _flat(entities: Any, depth: int, path: Path, parent: str = "") -> Iterator[t
 
 def _inserted(insert: Any, path: Path) -> Iterator[Any]:
     """Yield the entities of an inserted block at its place; ezdxf raises errors of any kind for a damaged one."""
+    if insert.dxf.get("zscale", 1.0) == 0.0:
+        # QCAD writes 0 for plane drawings, with which no transformation can be made.
+        insert.dxf.zscale = 1.0
     try:
         yield from insert.virtual_entities()
     except (TypeError, AttributeError, ValueError, KeyError, IndexError, ArithmeticError) as error:
