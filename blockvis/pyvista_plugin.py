@@ -4,19 +4,22 @@
     mesh = pyvista.read("wall.dxf")
     response = mesh.blockvis.settle({"right": "moving", "left": "fixed"}, direction=(1, 0), friction_coefficient=0.6)
 
-Importing this module registers everything. Suffixes that PyVista reads or writes itself stay with PyVista.
+Importing this module registers everything. Suffixes that PyVista reads or writes itself stay with PyVista, and so do
+``.msh`` files of anything but flat blocks.
 """
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import pyvista as pv
 
 import solver
 
+from .formats.gmsh_mesh import holds_volumes
 from .formats.pyvista_files import dataset_of, layout_of_dataset
 from .formats.read import read_layout, write_layout
 from .layout.assemble import assemble
@@ -26,6 +29,24 @@ from .layout.layout import Layout
 def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:
     """Read a layout as a dataset of one polygon per block; the options are those of ``read_layout``."""
     return dataset_of(read_layout(path, **options))
+
+
+def _mesh_reader(path: str, **options: Any) -> Any:
+    """Read a .msh file of flat blocks as a layout; leave every other to PyVista."""
+    try:
+        if not holds_volumes(Path(path)):
+            return _reader(path, **options)
+    except ValueError as error:
+        problem: ValueError | None = error
+    else:
+        problem = None
+    try:
+        return pv.read_meshio(path)
+    except Exception:
+        # What PyVista cannot read either is refused with our reason.
+        if problem is not None:
+            raise problem from None
+        raise
 
 
 def _writer(dataset: Any, path: str, **options: Any) -> None:
@@ -44,7 +65,10 @@ def _registered(register: Any, suffixes: Sequence[str], handler: Any) -> tuple[s
 
 
 #: Suffixes that ``pyvista.read`` now reads through blockvis.
-READS = _registered(pv.register_reader, (".dxf", ".json", ".msh", ".svg"), _reader)
+READS = (
+    *_registered(pv.register_reader, (".dxf", ".json", ".svg"), _reader),
+    *_registered(pv.register_reader, (".msh",), _mesh_reader),
+)
 
 #: Suffixes that ``dataset.save`` now writes through blockvis.
 WRITES = _registered(pv.register_writer, (".dxf", ".json", ".msh", ".svg"), _writer)

@@ -37,3 +37,18 @@ def test_three_lines_from_a_polygon_mesh_to_a_solved_collapse():
     response = mesh.blockvis.settle(direction=(1, 0), increment=0.005, limit=0.2, friction_coefficient=2.0)
     assert response.collapse.displacement == pytest.approx(2 * (np.hypot(a, h) - a), rel=5e-3)
     assert mesh.blockvis.assembly({"block 0": "fixed"}).roles[0] == "fixed"
+
+
+def test_meshes_without_flat_blocks_stay_with_pyvista(tmp_path):
+    ball = pv.Sphere(theta_resolution=8, phi_resolution=8).delaunay_3d()
+    pv.save_meshio(tmp_path / "ball.msh", ball, file_format="gmsh22")
+    assert ".msh" in pyvista_plugin.READS
+    again = pv.read(tmp_path / "ball.msh")
+    assert again.n_cells == ball.n_cells
+    assert set(np.asarray(again.celltypes)) == {10}
+    skin = ball.extract_surface(algorithm="dataset_surface").triangulate()
+    pv.save_meshio(tmp_path / "skin.msh", skin, file_format="gmsh22")
+    assert pv.read(tmp_path / "skin.msh").n_cells == skin.n_cells
+    (tmp_path / "broken.msh").write_text("no mesh")
+    with pytest.raises(ValueError, match="is not a gmsh mesh: it has no section"):
+        pv.read(tmp_path / "broken.msh")
