@@ -19,7 +19,7 @@ import pyvista as pv
 
 import solver
 
-from .formats.gmsh_mesh import holds_volumes
+from .formats.gmsh_mesh import holds_flat_blocks
 from .formats.pyvista_files import dataset_of, layout_of_dataset
 from .formats.read import read_layout, write_layout
 from .layout.assemble import assemble
@@ -34,7 +34,7 @@ def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:
 def _mesh_reader(path: str, **options: Any) -> Any:
     """Read a .msh file of flat blocks as a layout; leave every other to PyVista."""
     try:
-        if not holds_volumes(Path(path)):
+        if holds_flat_blocks(Path(path)):
             return _reader(path, **options)
     except ValueError as error:
         problem: ValueError | None = error
@@ -42,8 +42,8 @@ def _mesh_reader(path: str, **options: Any) -> Any:
         problem = None
     try:
         return pv.read_meshio(path)
-    except Exception:
-        # What PyVista cannot read either is refused with our reason.
+    except (SystemExit, Exception):
+        # meshio ends the process for some files; what PyVista cannot read either is refused with our reason.
         if problem is not None:
             raise problem from None
         raise

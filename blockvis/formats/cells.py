@@ -12,9 +12,10 @@ import numpy as np
 import solver
 from blockvis.layout.block_table import with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import UPRIGHT, flattened, outlines_of_cells
+from blockvis.layout.outlines import UPRIGHT, flattened, is_flat, outlines_of_cells
 
 from .bodies import Bodies, Body
+from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
 
 #: Names of the cell array that numbers the blocks, in order of preference.
 BLOCK_ARRAYS = ("block_id", "BlockId", "block", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags")
@@ -27,26 +28,14 @@ def block_array(data: Mapping[str, np.ndarray]) -> str | None:
     return next((name for name in numbered if name == "block_id" or (data[name] != data[name][0]).any()), None)
 
 
-def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
-    """(n_cells,) int array: number of the connected piece of each cell; shared points connect cells."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    first = np.concatenate([ring for ring in rings])
-    second = np.concatenate([np.full(len(ring), ring[0]) for ring in rings])
-    graph = coo_matrix((np.ones(len(first)), (first, second)), shape=(n_points, n_points))
-    piece = connected_components(graph, directed=False)[1]
-    return np.unique(piece[[ring[0] for ring in rings]], return_inverse=True)[1]
-
-
 def layout_of_cells(
     points: np.ndarray,
     rings: Sequence[np.ndarray],
     data: Mapping[str, np.ndarray],
     path: Path | str,
     view: str | None = None,
-) -> Layout:
-    """Make a layout of surface cells.
+) -> Layout | Bodies:
+    """Make a layout of surface cells; if they do not lie in a plane, find the bodies that they enclose.
 
     Parameters
     ----------
@@ -69,11 +58,13 @@ def layout_of_cells(
     """
     if not rings:
         raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
-    flat, note = flattened(points, f"'{path}'", view)
     used = np.unique(np.concatenate(list(rings)))
     if used.min() < 0 or used.max() >= len(points):
         raise ValueError(f"'{path}': a cell uses point {int(used.max())}, but there are {len(points)}; export it again")
     key = block_array(data)
+    if not is_flat(points):
+        return _enclosed(points, rings, data, key, path)
+    flat, note = flattened(points, f"'{path}'", view)
     if key is not None:
         ids, owner = np.unique(np.asarray(data[key]), return_inverse=True)
         names = [f"block {value}" for value in ids.tolist()]
@@ -91,6 +82,24 @@ def layout_of_cells(
     notes = tuple(text for text in (how, note) if text)
     layout = Layout(outlines=tuple(outlines), names=tuple(names), unit="", notes=notes)
     return with_rows(layout, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
+
+
+def _enclosed(
+    points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray], key: str | None, path: Path | str
+) -> Bodies:
+    """Find the bodies that surface cells in space enclose, one per value of a cell array, or one per piece."""
+    values, owner = np.unique(data[key] if key else np.zeros(len(rings), dtype=np.int64), return_inverse=True)
+    names = [f"block {value}" for value in values.tolist()] if key else ["block"]
+    try:
+        bodies, owners = bodies_of_surfaces(points, rings, owner, names, path)
+    except OpenSurface:
+        # A drawing that is meant to be flat: the error says how far it is not.
+        flattened(points, f"'{path}'")
+        raise
+    first = np.unique(owner, return_index=True)[1]
+    rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
+    how = f"one per value of the cell array '{key}'" if key else "one per closed surface"
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, {how}",))
 
 
 def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from blockvis.layout.outlines import FLAT
 
 from .bodies import Bodies, fans
 from .cells import layout_of_cells
-from .solids import closed_bodies
+from .closed_surfaces import closed_bodies
 
 #: Objects nested deeper than this are not looked into.
 DEEPEST = 40
@@ -106,7 +106,7 @@ def _left_out(planes: Sequence[_Mesh]) -> str:
     return f"left out: {listed}{more}, a single face without volume; draw a support that it stands for by [[supports]]"
 
 
-def _flat(meshes: Sequence[_Mesh], path: Path, view: str | None) -> Layout:
+def _flat(meshes: Sequence[_Mesh], path: Path, view: str | None) -> Layout | Bodies:
     """Make a layout of flat meshes: each is a block, but of a single one each face."""
     points = np.concatenate([mesh.points for mesh in meshes])
     starts = np.cumsum([0] + [len(mesh.points) for mesh in meshes])

@@ -1,4 +1,4 @@
-"""Meshes of gmsh, .msh 2.2 and 4.1, ASCII and binary: one surface or volume entity is one block.
+"""Meshes of gmsh, .msh 1, 2.2 and 4.1, ASCII and binary: one surface or volume entity is one block.
 
 This reader replaces that of meshio, which keeps one of two physical groups of an entity, one of two groups of the same
 name in different dimensions, and reserves whatever memory the file asks for. It follows the description of the format, https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format.
@@ -14,10 +14,11 @@ import numpy as np
 
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import flattened, outlines_of_cells
+from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
 from blockvis.layout.triangulation import cells_of_ring
 
 from .bodies import Bodies
+from .closed_surfaces import OpenSurface, bodies_of_surfaces
 from .node_order import GMSH, ring_of_nodes
 from .reading import Reading
 from .volumes import GMSH_SOLIDS, Faces, bodies_of_cells
@@ -106,7 +107,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
 
 def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies:
     """Read the content of a .msh file; the path is named in messages."""
-    mesh, table = _sections(data, path)
+    mesh, table = _content(data, path)
     if mesh.solids:
         return _bodies(mesh, path)
     if not mesh.rings:
@@ -119,6 +120,8 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
     tags, owner = np.unique(surface, return_inverse=True)
     rings = [ring for block in mesh.rings for ring in block]
     groups = _group_names(mesh, 2, tags, path)
+    if not is_flat(mesh.coordinates):
+        return _enclosed(mesh, rings, [groups[k] for k in owner], path)
     names = _entity_names(groups, tags, "surface")
     flat, note = flattened(mesh.coordinates, f"'{path}'", reading.view)
     outlines = outlines_of_cells(flat, rings, owner, names)
@@ -137,9 +140,31 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
     return _with_table(layout, table, tags)
 
 
-def holds_volumes(path: Path) -> bool:
-    """Whether a .msh file has cells with a volume."""
-    return bool(_sections(path.read_bytes(), path)[0].solids)
+def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Path) -> Bodies:
+    """Find the bodies that surfaces in space enclose: those of each physical group, or else of all together."""
+    named, owner = np.unique(groups, return_inverse=True)
+    names = [str(name) or "body" for name in named]
+    try:
+        bodies, owners = bodies_of_surfaces(mesh.coordinates, rings, owner, names, path)
+    except ValueError:
+        try:
+            names = ["body"]
+            bodies, owners = bodies_of_surfaces(mesh.coordinates, rings, np.zeros_like(owner), names, path)
+        except OpenSurface:
+            # A drawing that is meant to be flat: the error says how far it is not.
+            flattened(mesh.coordinates, f"'{path}'")
+            raise
+    rows = []
+    for body, whose in zip(bodies, owners.tolist(), strict=True):
+        group = str(named[whose]) if len(names) > 1 else ""
+        rows.append({"name": body.name, **({"group": group, "material": group} if group else {})})
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, one per closed surface",))
+
+
+def holds_flat_blocks(path: Path) -> bool:
+    """Whether a .msh file has surface cells in a plane and none with a volume."""
+    mesh, _ = _content(path.read_bytes(), path)
+    return bool(mesh.rings) and not mesh.solids and is_flat(mesh.coordinates)
 
 
 def _bodies(mesh: _Mesh, path: Path) -> Bodies:
@@ -190,6 +215,13 @@ def _entity_names(groups: list[str], tags: np.ndarray, kind: str) -> list[str]:
     return names
 
 
+def _content(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, object]]]:
+    """Read the sections of a file of any version, and our own."""
+    if _section(data, "MeshFormat") is None and _section(data, "NOD") is not None:
+        return _sections_1(data, path), {}
+    return _sections(data, path)
+
+
 def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, object]]]:
     head = _section(data, "MeshFormat")
     words = head.split(b"\n", 1)[0].split() if head else []
@@ -235,13 +267,35 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
     return mesh, table if isinstance(table, dict) else {}
 
 
-def _section(data: bytes, name: str) -> bytes | None:
+def _sections_1(data: bytes, path: Path) -> _Mesh:
+    """Read the sections of version 1, which is always ASCII and names no groups."""
+    mesh = _Mesh()
+    nodes, elements = (_section_between(data, name, end) for name, end in (("NOD", "ENDNOD"), ("ELM", "ENDELM")))
+    if elements is None or nodes is None:
+        raise ValueError(f"'{path}' has no section $ELM; mesh the surfaces (gmsh -2) and export again")
+    _nodes_22(_Numbers(nodes, "NOD", path, False, "<", "<i8"), mesh)
+    numbers = _Numbers(elements, "ELM", path, False, "<", "<i8")
+    for _ in range(numbers.line()):
+        _number, kind, group, entity, n = map(int, numbers.take("int", 5))
+        row = numbers.take("int", n).reshape(1, -1)
+        dimension = 2 if kind in GMSH else 3 if kind in GMSH_SOLIDS else 0
+        if group and group not in mesh.groups.setdefault((dimension, entity), []):
+            mesh.groups[dimension, entity].append(group)
+        _add(mesh, numbers, dimension, kind, row, np.array([entity]))
+    return mesh
+
+
+def _section_between(data: bytes, name: str, end: str) -> bytes | None:
     start = data.find(f"${name}".encode())
     if start < 0:
         return None
     start = data.find(b"\n", start) + 1
-    end = data.find(f"$End{name}".encode(), start)
-    return data[start : end if end >= 0 else len(data)]
+    stop = data.find(f"${end}".encode(), start)
+    return data[start : stop if stop >= 0 else len(data)]
+
+
+def _section(data: bytes, name: str) -> bytes | None:
+    return _section_between(data, name, f"End{name}")
 
 
 def _entities_41(numbers: _Numbers, mesh: _Mesh) -> None:

@@ -123,7 +123,7 @@ def _body(gmsh, tag: int) -> dict[str, object]:  # type: ignore[no-untyped-def]
         place = {int(node): coordinates[3 * k : 3 * k + 3].tolist() for k, node in enumerate(nodes)}
         kinds, _, connected = gmsh.model.mesh.getElements(2, surface)
         for kind, ring in zip(kinds, connected, strict=True):
-            for face in ring.reshape(-1, 3) if kind == 2 else []:
+            for face in _triangles(int(kind), ring):
                 for node in face:
                     if int(node) not in number:
                         number[int(node)] = len(points)
@@ -132,6 +132,15 @@ def _body(gmsh, tag: int) -> dict[str, object]:  # type: ignore[no-untyped-def]
     # Where a STEP file names no solid, gmsh gives the name of the translator.
     name = "" if name.startswith("Open CASCADE STEP translator") else name
     return {"name": name or f"volume {tag}", "group": group, "groups": len(groups), "points": points, "faces": faces}
+
+
+def _triangles(kind: int, nodes: np.ndarray) -> np.ndarray:
+    """(n, 3) int array: elements of triangles, and of quadrangles that extruded or recombined surfaces have."""
+    if kind == 2:
+        return nodes.reshape(-1, 3)
+    if kind == 3:
+        return nodes.reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return np.zeros((0, 3), dtype=np.int64)
 
 
 if __name__ == "__main__":

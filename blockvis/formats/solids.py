@@ -14,12 +14,10 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import FLAT
 from blockvis.layout.triangulation import triangles_of_ring
 
-from .bodies import Bodies, Body
-from .cells import components, layout_of_cells, merged
+from .bodies import Bodies
+from .cells import layout_of_cells, merged
+from .closed_surfaces import closed_bodies
 from .reading import Reading
-
-#: Points closer than this fraction of the size of the drawing are one: single precision is accurate to 6e-8.
-SAME_POINT = 2e-6
 
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
@@ -95,64 +93,6 @@ def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any) -> li
     if len(ids) != len(faces):
         return parts
     return [(f"block {value}", points, faces[ids == value]) for value in np.unique(ids).tolist()]
-
-
-def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Merge points that coincide, and drop the faces that have no area then."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
-    # Exact copies first: a million of them would make a million squared pairs.
-    unique, inverse = np.unique(points, axis=0, return_inverse=True)
-    pairs = cKDTree(unique).query_pairs(SAME_POINT * size, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(unique), len(unique)))
-    _, label = connected_components(graph, directed=False)
-    first = np.unique(label, return_index=True)[1]
-    faces = label[inverse.ravel()][faces]
-    alive = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    return unique[first], faces[alive]
-
-
-def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path: Path) -> list[Body]:
-    """Split a mesh of triangles into the closed bodies that it holds.
-
-    Parameters
-    ----------
-    name : str
-    points : (n, 3) array
-    faces : (m, 3) int array
-    size : float
-        Of the drawing, in the unit of the points.
-    path : Path
-        Named in messages.
-
-    Raises
-    ------
-    ValueError
-        For a mesh that is not closed, and for bodies that touch along an edge.
-    """
-    points, faces = _with_points_merged(points, faces, size)
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    if (counts == 1).any():
-        x, y, z = points[unique[counts == 1][0]].mean(axis=0)
-        raise ValueError(
-            f"'{path}': body '{name}' is not closed: {int((counts == 1).sum())} edges belong to one face only, "
-            f"one around ({x:.6g}, {y:.6g}, {z:.6g}); export closed bodies"
-        )
-    if (counts > 2).any():
-        x, y, z = points[unique[counts > 2][0]].mean(axis=0)
-        raise ValueError(
-            f"'{path}': body '{name}' holds bodies that touch and cannot be told apart: {int((counts > 2).sum())} "
-            f"edges belong to more than two faces, one around ({x:.6g}, {y:.6g}, {z:.6g}); "
-            "export one file or one named object per block (.obj, .glb, .step)"
-        )
-    # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.
-    inverse = inverse.ravel().reshape(-1, 3)
-    piece = components(list(inverse), len(unique))
-    n = int(piece.max()) + 1
-    return [Body(name if n == 1 else f"{name} {k + 1}", points, faces[piece == k]) for k in range(n)]
 
 
 def _flat(

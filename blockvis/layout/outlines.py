@@ -39,6 +39,14 @@ def ring_width(ring: np.ndarray) -> float:
     return 2.0 * abs(ring_area(ring)) / float(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).sum())
 
 
+def is_flat(points: np.ndarray) -> bool:
+    """Whether (n, 2) or (n, 3) points lie in a plane across an axis; also if their coordinates are not finite."""
+    if points.shape[1] == 2 or len(points) == 0:
+        return True
+    spread = np.ptp(points, axis=0)
+    return not np.isfinite(spread).all() or bool((spread <= FLAT * spread.max()).any())
+
+
 def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[np.ndarray, str]:
     """Take the two coordinates in which a flat drawing extends.
 

@@ -167,3 +167,15 @@ def test_messages_name_the_file_and_no_other(tmp_path):
     with pytest.raises(ValueError, match=r"a.geo' has no surface cells") as problem:
         read(tmp_path / "a.geo")
     assert "found.msh" not in str(problem.value)
+
+
+def test_extruded_and_recombined_volumes(tmp_path):
+    (tmp_path / "a.geo").write_text(
+        "Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Point(3) = {1, 1, 0}; Point(4) = {0, 1, 0};\n"
+        "Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1};\n"
+        "Curve Loop(1) = {1, 2, 3, 4}; Plane Surface(1) = {1}; Transfinite Surface {1}; Recombine Surface {1};\n"
+        "Extrude {0, 0, 0.5} { Surface{1}; Layers{2}; Recombine; }\n"
+    )
+    layout = read_layout(tmp_path / "a.geo", view="xz")
+    assert layout.thickness == pytest.approx([1.0])
+    assert read(tmp_path / "a.geo", view="xz").areas == pytest.approx([0.5])

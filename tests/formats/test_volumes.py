@@ -191,3 +191,52 @@ def test_the_time_grows_with_the_number_of_bodies(tmp_path):
         assert read_layout(tmp_path / "a.vtu").n_blocks == n
         seconds.append(time.process_time() - start)
     assert seconds[1] < 12 * seconds[0]
+
+
+def skin_of(box, path):
+    """Triangles around a box as a mesh of surfaces, in the format of a suffix."""
+    surface = pv.Box(box).triangulate()
+    if path.suffix == ".msh":
+        faces = surface.faces.reshape(-1, 4)[:, 1:]
+        tags = np.arange(len(faces)) // 2 + 1
+        data = {"gmsh:physical": [np.ones(len(faces), dtype=int)], "gmsh:geometrical": [tags]}
+        meshio.gmsh.write(path, meshio.Mesh(surface.points, [("triangle", faces)], cell_data=data), "2.2", binary=False)
+    else:
+        surface.save(path)
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".msh", ".vtp", ".vtk"])
+def test_closed_surfaces_are_bodies(tmp_path, suffix):
+    path = skin_of((0, 1, 0, 0.25, 0, 0.5), tmp_path / f"a{suffix}")
+    layout = read_layout(path, view="xz")
+    assert layout.thickness == pytest.approx([0.25])
+    assert read(path, view="xz").areas == pytest.approx([0.5])
+    assert any("one per closed surface" in note for note in layout.notes)
+
+
+@pytest.mark.parametrize("suffix", [".msh", ".vtp"])
+def test_surfaces_that_enclose_nothing_are_not_flat(tmp_path, suffix):
+    plate = pv.Plane(i_resolution=2, j_resolution=2).triangulate()
+    plate.clear_data()
+    plate.points[4, 2] = 0.01
+    path = tmp_path / f"a{suffix}"
+    if suffix == ".msh":
+        pv.save_meshio(path, plate, file_format="gmsh22")
+    else:
+        plate.save(path)
+    with pytest.raises(ValueError, match=r"is not flat: its points spread over 1 × 1 × 0.01"):
+        read(path)
+
+
+def test_version_1_of_msh(tmp_path):
+    (tmp_path / "a.msh").write_text(
+        "$NOD\n6\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 2 0 0\n6 2 1 0\n$ENDNOD\n"
+        "$ELM\n4\n1 1 0 1 2 1 2\n2 3 7 10 4 1 2 3 4\n3 2 8 11 3 2 5 6\n4 2 8 11 3 2 6 3\n$ENDELM\n"
+    )
+    layout = read_layout(tmp_path / "a.msh")
+    assert layout.groups == ("group 7", "group 8")
+    assert read(tmp_path / "a.msh").areas.tolist() == [1.0, 1.0]
+    (tmp_path / "b.msh").write_text("$NOD\n1\n1 0 0 0\n$ENDNOD\n$ELM\n3\n1 2 0 1 3 1 1\n$ENDELM\n")
+    with pytest.raises(ValueError, match=r"is cut off: its section \$ELM announces"):
+        read(tmp_path / "b.msh")
