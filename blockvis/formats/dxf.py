@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 from collections import Counter
 from collections.abc import Iterator
@@ -57,11 +58,22 @@ class _Found:
 
 def read(path: Path, reading: Reading) -> Layout:
     """Read a .dxf drawing; its unit is that of the header variable $INSUNITS."""
+    log = logging.getLogger("ezdxf")
+    level = log.level
+    # What ezdxf would print to the terminal is counted in a note.
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        return _read(path, reading)
+    finally:
+        log.setLevel(level)
+
+
+def _read(path: Path, reading: Reading) -> Layout:
     import ezdxf
     from ezdxf import recover
 
     try:
-        document, _ = recover.readfile(path)
+        document, audit = recover.readfile(path)
     except (OSError, ezdxf.DXFError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         raise ValueError(
             f"'{path}' is not a readable DXF file ({error}); save it again as DXF R2000 or later"
@@ -96,6 +108,9 @@ def read(path: Path, reading: Reading) -> Layout:
         raise ValueError(
             f"'{path}' has no closed outline in its model space (found: {seen}); draw each block as a closed polyline"
         )
+    faults = len(audit.fixes) + len(audit.errors)
+    if faults:
+        notes.append(f"{faults} faults of the file were repaired or passed over")
     if found.skipped:
         notes.append("skipped: " + ", ".join(f"{n} {kind}" for kind, n in found.skipped.items()))
     if found.hidden:

@@ -193,3 +193,14 @@ def test_the_view_of_a_drawing_in_space(tmp_path):
     layout = read_layout(path, view="xz")
     assert read(path, view="xz").areas == pytest.approx([2])
     assert any("elevations were ignored: the drawing was read as seen along y" in note for note in layout.notes)
+
+
+def test_faults_of_a_file_are_noted_and_not_printed(tmp_path, capfd):
+    def draw(document, space):
+        space.add_lwpolyline(SQUARE, close=True)
+        space.add_text("north", dxfattribs={"style": "not there"})
+
+    layout = read_layout(saved(tmp_path, draw))
+    assert layout.n_blocks == 1
+    assert any("faults of the file were repaired or passed over" in note for note in layout.notes)
+    assert capfd.readouterr() == ("", "")
