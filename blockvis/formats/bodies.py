@@ -24,6 +24,9 @@ LEVEL = 1e-5
 #: inexactly neighbours are drawn.
 COVERS = 0.01
 
+#: Sizes beyond this are damage: their squares, or those of their products, could not be computed.
+LARGEST_SIZE = 1e50
+
 #: Bodies compared with all others at a time.
 AT_A_TIME = 20
 
@@ -117,7 +120,12 @@ def layout_of_bodies(found: Bodies, path: Path | str, view: str | None = None) -
     if not bodies:
         raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
     every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
+    if not np.isfinite(every).all():
+        bad = every[~np.isfinite(every).all(axis=1)][0]
+        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
     size = float(np.ptp(every, axis=0).max())
+    if not 0.0 < size < LARGEST_SIZE:
+        raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
     axes = (2, 1, 0) if view is None else (axis_across(view),)
     seen = [_seen_along(axis, bodies, size) for axis in axes]
     fitting = [one for one in seen if not one.refused]

@@ -69,6 +69,8 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
         For bodies that touch along an edge.
     """
     points, faces = _with_points_merged(points, faces, size)
+    if len(faces) == 0:
+        raise OpenSurface(f"'{path}': body '{name}' has no face with an area; export closed bodies")
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     if (counts == 1).any():

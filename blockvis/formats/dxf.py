@@ -108,9 +108,7 @@ def _read(path: Path, reading: Reading) -> Layout:
         raise ValueError(
             f"'{path}' has no closed outline in its model space (found: {seen}); draw each block as a closed polyline"
         )
-    faults = len(audit.fixes) + len(audit.errors)
-    if faults:
-        notes.append(f"{faults} faults of the file were repaired or passed over")
+    notes += _faults(audit)
     if found.skipped:
         notes.append("skipped: " + ", ".join(f"{n} {kind}" for kind, n in found.skipped.items()))
     if found.hidden:
@@ -130,6 +128,12 @@ def _read(path: Path, reading: Reading) -> Layout:
         for layer, name, row in zip(found.layers, found.names, found.rows, strict=True)
     ]
     return with_rows(layout, rows)
+
+
+def _faults(audit: Any) -> list[str]:
+    """Count the faults that ezdxf found in a note."""
+    faults = len(audit.fixes) + len(audit.errors)
+    return [f"{faults} faults of the file were repaired or passed over"] if faults else []
 
 
 def _turned(found: _Found, view: str | None, path: Path) -> str:

@@ -331,7 +331,7 @@ def _nodes_22(numbers: _Numbers, mesh: _Mesh) -> None:
         record = np.dtype([("tag", numbers.types["int"]), ("x", numbers.types["double"], 3)])
         assert isinstance(numbers.body, bytes)
         if n * record.itemsize > len(numbers.body) - numbers.position:
-            numbers.take("double", 3 * n)
+            numbers.take("int", record.itemsize // 4 * n)
         found = np.frombuffer(numbers.body, record, n, numbers.position)
         tags, mesh.coordinates = found["tag"].astype(np.int64), found["x"].astype(float)
     else:

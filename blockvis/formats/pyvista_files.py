@@ -22,19 +22,22 @@ from .cells import block_array, layout_of_cells, merged, row_of
 from .node_order import VTK, ring_of_nodes
 from .reading import Reading
 from .volumes import VTK_SOLIDS, bodies_of_cells
-from .vtk_arrays import largest_number
+from .vtk_arrays import announced_bytes, largest_number
 
 if TYPE_CHECKING:
     import pyvista
 
-#: VTK's types of cells with a volume whose faces do not follow from the type alone: prisms, hulls, polyhedra.
-FACETED = (15, 16, 41, 42)
+#: VTK's type of cell with a volume that lists its faces, which do not follow from the type.
+POLYHEDRON = 42
 
 #: zlib compresses at most 1032 to 1: a file cannot hold more than this many numbers per byte.
 MOST_PER_BYTE = 1100
 
 #: Numbers that all arrays of a file may hold together: 400 MB, a thousand times a large drawing.
 MOST_NUMBERS = 50_000_000
+
+#: Pieces of text, as the parser hands them out, in which the header of a binary array surely lies.
+LINES_OF_HEADER = 8
 
 #: XML elements nested deeper than this are refused; VTK nests a handful.
 DEEPEST = 64
@@ -135,6 +138,7 @@ class _Held:
         self.appended = ""
         self.later: list[dict[str, str]] = []
         self.offsets: dict[str, str] | None = None
+        self.binary: dict[str, str] | None = None
         self.content: list[str] = []
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
@@ -161,28 +165,47 @@ class _Held:
             self.points = int(counts.pop("NumberOfPoints", self.points))
             self.cells = sum(int(value) for value in counts.values())
         elif tag in ("DataArray", "Array"):
-            components = int(counts.get("NumberOfComponents", 1))
-            self.numbers += components * int(counts.get("NumberOfTuples", max(self.points, self.cells)))
-            self._bound(self.numbers)
-            if attributes.get("Name") == "offsets":
-                if attributes.get("format") == "appended":
-                    self.later.append(attributes)
-                else:
-                    self.offsets, self.content = attributes, []
+            self._array(attributes, counts)
         elif tag == "AppendedData":
             self.appended = attributes.get("encoding", "base64")
+
+    def _array(self, attributes: dict[str, str], counts: dict[str, str]) -> None:
+        """Check the counts of an array, and prepare to read its header, or all of it if it holds offsets."""
+        components = int(counts.get("NumberOfComponents", 1))
+        self.numbers += components * int(counts.get("NumberOfTuples", max(self.points, self.cells)))
+        self._bound(self.numbers)
+        if attributes.get("format") == "binary":
+            self.binary, self.content = attributes, []
+        if attributes.get("Name", "").endswith("offsets"):
+            if attributes.get("format") == "appended":
+                self.later.append(attributes)
+            else:
+                self.offsets, self.content = attributes, []
 
     def end(self, tag: str) -> None:
         """Check the offsets of cells when their element ends."""
         self.depth -= 1
+        if self.binary is not None:
+            self.check_header("".join(self.content).strip().encode(), self.binary)
+            self.binary = None
         if self.offsets is not None:
             self.check_offsets("".join(self.content).strip().encode(), self.offsets)
             self.offsets = None
 
     def text(self, data: str) -> None:
-        """Collect the text of an element of offsets."""
-        if self.offsets is not None:
+        """Collect the text of an element of offsets, and the beginning of that of any binary array."""
+        if self.offsets is not None or (self.binary is not None and len(self.content) < LINES_OF_HEADER):
             self.content.append(data)
+
+    def check_header(self, content: bytes, attributes: dict[str, str]) -> None:
+        """Check the size that the header of a binary array announces: VTK reserves as much memory."""
+        try:
+            size = announced_bytes(content, attributes, self.file)
+        except (ValueError, KeyError, OverflowError) as error:
+            raise ValueError(
+                f"'{self.path}' has an array whose size cannot be read ({error}); export it again"
+            ) from None
+        _refuse(self.path, [size] if size > 8 * MOST_NUMBERS else [], self.size)
 
     def check_offsets(self, content: bytes, attributes: dict[str, str]) -> None:
         """Check the last offset: VTK reserves memory for so many numbers."""
@@ -251,7 +274,7 @@ def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | 
         return _found_in_parts(data, path, view)
     grid = _as_cells(data, path)
     types = np.asarray(grid.celltypes)
-    if np.isin(types, [*VTK_SOLIDS, *FACETED]).any():
+    if np.isin(types, [*VTK_SOLIDS, POLYHEDRON]).any():
         return _bodies_of_solids(grid, path)
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
     surface = np.flatnonzero(np.isin(types, list(VTK)))
@@ -295,7 +318,7 @@ def _has_blocks(part: Any) -> bool:
     if isinstance(part, pyvista.MultiBlock):
         return any(one is not None and _has_blocks(one) for one in part)
     types = np.asarray(part.cast_to_unstructured_grid().celltypes) if part.n_cells else np.zeros(0)
-    return bool(np.isin(types, [*VTK, *VTK_SOLIDS, *FACETED]).any())
+    return bool(np.isin(types, [*VTK, *VTK_SOLIDS, POLYHEDRON]).any())
 
 
 def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
@@ -311,24 +334,27 @@ def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
 def _bodies_of_solids(grid: Any, path: Path | str) -> Bodies:
     """Read the bodies of the cells with a volume; surface cells beside them are their skin."""
     types = np.asarray(grid.celltypes)
-    solid = np.flatnonzero(np.isin(types, [*VTK_SOLIDS, *FACETED]))
+    solid = np.flatnonzero(np.isin(types, [*VTK_SOLIDS, POLYHEDRON]))
     data = {str(key): np.asarray(grid.cell_data[key])[solid] for key in grid.cell_data}
     key = block_array(data)
     if key is not None:
         values, owner = np.unique(data[key], return_inverse=True)
         names = [f"block {value}" for value in values.tolist()]
         note = f"one per value of the cell array '{key}'"
-    elif np.isin(types[solid], FACETED).all():
+    elif (types[solid] == POLYHEDRON).all():
         owner, names = np.arange(len(solid)), [f"block {k}" for k in range(len(solid))]
         note = "one per cell: no cell array 'block_id' says which cells are one block"
     else:
         owner, names = np.zeros(len(solid), dtype=np.int64), ["block"]
         note = "one per piece that hangs together: no cell array 'block_id' says which cells are one block"
-    faceted = np.isin(types[solid], FACETED)
-    if faceted.any() and not faceted.all() and key is None:
-        raise ValueError(f"'{path}' has polyhedra beside other cells; number the blocks by a cell array 'block_id'")
+    faceted = types[solid] == POLYHEDRON
+    if faceted.any() and not faceted.all():
+        raise ValueError(f"'{path}' has polyhedra beside other cells with a volume; write all blocks as polyhedra")
     found = _faceted_bodies if faceted.any() else _bodies_by_shape
-    bodies, owners = found(grid, np.asarray(grid.points, dtype=float), solid, owner, names)
+    try:
+        bodies, owners = found(grid, np.asarray(grid.points, dtype=float), solid, owner, names)
+    except IndexError as error:
+        raise ValueError(f"'{path}' has a damaged cell ({error}); export it again") from None
     first = np.unique(owner, return_index=True)[1]
     rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
     return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, {note}",))
@@ -340,6 +366,8 @@ def _bodies_by_shape(
     """Find the bodies of cells whose faces follow from their type."""
     types = np.asarray(grid.celltypes)
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
+    if not _within(connectivity, len(points)):
+        raise IndexError("it uses a point that does not exist")
     cells, owners = [], []
     for kind in np.unique(types[solid]).tolist():
         chosen = np.flatnonzero(types[solid] == kind)
@@ -353,18 +381,32 @@ def _bodies_by_shape(
 def _faceted_bodies(
     grid: Any, points: np.ndarray, solid: np.ndarray, owner: np.ndarray, names: list[str]
 ) -> tuple[list[Body], np.ndarray]:
-    """Find the bodies of cells that have to be asked for their faces."""
-    faces: list[dict[tuple[int, ...], list[int]]] = [{} for _ in names]
+    """Find the bodies of polyhedra, which list their faces."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    def lists(array: Any) -> tuple[np.ndarray, np.ndarray]:
+        return vtk_to_numpy(array.GetOffsetsArray()), vtk_to_numpy(array.GetConnectivityArray())
+
+    if grid.GetPolyhedronFaces() is None or grid.GetPolyhedronFaceLocations() is None:
+        raise IndexError("a polyhedron has no faces")
+    corner_of, corners = lists(grid.GetPolyhedronFaces())
+    face_of, faces = lists(grid.GetPolyhedronFaceLocations())
+    if not (_within(corners, len(points)) and _within(faces, len(corner_of) - 1)):
+        raise IndexError("a face of a polyhedron uses a point that does not exist")
+    outside: list[dict[tuple[int, ...], list[int]]] = [{} for _ in names]
     for cell, whose in zip(solid.tolist(), owner.tolist(), strict=True):
-        asked = grid.GetCell(cell)
-        for k in range(asked.GetNumberOfFaces()):
-            face = asked.GetFace(k)
-            ring = [face.GetPointId(j) for j in range(face.GetNumberOfPoints())]
+        for face in faces[face_of[cell] : face_of[cell + 1]].tolist():
+            ring = corners[corner_of[face] : corner_of[face + 1]].tolist()
+            key = tuple(sorted(ring))
             # A face that two cells of one body share is inside it.
-            if faces[whose].pop(tuple(sorted(ring)), None) is None:
-                faces[whose][tuple(sorted(ring))] = ring
-    bodies = [body_of_polygons(name, points, list(mine.values())) for name, mine in zip(names, faces, strict=True)]
+            if outside[whose].pop(key, None) is None:
+                outside[whose][key] = ring
+    bodies = [body_of_polygons(name, points, list(mine.values())) for name, mine in zip(names, outside, strict=True)]
     return bodies, np.arange(len(names))
+
+
+def _within(numbers: np.ndarray, end: int) -> bool:
+    return len(numbers) == 0 or bool(numbers.min() >= 0 and numbers.max() < end)
 
 
 def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:

@@ -240,3 +240,33 @@ def test_version_1_of_msh(tmp_path):
     (tmp_path / "b.msh").write_text("$NOD\n1\n1 0 0 0\n$ENDNOD\n$ELM\n3\n1 2 0 1 3 1 1\n$ENDELM\n")
     with pytest.raises(ValueError, match=r"is cut off: its section \$ELM announces"):
         read(tmp_path / "b.msh")
+
+
+def test_damaged_cells_are_refused(tmp_path):
+    grid = polyhedra(2)
+    grid.save(tmp_path / "a.vtu", binary=False)
+    text = (tmp_path / "a.vtu").read_text()
+    assert "0 3 2 1 4 5" in text
+    (tmp_path / "a.vtu").write_text(text.replace("0 3 2 1 4 5", "0 3 99 1 4 5"))
+    with pytest.raises(ValueError, match=r"a.vtu' has a damaged cell \(a face of a polyhedron uses a point"):
+        read(tmp_path / "a.vtu")
+    points, cells, _ = bricks("hexahedron", 2)
+    pv.UnstructuredGrid({pv.CellType.HEXAHEDRON: cells}, points).save(tmp_path / "b.vtu", binary=False)
+    text = (tmp_path / "b.vtu").read_text()
+    assert "0 1 2 3 4 5" in text
+    (tmp_path / "b.vtu").write_text(text.replace("0 1 2 3 4 5", "0 1 2 3 4 55"))
+    with pytest.raises(ValueError, match=r"b.vtu' has a damaged cell \(it uses a point that does not exist"):
+        read(tmp_path / "b.vtu")
+
+
+def test_an_array_that_announces_more_than_a_drawing_holds_is_refused(tmp_path):
+    pv.Box((0, 1, 0, 0.25, 0, 0.5)).triangulate().save(tmp_path / "a.vtp")
+    data = (tmp_path / "a.vtp").read_bytes()
+    at = data.index(b'Name="connectivity"', data.index(b"<Polys>"))
+    start = data.index(b">", at) + 1
+    start += len(data[start:]) - len(data[start:].lstrip())
+    assert data[start : start + 4] == b"AQAA"
+    # The size of the only chunk, in base 64: 3.4 GB.
+    (tmp_path / "a.vtp").write_bytes(data[: start + 5] + b"3" + data[start + 6 :])
+    with pytest.raises(ValueError, match=r"announces \d{9,} items in \d+ bytes"):
+        read(tmp_path / "a.vtp")
