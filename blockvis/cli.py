@@ -69,12 +69,14 @@ def _parser() -> argparse.ArgumentParser:
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
     info.add_argument("file", metavar="FILE")
     info.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    _add_choice(info)
     info.add_argument("--picture", metavar="PNG", help="draw what was found")
     info.set_defaults(verb=_info)
     convert = verbs.add_parser("convert", help="any layout file to any other")
     convert.add_argument("source", metavar="IN")
     convert.add_argument("target", metavar="OUT")
     convert.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    _add_choice(convert)
     convert.add_argument(
         "--joint-thickness", default="0", metavar="M", help='close mortar joints up to this, or "auto"'
     )
@@ -99,6 +101,17 @@ def _parser() -> argparse.ArgumentParser:
     render.set_defaults(verb=_render)
     _add_sweep(verbs)
     return parser
+
+
+def _add_choice(verb: argparse.ArgumentParser) -> None:
+    for flag, what in (("--ignore", "leave out"), ("--only", "read nothing but")):
+        verb.add_argument(
+            flag,
+            action="append",
+            default=[],
+            metavar="PATTERN",
+            help=f"{what} this layer, group or name; may be given again",
+        )
 
 
 def _add_sweep(verbs: Any) -> None:
@@ -180,7 +193,7 @@ def _info(options: argparse.Namespace) -> int:
     from .formats.read import inspect
     from .pictures.inspection import draw_inspection
 
-    found = inspect(options.file, unit=options.unit)
+    found = inspect(options.file, unit=options.unit, ignore=options.ignore, only=options.only)
     print(found)
     if options.picture:
         print(f"drawn in {draw_inspection(found, options.picture)}")
@@ -192,7 +205,7 @@ def _convert(options: argparse.Namespace) -> int:
     from .layout.assemble import assemble
 
     target = _new_file(options.target, options.force)
-    layout = read_layout(options.source, unit=options.unit)
+    layout = read_layout(options.source, unit=options.unit, ignore=options.ignore, only=options.only)
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)
     joint = options.joint_thickness

@@ -57,6 +57,7 @@ def case_assembly(case: Case) -> solver.Assembly:
         thickness=case.thickness or THICKNESS,
         joint_thickness=case.joint_thickness,
         overlap_tolerance=case.overlap_tolerance,
+        closing=case.closing,
     )
     if case.settlements and not assembly.moving.any():
         groups = sorted({g for g in sketch.groups if g} | {s["name"] for s in case.supports}) or list(sketch.names[:12])
@@ -90,7 +91,7 @@ def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
 
 def _case_layout(case: Case) -> layout.Layout:
     if case.file is not None:
-        return read_layout(case.file, unit=case.unit)
+        return read_layout(case.file, unit=case.unit, ignore=case.ignore, only=case.only)
     assert case.layout is not None
     try:
         sketch = layout.layout_of(generators.build(case.layout, case.parameters))

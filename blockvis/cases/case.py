@@ -13,6 +13,7 @@ import numpy as np
 import solver
 from blockvis import generators
 from blockvis.formats import FORMATS
+from blockvis.layout.joints.close import WAYS
 from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import files_like
 from blockvis.video_suffixes import VIDEO_SUFFIXES
@@ -82,6 +83,9 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         raise geometry.error("file", problem + f", or a layout: {', '.join(generators.LAYOUTS)}" * (file is None))
     if file is not None and parameters:
         raise geometry.error("parameters", "belong to a layout, not to a file")
+    ignore, only = geometry.texts("ignore"), geometry.texts("only")
+    if file is None and (ignore or only):
+        raise geometry.error("ignore" if ignore else "only", "belongs to a file, not to a layout")
     joint = geometry.take("joint_thickness", 0.0)
     if joint != "auto":
         joint = geometry.number("joint_thickness", 0.0)
@@ -119,8 +123,11 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         layout=layout,
         parameters=dict(parameters),
         unit=geometry.text("unit"),
+        ignore=ignore,
+        only=only,
         thickness=geometry.number("thickness", positive=True),
         joint_thickness=joint,
+        closing=geometry.text("closing", "auto", among=WAYS),
         overlap_tolerance=geometry.number("overlap_tolerance", positive=True),
         roles=dict(roles),
         supports=tuple(_support(entry) for entry in top.tables("supports")),

@@ -12,6 +12,7 @@ import numpy as np
 import solver
 from blockvis.layout.block_table import with_rows
 from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import LeftOut
 from blockvis.layout.outlines import flattened, outlines_of_cells
 
 #: Names of the cell array that numbers the blocks, in order of preference.
@@ -73,11 +74,13 @@ def layout_of_cells(
         owner = components(rings, len(points))
         names = [f"block {k}" for k in range(int(owner.max()) + 1)]
         how = f"{len(names)} blocks, one per connected piece: no cell array 'block_id' says which cells are one block"
-    outlines = outlines_of_cells(flat, rings, owner, names)
+    unusable: dict[int, LeftOut] = {}
+    outlines = outlines_of_cells(flat, rings, owner, names, unusable)
     first = np.unique(owner, return_index=True)[1]
     notes = tuple(text for text in (how, note) if text)
     layout = Layout(outlines=tuple(outlines), names=tuple(names), unit="", notes=notes)
-    return with_rows(layout, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
+    layout = with_rows(layout, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
+    return layout.leaving_out(unusable)
 
 
 def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, Any]:
@@ -150,4 +153,5 @@ def merged(layouts: Sequence[Layout], labels: Sequence[str], path: Path | str) -
         density=numbers("density"),
         unit=named[0].unit,
         notes=tuple(dict.fromkeys(joined("notes"))),
+        left_out=joined("left_out"),
     )

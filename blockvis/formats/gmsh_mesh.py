@@ -14,6 +14,7 @@ import numpy as np
 
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import LeftOut
 from blockvis.layout.outlines import flattened, outlines_of_cells
 from blockvis.layout.triangulation import cells_of_ring
 
@@ -109,7 +110,8 @@ def read(path: Path, reading: Reading) -> Layout:
     groups = [mesh.group_names.get((2, g[0]), f"group {g[0]}") if g else "" for g in members.values()]
     names = _surface_names(groups, tags)
     flat, note = flattened(mesh.coordinates, f"'{path}'")
-    outlines = outlines_of_cells(flat, rings, owner, names)
+    unusable: dict[int, LeftOut] = {}
+    outlines = outlines_of_cells(flat, rings, owner, names, unusable)
     notes = [f"{len(tags)} blocks, one per meshed surface; a surface in no physical group may be missing from the file"]
     if "" in groups:
         notes.append(f"{groups.count('')} of {len(tags)} surfaces are in no physical group")
@@ -122,7 +124,7 @@ def read(path: Path, reading: Reading) -> Layout:
         unit="",
         notes=tuple(notes),
     )
-    return _with_table(layout, table, tags)
+    return _with_table(layout, table, tags).leaving_out(unusable)
 
 
 def _surface_names(groups: list[str], tags: np.ndarray) -> list[str]:

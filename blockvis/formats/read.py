@@ -16,7 +16,9 @@ from blockvis.formats import FORMATS, Format
 from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of
+from blockvis.layout.left_out import in_words
 from blockvis.layout.outlines import ring_area, without_collinear
+from blockvis.layout.selection import as_asked, without_debris, without_surroundings
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.suggestions import files_like
 
@@ -33,7 +35,14 @@ class MissingFile(FileNotFoundError, ValueError):
     """There is no file of that name."""
 
 
-def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: float | None = None) -> Layout:
+def read_layout(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    chord_tolerance: float | None = None,
+    ignore: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
+) -> Layout:
     """Read the blocks of a layout file.
 
     Parameters
@@ -44,11 +53,15 @@ def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: f
         Unit of the file's lengths; it replaces the one that the file states.
     chord_tolerance : float, optional [m]
         Largest distance of an arc from the chords that replace it; by default a thousandth of its radius.
+    ignore, only : str or sequence of str, optional
+        Layers, groups, materials and names, or patterns of them (``"dim*"``), that are left out, and beside which all
+        others are left out. What ``only`` names is not left out for looking like a frame, a title block or mortar.
 
     Returns
     -------
     Layout
-        Lengths in m, outlines without collinear points.
+        Lengths in m, outlines without collinear points. What the drawing holds beside its blocks is in ``left_out``,
+        and in a note per kind and layer.
 
     Raises
     ------
@@ -66,8 +79,10 @@ def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: f
         raise ValueError(f"'{path}' is empty (0 bytes); export it again")
     if unit is not None:
         metres_per(unit)
-    layout = _read_by_suffix(path, Reading(unit=unit, chord_tolerance=chord_tolerance))
-    if layout.n_blocks == 0:
+    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
+    reading = Reading(unit=unit, chord_tolerance=chord_tolerance, ignore=ignore, only=only)
+    layout = replace(_read_by_suffix(path, reading), source=str(path))
+    if layout.n_blocks == 0 and not layout.left_out:
         raise ValueError(f"'{path}' draws no block; draw each block as one closed outline or meshed surface")
     for i, ring in enumerate(layout.outlines):
         if not np.isfinite(ring).all():
@@ -80,20 +95,47 @@ def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: f
     chosen, note = chosen_unit(unit, layout.unit, sizes)
     factor = metres_per(chosen)
     outlines = tuple(without_collinear(ring * factor) for ring in layout.outlines)
-    for name, ring in zip(layout.names, outlines, strict=True):
+    layout = replace(
+        layout,
+        outlines=outlines,
+        thickness=None if layout.thickness is None else layout.thickness * factor,
+        unit=chosen,
+        notes=layout.notes + ((note,) if note else ()),
+        left_out=tuple(replace(item, points=item.points * factor) for item in layout.left_out),
+    )
+    return _checked(_sorted_out(layout, ignore, only))
+
+
+def _sorted_out(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:
+    """Leave out what is no block, with a note per kind and layer."""
+    layout = as_asked(layout, ignore, only)
+    layout = without_surroundings(without_debris(layout), only)
+    for item in layout.left_out:
+        if item.serious:
+            raise ValueError(f"'{layout.source}': {item.message}; or leave it out (ignore)")
+    if layout.n_blocks == 0:
+        first = next((item for item in layout.left_out if item.message), None)
+        asked = "all that it draws is left out as asked (ignore, only)"
+        counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
+        raise ValueError(f"'{layout.source}' draws no block: {first.message if first else asked}{counted}")
+    return replace(layout, notes=(*layout.notes, *in_words(layout.left_out)))
+
+
+def _checked(layout: Layout) -> Layout:
+    """Refuse outlines of too many corners, and coordinates out of bounds."""
+    path = layout.source
+    for name, ring in zip(layout.names, layout.outlines, strict=True):
         if len(ring) > MOST_CORNERS:
             raise ValueError(
                 f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
             )
-    largest = max(float(np.abs(ring).max()) for ring in outlines)
+    largest = max(float(np.abs(ring).max()) for ring in layout.outlines)
     if largest > LARGEST_COORDINATE:
         raise ValueError(
             f"'{path}' has a coordinate of {largest:.3g} m; corners must lie within {LARGEST_COORDINATE:.0e} m of the "
             "origin: check the unit or repair the file"
         )
-    thickness = None if layout.thickness is None else layout.thickness * factor
-    notes = layout.notes + ((note,) if note else ())
-    return replace(layout, outlines=outlines, thickness=thickness, unit=chosen, notes=notes, source=str(path))
+    return layout
 
 
 def write_layout(layout: Layout, path: str | Path) -> None:
@@ -114,22 +156,25 @@ def read(
     joint_thickness: float | str = 0.0,
     overlap_tolerance: float | None = None,
     chord_tolerance: float | None = None,
+    ignore: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
+    closing: str = "auto",
 ) -> solver.Assembly:
     """Read a layout file into an assembly.
 
     Parameters
     ----------
     path : str or Path
-    roles, supports, density, thickness, joint_thickness, overlap_tolerance
+    roles, supports, density, thickness, joint_thickness, overlap_tolerance, closing
         As of :func:`blockvis.layout.assemble.assemble`.
-    unit, chord_tolerance
+    unit, chord_tolerance, ignore, only
         As of :func:`read_layout`.
 
     Returns
     -------
     solver.Assembly
     """
-    layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance)
+    layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance, ignore=ignore, only=only)
     return assemble(
         layout,
         roles=roles,
@@ -138,6 +183,7 @@ def read(
         thickness=thickness,
         joint_thickness=joint_thickness,
         overlap_tolerance=overlap_tolerance,
+        closing=closing,
     )
 
 
@@ -146,7 +192,9 @@ def save_layout(assembly: solver.Assembly, path: str | Path, *, pose: solver.Pos
     write_layout(layout_of(assembly, pose=pose), path)
 
 
-def inspect(path: str | Path, *, unit: str | None = None) -> Inspection:
+def inspect(
+    path: str | Path, *, unit: str | None = None, ignore: str | Sequence[str] = (), only: str | Sequence[str] = ()
+) -> Inspection:
     """Read a layout file and measure it.
 
     Parameters
@@ -154,8 +202,10 @@ def inspect(path: str | Path, *, unit: str | None = None) -> Inspection:
     path : str or Path
     unit : str, optional
         Unit of the file's lengths; it replaces the one that the file states.
+    ignore, only : str or sequence of str, optional
+        As of :func:`read_layout`.
     """
-    return inspected(read_layout(path, unit=unit))
+    return inspected(read_layout(path, unit=unit, ignore=ignore, only=only))
 
 
 def _read_by_suffix(path: Path, reading: Reading) -> Layout:

@@ -16,6 +16,9 @@ from blockvis.suggestions import by_similarity
 from .layout import Layout
 from .repair import duplicates, repaired
 
+#: Beginnings of the notes of a layout that change what is analysed.
+TOLD = ("unit", "left out", "ignore", "cut", "joined")
+
 
 def assemble(
     layout: Layout,
@@ -26,6 +29,7 @@ def assemble(
     thickness: float = 1.0,
     joint_thickness: float | str = 0.0,
     overlap_tolerance: float | None = None,
+    closing: str = "auto",
 ) -> solver.Assembly:
     """Make an assembly of a layout.
 
@@ -47,6 +51,9 @@ def assemble(
     overlap_tolerance : float, optional [m]
         Overlaps up to this depth are resolved to their midline, deeper ones are an error; see
         :func:`blockvis.layout.repair.repaired` for the default.
+    closing : {"auto", "faces", "voronoi"}
+        How joints are closed: edges move to the midline between faces, or mortar goes to the nearest stone; "auto"
+        takes the second where faces are not straight.
 
     Returns
     -------
@@ -58,7 +65,7 @@ def assemble(
         For an unknown role, a key of ``roles`` that matches no block, and an overlap deeper than the tolerance.
     """
     for note in layout.notes:
-        if note.startswith("unit clash"):
+        if note.startswith(TOLD):
             warnings.warn(f"{layout.source}: {note}", stacklevel=2)
     n_drawn = layout.n_blocks
     twins = duplicates(layout.outlines)
@@ -80,12 +87,15 @@ def assemble(
         thickness=_filled(layout.thickness, thickness, layout.n_blocks),
         materials=layout.materials,
     )
-    outlines, _ = repaired(
+    outlines, repairs = repaired(
         assembly,
         joint_thickness=joint_thickness,
         overlap_tolerance=overlap_tolerance,
         anchored=np.arange(layout.n_blocks) >= n_drawn,
+        closing=closing,
     )
+    for note in repairs:
+        warnings.warn(f"{layout.source or 'layout'}: {note}", stacklevel=2)
     return solver.Assembly.from_outlines(
         outlines,
         names=assembly.names,
