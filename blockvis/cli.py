@@ -301,9 +301,13 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         response.assembly.vertices[response.assembly.free[response.assembly.block_of_vertex]], axis=0
     )
     weight = response.total_weight
+    assembly = response.assembly
+    largest = assembly.outline(int(np.argmax(np.where(assembly.free, assembly.areas, 0.0))))
+    across = float(np.hypot(*(largest[:, None, :] - largest[None, :, :]).T).max())
     lines = [
         f"{response.assembly.n_blocks} blocks ({int(response.assembly.free.sum())} free), "
-        f"{width:.4g} m wide, {height:.4g} m high, weight {weight:.6g} N",
+        f"{width:.4g} m wide, {height:.4g} m high, weight {weight:.6g} N, "
+        f"largest block {across:.3g} m across",
         f"{kind.headline(response)}, {sum(i.programs for i in response.increments)} linear "
         f"programs, {sum(i.seconds for i in response.increments):.2f} s of solver time",
     ]

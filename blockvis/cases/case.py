@@ -127,6 +127,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         only=only,
         thickness=geometry.number("thickness", positive=True),
         joint_thickness=joint,
+        outline_tolerance=_tolerance(geometry),
         closing=geometry.text("closing", "auto", among=WAYS),
         overlap_tolerance=geometry.number("overlap_tolerance", positive=True),
         roles=dict(roles),
@@ -147,6 +148,14 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     for table in (geometry, material, analysis, output, top):
         table.finish()
     return _checked(case, settings)
+
+
+def _tolerance(geometry: Table) -> float | None:
+    """Tolerance of outlines [m]: 0 keeps every corner; None where the case does not say."""
+    value = geometry.number("outline_tolerance")
+    if value is not None and value < 0.0:
+        raise geometry.error("outline_tolerance", f"is {value:g}; give a length in m of at least 0")
+    return None if value is None else float(value)
 
 
 def _checked(case: Case, settings: Mapping[str, Any]) -> Case:

@@ -41,6 +41,7 @@ class Case:
     thickness: float | None = None
     joint_thickness: float | str = 0.0
     closing: str = "auto"
+    outline_tolerance: float | None = None
     overlap_tolerance: float | None = None
     roles: Mapping[str, str] = field(default_factory=dict)
     supports: tuple[Mapping[str, Any], ...] = ()

@@ -19,7 +19,7 @@ from blockvis.layout.layout import Layout, layout_of
 from blockvis.layout.left_out import in_words
 from blockvis.layout.outlines import ring_area, without_collinear
 from blockvis.layout.selection import as_asked, without_debris, without_surroundings
-from blockvis.layout.units import chosen_unit, metres_per
+from blockvis.layout.units import chosen_unit, doubt, metres_per
 from blockvis.suggestions import files_like
 
 from .reading import Reading
@@ -118,7 +118,9 @@ def _sorted_out(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> L
         asked = "all that it draws is left out as asked (ignore, only)"
         counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
         raise ValueError(f"'{layout.source}' draws no block: {first.message if first else asked}{counted}")
-    return replace(layout, notes=(*layout.notes, *in_words(layout.left_out)))
+    sizes = np.sqrt([abs(ring_area(ring)) for ring in layout.outlines])
+    notes = [*layout.notes, *in_words(layout.left_out), doubt(layout.unit, float(np.median(sizes)))]
+    return replace(layout, notes=tuple(note for note in notes if note))
 
 
 def _checked(layout: Layout) -> Layout:
@@ -159,13 +161,14 @@ def read(
     ignore: str | Sequence[str] = (),
     only: str | Sequence[str] = (),
     closing: str = "auto",
+    outline_tolerance: float | None = None,
 ) -> solver.Assembly:
     """Read a layout file into an assembly.
 
     Parameters
     ----------
     path : str or Path
-    roles, supports, density, thickness, joint_thickness, overlap_tolerance, closing
+    roles, supports, density, thickness, joint_thickness, overlap_tolerance, closing, outline_tolerance
         As of :func:`blockvis.layout.assemble.assemble`.
     unit, chord_tolerance, ignore, only
         As of :func:`read_layout`.
@@ -184,6 +187,7 @@ def read(
         joint_thickness=joint_thickness,
         overlap_tolerance=overlap_tolerance,
         closing=closing,
+        outline_tolerance=outline_tolerance,
     )
 
 

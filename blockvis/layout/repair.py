@@ -175,7 +175,7 @@ def _notes(
     if thickness and closing.way == "voronoi":
         notes.append(
             f"joints of up to {thickness:g} m were closed by giving the mortar to the nearest stone, because faces are "
-            f"not straight; blocks have {sum(map(len, closing.outlines)) / len(closing.outlines):.3g} corners in the mean"
+            f"not straight; {sum(map(len, closing.outlines)) / len(closing.outlines):.3g} corners a block"
         )
     elif thickness:
         notes.append(

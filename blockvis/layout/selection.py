@@ -180,7 +180,7 @@ def _around_others(layout: Layout) -> dict[int, LeftOut]:
 
 
 def _title_cells(layout: Layout, shapes: Any, frames: list[int]) -> dict[int, LeftOut]:
-    """Outlines that hang together, reach the frame of a sheet and are not the main part of the drawing."""
+    """Upright rectangles that hang together, reach the frame of a sheet and are not the main part of the drawing."""
     import shapely
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -190,7 +190,8 @@ def _title_cells(layout: Layout, shapes: Any, frames: list[int]) -> dict[int, Le
         return {}
     frame = shapes[min(frames, key=lambda i: shapes[i].area)].exterior
     near = 2e-3 * frame.length / 4.0
-    a, b = shapely.STRtree(shapes[others]).query(shapes[others], "dwithin", near)
+    apart = max(near, 0.5 * float(np.sqrt(np.median(shapely.area(shapes[others])))))
+    a, b = shapely.STRtree(shapes[others]).query(shapes[others], "dwithin", apart)
     piece = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(len(others),) * 2), directed=False)[1]
     area = np.bincount(piece, shapely.area(shapes[others]))
     main = int(np.argmax(area))
@@ -200,7 +201,9 @@ def _title_cells(layout: Layout, shapes: Any, frames: list[int]) -> dict[int, Le
     found = {}
     for k in range(piece.max() + 1):
         members = others[piece == k]
-        if k != main and shapely.dwithin(shapes[members], frame, near).any():
+        boxes = shapely.box(*shapely.bounds(shapes[members]).T)
+        upright = (shapely.area(shapes[members]) > 0.99 * shapely.area(boxes)).all()
+        if k != main and upright and shapely.dwithin(shapes[members], frame, near).any():
             for i in members:
                 message = f"block '{layout.names[i]}' hangs on the frame of the sheet"
                 found[int(i)] = LeftOut("title", layout.outlines[i], message)

@@ -65,7 +65,11 @@ class Proposal:
     @property
     def note(self) -> str:
         """What is uncertain about the thickness, or ""."""
-        wider = self.stretches.gaps.max(axis=1) > self.thickness if len(self.stretches) else np.zeros(0, dtype=bool)
+        wider = (
+            self.stretches.gaps.max(axis=1) > 1.0001 * self.thickness
+            if len(self.stretches)
+            else np.zeros(0, dtype=bool)
+        )
         if self.thickness >= LIMIT * self.reach:
             return (
                 f"gaps were looked for up to {self.reach:.3g} m, and there are joints of that width: wider ones stay "
