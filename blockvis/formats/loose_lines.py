@@ -107,8 +107,9 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -
             rest -= set(inside)
     if found.pieces:
         n, cutting = sum(map(len, found.pieces.values())), len(lines) - len(rest)
+        around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
         found.notes.append(
-            f"cut: {cutting} lines within {len(found.pieces)} outlines cut them into {n} blocks; leave their layer out "
+            f"cut: {cutting} lines within {around} into {n} blocks; leave their layer out "
             "(ignore) if they are no joints"
         )
     _add_faces([lines[k] for k in sorted(rest)], [segments[k] for k in sorted(rest)], outlines, every, size, found)
@@ -135,7 +136,7 @@ def joined_ends(points: np.ndarray) -> tuple[np.ndarray, float] | None:
 def joined_note(misses: Sequence[float], size: float) -> list[str]:
     """Say how many outlines did not quite close, where that was more than rounding; ``size`` is that of the drawing."""
     far = [miss for miss in misses if miss > GRID * size]
-    return [f"joined: the ends of {len(far)} outlines, which missed each other by up to {max(far):.3g}"] if far else []
+    return [f"joined: the ends of {len(far)} outlines, which missed each other by up to {max(far):.3g} units"] if far else []
 
 
 def nothing_closed(faces: Faces) -> str:
@@ -197,7 +198,7 @@ def _joined(flat: list[np.ndarray], borders: list[Any], size: float, found: Face
             flat[k][e] = best
             moved.append(distance)
     if moved:
-        found.notes.append(f"joined: {len(moved)} ends of lines that missed another by up to {max(moved):.3g}")
+        found.notes.append(f"joined: {len(moved)} ends of lines that missed another by up to {max(moved):.3g} units")
     return flat
 
 
@@ -255,7 +256,9 @@ def _add_faces(
             found.left_out.append(LeftOut("hole", ring, message, layer, "face"))
             continue
         inner = face.buffer(-10 * grid)
-        if any(inner.intersects(drawn.geometries[k]) for k in drawn.query(inner)):
+        over = [drawn.geometries[k] for k in drawn.query(inner, "intersects")]
+        # Within an outline it may be a block in a frame: that is judged when all outlines are there.
+        if over and not all(outline.covers(inner) for outline in over):
             message = "loose lines enclose a face across closed outlines; leave their layer out (ignore)"
             found.left_out.append(LeftOut("across", ring, message, layer, "face"))
             continue

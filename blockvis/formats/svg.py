@@ -314,6 +314,11 @@ def _polygon(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarr
     return [(np.array(numbers).reshape(-1, 2), _tag(element) == "polygon")]
 
 
+def _segment(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
+    ends = np.array([[_length(element, f"{axis}{end}") for axis in "xy"] for end in (1, 2)])
+    return [(ends, False)]
+
+
 def _chords(sweep: float, radius: float, where: _Where) -> int:
     allowed = 1e-3 if where.tolerance is None else min(max(where.tolerance / radius, 1e-7), 1.0)
     widest = min(LARGEST_CHORD, 2.0 * math.acos(1.0 - allowed))
@@ -434,6 +439,7 @@ _SHAPES: dict[str, Callable[[ElementTree.Element, _Where], list[tuple[np.ndarray
     "ellipse": _ellipse,
     "polygon": _polygon,
     "polyline": _polygon,
+    "line": _segment,
     "path": _path,
 }
 

@@ -167,7 +167,9 @@ def close_joints(
         With the number of the outline, if "faces" would fold one.
     """
     if way == "auto":
-        way = chosen_way(outlines, facing_edges(outlines, thickness, overlap)) if thickness else "faces"
+        # Judged as far as joints may reach: corners too blunt for this thickness count, too.
+        reach = max(thickness, search_reach(outlines))
+        way = chosen_way(outlines, facing_edges(outlines, reach)) if thickness else "faces"
         if way == "faces":
             closing = _between_faces(outlines, thickness, overlap, anchored)
             if not thickness or _folded(outlines, closing.outlines) is None:
@@ -232,15 +234,14 @@ def _between_faces(
     if n_open == 0:
         return Closing(tuple(outlines), 0, 0, 0.0, 0.0)
     lines, uncommon = common_lines(found, edges, still, closed)
-    base = moved_outlines(edges, lines, LONGEST_MITRE * max(thickness, overlap))
+    base = _without_repeats(moved_outlines(edges, lines, LONGEST_MITRE * max(thickness, overlap)), closed)
     final = extended_to_lines(base, edges, found, uncommon, lines, still, max(thickness, overlap))
-    final = separated(final, still, max(thickness, overlap), 10.0 * closed)
+    final = separated(_without_repeats(final, closed), still, max(thickness, overlap), 10.0 * closed)
+    final = _without_repeats(final, closed)
     remaining = facing_edges(final, thickness, max(overlap, closed))
     residual = float(np.abs(remaining.gaps).max()) if len(remaining) else 0.0
     return Closing(
-        outlines=tuple(
-            outlines[i] if still[i] else _without_repeats(ring, 10.0 * closed) + origin for i, ring in enumerate(final)
-        ),
+        outlines=tuple(outlines[i] if still[i] else ring + origin for i, ring in enumerate(final)),
         n_joints=n_open,
         n_cut=len(uncommon),
         largest_gap=float(found.gaps.max()),
@@ -248,7 +249,7 @@ def _between_faces(
     )
 
 
-def _without_repeats(ring: np.ndarray, closed: float) -> np.ndarray:
+def _without_repeats(rings: Sequence[np.ndarray], closed: float) -> list[np.ndarray]:
     """Drop corners that coincide with the one before: an edge without length has no direction."""
-    kept = ring[np.hypot(*(ring - np.roll(ring, 1, axis=0)).T) > closed]
-    return kept if len(kept) > 2 else ring
+    kept = [ring[np.hypot(*(ring - np.roll(ring, 1, axis=0)).T) > closed] for ring in rings]
+    return [some if len(some) > 2 else ring for some, ring in zip(kept, rings, strict=True)]
