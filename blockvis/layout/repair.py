@@ -174,8 +174,8 @@ def _notes(
         )
     if thickness and closing.way == "voronoi":
         notes.append(
-            f"joints of up to {thickness:g} m were closed by giving the mortar to the nearest stone, because faces are "
-            f"not straight; {sum(map(len, closing.outlines)) / len(closing.outlines):.3g} corners a block"
+            f"joints of up to {thickness:g} m were closed by giving the mortar to the nearest stone: faces are not "
+            f"straight, or corners blunt; {sum(map(len, closing.outlines)) / len(closing.outlines):.3g} corners a block"
         )
     elif thickness:
         notes.append(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -120,7 +121,7 @@ def _chains(ids: np.ndarray, points: np.ndarray, nodes: np.ndarray) -> list[tupl
     ids = np.roll(ids, -cuts[0])
     ends = [*(cuts - cuts[0]), len(ids)]
     closed = [*ids.tolist(), int(ids[0])]
-    return [tuple(closed[i : j + 1]) for i, j in zip(ends[:-1], ends[1:], strict=True)]
+    return [tuple(closed[i : j + 1]) for i, j in itertools.pairwise(ends)]
 
 
 def _key(chain: tuple[int, ...]) -> tuple[int, ...]:

@@ -34,6 +34,9 @@ WAYS = ("auto", "faces", "voronoi")
 #: Faces are closed edge by edge where at least this share of the length of joints runs between straight ones.
 STRAIGHT = 0.85
 
+#: More pockets than this fraction of the area of the joints that are closed between faces, and mortar is shared out.
+POCKETS = 0.03
+
 #: A block that loses more of its area than this has not been closed but cut.
 LOST = 0.3
 
@@ -155,7 +158,8 @@ def close_joints(
         Blocks that keep their outline; edges that face them move across the whole gap.
     way : {"auto", "faces", "voronoi"}
         Whether edges move to the midline between faces, or mortar goes to the nearest stone. "auto" takes the second
-        where faces are not straight, or where edges that move would fold an outline.
+        where faces are not straight, where corners are so blunt that pockets would stay open between them, and where
+        edges that move would fold an outline.
 
     Returns
     -------
@@ -172,7 +176,8 @@ def close_joints(
         way = chosen_way(outlines, facing_edges(outlines, reach)) if thickness else "faces"
         if way == "faces":
             closing = _between_faces(outlines, thickness, overlap, anchored)
-            if not thickness or _folded(outlines, closing.outlines) is None:
+            whole = _folded(outlines, closing.outlines) is None
+            if not thickness or (whole and _pockets(outlines, closing.outlines, thickness) <= POCKETS):
                 return closing
         way = "voronoi"
     if way == "voronoi":
@@ -205,6 +210,18 @@ def _folded(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray]) -> int | 
     after = np.array([shapely.Polygon(ring) if len(ring) > 2 else shapely.Polygon() for ring in closed])
     folded = np.flatnonzero(~shapely.is_valid(after) | (shapely.area(after) < (1.0 - LOST) * before))
     return int(folded[0]) if len(folded) else None
+
+
+def _pockets(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray], thickness: float) -> float:
+    """Area of the pockets that stay open between blunt corners, as a fraction of that of the joints closed."""
+    import shapely
+
+    union = shapely.union_all(np.array([shapely.Polygon(ring) for ring in closed]))
+    holes = [shapely.Polygon(ring) for part in shapely.get_parts(union) for ring in part.interiors]
+    # An opening holds a disc of the radius of a joint and a half.
+    pockets = sum(hole.area for hole in holes if hole.buffer(-1.5 * thickness).is_empty)
+    joints = union.area - sum(shapely.Polygon(ring).area for ring in drawn)
+    return float(pockets / joints) if joints > 0.0 else 0.0
 
 
 def _to_nearest_stone(
