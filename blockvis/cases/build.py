@@ -128,12 +128,14 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
             f"density {light:g} kg/m³ is lighter than masonry; if it is in {unit}, give {factor * light:.4g} kg/m³"
         )
     steps = [s.increment for s in case.settlements if s.unit == "m"]
-    block = float(np.median(sizes)) if len(sizes) else np.inf
+    free = np.flatnonzero(assembly.free).tolist()
+    across = [float(np.hypot(*np.ptp(assembly.outline(i), axis=0))) for i in free]
+    block = float(np.median(across)) if across else np.inf
     if steps and max(steps) > LONGEST_STEP * block:
         notes.append(
-            f"[settlement] increment = {max(steps):g} m is {max(steps) / block:.3g} of the median block "
-            f"({block:.3g} m): what happens within a step is passed over; give at most {LONGEST_STEP * block:.2g} m"
-            + (f", or {1e-3 * max(steps):g} if it is in mm" if 1e-3 * max(steps) <= LONGEST_STEP * block else "")
+            f"[settlement] increment = {max(steps):g} m is {max(steps) / block:.3g} of the median block, "
+            f"{block:.3g} m across: a step passes over what happens within it; at most {LONGEST_STEP * block:.2g} m"
+            + (f", or is it in mm? {1e-3 * max(steps):g} m" if max(steps) > block else "")
         )
     for note in notes:
         if note:

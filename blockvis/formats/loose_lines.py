@@ -82,13 +82,14 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -
     beyond, as an axis or a dimension does, cuts nothing. An outline around lines that do not reach it stays whole.
     """
     import shapely
+    from scipy.spatial import cKDTree
 
     found = Faces()
     flat = [line.points[:, :2] for line in lines]
     if not flat:
         return found
-    every = np.concatenate([*flat, *outlines])
-    size = float(np.ptp(every, axis=0).max())
+    every = cKDTree(np.concatenate([*flat, *outlines]))
+    size = float(np.ptp(every.data, axis=0).max())
     usable = [float(np.ptp(ring, axis=0).max()) > GRID * size for ring in outlines]
     borders = [shapely.LinearRing(ring) for ring, good in zip(outlines, usable, strict=True) if good]
     flat = _joined(flat, borders, size, found)
@@ -221,7 +222,7 @@ def _add_faces(
     lines: list[Line],
     segments: list[Any],
     outlines: Sequence[np.ndarray],
-    every: np.ndarray,
+    every: Any,
     size: float,
     found: Faces,
 ) -> None:
@@ -233,6 +234,7 @@ def _add_faces(
     grid = GRID * size
     faces, cuts, dangles, _ = shapely.polygonize_full([shapely.union_all(segments, grid_size=grid)])
     loose = shapely.union_all([dangles, cuts]).buffer(2 * grid)
+    shapely.prepare(loose)
     for line, segment in zip(lines, segments, strict=True):
         if shapely.covers(loose, segment):
             found.left_out.append(
@@ -277,9 +279,7 @@ def _open_message(line: Line) -> str:
     )
 
 
-def _sharpened(ring: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
-    """Move the corners from the grid on which lines were intersected back to the drawn points beside them."""
-    from scipy.spatial import cKDTree
-
-    distance, nearest = cKDTree(points).query(ring)
-    return np.where((distance <= 2 * reach)[:, None], points[nearest], ring)
+def _sharpened(ring: np.ndarray, points: Any, reach: float) -> np.ndarray:
+    """Move the corners from the grid on which lines were intersected back to the points beside them (a cKDTree)."""
+    distance, nearest = points.query(ring)
+    return np.where((distance <= 2 * reach)[:, None], points.data[nearest], ring)

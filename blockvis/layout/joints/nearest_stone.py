@@ -20,7 +20,7 @@ SPACING = 0.2
 MOST_POINTS = 200_000
 
 #: Borders are drawn on a grid of this fraction of the size of the drawing.
-GRID = 1e-9
+GRID = 2e-9
 
 #: Two points face each other across mortar if outward normals there are more than acos(-0.3) = 107 degrees apart: the
 #: sides of a corner between two stones that touch do not.
@@ -99,10 +99,11 @@ def share_out(
     """
     import shapely
 
-    origin = np.concatenate(outlines).mean(axis=0)
-    shapes = np.array([shapely.Polygon(ring - origin).buffer(0) for ring in outlines])
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
-    grid = GRID * scale
+    # A power of ten, from a round origin: round coordinates stay what they are.
+    grid = float(10.0 ** np.floor(np.log10(GRID * scale)))
+    origin = np.round(np.concatenate(outlines).mean(axis=0) / (1e6 * grid)) * (1e6 * grid)
+    shapes = np.array([shapely.Polygon(ring - origin).buffer(0) for ring in outlines])
     growing = np.flatnonzero(~anchored) if not anchored.all() else np.arange(len(shapes))
     gaps = gaps_between(shapes, SPACING * thickness)
     masonry = _with_mortar(shapes, gaps, thickness, growing)
@@ -118,7 +119,8 @@ def share_out(
     simple = shapely.coverage_simplify(np.array(cells), simpler * size)
     rings = [np.array(shapely.orient_polygons(cell).exterior.coords)[:-1] for cell in simple]
     fixed = np.concatenate([np.zeros((0, 2)), *(rings[i] for i in np.flatnonzero(anchored))])
-    return [ring + origin for ring in _without_short_edges(rings, SHORTEST * size, fixed)]
+    found = [ring + origin for ring in _without_short_edges(rings, SHORTEST * size, fixed)]
+    return [np.asarray(outlines[i]) if anchored[i] else ring for i, ring in enumerate(found)]
 
 
 def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
