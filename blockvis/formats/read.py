@@ -178,6 +178,9 @@ def read(
     solver.Assembly
     """
     layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance, ignore=ignore, only=only)
+    if chord_tolerance is not None and outline_tolerance is None:
+        # Who says how fine arcs are wants their chords.
+        outline_tolerance = 0.0
     return assemble(
         layout,
         roles=roles,

@@ -90,7 +90,7 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
     return stated, ""
 
 
-def doubt(unit: str, size: float, *, remedy: str = 'unit = "{}" under [geometry], or --unit {}') -> str:
+def doubt(unit: str, size: float, *, remedy: str = 'say so under [geometry] unit = "{}", or by --unit {}') -> str:
     """Doubt the unit of a drawing whose blocks are far larger or smaller than those of masonry.
 
     Parameters
