@@ -90,6 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     info.add_argument("file", metavar="FILE", help="or a folder or a pattern of files, one per stone")
     info.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
     _add_view(info)
+    _add_choice(info)
     info.add_argument("--picture", metavar="PNG", help="draw what was found")
     info.set_defaults(verb=_info)
     convert = verbs.add_parser("convert", help="any layout file to any other")
@@ -97,6 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     convert.add_argument("target", metavar="OUT")
     convert.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
     _add_view(convert)
+    _add_choice(convert)
     convert.add_argument(
         "--joint-thickness", default="0", metavar="M", help='close mortar joints up to this, or "auto"'
     )
@@ -125,6 +127,17 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add_view(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--view", choices=tuple(VIEWS), help="coordinates to take, of a drawing in space")
+
+
+def _add_choice(verb: argparse.ArgumentParser) -> None:
+    for flag, what in (("--ignore", "leave out"), ("--only", "read nothing but")):
+        verb.add_argument(
+            flag,
+            action="append",
+            default=[],
+            metavar="PATTERN",
+            help=f"{what} this layer, group or name; may be given again",
+        )
 
 
 def _add_sweep(verbs: Any) -> None:
@@ -208,7 +221,7 @@ def _info(options: argparse.Namespace) -> int:
     from .formats.read import inspect
     from .pictures.inspection import draw_inspection
 
-    found = inspect(options.file, unit=options.unit, view=options.view)
+    found = inspect(options.file, unit=options.unit, view=options.view, ignore=options.ignore, only=options.only)
     print(found)
     if options.picture:
         print(f"drawn in {draw_inspection(found, options.picture)}")
@@ -220,7 +233,7 @@ def _convert(options: argparse.Namespace) -> int:
     from .layout.assemble import assemble
 
     target = _new_file(options.target, options.force)
-    layout = read_layout(options.source, unit=options.unit, view=options.view)
+    layout = read_layout(options.source, unit=options.unit, view=options.view, ignore=options.ignore, only=options.only)
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)
     joint = options.joint_thickness
@@ -316,9 +329,13 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         response.assembly.vertices[response.assembly.free[response.assembly.block_of_vertex]], axis=0
     )
     weight = response.total_weight
+    assembly = response.assembly
+    largest = assembly.outline(int(np.argmax(np.where(assembly.free, assembly.areas, 0.0))))
+    across = float(np.hypot(*(largest[:, None, :] - largest[None, :, :]).T).max())
     lines = [
         f"{response.assembly.n_blocks} blocks ({int(response.assembly.free.sum())} free), "
-        f"{width:.4g} m wide, {height:.4g} m high, weight {weight:.6g} N",
+        f"{width:.4g} m wide, {height:.4g} m high, weight {weight:.6g} N, "
+        f"largest block {across:.3g} m across",
         f"{kind.headline(response)}, {sum(i.programs for i in response.increments)} linear "
         f"programs, {sum(i.seconds for i in response.increments):.2f} s of solver time",
     ]

@@ -11,7 +11,8 @@ import numpy as np
 
 from blockvis.layout.block_table import with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import outlines_of_cells
+from blockvis.layout.left_out import LeftOut, matches
+from blockvis.layout.outlines import outlines_of_cells, rectangle
 from blockvis.layout.views import VIEWS, axis_across, view_along
 
 #: In a prism the sine of the angle between a face's normal and the axis, or the plane across it, is at most this.
@@ -99,7 +100,13 @@ class _Seen:
         return float(np.ptp(self.low) + np.ptp(self.high - self.low))
 
 
-def layout_of_bodies(found: Bodies, path: Path | str, view: str | None = None) -> Layout:
+def layout_of_bodies(
+    found: Bodies,
+    path: Path | str,
+    view: str | None = None,
+    ignore: Sequence[str] = (),
+    only: Sequence[str] = (),
+) -> Layout:
     """Make a layout of prismatic bodies: outlines across the axis of their extrusion, thicknesses along it.
 
     Parameters
@@ -110,15 +117,23 @@ def layout_of_bodies(found: Bodies, path: Path | str, view: str | None = None) -
     view : {"xy", "xz", "yz"}, optional
         The view to take; by default one in which no body lies behind another, of several that in which the bodies
         come closest to lying between the same two planes.
+    ignore, only : sequences of str, optional
+        Groups, materials and names of bodies, or patterns of them, that are left out, and beside which all others are.
 
     Raises
     ------
     ValueError
         If the bodies are not prisms side by side.
     """
-    bodies = found.bodies
-    if not bodies:
+    if not found.bodies:
         raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
+    labels = [[str(row.get(key, "")) for key in ("name", "group", "material")] for row in found.rows]
+    wanted = [not matches(words, ignore) and (not only or matches(words, only)) for words in labels]
+    dropped = [k for k, keep in enumerate(wanted) if not keep]
+    kept = [k for k, keep in enumerate(wanted) if keep]
+    if not kept:
+        raise ValueError(f"'{path}' draws no block: all that it draws is left out as asked (ignore, only)")
+    bodies, rows = [found.bodies[k] for k in kept], [found.rows[k] for k in kept]
     every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
     if not np.isfinite(every).all():
         bad = every[~np.isfinite(every).all(axis=1)][0]
@@ -150,7 +165,14 @@ def layout_of_bodies(found: Bodies, path: Path | str, view: str | None = None) -
         unit=found.unit,
         notes=(*notes, *found.notes),
     )
-    return replace(with_rows(layout, found.rows), thickness=best.high - best.low)
+    layout = replace(with_rows(layout, rows), thickness=best.high - best.low)
+    left_out = []
+    for k in dropped:
+        points = found.bodies[k].points[:, VIEWS[name]]
+        layer = next((word for word in labels[k][1:] if matches([word], ignore)), labels[k][1])
+        box = rectangle(*points.min(axis=0), *points.max(axis=0))
+        left_out.append(LeftOut("asked", box, "", layer, labels[k][0]))
+    return replace(layout, left_out=tuple(left_out))
 
 
 def _seen_along(axis: int, bodies: Sequence[Body], size: float) -> _Seen:

@@ -12,6 +12,7 @@ import numpy as np
 import solver
 from blockvis.layout.block_table import with_rows
 from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import LeftOut
 from blockvis.layout.outlines import UPRIGHT, flattened, is_flat, outlines_of_cells
 
 from .bodies import Bodies, Body
@@ -77,11 +78,13 @@ def layout_of_cells(
         owner = components(rings, len(points))
         names = [f"block {k}" for k in range(int(owner.max()) + 1)]
         how = f"{len(names)} blocks, one per connected piece: no cell array 'block_id' says which cells are one block"
-    outlines = outlines_of_cells(flat, rings, owner, names)
+    unusable: dict[int, LeftOut] = {}
+    outlines = outlines_of_cells(flat, rings, owner, names, unusable)
     first = np.unique(owner, return_index=True)[1]
     notes = tuple(text for text in (how, note) if text)
     layout = Layout(outlines=tuple(outlines), names=tuple(names), unit="", notes=notes)
-    return with_rows(layout, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
+    layout = with_rows(layout, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
+    return layout.leaving_out(unusable)
 
 
 def _enclosed(
@@ -209,6 +212,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
         density=numbers("density"),
         unit=named[0].unit,
         notes=tuple(dict.fromkeys(joined("notes"))),
+        left_out=joined("left_out"),
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import LeftOut
 from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
 from blockvis.layout.triangulation import cells_of_ring
 
@@ -124,7 +125,8 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
         return _enclosed(mesh, rings, [groups[k] for k in owner], path)
     names = _entity_names(groups, tags, "surface")
     flat, note = flattened(mesh.coordinates, f"'{path}'", reading.view)
-    outlines = outlines_of_cells(flat, rings, owner, names)
+    unusable: dict[int, LeftOut] = {}
+    outlines = outlines_of_cells(flat, rings, owner, names, unusable)
     notes = [f"{len(tags)} blocks, one per meshed surface; a surface in no physical group may be missing from the file"]
     if "" in groups:
         notes.append(f"{groups.count('')} of {len(tags)} surfaces are in no physical group")
@@ -137,7 +139,7 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
         unit="",
         notes=tuple(notes),
     )
-    return _with_table(layout, table, tags)
+    return _with_table(layout, table, tags).leaving_out(unusable)
 
 
 def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Path) -> Bodies:

@@ -16,8 +16,10 @@ from blockvis.formats import FORMATS, Format
 from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of
+from blockvis.layout.left_out import in_words
 from blockvis.layout.outlines import ring_area, without_collinear
-from blockvis.layout.units import chosen_unit, metres_per
+from blockvis.layout.selection import as_asked, without_debris, without_surroundings
+from blockvis.layout.units import chosen_unit, doubt, metres_per
 from blockvis.layout.views import checked_view
 
 from .bodies import Bodies, layout_of_bodies
@@ -39,6 +41,8 @@ def read_layout(
     unit: str | None = None,
     chord_tolerance: float | None = None,
     view: str | None = None,
+    ignore: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
 ) -> Layout:
     """Read the blocks of a layout file.
 
@@ -53,11 +57,15 @@ def read_layout(
         Largest distance of an arc from the chords that replace it; by default a thousandth of its radius.
     view : {"xy", "xz", "yz"}, optional
         Coordinates that become x and y, of drawings in space; by default those in which the blocks lie side by side.
+    ignore, only : str or sequence of str, optional
+        Layers, groups, materials and names, or patterns of them (``"dim*"``), that are left out, and beside which all
+        others are left out. What ``only`` names is not left out for looking like a frame, a title block or mortar.
 
     Returns
     -------
     Layout
-        Lengths in m, outlines without collinear points.
+        Lengths in m, outlines without collinear points. What the drawing holds beside its blocks is in ``left_out``,
+        and in a note per kind and layer.
 
     Raises
     ------
@@ -67,12 +75,14 @@ def read_layout(
     path = Path(path)
     if unit is not None:
         metres_per(unit)
-    reading = Reading(unit=unit, chord_tolerance=chord_tolerance, view=checked_view(view))
+    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
+    reading = Reading(unit=unit, chord_tolerance=chord_tolerance, view=checked_view(view), ignore=ignore, only=only)
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
     content = found[0] if files == [path] else of_files(found, files, path)
-    layout = layout_of_bodies(content, path, view) if isinstance(content, Bodies) else content
-    if layout.n_blocks == 0:
+    layout = layout_of_bodies(content, path, view, ignore, only) if isinstance(content, Bodies) else content
+    layout = replace(layout, source=str(path))
+    if layout.n_blocks == 0 and not layout.left_out:
         raise ValueError(f"'{path}' draws no block; draw each block as one closed outline or meshed surface")
     for i, ring in enumerate(layout.outlines):
         if not np.isfinite(ring).all():
@@ -85,20 +95,49 @@ def read_layout(
     chosen, note = chosen_unit(unit, layout.unit, sizes)
     factor = metres_per(chosen)
     outlines = tuple(without_collinear(ring * factor) for ring in layout.outlines)
-    for name, ring in zip(layout.names, outlines, strict=True):
+    layout = replace(
+        layout,
+        outlines=outlines,
+        thickness=None if layout.thickness is None else layout.thickness * factor,
+        unit=chosen,
+        notes=layout.notes + ((note,) if note else ()),
+        left_out=tuple(replace(item, points=item.points * factor) for item in layout.left_out),
+    )
+    return _checked(_sorted_out(layout, ignore, only))
+
+
+def _sorted_out(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:
+    """Leave out what is no block, with a note per kind and layer."""
+    layout = as_asked(layout, ignore, only)
+    layout = without_surroundings(without_debris(layout), only)
+    for item in layout.left_out:
+        if item.serious:
+            raise ValueError(f"'{layout.source}': {item.message}; or leave it out (ignore)")
+    if layout.n_blocks == 0:
+        first = next((item for item in layout.left_out if item.message), None)
+        asked = "all that it draws is left out as asked (ignore, only)"
+        counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
+        raise ValueError(f"'{layout.source}' draws no block: {first.message if first else asked}{counted}")
+    sizes = np.sqrt([abs(ring_area(ring)) for ring in layout.outlines])
+    notes = [*layout.notes, *in_words(layout.left_out), doubt(layout.unit, float(np.median(sizes)))]
+    return replace(layout, notes=tuple(note for note in notes if note))
+
+
+def _checked(layout: Layout) -> Layout:
+    """Refuse outlines of too many corners, and coordinates out of bounds."""
+    path = layout.source
+    for name, ring in zip(layout.names, layout.outlines, strict=True):
         if len(ring) > MOST_CORNERS:
             raise ValueError(
                 f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
             )
-    largest = max(float(np.abs(ring).max()) for ring in outlines)
+    largest = max(float(np.abs(ring).max()) for ring in layout.outlines)
     if largest > LARGEST_COORDINATE:
         raise ValueError(
             f"'{path}' has a coordinate of {largest:.3g} m; corners must lie within {LARGEST_COORDINATE:.0e} m of the "
             "origin: check the unit or repair the file"
         )
-    thickness = None if layout.thickness is None else layout.thickness * factor
-    notes = layout.notes + ((note,) if note else ())
-    return replace(layout, outlines=outlines, thickness=thickness, unit=chosen, notes=notes, source=str(path))
+    return layout
 
 
 def write_layout(layout: Layout, path: str | Path) -> None:
@@ -120,22 +159,29 @@ def read(
     overlap_tolerance: float | None = None,
     chord_tolerance: float | None = None,
     view: str | None = None,
+    ignore: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
+    closing: str = "auto",
+    outline_tolerance: float | None = None,
 ) -> solver.Assembly:
     """Read a layout file into an assembly.
 
     Parameters
     ----------
     path : str or Path
-    roles, supports, density, thickness, joint_thickness, overlap_tolerance
+    roles, supports, density, thickness, joint_thickness, overlap_tolerance, closing, outline_tolerance
         As of :func:`blockvis.layout.assemble.assemble`.
-    unit, chord_tolerance, view
+    unit, chord_tolerance, view, ignore, only
         As of :func:`read_layout`.
 
     Returns
     -------
     solver.Assembly
     """
-    layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance, view=view)
+    layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance, view=view, ignore=ignore, only=only)
+    if chord_tolerance is not None and outline_tolerance is None:
+        # Who says how fine arcs are wants their chords.
+        outline_tolerance = 0.0
     return assemble(
         layout,
         roles=roles,
@@ -144,6 +190,8 @@ def read(
         thickness=thickness,
         joint_thickness=joint_thickness,
         overlap_tolerance=overlap_tolerance,
+        closing=closing,
+        outline_tolerance=outline_tolerance,
     )
 
 
@@ -152,7 +200,14 @@ def save_layout(assembly: solver.Assembly, path: str | Path, *, pose: solver.Pos
     write_layout(layout_of(assembly, pose=pose), path)
 
 
-def inspect(path: str | Path, *, unit: str | None = None, view: str | None = None) -> Inspection:
+def inspect(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    view: str | None = None,
+    ignore: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
+) -> Inspection:
     """Read a layout file and measure it.
 
     Parameters
@@ -161,9 +216,10 @@ def inspect(path: str | Path, *, unit: str | None = None, view: str | None = Non
     unit : str, optional
         Unit of the file's lengths; it replaces the one that the file states.
     view : {"xy", "xz", "yz"}, optional
+    ignore, only : str or sequence of str, optional
         As of :func:`read_layout`.
     """
-    return inspected(read_layout(path, unit=unit, view=view))
+    return inspected(read_layout(path, unit=unit, view=view, ignore=ignore, only=only))
 
 
 def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .left_out import LeftOut
 from .views import VIEWS, axis_across
 
 #: A point this close to the line between its neighbours, as a fraction of the size of the block, lies on it: in files
@@ -92,7 +93,11 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
 
 
 def outlines_of_cells(
-    points: np.ndarray, cells: Sequence[Sequence[int]] | Sequence[np.ndarray], owner: np.ndarray, names: Sequence[str]
+    points: np.ndarray,
+    cells: Sequence[Sequence[int]] | Sequence[np.ndarray],
+    owner: np.ndarray,
+    names: Sequence[str],
+    unusable: dict[int, LeftOut] | None = None,
 ) -> list[np.ndarray]:
     """Find the outline of each block: the edges that belong to one of its cells only.
 
@@ -105,6 +110,8 @@ def outlines_of_cells(
         Block of each cell, 0 to n_blocks - 1.
     names : sequence of str
         One per block, for messages.
+    unusable : dict, optional
+        Takes up the blocks that are not one piece with one outline; their outlines are those of their largest piece.
 
     Returns
     -------
@@ -114,7 +121,8 @@ def outlines_of_cells(
     Raises
     ------
     ValueError
-        For a block with a hole, in several pieces, with an outline that meets itself, or with no outline.
+        For a block with a hole, in several pieces, with an outline that meets itself, or with no outline, unless
+        ``unusable`` takes it up.
     """
     counts = np.array([len(cell) for cell in cells])
     flat = np.concatenate([np.asarray(cell, dtype=np.int64) for cell in cells])
@@ -134,44 +142,59 @@ def outlines_of_cells(
     edges: list[list[tuple[int, int]]] = [[] for _ in names]
     for i in once:
         edges[block[i]].append((int(start[i]), int(end[i])))
-    return [_ring(points, edges[b], names[b]) for b in range(len(names))]
+    rings = []
+    for b, name in enumerate(names):
+        ring, problem = _ring(points, edges[b], name)
+        if problem is not None:
+            if unusable is None:
+                raise ValueError(problem.message)
+            unusable[b] = problem
+        rings.append(ring)
+    return rings
 
 
-def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> np.ndarray:
-    loops = _loops(edges, points, name)
+def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> tuple[np.ndarray, LeftOut | None]:
+    """Outline of a block, and why it cannot be used if so."""
+    loops, crossing = _loops(edges)
+    if crossing is not None:
+        x, y = points[crossing]
+        around = points[np.unique(edges)]
+        meeting = sum(crossing in edge for edge in edges)
+        message = (
+            f"the outline of block '{name}' meets itself at ({x:.6g}, {y:.6g}), where {meeting} of its edges "
+            "end; a block is one piece with one outline"
+        )
+        return around, LeftOut("pieces", around, message, serious=True)
     if not loops:
-        raise ValueError(
+        message = (
             f"block '{name}' has no outline: each of its edges belongs to two cells; its cells are in the file twice"
         )
-    rings = [points[loop] for loop in loops]
-    if len(rings) > 1:
-        by_area = sorted(rings, key=lambda ring: abs(ring_area(ring)))
-        outer, inner = by_area[-1], by_area[-2]
-        x, y = inner.mean(axis=0)
-        if _contains(outer, inner[0]):
-            raise ValueError(
-                f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, "
-                "or fill the hole with a block"
-            )
-        raise ValueError(
-            f"block '{name}' is in {len(rings)} separate pieces, one around ({x:.6g}, {y:.6g}); give each its own block"
+        return np.zeros((0, 2)), LeftOut("no outline", np.zeros((0, 2)), message, serious=True)
+    rings = sorted((points[loop] for loop in loops), key=lambda ring: -abs(ring_area(ring)))
+    ring = without_collinear(rings[0] if ring_area(rings[0]) > 0 else rings[0][::-1])
+    if len(rings) == 1:
+        return ring, None
+    x, y = rings[1].mean(axis=0)
+    if _contains(rings[0], rings[1][0]):
+        message = (
+            f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
         )
-    ring = rings[0]
-    return without_collinear(ring if ring_area(ring) > 0 else ring[::-1])
+        return ring, LeftOut("hole", ring, message)
+    message = (
+        f"block '{name}' is in {len(rings)} separate pieces, one around ({x:.6g}, {y:.6g}); give each its own block"
+    )
+    return ring, LeftOut("pieces", ring, message, serious=True)
 
 
-def _loops(edges: list[tuple[int, int]], points: np.ndarray, name: str) -> list[list[int]]:
+def _loops(edges: list[tuple[int, int]]) -> tuple[list[list[int]], int | None]:
+    """Find the closed loops of edges; or a point in which more than two of them end."""
     neighbours: dict[int, list[int]] = {}
     for a, b in edges:
         neighbours.setdefault(a, []).append(b)
         neighbours.setdefault(b, []).append(a)
     for node, others in neighbours.items():
         if len(others) != 2:
-            x, y = points[node]
-            raise ValueError(
-                f"the outline of block '{name}' meets itself at ({x:.6g}, {y:.6g}), where {len(others)} of its edges "
-                "end; a block is one piece with one outline"
-            )
+            return [], node
     loops, seen = [], set()
     for first in neighbours:
         if first in seen:
@@ -184,7 +207,7 @@ def _loops(edges: list[tuple[int, int]], points: np.ndarray, name: str) -> list[
             one, other = neighbours[node]
             previous, node = node, (other if one == previous else one)
         loops.append(loop)
-    return loops
+    return loops, None
 
 
 def _contains(ring: np.ndarray, point: np.ndarray) -> bool:

@@ -26,7 +26,7 @@ from .reopen import open_results
 from .write import finish
 
 #: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
-AS_DRAWN = 0.02
+AS_DRAWN = 0.002
 
 
 def record_of(case: Case) -> Record:

@@ -82,7 +82,7 @@ def test_loose_lines_enclose_blocks(tmp_path):
     drawing = read_layout(saved(tmp_path, draw))
     assert drawing.groups == ("stone", "stone")
     assert any("2 blocks are faces between 6 loose lines" in note for note in drawing.notes)
-    assert any("1 loose lines enclose nothing" in note for note in drawing.notes)
+    assert any("left out: 1 line that closes no outline on layer '0'" in note for note in drawing.notes)
 
 
 def test_open_polyline_names_layer_handle_and_gap(tmp_path):
