@@ -233,7 +233,9 @@ def _hidden(
 
 def _not_flat(seen: Sequence[_Seen], bodies: Sequence[Body], path: Path | str, view: str | None) -> ValueError:
     """Make the error for bodies that are not prisms side by side, with the reason in every view that was tried."""
-    remedy = "blocks in space cannot be analysed yet: leave out all but one leaf, or draw its outlines in the plane"
+    remedy = (
+        "blocks in space cannot be analysed yet: leave out all but one leaf (ignore), or draw its outlines in the plane"
+    )
     if view is None and not any(len(one.outlines) for one in seen):
         holed = [one.refused for one in seen if "no extrusion" not in one.refused]
         if holed:

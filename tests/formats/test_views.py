@@ -56,7 +56,7 @@ def test_two_leaves_are_refused_as_three_dimensional(tmp_path):
     with pytest.raises(
         ValueError,
         match=r"is three-dimensional: .*seen along y, 'brick 9' lies behind 'brick 0'"
-        r".*blocks in space cannot be analysed yet: leave out all but one leaf",
+        r".*blocks in space cannot be analysed yet: leave out all but one leaf \(ignore\)",
     ):
         read(path)
 
@@ -129,3 +129,17 @@ def test_a_flat_drawing_has_the_view_of_its_plane_only(tmp_path):
     assert read(tmp_path / "a.svg", view="xy").n_blocks == 1
     with pytest.raises(ValueError, match="drawn in the plane xy; it has no view xz"):
         read(tmp_path / "a.svg", view="xz")
+
+
+def test_a_leaf_can_be_left_out(tmp_path, capsys):
+    path = written(leaf(0.0) + leaf(0.2), tmp_path / "wall.glb")
+    behind = [f"brick {k}" for k in range(9, 18)]
+    layout = read_layout(path, ignore=behind)
+    assert layout.names == tuple(f"brick {k}" for k in range(9))
+    assert len(layout.left_out) == 9
+    assert not any("matches no" in note for note in layout.notes)
+    assert read(path, only=[f"brick {k}" for k in range(9)]).n_blocks == 9
+    assert main(["info", str(path), "--ignore", "brick 9", "--ignore", "brick 1?"]) == 0
+    assert "left out: 9 outlines, as asked for" in capsys.readouterr().out
+    with pytest.raises(ValueError, match=r"draws no block: all that it draws is left out as asked"):
+        read(path, ignore="brick *")
