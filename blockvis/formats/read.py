@@ -101,7 +101,7 @@ def read_layout(
         thickness=None if layout.thickness is None else layout.thickness * factor,
         unit=chosen,
         notes=layout.notes + ((note,) if note else ()),
-        left_out=tuple(replace(item, points=item.points * factor) for item in layout.left_out),
+        left_out=tuple(item.mapped(factor) for item in layout.left_out),
     )
     return _checked(_sorted_out(layout, ignore, only))
 

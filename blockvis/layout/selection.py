@@ -146,6 +146,11 @@ def without_surroundings(layout: Layout, only: Sequence[str] = ()) -> Layout:
     return layout.leaving_out(reasons)
 
 
+def drawn_mortar(layout: Layout) -> list[LeftOut]:
+    """Find the surfaces of mortar around stones among what was left out, by itself or as asked."""
+    return [item for item in layout.left_out if item.holes and MORTAR.search(f"{item.layer} {item.name}")]
+
+
 def _around_others(layout: Layout) -> dict[int, LeftOut]:
     """Frames and backgrounds around other blocks, title blocks on a frame, inner lines of blocks."""
     import shapely
