@@ -60,7 +60,7 @@ def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] =
     Raises
     ------
     ValueError
-        If a pattern of ``only`` matches nothing, no block is left, or something is drawn that cannot be left out unasked.
+        If a pattern of ``only`` matches nothing, no block is left, or something cannot be left out unasked.
     """
     where = f"'{layout.source}'" if layout.source else "the drawing"
     layout = as_asked(layout, ignore, only)
