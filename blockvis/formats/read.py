@@ -102,23 +102,18 @@ def read_layout(
         notes=layout.notes + ((note,) if note else ()),
         left_out=tuple(item.mapped(factor) for item in layout.left_out),
     )
-    return _checked(sorted_out(layout, ignore, only))
-
-
-def _checked(layout: Layout) -> Layout:
-    """Refuse outlines of too many corners, and coordinates out of bounds."""
-    path = layout.source
-    for name, ring in zip(layout.names, layout.outlines, strict=True):
-        if len(ring) > MOST_CORNERS:
-            raise ValueError(
-                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
-            )
-    largest = max(float(np.abs(ring).max()) for ring in layout.outlines)
+    largest = max((float(np.abs(ring).max()) for ring in layout.outlines), default=0.0)
     if largest > LARGEST_COORDINATE:
         raise ValueError(
             f"'{path}' has a coordinate of {largest:.3g} m; corners must lie within {LARGEST_COORDINATE:.0e} m of the "
             "origin: check the unit or repair the file"
         )
+    layout = sorted_out(layout, ignore, only)
+    for name, ring in zip(layout.names, layout.outlines, strict=True):
+        if len(ring) > MOST_CORNERS:
+            raise ValueError(
+                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
+            )
     return layout
 
 
