@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from .formats.pyvista_files import dataset_of, layout_of_dataset
 from .formats.read import read_layout, write_layout
 from .layout.assemble import assemble
 from .layout.layout import Layout
+from .layout.selection import sorted_out
 
 
 def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:
@@ -51,7 +53,7 @@ def _mesh_reader(path: str, **options: Any) -> Any:
 
 def _writer(dataset: Any, path: str, **options: Any) -> None:
     """Write the blocks of a dataset to a layout file."""
-    write_layout(layout_of_dataset(dataset), path)
+    write_layout(BlockvisAccessor(dataset).layout(), path)
 
 
 def _registered(register: Any, suffixes: Sequence[str], handler: Any) -> tuple[str, ...]:
@@ -86,7 +88,8 @@ class BlockvisAccessor:
 
     def layout(self) -> Layout:
         """Read the blocks as a layout, lengths in m."""
-        return layout_of_dataset(self._mesh)
+        layout = layout_of_dataset(self._mesh)
+        return sorted_out(replace(layout, unit=layout.unit or "m"))
 
     def assembly(self, roles: Mapping[str, str] | None = None, **options: Any) -> solver.Assembly:
         """Build an assembly of the blocks; the options are those of :func:`blockvis.layout.assemble.assemble`."""

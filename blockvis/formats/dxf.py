@@ -319,24 +319,29 @@ def _add_hatch(entity: Any, handle: str, found: _Found, tolerance: float | None)
     if not rings:
         found.skipped["HATCH without boundary"] += 1
         return
-    holed = False
-    for k, ring in enumerate(rings):
-        for other in rings[:k]:
-            inner, outer = (ring, other) if np.ptp(ring, 0).max() < np.ptp(other, 0).max() else (other, ring)
-            if not holed and (inner.min(0) >= outer.min(0)).all() and (inner.max(0) <= outer.max(0)).all():
-                holed = True
-                x, y = inner[:, :2].mean(axis=0)
-                message = (
-                    f"HATCH {handle} on layer '{entity.dxf.layer}' has a hole around ({x:.6g}, {y:.6g}); "
-                    "cut the block in two, or fill the hole with a block"
-                )
-                layer, name = str(entity.dxf.layer), f"hatch {handle}"
-                found.left_out.append(LeftOut("hole", outer[:, :2], message, layer, name))
-    if holed:
+    inside = [k for k, ring in enumerate(rings) if any(_within(ring, other) for other in rings if other is not ring)]
+    if inside:
+        x, y = rings[inside[0]][:, :2].mean(axis=0)
+        message = (
+            f"HATCH {handle} on layer '{entity.dxf.layer}' has a hole around ({x:.6g}, {y:.6g}); "
+            "cut the block in two, or fill the hole with a block"
+        )
+        outer = max(
+            (ring for k, ring in enumerate(rings) if k not in inside), key=lambda ring: float(np.ptp(ring, 0).max())
+        )
+        holes = tuple(rings[k][:, :2] for k in inside)
+        layer, name = str(entity.dxf.layer), f"hatch {handle}"
+        found.left_out.append(LeftOut("hole", outer[:, :2], message, layer, name, holes=holes))
         return
     outlined = [ring for ring in rings if not _drawn_already(ring, found)]
     for k, ring in enumerate(outlined):
         found.add(ring, entity, handle if len(rings) == 1 else f"{handle}.{k}")
+
+
+def _within(inner: np.ndarray, outer: np.ndarray) -> bool:
+    """Whether the box around a boundary lies within the larger box around another."""
+    smaller = np.ptp(inner, 0).max() < np.ptp(outer, 0).max()
+    return bool(smaller and (inner.min(0) >= outer.min(0)).all() and (inner.max(0) <= outer.max(0)).all())
 
 
 def _drawn_already(ring: np.ndarray, found: _Found) -> bool:

@@ -256,7 +256,8 @@ def _add_faces(
                 f"the lines around ({x:.6g}, {y:.6g}) leave a face with a hole; cut the block in two, "
                 "or draw the blocks as closed outlines"
             )
-            found.left_out.append(LeftOut("hole", ring, message, layer, "face"))
+            holes = tuple(np.array(inner.coords)[:-1] for inner in face.interiors)
+            found.left_out.append(LeftOut("hole", ring, message, layer, "face", holes=holes))
             continue
         inner = face.buffer(-10 * grid)
         over = [drawn.geometries[k] for k in drawn.query(inner, "intersects")]

@@ -16,10 +16,9 @@ from blockvis.formats import FORMATS, Format
 from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of
-from blockvis.layout.left_out import in_words
 from blockvis.layout.outlines import ring_area, without_collinear
-from blockvis.layout.selection import as_asked, without_debris, without_surroundings
-from blockvis.layout.units import chosen_unit, doubt, metres_per
+from blockvis.layout.selection import sorted_out
+from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_view
 
 from .bodies import Bodies, layout_of_bodies
@@ -101,42 +100,20 @@ def read_layout(
         thickness=None if layout.thickness is None else layout.thickness * factor,
         unit=chosen,
         notes=layout.notes + ((note,) if note else ()),
-        left_out=tuple(replace(item, points=item.points * factor) for item in layout.left_out),
+        left_out=tuple(item.mapped(factor) for item in layout.left_out),
     )
-    return _checked(_sorted_out(layout, ignore, only))
-
-
-def _sorted_out(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:
-    """Leave out what is no block, with a note per kind and layer."""
-    layout = as_asked(layout, ignore, only)
-    layout = without_surroundings(without_debris(layout), only)
-    for item in layout.left_out:
-        if item.serious:
-            raise ValueError(f"'{layout.source}': {item.message}; or leave it out (ignore)")
-    if layout.n_blocks == 0:
-        first = next((item for item in layout.left_out if item.message), None)
-        asked = "all that it draws is left out as asked (ignore, only)"
-        counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
-        raise ValueError(f"'{layout.source}' draws no block: {first.message if first else asked}{counted}")
-    sizes = np.sqrt([abs(ring_area(ring)) for ring in layout.outlines])
-    notes = [*layout.notes, *in_words(layout.left_out), doubt(layout.unit, float(np.median(sizes)))]
-    return replace(layout, notes=tuple(note for note in notes if note))
-
-
-def _checked(layout: Layout) -> Layout:
-    """Refuse outlines of too many corners, and coordinates out of bounds."""
-    path = layout.source
-    for name, ring in zip(layout.names, layout.outlines, strict=True):
-        if len(ring) > MOST_CORNERS:
-            raise ValueError(
-                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
-            )
-    largest = max(float(np.abs(ring).max()) for ring in layout.outlines)
+    largest = max((float(np.abs(ring).max()) for ring in layout.outlines), default=0.0)
     if largest > LARGEST_COORDINATE:
         raise ValueError(
             f"'{path}' has a coordinate of {largest:.3g} m; corners must lie within {LARGEST_COORDINATE:.0e} m of the "
             "origin: check the unit or repair the file"
         )
+    layout = sorted_out(layout, ignore, only)
+    for name, ring in zip(layout.names, layout.outlines, strict=True):
+        if len(ring) > MOST_CORNERS:
+            raise ValueError(
+                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
+            )
     return layout
 
 

@@ -108,7 +108,7 @@ def read(path: Path, reading: Reading) -> Layout:
     found.notes += faces.notes + joined_note(found.misses, float(np.ptp(every, axis=0).max()))
     turned = tuple(ring * [1.0, -1.0] for ring in found.rings)
     names = tuple(row.get("name", f"block {k}") for k, row in enumerate(found.rows))
-    left_out = tuple(replace(item, points=item.points * [1.0, -1.0]) for item in found.left_out)
+    left_out = tuple(item.mapped((1.0, -1.0)) for item in found.left_out)
     layout = Layout(outlines=turned, names=names, unit=stated, notes=tuple(found.notes), left_out=left_out)
     return with_rows(layout, found.rows)
 
@@ -229,8 +229,9 @@ def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], whe
             f"{_called(element)} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a "
             "block"
         )
-        outer = max(rings, key=lambda ring: float(np.ptp(ring, axis=0).max()))
-        found.left_out.append(LeftOut("hole", outer, message, where.layer, name))
+        outer = max(range(len(rings)), key=lambda k: float(np.ptp(rings[k], axis=0).max()))
+        holes = tuple(ring for k, ring in enumerate(rings) if k != outer)
+        found.left_out.append(LeftOut("hole", rings[outer], message, where.layer, name, holes=holes))
         return
     for k, ring in enumerate(rings):
         row = _row(where.layer, "" if not name else name if len(rings) == 1 else f"{name} {k + 1}")

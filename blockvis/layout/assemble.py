@@ -15,6 +15,7 @@ from blockvis.suggestions import by_similarity
 
 from .layout import Layout
 from .repair import duplicates, repaired
+from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
 
 #: Beginnings of the notes of a layout that change what is analysed.
@@ -104,6 +105,7 @@ def assemble(
         overlap_tolerance=overlap_tolerance,
         anchored=np.arange(layout.n_blocks) >= n_drawn,
         closing=closing,
+        mortar=drawn_mortar(layout),
     )
     for note in repairs:
         warnings.warn(f"{layout.source or 'layout'}: {note}", stacklevel=2)

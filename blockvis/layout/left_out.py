@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,6 +44,8 @@ class LeftOut:
         Whether the points are an outline.
     serious : bool
         Whether it refuses the file unless the caller asks to leave it out.
+    holes : tuple of (n, 2) arrays [m]
+        Outlines of its holes.
     """
 
     kind: str
@@ -53,6 +55,12 @@ class LeftOut:
     name: str = ""
     closed: bool = True
     serious: bool = False
+    holes: tuple[np.ndarray, ...] = ()
+
+    def mapped(self, factors: float | Sequence[float]) -> LeftOut:
+        """Multiply its coordinates."""
+        holes = tuple(ring * np.asarray(factors) for ring in self.holes)
+        return replace(self, points=self.points * np.asarray(factors), holes=holes)
 
     @property
     def place(self) -> np.ndarray:

@@ -179,7 +179,7 @@ def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> tuple[
         message = (
             f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
         )
-        return ring, LeftOut("hole", ring, message)
+        return ring, LeftOut("hole", ring, message, holes=tuple(rings[1:]))
     message = (
         f"block '{name}' is in {len(rings)} separate pieces, one around ({x:.6g}, {y:.6g}); give each its own block"
     )

@@ -9,6 +9,7 @@ import numpy as np
 import solver
 
 from .joints.close import WAYS, Closing, FoldedOutline, close_joints, proposed
+from .left_out import LeftOut
 
 #: Two outlines closer than this fraction of the size of a block, corner by corner, are one block drawn twice.
 SAME = 1e-6
@@ -80,6 +81,7 @@ def repaired(
     overlap_tolerance: float | None,
     anchored: np.ndarray,
     closing: str = "auto",
+    mortar: Sequence[LeftOut] = (),
 ) -> tuple[list[np.ndarray], list[str]]:
     """Resolve the overlaps of the outlines of an assembly and close its joints.
 
@@ -95,6 +97,8 @@ def repaired(
         Blocks that keep their outline.
     closing : {"auto", "faces", "voronoi"}
         How joints are closed; see :func:`blockvis.layout.joints.close.close_joints`.
+    mortar : sequence of LeftOut
+        Surfaces of mortar as drawn, with the stones as their holes.
 
     Returns
     -------
@@ -130,13 +134,13 @@ def repaired(
         return outlines, notes
     depth = min(tolerance, 1.01 * found[0][2]) if found else 0.0
     try:
-        closed = close_joints(outlines, thickness, overlap=depth, anchored=anchored, way=closing)
+        closed = close_joints(outlines, thickness, overlap=depth, anchored=anchored, way=closing, mortar=mortar)
     except FoldedOutline as error:
         raise ValueError(
             f"closing the joints of block {error.block} ('{assembly.names[error.block]}') face by face folds its "
             f'outline; give closing = "voronoi", or a joint_thickness other than {thickness:g} m'
         ) from None
-    notes += _notes(closed, thickness, found, assembly)
+    notes += _notes(closed, thickness, found, assembly, bool(mortar))
     return list(closed.outlines), notes
 
 
@@ -163,7 +167,11 @@ def _thickness(
 
 
 def _notes(
-    closing: Closing, thickness: float, found: list[tuple[int, int, float]], assembly: solver.Assembly
+    closing: Closing,
+    thickness: float,
+    found: list[tuple[int, int, float]],
+    assembly: solver.Assembly,
+    drawn: bool,
 ) -> list[str]:
     notes = []
     if found:
@@ -174,8 +182,9 @@ def _notes(
         )
     if thickness and closing.way == "voronoi":
         notes.append(
-            f"joints of up to {thickness:g} m were closed by giving the mortar to the nearest stone: faces are not "
-            f"straight, or corners blunt; {sum(map(len, closing.outlines)) / len(closing.outlines):.3g} corners a block"
+            f"joints of up to {thickness:g} m{', and the mortar as drawn,' if drawn else ''} were closed by giving the "
+            "mortar to the nearest stone: faces are not straight, or corners blunt; "
+            f"{sum(map(len, closing.outlines)) / len(closing.outlines):.3g} corners a block"
         )
     elif thickness:
         notes.append(

@@ -12,8 +12,9 @@ import numpy as np
 from blockvis.suggestions import by_similarity
 
 from .layout import Layout
-from .left_out import LeftOut, matches
+from .left_out import LeftOut, in_words, matches
 from .outlines import ring_area, ring_width
+from .units import doubt
 
 #: An outline with less area than this times its perimeter squared is a line: the solver takes no block of less.
 LINE = 1e-9
@@ -46,6 +47,37 @@ def labels_of(layout: Layout, block: int) -> tuple[str, ...]:
     return layout.groups[block], layout.materials[block], layout.names[block]
 
 
+def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] = ()) -> Layout:
+    """Leave out what is no block, with a note per kind and layer, and doubt the unit.
+
+    Parameters
+    ----------
+    layout : Layout
+        As a format's reader gives it, lengths in m.
+    ignore, only : sequences of str
+        Layers, groups, materials and names of blocks, or patterns of them.
+
+    Raises
+    ------
+    ValueError
+        If a pattern of ``only`` matches nothing, no block is left, or something cannot be left out unasked.
+    """
+    where = f"'{layout.source}'" if layout.source else "the drawing"
+    layout = as_asked(layout, ignore, only)
+    layout = without_surroundings(without_debris(layout), only)
+    for item in layout.left_out:
+        if item.serious:
+            raise ValueError(f"{where}: {item.message}; or leave it out (ignore)")
+    if layout.n_blocks == 0:
+        first = next((item for item in layout.left_out if item.message), None)
+        asked = "all that it draws is left out as asked (ignore, only)"
+        counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
+        raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}")
+    sizes = np.sqrt([abs(ring_area(ring)) for ring in layout.outlines])
+    notes = [*layout.notes, *in_words(layout.left_out), doubt(layout.unit, float(np.median(sizes)))]
+    return replace(layout, notes=tuple(note for note in notes if note))
+
+
 def as_asked(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:
     """Leave out what the caller asks to leave out.
 
@@ -72,7 +104,7 @@ def as_asked(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layo
         listed = ", ".join(f"'{label}'" for label in by_similarity(pattern, list(dict.fromkeys(every))[:2000])[:12])
         message = f"'{pattern}' matches no layer, group or name; the drawing has {listed or 'none'}"
         if pattern in only:
-            raise ValueError(f"'{layout.source}': only: {message}; correct it")
+            raise ValueError(f"{layout.source or 'the drawing'}: only: {message}; correct it")
         notes.append(f"ignore: {message}")
     reasons = {
         i: LeftOut("asked", layout.outlines[i], "")
@@ -144,6 +176,11 @@ def without_surroundings(layout: Layout, only: Sequence[str] = ()) -> Layout:
     reasons = _around_others(layout)
     reasons = {i: item for i, item in reasons.items() if not matches(labels_of(layout, i), only)}
     return layout.leaving_out(reasons)
+
+
+def drawn_mortar(layout: Layout) -> list[LeftOut]:
+    """Find the surfaces of mortar around stones among what was left out, by itself or as asked."""
+    return [item for item in layout.left_out if item.holes and MORTAR.search(f"{item.layer} {item.name}")]
 
 
 def _around_others(layout: Layout) -> dict[int, LeftOut]:

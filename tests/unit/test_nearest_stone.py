@@ -196,3 +196,31 @@ def test_the_way_can_be_chosen():
     assert proposed(rings).way == "faces"
     assert proposed(rubble(1)).way == "voronoi"
     assert close_joints(rings[:4], 0.01, way="voronoi").way == "voronoi"
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_mortar_that_is_drawn_is_given_away_however_wide_and_openings_in_it_stay(tmp_path):
+    from blockvis.formats.read import read
+
+    stones = [shapely.Polygon(ring) for ring in rubble(3)]
+    border = shapely.box(0, 0, WIDTH, HEIGHT)
+    # A window takes the place of a stone, and at the edge of the wall a pocket is wider than any joint.
+    window = shapely.box(0.7, 0.5, 0.9, 0.7)
+    stones = [stone for stone in stones if not stone.intersects(window)]
+    stones[0] = stones[0].buffer(-0.06)
+    holes = [np.asarray(shape.exterior.coords)[:-1] for shape in (*stones, window)]
+
+    def path(rings):
+        return " ".join("M" + " L".join(f"{x:.9f},{-y:.9f}" for x, y in ring) + " Z" for ring in rings)
+
+    (tmp_path / "a.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg"><g id="mortar">'
+        f'<path d="{path([ring_of(border), *holes])}"/></g><g id="stone">'
+        + "".join(f'<path d="{path([hole])}"/>' for hole in holes[:-1])
+        + "</g></svg>"
+    )
+    for ignore in ((), "mortar"):
+        assembly = read(tmp_path / "a.svg", joint_thickness="auto", closing="voronoi", ignore=ignore)
+        assert assembly.n_blocks == len(stones)
+        # Outside, borders are simplified, too.
+        assert assembly.areas.sum() == pytest.approx(border.area - window.area, rel=1e-2)

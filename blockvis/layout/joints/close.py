@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from blockvis.layout.left_out import LeftOut
+
 from .facing_edges import (
     CLOSED,
     Facing,
@@ -143,6 +145,7 @@ def close_joints(
     overlap: float = 0.0,
     anchored: np.ndarray | None = None,
     way: str = "faces",
+    mortar: Sequence[LeftOut] = (),
 ) -> Closing:
     """Move facing edges onto the line midway between them, or give the mortar to the nearest stone.
 
@@ -160,6 +163,8 @@ def close_joints(
         Whether edges move to the midline between faces, or mortar goes to the nearest stone. "auto" takes the second
         where faces are not straight, where corners are so blunt that pockets would stay open between them, and where
         edges that move would fold an outline.
+    mortar : sequence of LeftOut
+        Surfaces of mortar as drawn, with the stones as their holes; the nearest stone takes all of it, however wide.
 
     Returns
     -------
@@ -181,7 +186,7 @@ def close_joints(
                 return closing
         way = "voronoi"
     if way == "voronoi":
-        return _to_nearest_stone(outlines, thickness, overlap, anchored)
+        return _to_nearest_stone(outlines, thickness, overlap, anchored, mortar)
     closing = _between_faces(outlines, thickness, overlap, anchored)
     folded = _folded(outlines, closing.outlines)
     if folded is not None:
@@ -225,13 +230,17 @@ def _pockets(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray], thicknes
 
 
 def _to_nearest_stone(
-    outlines: Sequence[np.ndarray], thickness: float, overlap: float, anchored: np.ndarray | None
+    outlines: Sequence[np.ndarray],
+    thickness: float,
+    overlap: float,
+    anchored: np.ndarray | None,
+    mortar: Sequence[LeftOut],
 ) -> Closing:
     still = np.zeros(len(outlines), dtype=bool) if anchored is None else np.asarray(anchored, dtype=bool)
     found = facing_edges(outlines, thickness, overlap)
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
     n_open = int((np.abs(found.gaps).max(axis=1) > CLOSED * scale).sum()) if len(found) else 0
-    closed = share_out(outlines, thickness, still)
+    closed = share_out(outlines, thickness, still, mortar)
     return Closing(tuple(closed), n_open, 0, float(found.gaps.max(initial=0.0)), 0.0, "voronoi")
 
 

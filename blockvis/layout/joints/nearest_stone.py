@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from blockvis.layout.left_out import LeftOut
+
 #: Points along the outlines are this fraction of the joint thickness apart.
 SPACING = 0.2
 
@@ -78,7 +80,12 @@ class Gaps:
 
 
 def share_out(
-    outlines: Sequence[np.ndarray], thickness: float, anchored: np.ndarray, simpler: float = SIMPLER
+    outlines: Sequence[np.ndarray],
+    thickness: float,
+    anchored: np.ndarray,
+    mortar: Sequence[LeftOut] = (),
+    *,
+    simpler: float = SIMPLER,
 ) -> list[np.ndarray]:
     """Give mortar to the nearest stone.
 
@@ -90,6 +97,8 @@ def share_out(
         Gaps up to this width are mortar, and the pockets between such gaps.
     anchored : (n_blocks,) bool array
         Blocks that keep their place: the mortar beside them goes to the others.
+    mortar : sequence of LeftOut
+        Surfaces of mortar as drawn, with the stones as their holes; holes without a stone are openings.
     simpler : float
         Fraction of the size of a typical stone to which borders are simplified.
 
@@ -107,6 +116,7 @@ def share_out(
     growing = np.flatnonzero(~anchored) if not anchored.all() else np.arange(len(shapes))
     gaps = gaps_between(shapes, SPACING * thickness)
     masonry = _with_mortar(shapes, gaps, thickness, growing)
+    masonry = shapely.union_all([masonry, *(_surface(item, origin, shapes) for item in mortar)])
     grown = np.isin(gaps.owner, growing)
     points, owner = gaps.points[grown], gaps.owner[grown]
     borders = _borders(points, owner, scale)
@@ -205,6 +215,16 @@ def _with_mortar(shapes: np.ndarray, gaps: Gaps, thickness: float, growing: np.n
         holes = [ring for ring in part.interiors if not shapely.Polygon(ring).buffer(-thickness).is_empty]
         kept.append(shapely.Polygon(part.exterior, holes))
     return shapely.union_all(kept)
+
+
+def _surface(mortar: LeftOut, origin: np.ndarray, shapes: np.ndarray) -> Any:
+    """Fill the holes in a surface of mortar that hold a stone."""
+    import shapely
+
+    holes = [shapely.Polygon(ring - origin).buffer(0) for ring in mortar.holes]
+    inside = shapely.STRtree(shapely.point_on_surface(shapes))
+    openings = [hole for hole in holes if len(inside.query(hole, "contains")) == 0]
+    return shapely.Polygon(mortar.points - origin).buffer(0).difference(shapely.union_all(openings))
 
 
 def _borders(points: np.ndarray, owner: np.ndarray, scale: float) -> Any:
