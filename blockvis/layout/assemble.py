@@ -19,7 +19,7 @@ from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
 
 #: Beginnings of the notes of a layout that change what is analysed.
-TOLD = ("unit", "left out", "ignore", "cut", "joined")
+TOLD = ("unit", "left out", "ignore", "cut", "joined", "the middle planes", "elevations were ignored")
 
 
 def assemble(

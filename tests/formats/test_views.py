@@ -84,6 +84,8 @@ def test_eccentric_bodies_are_read_with_a_note(tmp_path):
     bodies = [box((0, 0, 0), (1, 0.4, 1)), box((0.2, 0.1, 1), (1, 0.4, 1))]
     layout = read_layout(written(bodies, tmp_path / "a.glb"), view="xz")
     assert any("middle planes of the bodies along y differ by up to 0.1" in note for note in layout.notes)
+    with pytest.warns(UserWarning, match="the middle planes of the bodies along y differ"):
+        read(tmp_path / "a.glb", view="xz")
     wide = [box((0, 0, 0), (1, 0.4, 1)), box((0.2, 0.1, 1), (1, 0.2, 1))]
     layout = read_layout(written(wide, tmp_path / "b.glb"), view="xz")
     assert layout.thickness == pytest.approx([0.4, 0.2])
