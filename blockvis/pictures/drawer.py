@@ -45,9 +45,6 @@ MOST_PARTS = 16
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
 
-#: Single pictures up to this size [pixels] are drawn at four times their size, against steps in flat slopes.
-FINE_UP_TO = 2600
-
 
 @dataclass(frozen=True)
 class Look:
@@ -123,11 +120,6 @@ class Drawer:
         Whether the curve stands beside the blocks.
     extra : tuple of solver.Pose
         Poses that the frame has to hold, too.
-
-    Raises
-    ------
-    RenderingUnavailable
-        Where there is no usable OpenGL.
     """
 
     def __init__(
@@ -158,19 +150,10 @@ class Drawer:
         fill = palette.block_colours(assembly.materials, assembly.free)
         self.fill = fill
         self.tints: np.ndarray | None = None
-        fine = max(size) <= FINE_UP_TO and len(increments) == 1
-        self.scene = Scene(assembly, frame, self.sheet.inside_size, fill, supersampling=4 if fine else 2)
+        self.scene = Scene(assembly, frame, self.sheet.inside_size, fill)
         self.force_scale, self.force_shown = self._force_scale()
         self._show_start()
         self._keys: list[Key] | None = None
-
-    def __enter__(self) -> Drawer:
-        """Open the scene."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the scene."""
-        self.scene.close()
 
     def _surveyed(self) -> Iterator[solver.Pose]:
         """Yield the poses as shown, and note what must be the same in all pictures.
@@ -210,7 +193,7 @@ class Drawer:
         true = increment.pose if pose is None else pose
         shown = magnified(self.assembly, true, self.look.magnification)
         at = increment.with_arrays(pose=true, contacts=_contacts_at(increment, true)) if pose is not None else increment
-        self.scene.pose(shown, self._vertex_colours(true))
+        self.scene.pose(shown, self._block_colours(true))
         self._draw_joints(at, shown)
         self._draw_forces(at, shown)
         self._draw_ground(shown)
@@ -256,18 +239,17 @@ class Drawer:
         parts : (n_blocks,) int array
             As ``solver.rigid_parts`` gives them.
         """
-        assembly, scene, block = self.assembly, self.scene, self.assembly.block_of_vertex
-        before, after = solver.moved_vertices(assembly, pose), solver.moved_vertices(assembly, displaced)
+        assembly, scene = self.assembly, self.scene
         n = int(parts.max(initial=-1)) + 1
         if n <= MOST_PARTS:
-            tints = palette.part_colours(self.fill, parts)[block]
-            outlines = part_outlines(assembly, after, parts)
+            tints = palette.part_colours(self.fill, parts)
+            outlines = part_outlines(assembly, solver.moved_vertices(assembly, displaced), parts)
             scene.lines("motion outline", outlines, palette.SETTLEMENT, self.scene.size[1] / 600.0)
             chosen = [np.flatnonzero(parts == part) for part in range(n)]
         else:
-            travel = np.hypot(*(after - before).T)
-            tints = palette.displacement_colours(0.75 * travel / travel[assembly.free[block]].max())
-            tints = np.where(assembly.free[block][:, None], tints, self.fill[block])
+            travel = np.hypot(*(displaced.positions - pose.positions).T)
+            tints = palette.displacement_colours(0.75 * travel / travel[assembly.free].max())
+            tints = np.where(assembly.free[:, None], tints, self.fill)
             cell = np.floor(pose.positions / (0.07 * scene.frame.size.max())).astype(np.int64)
             moves = np.flatnonzero(parts >= 0)
             _, first = np.unique(cell[moves], axis=0, return_index=True)
@@ -307,13 +289,12 @@ class Drawer:
         """Hinges that get a dot: in a wall of many blocks nearly every brick turns a little about some corner."""
         return found.hinges if self.assembly.n_blocks <= FEW_BLOCKS else found.hinges[:0]
 
-    def _vertex_colours(self, pose: solver.Pose) -> np.ndarray | None:
+    def _block_colours(self, pose: solver.Pose) -> np.ndarray | None:
         if self.look.colour_by != "displacement":
             return self.tints
-        moved = solver.moved_vertices(self.assembly, pose) - self.assembly.vertices
+        moved = pose.displacements(self.assembly)[:, :2]
         colours = palette.displacement_colours(np.hypot(*moved.T) / (self.largest or 1.0))
-        block = self.assembly.block_of_vertex
-        return np.where(self.assembly.free[block][:, None], colours, self.fill[block])
+        return np.where(self.assembly.free[:, None], colours, self.fill)
 
     def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if not self.look.joints:

@@ -56,17 +56,11 @@ def draw_still(
     Returns
     -------
     pathlib.Path
-
-    Raises
-    ------
-    RenderingUnavailable
-        Where there is no usable OpenGL; the message says what to install.
     """
     _check_response(response)
     chosen = response.increments[increment] if isinstance(increment, int) else increment
     look = Look(magnification, colour_by, forces, joints)
-    with Drawer(response, look, size, (chosen,), curve=curve) as drawer:
-        return _save(drawer.picture(chosen), path)
+    return _save(Drawer(response, look, size, (chosen,), curve=curve).picture(chosen), path)
 
 
 def draw_mechanism(
@@ -102,10 +96,10 @@ def draw_mechanism(
     reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
     displaced = solver.swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
     parts = solver.rigid_parts(assembly, last)
-    with Drawer(response, Look(forces="none"), size, (last,), extra=(displaced,)) as drawer:
-        if fastest > 0:
-            drawer.show_motion(last.pose, displaced, parts)
-        return _save(drawer.picture(last, note=_mechanism_note(response, parts)), path)
+    drawer = Drawer(response, Look(forces="none"), size, (last,), extra=(displaced,))
+    if fastest > 0:
+        drawer.show_motion(last.pose, displaced, parts)
+    return _save(drawer.picture(last, note=_mechanism_note(response, parts)), path)
 
 
 def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
@@ -161,8 +155,8 @@ def animate(
     """
     _check_response(response)
     look = Look(magnification, colour_by, forces, joints)
-    with Drawer(response, look, size, response.increments, curve=curve) as drawer:
-        return write_film(drawer.frames(fps, seconds), path, size=size, fps=fps)
+    drawer = Drawer(response, look, size, response.increments, curve=curve)
+    return write_film(drawer.frames(fps, seconds), path, size=size, fps=fps)
 
 
 def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
