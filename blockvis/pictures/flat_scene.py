@@ -19,7 +19,7 @@ from .hatching import hatch_lines
 
 #: The layers, back to front.
 ORDER = (
-    "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding", "motion outline",
+    "earth", "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding", "motion outline",
     "force line", "force", "hinge", "hinge top", "motion rim", "motion top", "live rim", "live top",
     "arrow rim", "arrow top",
 )  # fmt: skip
