@@ -291,6 +291,11 @@ class Drawer:
         """Return the legend: what is marked in any of the increments, so that it is the same in all pictures."""
         if self._keys is None:
             keys = []
+            if self._swing is not None and self._swing.moves:
+                together = int(self._swing.parts.max(initial=-1)) + 1 <= MOST_PARTS
+                colour = palette.PARTS[0] if together else palette.RAMP[5]
+                words = "parts of the last mechanism" if together else "faster in the last mechanism"
+                keys.append(Key("area", words, (int(colour[0]), int(colour[1]), int(colour[2]))))
             if self.look.joints:
                 seen = self._seen
                 keys += [Key("area", "open joint", palette.OPEN)] if seen.cracks else []

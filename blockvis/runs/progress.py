@@ -7,6 +7,7 @@ import time
 from typing import TextIO
 
 import solver
+from blockvis.fall import LONGEST
 
 from .kind import Course
 
@@ -53,7 +54,7 @@ class _Line:
 
 
 class DrawingProgress:
-    """A bar that counts the frames of the film.
+    """A bar that counts the seconds of the fall as it is worked out, then the frames of the film.
 
     Parameters
     ----------
@@ -63,6 +64,11 @@ class DrawingProgress:
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._line = _Line(stream)
+
+    def fall(self, time: float) -> None:
+        """Show how far the fall is worked out [s]."""
+        if self._line.due:
+            self._line.write(f"fall, {time:.1f} s of at most {LONGEST:g} s", time / LONGEST)
 
     def frame(self, done: int, total: int) -> None:
         """Show how many frames are drawn."""
