@@ -134,7 +134,7 @@ def _layout(found: _Found, faces: Faces, stated: str) -> Layout:
         names=tuple(found.names),
         unit=stated,
         notes=tuple(notes),
-        left_out=tuple(found.left_out),
+        left_out=tuple(item.seen([0, 1]) for item in found.left_out),
     )
     rows = [
         {"group": layer, **({"material": layer} if layer != "0" else {}), "name": name, **row}
@@ -178,6 +178,7 @@ def _turned(found: _Found, view: str | None, path: Path) -> list[str]:
     order = [*VIEWS[chosen], axis_across(chosen)]
     found.rings = [ring[:, order] for ring in found.rings]
     found.loose = [replace(line, points=line.points[:, order]) for line in found.loose]
+    found.left_out = [item.seen(order) for item in found.left_out]
     return [f"{UPRIGHT}: its ({chosen[0]}, {chosen[1]}) were read as (x, y)"]
 
 
@@ -329,9 +330,9 @@ def _add_hatch(entity: Any, handle: str, found: _Found, tolerance: float | None)
         outer = max(
             (ring for k, ring in enumerate(rings) if k not in inside), key=lambda ring: float(np.ptp(ring, 0).max())
         )
-        holes = tuple(rings[k][:, :2] for k in inside)
+        holes = tuple(rings[k] for k in inside)
         layer, name = str(entity.dxf.layer), f"hatch {handle}"
-        found.left_out.append(LeftOut("hole", outer[:, :2], message, layer, name, holes=holes))
+        found.left_out.append(LeftOut("hole", outer, message, layer, name, holes=holes))
         return
     outlined = [ring for ring in rings if not _drawn_already(ring, found)]
     for k, ring in enumerate(outlined):

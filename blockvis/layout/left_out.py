@@ -62,6 +62,10 @@ class LeftOut:
         holes = tuple(ring * np.asarray(factors) for ring in self.holes)
         return replace(self, points=self.points * np.asarray(factors), holes=holes)
 
+    def seen(self, order: Sequence[int]) -> LeftOut:
+        """Take these of its coordinates, in this order."""
+        return replace(self, points=self.points[:, order], holes=tuple(ring[:, order] for ring in self.holes))
+
     @property
     def place(self) -> np.ndarray:
         """(2,) array [m]: a point of it, for messages."""

@@ -145,3 +145,25 @@ def test_a_leaf_can_be_left_out(tmp_path, capsys):
     assert "left out: 9 outlines, as asked for" in capsys.readouterr().out
     with pytest.raises(ValueError, match=r"draws no block: all that it draws is left out as asked"):
         read(path, ignore="brick *")
+
+
+def test_what_is_left_out_of_an_upright_drawing_is_turned_with_it(tmp_path):
+    import ezdxf
+
+    document = ezdxf.new("R2010")
+    document.header["$INSUNITS"] = 6
+    space = document.modelspace()
+
+    def upright(x, z, size):
+        return [(x, 0.0, z), (x + size, 0.0, z), (x + size, 0.0, z + size), (x, 0.0, z + size)]
+
+    space.add_polyline3d(upright(0.0, 0.0, 0.5), close=True)
+    hatch = space.add_hatch(dxfattribs={"layer": "mortar", "extrusion": (0, -1, 0)})
+    # In the coordinates of an extrusion along -y, (x, z) are the first two.
+    for low, size in ((1.0, 1.0), (1.2, 0.2)):
+        hatch.paths.add_polyline_path([(x, z) for x, _, z in upright(low, low, size)])
+    document.saveas(tmp_path / "a.dxf")
+    drawing = read_layout(tmp_path / "a.dxf")
+    (mortar,) = drawing.left_out
+    assert np.ptp(mortar.points, axis=0) == pytest.approx([1.0, 1.0])
+    assert np.ptp(mortar.holes[0], axis=0) == pytest.approx([0.2, 0.2])

@@ -189,3 +189,18 @@ def test_info_honours_roles_of_layers_and_draws_what_was_left_out(tmp_path):
     picture = draw_inspection(found, tmp_path / "a.svg").read_text()
     for words in ("left out: 1", "moving: 1", "fixed: 1", "gap between facing edges"):
         assert words in picture
+
+
+def test_bodies_are_left_out_before_they_hide_the_others(tmp_path):
+    import trimesh
+
+    scene = trimesh.Scene()
+    for name, place in (("stone 1", (0, 0, 0)), ("stone 2", (1, 0, 0)), ("second leaf", (0, 0, 2))):
+        stone = trimesh.creation.box((1, 1, 1), trimesh.transformations.translation_matrix(place))
+        scene.add_geometry(stone, node_name=name, geom_name=name)
+    scene.export(tmp_path / "a.glb")
+    drawing = read_layout(tmp_path / "a.glb", ignore="second*")
+    assert drawing.names == ("stone 1", "stone 2")
+    assert any("left out: 1 outline, as asked for, 'second leaf'" in note for note in drawing.notes)
+    with pytest.raises(ValueError, match="all that it draws is left out as asked"):
+        read_layout(tmp_path / "a.glb", ignore="*")
