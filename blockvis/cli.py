@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import tomllib
 import warnings
@@ -16,9 +17,17 @@ import solver
 
 from .extras import MissingExtra
 from .generators import LAYOUTS
+from .layout.views import VIEWS
 
-#: Exit codes: bad input or a missing extra, a solver failure, everything written but the pictures, Ctrl-C.
-BAD_INPUT, SOLVER_FAILED, NO_PICTURES, INTERRUPTED = 2, 3, 4, 130
+#: Exit codes: bad input or a missing extra, a solver failure, everything written but the pictures, no equilibrium to
+#: start from, Ctrl-C.
+BAD_INPUT, SOLVER_FAILED, NO_PICTURES, NO_EQUILIBRIUM, INTERRUPTED = 2, 3, 4, 5, 130
+
+EXIT_CODES = (
+    f"exit codes: 0 done, also when the structure collapses; {BAD_INPUT} bad input or a missing package; "
+    f"{SOLVER_FAILED} the solver failed; {NO_PICTURES} everything is written but the pictures; {NO_EQUILIBRIUM} no "
+    f"initial equilibrium: the structure does not stand as drawn; {INTERRUPTED} interrupted"
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,6 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = _show_warning
     try:
         code: int = options.verb(options)
+    except BrokenPipeError:
+        raise
     except (ValueError, OSError, MissingExtra) as error:
         print(f"blockvis: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -42,39 +53,56 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except solver.SolveError as error:
         print(f"blockvis: the linear program could not be solved: {error}", file=sys.stderr)
         return SOLVER_FAILED
-    except KeyboardInterrupt:
-        print("blockvis: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(f"blockvis: {stop}" if str(stop) else "blockvis: interrupted", file=sys.stderr)
         return INTERRUPTED
     return code
 
 
 def entry() -> None:
     """Console script."""
-    sys.exit(main())
+    try:
+        code = main()
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whatever reads the output, such as head, has enough of it; Python would complain again as it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 0
+    sys.exit(code)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="blockvis", description="How dry-jointed masonry cracks on settling supports, and how far it can go."
+        prog="blockvis",
+        description="How dry-jointed masonry cracks on settling supports, and how far it can go.",
+        epilog=EXIT_CODES,
     )
     verbs = parser.add_subparsers(required=True, metavar="VERB")
-    run = verbs.add_parser("run", help="solve a case, write everything, draw")
+    run = verbs.add_parser("run", help="solve a case, write everything, draw", epilog=EXIT_CODES)
     run.add_argument("case", metavar="CASE.toml", nargs="?")
     run.add_argument("-o", "--output", metavar="OUT", help="results folder (default: <case>-results)")
     run.add_argument("--force", action="store_true", help="replace results that are there already")
     run.add_argument(
         "--resume", metavar="OUT", help="go on with the run in this results folder, however it was stopped"
     )
+    run.add_argument("--no-film", action="store_true", help="draw all but the film")
+    run.add_argument(
+        "--no-pictures", action="store_true", help="draw nothing and write no report; blockvis render OUT does later"
+    )
     run.set_defaults(verb=_run)
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
-    info.add_argument("file", metavar="FILE")
+    info.add_argument("file", metavar="FILE", help="or a folder or a pattern of files, one per stone")
     info.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    _add_view(info)
+    _add_choice(info)
     info.add_argument("--picture", metavar="PNG", help="draw what was found")
     info.set_defaults(verb=_info)
     convert = verbs.add_parser("convert", help="any layout file to any other")
-    convert.add_argument("source", metavar="IN")
+    convert.add_argument("source", metavar="IN", help="or a folder or a pattern of files, one per stone")
     convert.add_argument("target", metavar="OUT")
     convert.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    _add_view(convert)
+    _add_choice(convert)
     convert.add_argument(
         "--joint-thickness", default="0", metavar="M", help='close mortar joints up to this, or "auto"'
     )
@@ -92,13 +120,28 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("results", metavar="OUT")
     render.add_argument("--animation", default="collapse.mp4", help=".mp4, .gif or .webp in the folder; none to skip")
     render.add_argument("--magnification", type=float, default=1.0, help="of the displacements")
-    render.add_argument("--colour-by", choices=("material", "displacement"), default="material")
+    render.add_argument("--colour-by", choices=("material", "mechanism", "displacement"), default="mechanism")
     render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
     _add_sweep(verbs)
     return parser
+
+
+def _add_view(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("--view", choices=tuple(VIEWS), help="coordinates to take, of a drawing in space")
+
+
+def _add_choice(verb: argparse.ArgumentParser) -> None:
+    for flag, what in (("--ignore", "leave out"), ("--only", "read nothing but")):
+        verb.add_argument(
+            flag,
+            action="append",
+            default=[],
+            metavar="PATTERN",
+            help=f"{what} this layer, group or name; may be given again",
+        )
 
 
 def _add_sweep(verbs: Any) -> None:
@@ -154,16 +197,17 @@ def _run_numbers(text: str) -> tuple[int, ...]:
 def _run(options: argparse.Namespace) -> int:
     from .runs.run import resume_run, run_case
 
+    drawn = {"film": not options.no_film, "pictures": not options.no_pictures}
     if options.resume is not None:
         if options.case is not None or options.output is not None or options.force:
             raise ValueError("--resume takes the results folder alone; the case is stored in it")
-        run = resume_run(options.resume)
+        run = resume_run(options.resume, **drawn)
         if run.had_finished:
             print(f"blockvis: this run had finished ({run.response.stop}); nothing was left to solve", file=sys.stderr)
     elif options.case is None:
         raise ValueError("name a case file: blockvis run CASE.toml, or go on with a run: blockvis run --resume OUT")
     else:
-        run = run_case(options.case, options.output, overwrite=options.force)
+        run = run_case(options.case, options.output, overwrite=options.force, **drawn)
     print(_in_words(run.response, run.folder))
     for problem in run.missing:
         print(f"blockvis: everything but the pictures is written: {problem}", file=sys.stderr)
@@ -173,6 +217,8 @@ def _run(options: argparse.Namespace) -> int:
         return INTERRUPTED
     if stop is solver.Status.SOLVER_FAILED:
         return SOLVER_FAILED
+    if stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
+        return NO_EQUILIBRIUM
     return NO_PICTURES if run.missing else 0
 
 
@@ -180,7 +226,7 @@ def _info(options: argparse.Namespace) -> int:
     from .formats.read import inspect
     from .pictures.inspection import draw_inspection
 
-    found = inspect(options.file, unit=options.unit)
+    found = inspect(options.file, unit=options.unit, view=options.view, ignore=options.ignore, only=options.only)
     print(found)
     if options.picture:
         print(f"drawn in {draw_inspection(found, options.picture)}")
@@ -192,7 +238,7 @@ def _convert(options: argparse.Namespace) -> int:
     from .layout.assemble import assemble
 
     target = _new_file(options.target, options.force)
-    layout = read_layout(options.source, unit=options.unit)
+    layout = read_layout(options.source, unit=options.unit, view=options.view, ignore=options.ignore, only=options.only)
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)
     joint = options.joint_thickness
@@ -216,27 +262,26 @@ def _layout(options: argparse.Namespace) -> int:
 
 
 def _render(options: argparse.Namespace) -> int:
+    from .fall import fall_of
     from .pictures.curves import draw_curve
-    from .pictures.opengl import rendering_available
     from .pictures.render import animate, draw_mechanism, draw_still
     from .report.page import write_report
+    from .results.fall_files import stored_fall
     from .results.folder import stored_case
+    from .runs.progress import DrawingProgress
     from .runs.reopen import open_results
 
     folder = Path(options.results)
     response = open_results(folder)
     width, _, height = options.size.partition("x")
     size = (int(_number(width)), int(_number(height or "0")))
-    write_report(response, folder / "report.html", stored_case(folder))
+    fall = stored_fall(folder) or fall_of(response)
+    write_report(response, folder / "report.html", stored_case(folder), fall=fall)
     drawn = ["report.html"]
     if response.path:
         draw_curve(response, folder / "curve.png")
         draw_curve(response, folder / "curve.svg")
         drawn += ["curve.png", "curve.svg"]
-    problem = rendering_available()
-    if problem is not None:
-        print(f"blockvis: {problem}", file=sys.stderr)
-        return NO_PICTURES
     look = {
         "magnification": options.magnification,
         "colour_by": options.colour_by,
@@ -248,7 +293,11 @@ def _render(options: argparse.Namespace) -> int:
     draw_mechanism(response, folder / "mechanism.png")
     drawn += ["last.png", "mechanism.png"]
     if options.animation != "none":
-        animate(response, folder / options.animation, size=size, **look)
+        progress = DrawingProgress()
+        try:
+            animate(response, folder / options.animation, size=size, fall=fall, progress=progress.frame, **look)
+        finally:
+            progress.done()
         drawn.append(options.animation)
     print(f"drawn in {folder}/: {', '.join(drawn)}")
     return 0
@@ -288,9 +337,13 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         response.assembly.vertices[response.assembly.free[response.assembly.block_of_vertex]], axis=0
     )
     weight = response.total_weight
+    assembly = response.assembly
+    largest = assembly.outline(int(np.argmax(np.where(assembly.free, assembly.areas, 0.0))))
+    across = float(np.hypot(*(largest[:, None, :] - largest[None, :, :]).T).max())
     lines = [
         f"{response.assembly.n_blocks} blocks ({int(response.assembly.free.sum())} free), "
-        f"{width:.4g} m wide, {height:.4g} m high, weight {weight:.6g} N",
+        f"{width:.4g} m wide, {height:.4g} m high, weight {weight:.6g} N, "
+        f"largest block {across:.3g} m across",
         f"{kind.headline(response)}, {sum(i.programs for i in response.increments)} linear "
         f"programs, {sum(i.seconds for i in response.increments):.2f} s of solver time",
     ]

@@ -11,6 +11,7 @@ import shapely
 from PIL import Image
 
 import solver
+from blockvis.fall import CAPTION, Fall, falling_increment
 from blockvis.numbers import force_text, rounded_length
 
 from . import palette
@@ -23,12 +24,13 @@ from .annotations import (
     part_outlines,
     resultants,
 )
-from .captions import badge_of, matters, state_text
+from .captions import FALL_BADGE, badge_of, matters, state_text
 from .curves import CurvePanel
 from .flat_scene import Scene, magnified
 from .frame import ColourBar, Key, Sheet, framed
 from .hatching import cut_into_triangles
 from .live_load import LiveLoads
+from .swing import Swing, swing_of
 
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
@@ -42,11 +44,14 @@ WIDE_CRACK = 0.2
 #: Up to this many parts of a mechanism are tinted one by one.
 MOST_PARTS = 16
 
+#: Layers that a fall in time has not.
+OF_STATICS = (
+    *("crack", "crack edge", "sliding", "hinge", "hinge top", "force", "force line", "ground"),
+    *("arrow rim", "arrow top", "live rim", "live top"),
+)
+
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
-
-#: Single pictures up to this size [pixels] are drawn at four times their size, against steps in flat slopes.
-FINE_UP_TO = 2600
 
 
 @dataclass(frozen=True)
@@ -57,7 +62,8 @@ class Look:
     ----------
     magnification : float
         Of displacements and rotations; 1 is true scale.
-    colour_by : {"material", "displacement"}
+    colour_by : {"material", "mechanism", "displacement"}
+        By "mechanism" the parts that move as one after the last equilibrium are tinted.
     forces : {"auto", "thrust", "points", "none"}
         Resultant of each joint, forces at the contact points, or neither; "auto" draws the resultants of structures
         with up to ``FEW_BLOCKS`` blocks.
@@ -75,7 +81,7 @@ class Look:
         if not (np.isfinite(self.magnification) and self.magnification > 0.0):
             raise ValueError(f"magnification is {self.magnification:g}; it must be a positive number, 1 is true scale")
         for name, allowed in (
-            ("colour_by", ("material", "displacement")),
+            ("colour_by", ("material", "mechanism", "displacement")),
             ("forces", ("auto", "thrust", "points", "none")),
         ):
             if getattr(self, name) not in allowed:
@@ -123,11 +129,8 @@ class Drawer:
         Whether the curve stands beside the blocks.
     extra : tuple of solver.Pose
         Poses that the frame has to hold, too.
-
-    Raises
-    ------
-    RenderingUnavailable
-        Where there is no usable OpenGL.
+    fall : Fall, optional
+        What comes after the last equilibrium; its frames are drawn beside those of the increments.
     """
 
     def __init__(
@@ -139,15 +142,17 @@ class Drawer:
         *,
         curve: bool = False,
         extra: tuple[solver.Pose, ...] = (),
+        fall: Fall | None = None,
     ) -> None:
         if look.forces == "auto":
             few = response.assembly.n_blocks <= FEW_BLOCKS
             look = replace(look, forces="thrust" if few else "none")
-        self.response, self.look, self.increments = response, look, increments
+        self.response, self.look, self.increments, self.fall = response, look, increments, fall
         assembly = self.assembly = response.assembly
         self.joints = initial_joints(assembly)
         self._seen = _Seen(sampled=_sampled([k for k, i in enumerate(increments) if matters(i, response)]))
-        frame = framed(assembly, chain([solver.Pose.initial(assembly)], self._surveyed(), extra))
+        falling = () if fall is None else map(fall.pose, range(len(fall)))
+        frame = framed(assembly, chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
         bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
         beside = round(0.36 * size[0]) if curve else 0
@@ -158,19 +163,15 @@ class Drawer:
         fill = palette.block_colours(assembly.materials, assembly.free)
         self.fill = fill
         self.tints: np.ndarray | None = None
-        fine = max(size) <= FINE_UP_TO and len(increments) == 1
-        self.scene = Scene(assembly, frame, self.sheet.inside_size, fill, supersampling=4 if fine else 2)
+        self.scene = Scene(assembly, frame, self.sheet.inside_size, fill)
         self.force_scale, self.force_shown = self._force_scale()
         self._show_start()
+        if fall is not None:
+            self._show_ground(fall.ground)
+        self._swing = swing_of(response) if look.colour_by == "mechanism" else None
+        if self._swing is not None and self._swing.moves:
+            self.tints = self._tints(self._swing)
         self._keys: list[Key] | None = None
-
-    def __enter__(self) -> Drawer:
-        """Open the scene."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the scene."""
-        self.scene.close()
 
     def _surveyed(self) -> Iterator[solver.Pose]:
         """Yield the poses as shown, and note what must be the same in all pictures.
@@ -193,7 +194,15 @@ class Drawer:
             yield magnified(self.assembly, increment.pose, look.magnification)
 
     def picture(
-        self, increment: solver.Increment, pose: solver.Pose | None = None, s: float | None = None, note: str = ""
+        self,
+        increment: solver.Increment,
+        pose: solver.Pose | None = None,
+        s: float | None = None,
+        *,
+        title: str = "",
+        note: str = "",
+        badge: str = "",
+        blocks_only: bool = False,
     ) -> Image.Image:
         """Draw one increment; for frames in between, with its blocks at another pose.
 
@@ -204,76 +213,72 @@ class Drawer:
             Where the blocks are in a frame between two increments.
         s : float, optional [m or rad]
             The parameter there.
-        note : str
-            Second line of the caption, instead of that of the increment.
+        title, note, badge : str
+            First and second line of the caption, and the warning, instead of those of the increment.
+        blocks_only : bool
+            Leave out what statics knows: joints, forces, what stands on what, and where supports go.
         """
+        if self._swing is not None and pose is None and increment is self.response.governing:
+            increment = self._swing.increment
         true = increment.pose if pose is None else pose
         shown = magnified(self.assembly, true, self.look.magnification)
         at = increment.with_arrays(pose=true, contacts=_contacts_at(increment, true)) if pose is not None else increment
-        self.scene.pose(shown, self._vertex_colours(true))
-        self._draw_joints(at, shown)
-        self._draw_forces(at, shown)
-        self._draw_ground(shown)
-        self._draw_settlement_arrow(at, shown)
-        self._draw_live_load(increment, shown)
+        self.scene.pose(shown, self._block_colours(true))
+        if blocks_only:
+            self.scene.clear(*OF_STATICS)
+        else:
+            self._draw_joints(at, shown)
+            self._draw_forces(at, shown)
+            self._draw_ground(shown)
+            self._draw_settlement_arrow(at, shown)
+            self._draw_live_load(increment, shown)
         falling = increment.status == solver.Status.FALLING
-        title, detail = _caption(self.response, at, self.look, s)
+        head, detail = _caption(self.response, at, self.look, s)
         return self.sheet.composed(
             self.scene.image(),
-            title=title,
+            title=title or head,
             detail=note or detail,
-            badge=badge_of(self.response) if falling else "",
+            badge=badge or (badge_of(self.response) if falling else ""),
             keys=self.keys(),
             pixel=self.scene.pixel,
             beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, parameter=s)),
         )
 
-    def frames(self, fps: float, seconds: float) -> Iterator[Image.Image]:
-        """Yield the frames of the film: even motion along the path, a pause, then the fall."""
-        path = [i for i in self.increments if matters(i, self.response)]
-        fall = [i for i in self.increments if i.status == solver.Status.FALLING]
-        picture = None
-        for increment, pose, s in _even_motion(path, max(2, round(fps * seconds))):
-            picture = self.picture(increment, pose, s)
-            yield picture
-        if picture is not None:
-            yield from (picture for _ in range(round(0.6 * fps)))
-        for increment in fall:
-            picture = self.picture(increment)
-            yield picture
-        if picture is not None:
-            yield from (picture for _ in range(round(1.2 * fps)))
+    def falling_picture(self, time: float) -> Image.Image:
+        """Draw the fall at a time [s] after the last equilibrium."""
+        assert self.fall is not None
+        return self.picture(
+            falling_increment(self.response, self.fall.at(time)),
+            title=f"Fall   ·   {time:.2f} s after the last equilibrium",
+            note=f"{CAPTION}   ·   true scale",
+            badge=FALL_BADGE,
+            blocks_only=True,
+        )
 
-    def show_motion(self, pose: solver.Pose, displaced: solver.Pose, parts: np.ndarray) -> None:
+    def show_motion(self, swing: Swing) -> None:
         """Show by tints, outlines and arrows where a mechanism takes the parts that move as one.
 
         Of more than ``MOST_PARTS`` parts the speed is tinted instead, and arrows stand on a grid.
 
         Parameters
         ----------
-        pose, displaced : solver.Pose
-            Before and after the motion, which is out of scale.
-        parts : (n_blocks,) int array
-            As ``solver.rigid_parts`` gives them.
+        swing : Swing
         """
-        assembly, scene, block = self.assembly, self.scene, self.assembly.block_of_vertex
-        before, after = solver.moved_vertices(assembly, pose), solver.moved_vertices(assembly, displaced)
+        assembly, scene, pose, displaced, parts = (
+            self.assembly, self.scene, swing.increment.pose, swing.displaced, swing.parts,
+        )  # fmt: skip
         n = int(parts.max(initial=-1)) + 1
         if n <= MOST_PARTS:
-            tints = palette.part_colours(self.fill, parts)[block]
-            outlines = part_outlines(assembly, after, parts)
+            outlines = part_outlines(assembly, solver.moved_vertices(assembly, displaced), parts)
             scene.lines("motion outline", outlines, palette.SETTLEMENT, self.scene.size[1] / 600.0)
             chosen = [np.flatnonzero(parts == part) for part in range(n)]
         else:
-            travel = np.hypot(*(after - before).T)
-            tints = palette.displacement_colours(0.75 * travel / travel[assembly.free[block]].max())
-            tints = np.where(assembly.free[block][:, None], tints, self.fill[block])
             cell = np.floor(pose.positions / (0.07 * scene.frame.size.max())).astype(np.int64)
             moves = np.flatnonzero(parts >= 0)
             _, first = np.unique(cell[moves], axis=0, return_index=True)
             chosen = [moves[[k]] for k in first]
-        scene.pose(pose, tints)
-        self.tints = tints
+        self.tints = self._tints(swing)
+        scene.pose(pose, self.tints)
         tails, tips = np.zeros((len(chosen), 2)), np.zeros((len(chosen), 2))
         for k, blocks in enumerate(chosen):
             weight = assembly.areas[blocks] / assembly.areas[blocks].sum()
@@ -281,10 +286,23 @@ class Drawer:
             tips[k] = solver.carried(tails[[k]], blocks[:1], pose, displaced)[0]
         self._arrows("motion", tails, tips, 0.6)
 
+    def _tints(self, swing: Swing) -> np.ndarray:
+        """(n_blocks, 3) uint8 array: fills with the parts of a mechanism tinted, or darker where they are faster."""
+        if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
+            return palette.part_colours(self.fill, swing.parts)
+        travel = np.hypot(*(swing.displaced.positions - swing.increment.pose.positions).T)
+        tints = palette.displacement_colours(0.75 * travel / travel[self.assembly.free].max())
+        return np.where(self.assembly.free[:, None], tints, self.fill)
+
     def keys(self) -> list[Key]:
         """Return the legend: what is marked in any of the increments, so that it is the same in all pictures."""
         if self._keys is None:
             keys = []
+            if self._swing is not None and self._swing.moves:
+                together = int(self._swing.parts.max(initial=-1)) + 1 <= MOST_PARTS
+                colour = palette.PARTS[0] if together else palette.RAMP[5]
+                words = "parts of the last mechanism" if together else "faster in the last mechanism"
+                keys.append(Key("area", words, (int(colour[0]), int(colour[1]), int(colour[2]))))
             if self.look.joints:
                 seen = self._seen
                 keys += [Key("area", "open joint", palette.OPEN)] if seen.cracks else []
@@ -307,13 +325,12 @@ class Drawer:
         """Hinges that get a dot: in a wall of many blocks nearly every brick turns a little about some corner."""
         return found.hinges if self.assembly.n_blocks <= FEW_BLOCKS else found.hinges[:0]
 
-    def _vertex_colours(self, pose: solver.Pose) -> np.ndarray | None:
+    def _block_colours(self, pose: solver.Pose) -> np.ndarray | None:
         if self.look.colour_by != "displacement":
             return self.tints
-        moved = solver.moved_vertices(self.assembly, pose) - self.assembly.vertices
+        moved = pose.displacements(self.assembly)[:, :2]
         colours = palette.displacement_colours(np.hypot(*moved.T) / (self.largest or 1.0))
-        block = self.assembly.block_of_vertex
-        return np.where(self.assembly.free[block][:, None], colours, self.fill[block])
+        return np.where(self.assembly.free[:, None], colours, self.fill)
 
     def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if not self.look.joints:
@@ -341,8 +358,7 @@ class Drawer:
         scene = self.scene
         if increment.status == solver.Status.FALLING:
             # Without equilibrium the forces have no meaning.
-            scene.polygons("force", np.zeros((0, 4, 2)), palette.FORCE)
-            scene.lines("force line", np.zeros((0, 2, 2)), palette.FORCE, 1.0)
+            scene.clear("force", "force line")
             return
         points, forces, blocks = _joint_forces(increment, self.look.forces)
         size = np.hypot(*forces.T)
@@ -374,6 +390,19 @@ class Drawer:
         moving = self.assembly.moving[self.assembly.block_of_vertex]
         start = _edges(self.assembly, self.assembly.vertices)[moving]
         self.scene.lines("ghost", start, palette.GHOST, self.scene.size[1] / 800.0)
+
+    def _show_ground(self, height: float) -> None:
+        """Draw the ground line over the whole width, hatched below, behind everything."""
+        frame, tick = self.scene.frame, self.scene.size[1] / 60.0 * self.scene.pixel
+        (left, _), (right, _) = frame.low, frame.high
+        self.scene.lines(
+            "earth", np.array([[[left, height], [right, height]]]), palette.HATCH, max(1.2, self.scene.size[1] / 400.0)
+        )
+        x = np.arange(left, right + tick, tick)
+        ticks = np.stack(
+            [np.stack([x, x - tick], axis=1), np.broadcast_to([height, height - tick], (len(x), 2))], axis=2
+        )
+        self.scene.lines("earth/hatch", ticks, palette.HATCH, max(0.7, self.scene.size[1] / 1000.0))
 
     def _draw_ground(self, shown: solver.Pose) -> None:
         """Draw a heavy line where supports carry the structure."""
@@ -486,28 +515,6 @@ def _contacts_at(increment: solver.Increment, pose: solver.Pose) -> solver.Conta
     contacts = increment.contacts
     points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
     return replace(contacts, points=points)
-
-
-def _even_motion(
-    path: list[solver.Increment], n: int
-) -> Iterator[tuple[solver.Increment, solver.Pose | None, float | None]]:
-    """``n`` frames at even steps of the parameter: the increment before each, its pose, and its parameter."""
-    if not path:
-        return
-    total = solver.path_parameters(path)
-    if total[-1] <= total[0]:
-        yield path[-1], None, None
-        return
-    for at in np.linspace(total[0], total[-1], n):
-        k = int(np.clip(np.searchsorted(total, at, side="right") - 1, 0, len(path) - 1))
-        if k == len(path) - 1 or at <= total[k]:
-            yield path[k], None, None
-            continue
-        t = (at - total[k]) / (total[k + 1] - total[k])
-        a, b = path[k].pose, path[k + 1].pose
-        pose = solver.Pose(a.positions + t * (b.positions - a.positions), a.rotations + t * (b.rotations - a.rotations))
-        start = path[k].parameter if path[k].phase == path[k + 1].phase else 0.0
-        yield path[k], pose, start + t * (path[k + 1].parameter - start)
 
 
 def _caption(response: solver.Response, increment: solver.Increment, look: Look, s: float | None) -> tuple[str, str]:

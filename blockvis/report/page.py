@@ -11,13 +11,14 @@ from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 import solver
 from blockvis.atomic_files import write_whole
+from blockvis.fall import CAPTION, Fall, falling_increment
 from blockvis.numbers import force_text, rounded_length
 from blockvis.pictures import palette
 from blockvis.pictures.annotations import (
@@ -32,6 +33,7 @@ from blockvis.pictures.annotations import (
     resultants,
 )
 from blockvis.pictures.captions import (
+    FALL_BADGE,
     badge_of,
     collapse_places,
     force_unit,
@@ -58,9 +60,16 @@ FORCE_FINENESS = 1e-3
 #: Seconds the path takes at even settlement, and each frame of the fall.
 PATH_SECONDS, FALL_SECONDS = 6.0, 0.06
 
+T = TypeVar("T")
+
 
 def write_report(
-    response: solver.Response, path: str | os.PathLike[str], case_text: str = "", *, title: str = ""
+    response: solver.Response,
+    path: str | os.PathLike[str],
+    case_text: str = "",
+    *,
+    title: str = "",
+    fall: Fall | None = None,
 ) -> Path:
     """Write the report.
 
@@ -72,15 +81,17 @@ def write_report(
         The case file, shown as it is.
     title : str
         Of the page; says what happened by default.
+    fall : Fall, optional
+        After the last equilibrium, played in real time.
 
     Returns
     -------
     pathlib.Path
     """
-    return write_whole(path, report_html(response, case_text, title=title))
+    return write_whole(path, report_html(response, case_text, title=title, fall=fall))
 
 
-def report_html(response: solver.Response, case_text: str = "", *, title: str = "") -> str:
+def report_html(response: solver.Response, case_text: str = "", *, title: str = "", fall: Fall | None = None) -> str:
     """Make the report as HTML text; parameters as those of :func:`write_report`.
 
     Notes
@@ -92,10 +103,10 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
         raise ValueError(f"there is no increment to show: {response.message or response.stop}")
     page = files("blockvis") / "report"
     # No "<" may survive in the data: a name with "</script>" in it would end the script.
-    model = json.dumps(_model(response), ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
+    model = json.dumps(_model(response, fall), ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
     return Template((page / "player.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title or KINDS[response.analysis].title(response)),
-        badge=html.escape(badge_of(response)),
+        badge=html.escape(badge_of(response) if fall is None else FALL_BADGE),
         style=(page / "player.css").read_text(encoding="utf-8"),
         script=(page / "player.js").read_text(encoding="utf-8"),
         summary=_rows(_summary(response)),
@@ -106,9 +117,9 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
     )
 
 
-def _model(response: solver.Response) -> dict[str, Any]:
+def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
     assembly = response.assembly
-    shown = _thinned(response.increments, assembly.n_blocks)
+    shown, seconds = _shown(response, fall)
     frame, largest = _surveyed(assembly, shown)
     live = LiveLoads(response, shown, float(frame.size.max()))
     frame = frame.holding(live.tails)
@@ -142,8 +153,9 @@ def _model(response: solver.Response) -> dict[str, Any]:
                 "live",
             )
         },
-        "frames": _frames(response, shown),
-        "times": _times(shown),
+        "frames": _frames(response, shown, seconds),
+        "times": _times(shown, seconds),
+        "joints_of_fall": fall is None,
         "curve": _curve(response),
         "force_unit": FORCE_FINENESS * largest,
         "force_length": force_length,
@@ -159,12 +171,26 @@ def _model(response: solver.Response) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _thinned(increments: tuple[solver.Increment, ...], n_blocks: int) -> list[solver.Increment]:
-    """All increments, or an even choice of them with the last equilibrium kept."""
+def _shown(response: solver.Response, fall: Fall | None) -> tuple[list[solver.Increment], np.ndarray]:
+    """Choose the increments shown, and the seconds of those that are a fall in time, which come last."""
+    n = response.assembly.n_blocks
+    if fall is None:
+        return _thinned(response.increments, n), np.zeros(0)
+    poses = _thinned(tuple(range(1, len(fall))), 2 * n)
+    return [
+        *_thinned(response.path, 2 * n),
+        *(falling_increment(response, fall.pose(k)) for k in poses),
+    ], fall.times[poses]
+
+
+def _thinned(increments: tuple[T, ...], n_blocks: int) -> list[T]:
+    """All increments, or an even choice of them with the last equilibrium kept; or of other things."""
     most = max(FEWEST_FRAMES, min(MOST_FRAMES, MOST_POSES // n_blocks))
     if len(increments) <= most:
         return list(increments)
-    last = max((k for k, i in enumerate(increments) if i.status == solver.Status.EQUILIBRIUM), default=0)
+    last = max(
+        (k for k, i in enumerate(increments) if getattr(i, "status", "") == solver.Status.EQUILIBRIUM), default=0
+    )
     chosen = np.unique([*np.linspace(0, len(increments) - 1, most - 1).round().astype(int), last])
     return [increments[k] for k in chosen]
 
@@ -284,7 +310,7 @@ def _empty(columns: int) -> list[np.ndarray]:
     return [np.zeros((0, columns), dtype=np.int32)]
 
 
-def _frames(response: solver.Response, shown: list[solver.Increment]) -> list[dict[str, Any]]:
+def _frames(response: solver.Response, shown: list[solver.Increment], seconds: np.ndarray) -> list[dict[str, Any]]:
     place = {id(increment): k for k, increment in enumerate(response.path)}
     frames = []
     for increment in shown:
@@ -293,11 +319,13 @@ def _frames(response: solver.Response, shown: list[solver.Increment]) -> list[di
         if len(response.settlements) > 1:
             caption += f"  ·  phase {increment.phase + 1}"
         frames.append({"caption": caption, "falling": falling, "curve": place.get(id(increment), len(response.path))})
+    for frame, time in zip(frames[len(frames) - len(seconds) :], seconds, strict=True):
+        frame["caption"] = f"{CAPTION}  ·  {time:.2f} s"
     return frames
 
 
-def _times(shown: list[solver.Increment]) -> list[float]:
-    """Seconds at which each frame plays: even settlement, then the fall."""
+def _times(shown: list[solver.Increment], seconds: np.ndarray) -> list[float]:
+    """Seconds at which each frame plays: even settlement, then the fall, in real time where it has one."""
     path = solver.path_parameters([i for i in shown if i.status != solver.Status.FALLING])
     path = path - path[:1]
     total = float(path[-1]) if len(path) and path[-1] > 0 else 1.0
@@ -308,6 +336,9 @@ def _times(shown: list[solver.Increment]) -> list[float]:
         else:
             pause = 0.6 if k == len(path) and times else FALL_SECONDS
             times.append((times[-1] + pause) if times else 0.0)
+    if len(seconds):
+        start = len(shown) - len(seconds)
+        times[start:] = [(times[start - 1] if start else 0.0) + 0.6 + float(t) for t in seconds]
     return [round(t, 4) for t in times]
 
 

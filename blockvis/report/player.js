@@ -106,6 +106,8 @@
   const support = hatch();
 
   function cracks(pen, falling) {
+    // In a fall in time blocks part and meet anew: what lay between two of them is no joint any more.
+    if (falling && !model.joints_of_fall) return new Path2D();
     const [widest, widestFalling, steepest] = model.widest;
     pen.fillStyle = pen.strokeStyle = model.colours.open;
     pen.lineWidth = 1.6;

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import shutil
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from blockvis.cli import main
+from blockvis.runs import progress
 
 ROOT = Path(__file__).parents[2]
 
@@ -42,12 +44,13 @@ def _refused(case, capsys, *words):
 
 
 @pytest.mark.pictures
-def test_run_writes_the_results_folder(case, capsys):
+def test_run_writes_the_results_folder(case, capsys, monkeypatch):
+    monkeypatch.setattr(progress, "LINES", math.inf)
     out = case.parent / "out"
     assert main(["run", str(case), "-o", str(out)]) == 0
     printed = capsys.readouterr()
     assert "collapse displacement" in printed.out
-    assert printed.err == "", "stderr is quiet where it is not a terminal"
+    assert printed.err == "", "a short run is quiet where stderr is no terminal"
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert summary["status"] == "collapsed"
     assert summary["collapse_displacement"] == pytest.approx(0.14104982, rel=1e-3)
@@ -145,3 +148,22 @@ def test_overlapping_support_names_both_blocks_and_the_depth(case, capsys):
     with open(case, "a", encoding="utf-8") as file:
         file.write('\n[[supports]]\nname = "prop"\noutline = [[-0.2, 0.9], [0.2, 0.9], [0.2, 1.0], [-0.2, 1.0]]\n')
     _refused(case, capsys, "prop", "overlaps", "voussoir")
+
+
+def test_no_initial_equilibrium_has_its_own_exit_code(case, capsys):
+    """A row of voussoirs whose springer is moving only: the other end has nothing to stand on."""
+    _changed(case, '"left springer" = "fixed"', '"left springer" = "free"')
+    assert main(["run", str(case), "-o", str(case.parent / "out")]) == 5
+    summary = json.loads((case.parent / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["status"] == "no initial equilibrium"
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "5 no initial equilibrium" in " ".join(capsys.readouterr().out.split())
+
+
+def test_output_that_nobody_reads_to_its_end_is_no_error(case):
+    command = f"{sys.executable} -m blockvis info {case.parent / 'arch.msh'} | true"
+    done = subprocess.run(
+        ["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert (done.returncode, done.stderr) == (0, "")
