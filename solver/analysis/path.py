@@ -12,8 +12,11 @@ from solver.assembly import find_contacts, measure_contacts
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts, matched_contacts
 from solver.kinematics import Pose, moved, moved_vertices, relative_velocities, unit_lengths
+from solver.lp.problem import SolveError
 from solver.program.admissible import Admissible, admissible
 from solver.program.coulomb import NotSolved, Step, solve_step
+from solver.program.increment import Locked, solve_program
+from solver.program.light_blocks import light_blocks
 from solver.program.model import Model
 from solver.results.certificate import Certificate
 from solver.results.increment import Increment, State, Status
@@ -70,6 +73,9 @@ MECHANISM = 1e-3
 #: At rest: movement of a block in a step of a fall whose drag is that of a step of a block size.
 AT_REST = 1e-7
 
+#: Penetration that a step may leave, in block sizes, where forces grow fast.
+PRESSED = 1e-5
+
 #: Force, in total loads, beyond which blocks wedged between supports count as locked.
 LOCKED_FORCE = 1e3
 
@@ -96,6 +102,10 @@ class Wedged(Exception):
     def __init__(self, place: Place) -> None:
         super().__init__("wedged")
         self.place = place
+
+
+class Pressed(NotSolved):
+    """Blocks were pressed into each other in a step, by more than what the joints give."""
 
 
 class NoStep(Exception):
@@ -299,7 +309,7 @@ class Path:
         gone = np.zeros(len(load))
         multiplier = place.multiplier * live_size
         pose = self._with_supports(place.pose, supports)
-        way, near = 0.0, None
+        way, pressed, near = 0.0, 0.0, None
         stiff = 1.0 if self.care == 1.0 else STIFF
         for _ in range(LINEARISATIONS):
             contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
@@ -322,7 +332,7 @@ class Path:
             )
             self.programs += 1
             found = solve_step(linear, gone, multiplier, near)
-            near = found
+            near, pressed = found, float((found.normal - normal).max(initial=0.0)) * linear.give[0]
             # The give is taken back: the next linearisation starts from the forces it has reached.
             normal, shear, multiplier = found.normal, found.shear, found.multiplier
             gone = gone + found.motion
@@ -336,6 +346,8 @@ class Path:
                 break
         if way > ACCEPTED:
             raise NotSolved(f"the geometry still moves by {way:.1e} block sizes")
+        if pressed > PRESSED:
+            raise Pressed(f"blocks are pressed into each other by {pressed:.1e} block sizes")
         motion = full + np.where(free[:, None], 0.0, 1.0) * self._between(place.pose, pose)
         if not still and np.abs(gone).max(initial=0.0) > max(FALLING_FORCE / (DRAG * self.care) * size, 1e3 * GIVE):
             raise Falls
@@ -426,6 +438,8 @@ class Path:
             try:
                 new, motion = self._careful_step(place, length) if careful else self.step(place, length)
             except NotSolved as error:
+                if isinstance(error, Pressed) and self._locks(place, length):
+                    raise Wedged(place) from None
                 step, grow = length / 2.0, SLOW_GROWTH
                 if step < smallest:
                     raise NoStep(f"at {place.s:.6g} {self.driver.unit}: {error}") from None
@@ -455,6 +469,19 @@ class Path:
                 if moved_by > 1e2 * GIVE and place.s > started:
                     break
         return place, step
+
+    def _locks(self, place: Place, length: float) -> bool:
+        """Whether no movement whatever lets the supports go on: proved by a linear program without end."""
+        if self.model.live is not None:
+            return False
+        self.programs += 1
+        try:
+            solve_program(self.model, place.pose, self.driver.rate(place.s) * length)
+        except Locked:
+            return True
+        except SolveError:
+            pass
+        return False
 
     def _careful_step(self, place: Place, length: float) -> tuple[Place, np.ndarray]:
         """Take a step with less drag and stiffer joints, or an ordinary one where that is not solved."""
@@ -505,7 +532,7 @@ class Path:
         remembered = self._remembered(place, contacts)
         if not bounds.exists:
             return Proved(place, contacts, friction, bounds, remembered, place.multiplier)
-        if place.s == 0.0:
+        if place.s == 0.0 and np.isfinite(bounds.low if model.live is None else bounds.high):
             # Nothing has moved: what the first movement has to overcome, least reaction or largest multiplier.
             forces, multiplier = bounds.forces, bounds.high
         else:
@@ -577,7 +604,7 @@ class Path:
             self.programs = 0
             if resume.ended:
                 return self._reached()
-        if resume is None and not proved.bounds.exists:
+        if resume is None and not (proved.bounds.exists and self._light_blocks_stand(start.pose)):
             motion = next((motion for _, motion, _ in self._sinking(start)), self.drag)
             yield self._falling(start, motion * self.model.lengths, start.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, self._no_equilibrium(motion))
@@ -588,6 +615,14 @@ class Path:
                 )
             yield self._falling(start, np.zeros((self.model.assembly.n_blocks, 3)), start.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
+        if resume is None and self.model.live is None and np.isinf(proved.bounds.low):
+            length = GIVE * self.model.length / self.lever
+            if self._locks(start, length):
+                return Ending(Status.LOCKED, self._locked(replace(start, contacts=proved.contacts, forces=proved.forces)))
+        if resume is None and self.model.live is not None:
+            _, onset = self._at_first(proved)
+            if onset <= 0.0:
+                raise ValueError(self.driver.misdirected())
         reported, without, spent = resume is not None, None, None
         self.reported = start.s
         while True:
@@ -629,8 +664,6 @@ class Path:
                 continue
             reached = self.proved(new)
             crept: Proved | None = reached
-            if place.s == 0.0 and self.model.live is not None and reached.measured <= 0.0:
-                raise ValueError(self.driver.misdirected())
             lost = reached.measured if reached.bounds.exists else None
             if not self._holds(reached) and lost is None and new.s > self.careful_until:
                 # What the drag holds back may only have to creep on.
@@ -652,6 +685,13 @@ class Path:
             return False
         self.barrier = place.s + length
         return True
+
+    def _light_blocks_stand(self, pose: Pose) -> bool:
+        """Whether blocks too light for the others' programs stand where the others do."""
+        if self.model.live is not None or not light_blocks(self.model).any():
+            return True
+        self.programs += 1
+        return not solve_program(self.model, pose).falling
 
     def _beyond(self, place: Place) -> Place:
         """A place just beyond one from which the structure falls: reached by the longest step that is solved."""
@@ -775,7 +815,19 @@ class Path:
         # The first movement that is large against the give of the joints, and small enough to be one of velocities.
         sizes = [float(np.abs(frame.velocity * unit_lengths(3, model.length)).max()) for frame in frames]
         chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))
-        velocity, first, largest = frames[chosen].velocity, frames[chosen], max(sizes[chosen], 1e-300)
+        velocity, largest = frames[chosen].velocity, max(sizes[chosen], 1e-300)
+        standing = self._reported(
+            last.place,
+            last.contacts,
+            last.forces,
+            last.friction,
+            velocity / largest,
+            last.measured,
+            np.zeros((model.assembly.n_blocks, 3)),
+            frames[chosen].certificate,
+            Status.EQUILIBRIUM,
+            (),
+        )
         # Where a multiplier reaches zero, it does so in between; an equilibrium that is lost, somewhere.
         part = 0.5 if spent is None else last.measured / (last.measured - spent)
         reaction = last.measured
@@ -787,11 +839,12 @@ class Path:
             reaction=reaction,
             mechanism=velocity / largest,
             unit=driver.unit,
-            words=str(mechanism_of(model.assembly, first)),
+            words=str(mechanism_of(model.assembly, standing)),
             lost="equilibrium" if spent is None else "capacity",
         )
-        if self.falling_frames:
-            yield from frames[: self.falling_frames]
+        del standing, last, frames[self.falling_frames :]
+        while frames:
+            yield frames.pop(0)
         if model.live is None:
             return Ending(Status.COLLAPSED, str(collapse), collapse)
         what = "equilibrium is lost" if spent is None else "no capacity is left"

@@ -242,7 +242,10 @@ def _in_states(step: Step, pattern: _Pattern, gone: np.ndarray, multiplier: floa
         found_multiplier = multiplier
         if step.live is not None and step.control is not None:
             by_live = solve(step.live)
-            found_multiplier = (step.wanted - float(step.control @ motion)) / float(step.control @ by_live)
+            moved = float(step.control @ by_live)
+            if moved == 0.0:
+                return None
+            found_multiplier = (step.wanted - float(step.control @ motion)) / moved
             motion = motion + found_multiplier * by_live
         gap, slip = (pattern.to_contacts @ motion).reshape(-1, 2).T
         normal = first - local[:, 0, 0] * gap
@@ -383,7 +386,10 @@ class _Newton:
         motion = self.solve(unbalanced + self.pattern.to_blocks @ _paired(at_once, shear))
         multiplier = 0.0
         if self.by_live is not None and step.control is not None:
-            multiplier = (behind - float(step.control @ motion)) / float(step.control @ self.by_live)
+            moved = float(step.control @ self.by_live)
+            if moved == 0.0:
+                raise NotSolved("the live load does not move the control point")
+            multiplier = (behind - float(step.control @ motion)) / moved
             motion = motion + multiplier * self.by_live
         relative = (self.pattern.to_contacts @ motion).reshape(-1, 2)
         d_normal = (for_normal - relative[:, 0]) / self.k_normal
