@@ -136,6 +136,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         settings=settings[kind.name],
         controls=_controls(analysis, geometry.number("overlap_tolerance", positive=True)),
         animation=animation or None,
+        vtu=output.text("vtu", "moved", among=("moved", "undeformed")),
     )
     for table in (geometry, material, analysis, output, top):
         table.finish()

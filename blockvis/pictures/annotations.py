@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 import solver
+from blockvis.results.joints import InitialJoints
 
 #: A joint is shown open from this fraction of the block size on; on an ordinary brick it is a tenth of a millimetre.
 SMALLEST_OPENING = 1e-3
@@ -19,12 +20,6 @@ WIDEST_STANDING, WIDEST_FALLING, STEEPEST_FALLING = 1.5, 0.6, 1.0
 #: What cracks and blocks enclose without covering it belongs to the cracks from this fraction of the block size squared
 #: (what is smaller is rounding) up to that: where several cracks meet.
 SMALLEST_POCKET, LARGEST_POCKET = 1e-5, 2.0
-
-#: Faces count as one initial joint when they are apart by at most this fraction of the block size.
-TOUCHING = 2e-3
-
-#: Faces count as parallel up to this sine.
-PARALLEL = 0.05
 
 #: Resultants below this fraction of the largest are not drawn.
 SMALLEST_RESULTANT = 2e-3
@@ -59,25 +54,6 @@ def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndar
 
 
 @dataclass(frozen=True)
-class InitialJoints:
-    """Pairs of faces that touch in the layout.
-
-    Attributes
-    ----------
-    block_a, block_b : (n_joints,) int arrays
-    ends : (n_joints, 2, 2) array [m]
-        Both ends of the common length, where the layout has them.
-    normals : (n_joints, 2) array
-        Unit normal in the layout, from ``block_b`` into ``block_a``.
-    """
-
-    block_a: np.ndarray
-    block_b: np.ndarray
-    ends: np.ndarray
-    normals: np.ndarray
-
-
-@dataclass(frozen=True)
 class Marks:
     """What is marked at one pose.
 
@@ -99,34 +75,6 @@ class Marks:
     pockets: tuple[np.ndarray, ...]
     sliding: np.ndarray
     hinges: np.ndarray
-
-
-def initial_joints(assembly: solver.Assembly) -> InitialJoints:
-    """Find the faces that touch in the layout; where they part later there is a crack."""
-    tolerance = TOUCHING * assembly.block_size
-    contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * tolerance)
-    touching = np.abs(contacts.gaps) <= tolerance
-    vertex, edge_b, _ = solver.corners_and_edges(contacts.features[touching])
-    # The corner belongs to two faces of block a; either may lie on the edge of block b.
-    edge_a = np.concatenate([vertex, assembly.previous_vertex[vertex]])
-    edge_b = np.concatenate([edge_b, edge_b])
-    pairs = np.unique(np.stack([np.minimum(edge_a, edge_b), np.maximum(edge_a, edge_b)], axis=1), axis=0)
-    a, b = pairs[:, 0], pairs[:, 1]
-    start, stop = assembly.vertices[b], assembly.vertices[assembly.next_vertex[b]]
-    length = assembly.edge_lengths[b]
-    tangent = (stop - start) / length[:, None]
-    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
-    ends_a = np.stack([assembly.vertices[a], assembly.vertices[assembly.next_vertex[a]]], axis=1) - start[:, None]
-    along = np.einsum("nij,nj->ni", ends_a, tangent)
-    across = np.abs(np.einsum("nij,nj->ni", ends_a, normal))
-    lean = np.abs(across[:, 1] - across[:, 0]) / assembly.edge_lengths[a]
-    low = np.maximum(0.0, along.min(axis=1))
-    high = np.minimum(length, along.max(axis=1))
-    keep = (high - low > 10.0 * tolerance) | (high - low > 0.5 * np.minimum(length, assembly.edge_lengths[a]))
-    keep &= (lean < PARALLEL) & (across.min(axis=1) <= 2.0 * tolerance) & (along[:, 0] > along[:, 1])
-    ends = np.stack([start + low[:, None] * tangent, start + high[:, None] * tangent], axis=1)
-    owner = assembly.block_of_vertex
-    return InitialJoints(owner[a][keep], owner[b][keep], ends[keep], normal[keep])
 
 
 def marks_of(

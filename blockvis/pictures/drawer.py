@@ -12,12 +12,12 @@ from PIL import Image
 
 import solver
 from blockvis.numbers import force_text, rounded_length
+from blockvis.results.joints import initial_joints
 
 from . import palette
 from .annotations import (
     SMALLEST_RESULTANT,
     Marks,
-    initial_joints,
     length_per_force,
     marks_of,
     part_outlines,

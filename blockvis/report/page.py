@@ -26,7 +26,6 @@ from blockvis.pictures.annotations import (
     STEEPEST_FALLING,
     WIDEST_FALLING,
     WIDEST_STANDING,
-    initial_joints,
     joint_places,
     length_per_force,
     resultants,
@@ -43,6 +42,7 @@ from blockvis.pictures.captions import (
 )
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
+from blockvis.results.joints import initial_joints
 from blockvis.runs.kinds import KINDS
 
 #: Increments beyond this many are thinned out evenly; the page stays below 2 MB for a thousand blocks. Of more than

@@ -93,7 +93,12 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
     run = planned(case, assembly)
     try:
         results = ResultsFolder(
-            folder, assembly, record=record_of(case), overwrite=overwrite, parameter=run.course.parameter
+            folder,
+            assembly,
+            record=record_of(case),
+            overwrite=overwrite,
+            parameter=run.course.parameter,
+            shape=case.vtu,
         )
     except OSError as error:
         raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
@@ -138,7 +143,7 @@ def resume_run(folder: str | Path) -> Run:
     for note in record.changes():
         warnings.warn(note, stacklevel=2)
     kind = KINDS[case.analysis]
-    results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint)
+    results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint, case.vtu)
     return _followed(case, results, planned(case, results.assembly, checkpoint, tuple(results.increments)))
 
 

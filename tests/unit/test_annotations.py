@@ -10,6 +10,7 @@ from blockvis.numbers import rounded_length
 from blockvis.pictures import annotations as marks
 from blockvis.pictures.annotations import part_outlines
 from blockvis.pictures.hatching import cut_into_triangles, hatch_lines, triangles
+from blockvis.results.joints import initial_joints
 
 
 def stacked(shift=(0.0, 0.0), turn=0.0):
@@ -22,7 +23,7 @@ def stacked(shift=(0.0, 0.0), turn=0.0):
 
 
 def cracks(assembly, pose, falling=False):
-    return marks._cracks(assembly, marks.initial_joints(assembly), pose, pose, falling)[0]
+    return marks._cracks(assembly, initial_joints(assembly), pose, pose, falling)[0]
 
 
 def area(polygon):
@@ -32,7 +33,7 @@ def area(polygon):
 
 def test_one_joint_between_two_full_faces():
     assembly, _ = stacked()
-    joints = marks.initial_joints(assembly)
+    joints = initial_joints(assembly)
     assert len(joints.block_a) == 1
     assert {int(joints.block_a[0]), int(joints.block_b[0])} == {0, 1}
     assert np.sort(joints.ends[0, :, 0]).tolist() == [0.0, 1.0]
@@ -41,7 +42,7 @@ def test_one_joint_between_two_full_faces():
 
 def test_joints_of_a_running_bond_wall_are_counted():
     assembly = wall(4, 2)
-    joints = marks.initial_joints(assembly)
+    joints = initial_joints(assembly)
     # Lower course of 4: three heads; upper course of 5 (halves at the ends): four heads; 8 beds between them,
     # since joints alternate; the 4 lower bricks stand on a footing each, the split falls on a head joint.
     assert len(joints.block_a) == 3 + 4 + 8 + 4
@@ -79,7 +80,7 @@ def four_blocks(apart):
 @given(st.floats(0.01, 0.3))
 def test_where_four_cracks_meet_nothing_stays_white(apart):
     assembly, pose = four_blocks(apart)
-    found, openings, beside = marks._cracks(assembly, marks.initial_joints(assembly), pose, pose, False)
+    found, openings, beside = marks._cracks(assembly, initial_joints(assembly), pose, pose, False)
     pockets = marks._pockets(assembly, found, beside, pose)
     assert len(found) == 4
     np.testing.assert_allclose(openings, 2.0 * apart, rtol=1e-9)
@@ -96,14 +97,14 @@ def test_an_opening_of_the_drawing_is_no_pocket():
     assembly = solver.Assembly.from_outlines([[low, (high[0], low[1]), high, (low[0], high[1])] for low, high in ring])
     away = 0.05 * np.sign(np.round(assembly.centroids - 1.5, 9))
     pose = solver.Pose(assembly.centroids + away, np.zeros((4, 1)))
-    found, _, beside = marks._cracks(assembly, marks.initial_joints(assembly), pose, pose, False)
+    found, _, beside = marks._cracks(assembly, initial_joints(assembly), pose, pose, False)
     assert len(found) == 4
     assert marks._pockets(assembly, found, beside, pose) == ()
 
 
 def test_joints_that_hardly_slide_are_not_marked():
     response = arch_response()
-    last, joints = response.path[-1], marks.initial_joints(response.assembly)
+    last, joints = response.path[-1], initial_joints(response.assembly)
     used_up = np.stack([last.forces[:, 0], last.friction * last.forces[:, 0]], axis=1)
     fastest = np.abs(last.velocity[:, :2]).max()
     for slip, drawn in ((0.5, True), (1e-4, False)):
@@ -127,7 +128,7 @@ def test_resultants_balance_every_voussoir():
 
 def test_arch_spreads_on_three_hinges_and_falls_on_five():
     response = arch_response()
-    last, joints = response.path[-1], marks.initial_joints(response.assembly)
+    last, joints = response.path[-1], initial_joints(response.assembly)
     spreading = marks.marks_of(response.assembly, joints, last, last.pose)
     assert len(spreading.hinges) == 3
     falling = solver.with_motion(last, response.collapse.mechanism)

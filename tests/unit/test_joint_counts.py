@@ -17,6 +17,7 @@ from blockvis import generators
 from blockvis.pictures import annotations
 from blockvis.pictures.curves import events_of
 from blockvis.report.page import report_html
+from blockvis.results.joints import initial_joints
 
 SINKS = (0.0, -1.0)
 
@@ -67,7 +68,7 @@ def test_every_increment_has_one_count(name, tmp_path):
     response = RESPONSES[name]()
     expected = [counted(response, increment) for increment in response.increments]
     assert max(hinges for hinges, _ in expected) > 0
-    joints = annotations.initial_joints(response.assembly)
+    joints = initial_joints(response.assembly)
     for increment, (hinges, sliding) in zip(response.increments, expected, strict=True):
         words = str(solver.mechanism_of(response.assembly, increment))
         assert in_words(words) == (hinges, sliding)
