@@ -15,6 +15,7 @@ import numpy as np
 
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
+from blockvis.layout.outlines import FLAT
 
 from .cells import layout_of_cells, merged, row_of
 from .node_order import VTK, ring_of_nodes
@@ -241,13 +242,15 @@ def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
         for k, part in enumerate(data):
             if part is None or (isinstance(part, pyvista.DataSet) and part.n_cells == 0):
                 continue
-            parts.append(layout_of_dataset(part, path))
+            parts.append(part)
             name = data.get_block_name(k) or ""
             labels.append("" if re.fullmatch(r"Block-\d+", name) else name)
-        return merged(parts, labels, path)
+        if parts and all(_is_solid(part) for part in parts):
+            return _layout_of_solids(_one_grid(parts, labels), path)
+        return merged([layout_of_dataset(part, path) for part in parts], labels, path)
     grid = _as_cells(data, path)
     types = np.asarray(grid.celltypes)
-    if np.isin(types, list(SOLID_CELLS)).any():
+    if _is_solid(grid):
         return _layout_of_solids(grid, path)
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
     surface = np.flatnonzero(np.isin(types, list(VTK)))
@@ -257,6 +260,41 @@ def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
         rings.append(ring_of_nodes(nodes, VTK[int(types[cell])]))
     cell_data = {str(key): np.asarray(grid.cell_data[key])[surface] for key in grid.cell_data}
     return layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path)
+
+
+def _is_solid(data: Any) -> bool:
+    """Whether a mesh has cells with a volume, or closed surfaces around some."""
+    import pyvista
+
+    if not isinstance(data, pyvista.DataSet) or data.n_cells == 0:
+        return False
+    grid = _as_cells(data, "")
+    if np.isin(np.asarray(grid.celltypes), list(SOLID_CELLS)).any():
+        return True
+    spread = np.ptp(np.asarray(grid.points, dtype=float), axis=0)
+    if spread.min() <= FLAT * spread.max():
+        return False
+    return bool(grid.extract_surface(algorithm="dataset_surface").n_open_edges == 0)
+
+
+def _one_grid(parts: list[Any], labels: list[str]) -> Any:
+    """Put solid parts into one grid: together they say in which direction the structure is extruded."""
+    import pyvista
+
+    grids, n = [], 0
+    for part, label in zip(parts, labels, strict=True):
+        grid = _as_cells(part, "").copy()
+        given = "block_id" in grid.cell_data
+        ids = grid.cell_data["block_id"] if given else grid.connectivity().cell_data["RegionId"]
+        _, ids = np.unique(np.asarray(ids), return_inverse=True)
+        if "name" not in grid.cell_data:
+            several = ids.max() > 0
+            names = [f"{label or 'block'} {n + i}" if several or not label else label for i in ids]
+            grid.cell_data["name"] = np.array(names)
+        grid.cell_data["block_id"] = ids + n
+        n += int(ids.max()) + 1
+        grids.append(grid)
+    return pyvista.merge(grids, merge_points=False)
 
 
 def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
