@@ -75,7 +75,7 @@ class BlockvisAccessor:
         """Read the blocks as a layout, lengths in m."""
         return layout_of_dataset(self._mesh)
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
+    def save(self, path: str | Path) -> Path:
         """Write the blocks to a layout file of any format that blockvis writes."""
         write_layout(self.layout(), path)
         return Path(path)

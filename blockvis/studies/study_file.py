@@ -18,11 +18,11 @@ from blockvis.cases.case import case_of, read_case
 from blockvis.cases.distributions import Distribution, read_distribution
 from blockvis.cases.imperfections import read_imperfection
 from blockvis.cases.toml_table import is_number
+from blockvis.cases.value_paths import parse_path, put
 from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import nearest, refuse_unknown
 
 from .sampling import METHODS, Design, designed
-from .value_paths import parse_path, put
 
 #: Columns of the table besides the parameters.
 RESERVED = (
