@@ -312,7 +312,6 @@ def _layout(options: argparse.Namespace) -> int:
 
 def _render(options: argparse.Namespace) -> int:
     from .pictures.curves import draw_curve
-    from .pictures.opengl import rendering_available
     from .pictures.render import animate, draw_mechanism, draw_still
     from .report.page import write_report
     from .results.folder import stored_case
@@ -328,10 +327,6 @@ def _render(options: argparse.Namespace) -> int:
         draw_curve(response, folder / "curve.png")
         draw_curve(response, folder / "curve.svg")
         drawn += ["curve.png", "curve.svg"]
-    problem = rendering_available()
-    if problem is not None:
-        print(f"blockvis: {problem}", file=sys.stderr)
-        return NO_PICTURES
     look = {
         "magnification": options.magnification,
         "colour_by": options.colour_by,

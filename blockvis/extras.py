@@ -8,6 +8,7 @@ from importlib.util import find_spec
 EXTRAS: dict[str, tuple[str, ...]] = {
     "studies": ("dask", "distributed", "pandas", "pyarrow", "SALib", "tomli_w"),
     "cad": ("gmsh",),
+    "fall": ("pymunk",),
 }
 
 
@@ -45,12 +46,23 @@ def require(extra: str, needed_by: str) -> None:
     MissingExtra
         If a package is not installed.
     """
-    missing = [name for name in EXTRAS[extra] if not _is_installed(name)]
+    missing = missing_packages(extra)
     if missing:
         raise MissingExtra(
             f"{needed_by} need {', '.join(missing)}, which this environment lacks; "
             f"install with: {install_command(extra)}"
         )
+
+
+def missing_packages(extra: str) -> list[str]:
+    """List the packages of an extra that are not installed, without importing any.
+
+    Parameters
+    ----------
+    extra : str
+        A key of :data:`EXTRAS`.
+    """
+    return [name for name in EXTRAS[extra] if not _is_installed(name)]
 
 
 def _is_installed(name: str) -> bool:

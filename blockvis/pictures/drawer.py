@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from itertools import chain
+from functools import partial
+from itertools import chain, pairwise
 
 import numpy as np
 import shapely
 from PIL import Image
 
 import solver
+from blockvis.fall import CAPTION, Fall
 from blockvis.numbers import force_text, rounded_length
 from blockvis.results.joints import initial_joints
 
@@ -29,6 +31,7 @@ from .flat_scene import Scene, magnified
 from .frame import ColourBar, Key, Sheet, framed
 from .hatching import cut_into_triangles
 from .live_load import LiveLoads
+from .swing import Swing, swing_of
 
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
@@ -45,8 +48,12 @@ MOST_PARTS = 16
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
 
-#: Single pictures up to this size [pixels] are drawn at four times their size, against steps in flat slopes.
-FINE_UP_TO = 2600
+
+#: Seconds for which the last equilibrium and the end of the film are held.
+PAUSE, END = 0.6, 0.8
+
+#: Nothing moves from one frame to the next where no corner moves by more than this [pixels].
+STILL = 0.3
 
 
 @dataclass(frozen=True)
@@ -57,7 +64,8 @@ class Look:
     ----------
     magnification : float
         Of displacements and rotations; 1 is true scale.
-    colour_by : {"material", "displacement"}
+    colour_by : {"material", "mechanism", "displacement"}
+        By "mechanism" the parts that move as one after the last equilibrium are tinted.
     forces : {"auto", "thrust", "points", "none"}
         Resultant of each joint, forces at the contact points, or neither; "auto" draws the resultants of structures
         with up to ``FEW_BLOCKS`` blocks.
@@ -75,7 +83,7 @@ class Look:
         if not (np.isfinite(self.magnification) and self.magnification > 0.0):
             raise ValueError(f"magnification is {self.magnification:g}; it must be a positive number, 1 is true scale")
         for name, allowed in (
-            ("colour_by", ("material", "displacement")),
+            ("colour_by", ("material", "mechanism", "displacement")),
             ("forces", ("auto", "thrust", "points", "none")),
         ):
             if getattr(self, name) not in allowed:
@@ -123,11 +131,8 @@ class Drawer:
         Whether the curve stands beside the blocks.
     extra : tuple of solver.Pose
         Poses that the frame has to hold, too.
-
-    Raises
-    ------
-    RenderingUnavailable
-        Where there is no usable OpenGL.
+    fall : Fall, optional
+        What comes after the last equilibrium; its frames are drawn beside those of the increments.
     """
 
     def __init__(
@@ -139,15 +144,17 @@ class Drawer:
         *,
         curve: bool = False,
         extra: tuple[solver.Pose, ...] = (),
+        fall: Fall | None = None,
     ) -> None:
         if look.forces == "auto":
             few = response.assembly.n_blocks <= FEW_BLOCKS
             look = replace(look, forces="thrust" if few else "none")
-        self.response, self.look, self.increments = response, look, increments
+        self.response, self.look, self.increments, self.fall = response, look, increments, fall
         assembly = self.assembly = response.assembly
         self.joints = initial_joints(assembly)
         self._seen = _Seen(sampled=_sampled([k for k, i in enumerate(increments) if matters(i, response)]))
-        frame = framed(assembly, chain([solver.Pose.initial(assembly)], self._surveyed(), extra))
+        falling = () if fall is None else map(fall.pose, range(len(fall)))
+        frame = framed(assembly, chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
         bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
         beside = round(0.36 * size[0]) if curve else 0
@@ -158,19 +165,15 @@ class Drawer:
         fill = palette.block_colours(assembly.materials, assembly.free)
         self.fill = fill
         self.tints: np.ndarray | None = None
-        fine = max(size) <= FINE_UP_TO and len(increments) == 1
-        self.scene = Scene(assembly, frame, self.sheet.inside_size, fill, supersampling=4 if fine else 2)
+        self.scene = Scene(assembly, frame, self.sheet.inside_size, fill)
         self.force_scale, self.force_shown = self._force_scale()
         self._show_start()
+        if fall is not None:
+            self._show_ground(fall.ground)
+        self._swing = swing_of(response) if look.colour_by == "mechanism" else None
+        if self._swing is not None and self._swing.moves:
+            self.tints = self._tints(self._swing)
         self._keys: list[Key] | None = None
-
-    def __enter__(self) -> Drawer:
-        """Open the scene."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the scene."""
-        self.scene.close()
 
     def _surveyed(self) -> Iterator[solver.Pose]:
         """Yield the poses as shown, and note what must be the same in all pictures.
@@ -193,7 +196,14 @@ class Drawer:
             yield magnified(self.assembly, increment.pose, look.magnification)
 
     def picture(
-        self, increment: solver.Increment, pose: solver.Pose | None = None, s: float | None = None, note: str = ""
+        self,
+        increment: solver.Increment,
+        pose: solver.Pose | None = None,
+        s: float | None = None,
+        *,
+        title: str = "",
+        note: str = "",
+        badge: str = "",
     ) -> Image.Image:
         """Draw one increment; for frames in between, with its blocks at another pose.
 
@@ -204,82 +214,148 @@ class Drawer:
             Where the blocks are in a frame between two increments.
         s : float, optional [m or rad]
             The parameter there.
-        note : str
-            Second line of the caption, instead of that of the increment.
+        title, note, badge : str
+            First and second line of the caption, and the warning, instead of those of the increment.
         """
+        if self._swing is not None and pose is None and increment is self.response.governing:
+            increment = self._swing.increment
         true = increment.pose if pose is None else pose
         shown = magnified(self.assembly, true, self.look.magnification)
         at = increment.with_arrays(pose=true, contacts=_contacts_at(increment, true)) if pose is not None else increment
-        self.scene.pose(shown, self._vertex_colours(true))
+        self.scene.pose(shown, self._block_colours(true))
         self._draw_joints(at, shown)
         self._draw_forces(at, shown)
         self._draw_ground(shown)
-        self._draw_settlement_arrow(at, shown)
+        self._draw_settlement_arrow(at, shown, hidden=self.fall is not None and increment.status == solver.Status.FALLING)
         self._draw_live_load(increment, shown)
         falling = increment.status == solver.Status.FALLING
-        title, detail = _caption(self.response, at, self.look, s)
+        head, detail = _caption(self.response, at, self.look, s)
         return self.sheet.composed(
             self.scene.image(),
-            title=title,
+            title=title or head,
             detail=note or detail,
-            badge=badge_of(self.response) if falling else "",
+            badge=badge or (badge_of(self.response) if falling else ""),
             keys=self.keys(),
             pixel=self.scene.pixel,
             beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, parameter=s)),
         )
 
-    def frames(self, fps: float, seconds: float) -> Iterator[Image.Image]:
-        """Yield the frames of the film: even motion along the path, a pause, then the fall."""
-        path = [i for i in self.increments if matters(i, self.response)]
-        fall = [i for i in self.increments if i.status == solver.Status.FALLING]
-        picture = None
-        for increment, pose, s in _even_motion(path, max(2, round(fps * seconds))):
-            picture = self.picture(increment, pose, s)
-            yield picture
-        if picture is not None:
-            yield from (picture for _ in range(round(0.6 * fps)))
-        for increment in fall:
-            picture = self.picture(increment)
-            yield picture
-        if picture is not None:
-            yield from (picture for _ in range(round(1.2 * fps)))
+    def frames(
+        self, fps: float, seconds: float, progress: Callable[[int, int], None] | None = None
+    ) -> Iterator[Image.Image]:
+        """Yield the frames of the film: even motion along the path, a pause, then the fall.
 
-    def show_motion(self, pose: solver.Pose, displaced: solver.Pose, parts: np.ndarray) -> None:
+        A picture is drawn where something has moved since the last, and held till then.
+
+        Parameters
+        ----------
+        fps : float
+            Frames per second.
+        seconds : float [s]
+            Of the path.
+        progress : callable, optional
+            Called with the pictures drawn and their number.
+        """
+        path = [i for i in self.increments if matters(i, self.response)]
+        lasting = max(2, round(fps * seconds))
+        distinct = self._distinct(path, lasting)
+        falling = list(self._falling(fps))
+        total, drawn = distinct + len(falling), 0
+
+        def told(picture: Image.Image) -> Image.Image:
+            nonlocal drawn
+            drawn += 1
+            if progress is not None:
+                progress(drawn, total)
+            return picture
+
+        picture, until = None, np.diff(np.linspace(0, lasting, distinct + 1).round().astype(int))
+        for held, (increment, pose, s) in zip(until, _even_motion(path, distinct), strict=False):
+            picture = told(self.picture(increment, pose, s))
+            yield from (picture for _ in range(held))
+        if picture is not None:
+            yield from (picture for _ in range(round(PAUSE * fps)))
+        for draw in falling:
+            picture = told(draw())
+            yield picture
+        if picture is not None:
+            yield from (picture for _ in range(round(END * fps)))
+
+    def _distinct(self, path: list[solver.Increment], most: int) -> int:
+        """How many pictures of the path differ: one for each pixel of the way of the block that goes farthest."""
+        way, before = 0.0, None
+        for increment in path:
+            corners = solver.moved_vertices(self.assembly, increment.pose)
+            if before is not None:
+                way += float(np.hypot(*(corners - before).T).max())
+            before = corners
+        pixels = way * self.look.magnification / self.scene.pixel
+        return int(np.clip(np.ceil(pixels), min(len(path), most), most))
+
+    def _falling(self, fps: float) -> Iterator[Callable[[], Image.Image]]:
+        """Yield what draws each frame of the fall, up to the last in which something moves."""
+        if self.fall is not None:
+            n = int(np.ceil(self.fall.times[-1] * fps))
+            yield from (partial(self.falling_picture, k / fps) for k in range(1, n + 1))
+            return
+        fall = [i for i in self.increments if i.status == solver.Status.FALLING]
+        corners = [solver.moved_vertices(self.assembly, increment.pose) for increment in fall]
+        moves = [np.abs(b - a).max() > STILL * self.scene.pixel for a, b in pairwise(corners)]
+        last = max((k + 1 for k, move in enumerate(moves) if move), default=0)
+        yield from (partial(self.picture, increment) for increment in fall[: last + 1])
+
+    def falling_picture(self, time: float) -> Image.Image:
+        """Draw the fall at a time [s] after the last equilibrium."""
+        assert self.fall is not None
+        pose = self.fall.at(time)
+        last = self.response.path[-1]
+        nothing = last.contacts[np.zeros(0, dtype=int)]
+        empty = np.zeros((0, last.forces.shape[1]))
+        falling = replace(last, status=solver.Status.FALLING).with_arrays(
+            pose=pose, contacts=nothing, forces=empty, displacements=empty, friction=np.zeros(0)
+        )
+        return self.picture(
+            falling, title=f"Fall   ·   {time:.2f} s after the last equilibrium", note=CAPTION, badge="FALLING · real time"
+        )
+
+    def show_motion(self, swing: Swing) -> None:
         """Show by tints, outlines and arrows where a mechanism takes the parts that move as one.
 
         Of more than ``MOST_PARTS`` parts the speed is tinted instead, and arrows stand on a grid.
 
         Parameters
         ----------
-        pose, displaced : solver.Pose
-            Before and after the motion, which is out of scale.
-        parts : (n_blocks,) int array
-            As ``solver.rigid_parts`` gives them.
+        swing : Swing
         """
-        assembly, scene, block = self.assembly, self.scene, self.assembly.block_of_vertex
-        before, after = solver.moved_vertices(assembly, pose), solver.moved_vertices(assembly, displaced)
+        assembly, scene, pose, displaced, parts = (
+            self.assembly, self.scene, swing.increment.pose, swing.displaced, swing.parts,
+        )  # fmt: skip
         n = int(parts.max(initial=-1)) + 1
         if n <= MOST_PARTS:
-            tints = palette.part_colours(self.fill, parts)[block]
-            outlines = part_outlines(assembly, after, parts)
+            outlines = part_outlines(assembly, solver.moved_vertices(assembly, displaced), parts)
             scene.lines("motion outline", outlines, palette.SETTLEMENT, self.scene.size[1] / 600.0)
             chosen = [np.flatnonzero(parts == part) for part in range(n)]
         else:
-            travel = np.hypot(*(after - before).T)
-            tints = palette.displacement_colours(0.75 * travel / travel[assembly.free[block]].max())
-            tints = np.where(assembly.free[block][:, None], tints, self.fill[block])
             cell = np.floor(pose.positions / (0.07 * scene.frame.size.max())).astype(np.int64)
             moves = np.flatnonzero(parts >= 0)
             _, first = np.unique(cell[moves], axis=0, return_index=True)
             chosen = [moves[[k]] for k in first]
-        scene.pose(pose, tints)
-        self.tints = tints
+        self.tints = self._tints(swing)
+        scene.pose(pose, self.tints)
         tails, tips = np.zeros((len(chosen), 2)), np.zeros((len(chosen), 2))
         for k, blocks in enumerate(chosen):
             weight = assembly.areas[blocks] / assembly.areas[blocks].sum()
             tails[k] = weight @ pose.positions[blocks]
             tips[k] = solver.carried(tails[[k]], blocks[:1], pose, displaced)[0]
         self._arrows("motion", tails, tips, 0.6)
+
+    def _tints(self, swing: Swing) -> np.ndarray:
+        """(n_blocks, 3) uint8 array: fills with the parts of a mechanism tinted, or darker where they are faster."""
+        if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
+            return palette.part_colours(self.fill, swing.parts)
+        travel = np.hypot(*(swing.displaced.positions - swing.increment.pose.positions).T)
+        tints = palette.displacement_colours(0.75 * travel / travel[self.assembly.free].max())
+        return np.where(self.assembly.free[:, None], tints, self.fill)
 
     def keys(self) -> list[Key]:
         """Return the legend: what is marked in any of the increments, so that it is the same in all pictures."""
@@ -307,13 +383,12 @@ class Drawer:
         """Hinges that get a dot: in a wall of many blocks nearly every brick turns a little about some corner."""
         return found.hinges if self.assembly.n_blocks <= FEW_BLOCKS else found.hinges[:0]
 
-    def _vertex_colours(self, pose: solver.Pose) -> np.ndarray | None:
+    def _block_colours(self, pose: solver.Pose) -> np.ndarray | None:
         if self.look.colour_by != "displacement":
             return self.tints
-        moved = solver.moved_vertices(self.assembly, pose) - self.assembly.vertices
+        moved = pose.displacements(self.assembly)[:, :2]
         colours = palette.displacement_colours(np.hypot(*moved.T) / (self.largest or 1.0))
-        block = self.assembly.block_of_vertex
-        return np.where(self.assembly.free[block][:, None], colours, self.fill[block])
+        return np.where(self.assembly.free[:, None], colours, self.fill)
 
     def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if not self.look.joints:
@@ -375,6 +450,17 @@ class Drawer:
         start = _edges(self.assembly, self.assembly.vertices)[moving]
         self.scene.lines("ghost", start, palette.GHOST, self.scene.size[1] / 800.0)
 
+    def _show_ground(self, height: float) -> None:
+        """Draw the ground line over the whole width, hatched below, behind everything."""
+        frame, tick = self.scene.frame, self.scene.size[1] / 60.0 * self.scene.pixel
+        (left, _), (right, _) = frame.low, frame.high
+        self.scene.lines(
+            "earth", np.array([[[left, height], [right, height]]]), palette.HATCH, max(1.2, self.scene.size[1] / 400.0)
+        )
+        x = np.arange(left, right + tick, tick)
+        ticks = np.stack([np.stack([x, x - tick], axis=1), np.broadcast_to([height, height - tick], (len(x), 2))], axis=2)
+        self.scene.lines("earth/hatch", ticks, palette.HATCH, max(0.7, self.scene.size[1] / 1000.0))
+
     def _draw_ground(self, shown: solver.Pose) -> None:
         """Draw a heavy line where supports carry the structure."""
         joints, free = self.joints, self.assembly.free
@@ -391,9 +477,11 @@ class Drawer:
         if self.live.largest > 0.0:
             self._arrows("live", *self.live.arrows(increment, shown), 0.55, palette.LIVE)
 
-    def _draw_settlement_arrow(self, increment: solver.Increment, shown: solver.Pose) -> None:
+    def _draw_settlement_arrow(self, increment: solver.Increment, shown: solver.Pose, *, hidden: bool) -> None:
         assembly, scene = self.assembly, self.scene
-        if not self.response.settlements:
+        if hidden or not self.response.settlements:
+            if self.response.settlements:
+                self._arrows("arrow", np.zeros((0, 2)), np.zeros((0, 2)), 1.0)
             return
         phase = self.response.settlements[min(increment.phase, len(self.response.settlements) - 1)]
         part = np.flatnonzero(phase.taking_part(assembly))

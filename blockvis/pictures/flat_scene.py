@@ -1,28 +1,33 @@
-"""The off-screen scene: blocks and marks as VTK layers whose arrays change in place from frame to frame."""
+"""The scene: blocks and marks as layers of outlines, drawn by Agg with exact edges, frame after frame."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import groupby
+
 import numpy as np
+from matplotlib.backends.backend_agg import RendererAgg
+from matplotlib.path import Path
+from matplotlib.transforms import Affine2D
 from PIL import Image
 
 import solver
 
 from . import palette
 from .frame import Frame
-from .hatching import hatch_lines, triangles
-from .opengl import RenderingUnavailable, rendering_available
+from .hatching import hatch_lines
 
-#: Depths of the layers, back to front.
-DEPTHS = {
-    name: k / 170.0
-    for k, name in enumerate(
-        (
-            "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding", "motion outline",
-            "force line", "force", "hinge", "hinge top", "motion rim", "motion top", "live rim", "live top",
-            "arrow rim", "arrow top",
-        )
-    )
-}  # fmt: skip
+#: The layers, back to front.
+ORDER = (
+    "earth", "ghost", "crack", "fill", "hatch", "outline", "ground", "crack edge", "sliding", "motion outline",
+    "force line", "force", "hinge", "hinge top", "motion rim", "motion top", "live rim", "live top",
+    "arrow rim", "arrow top",
+)  # fmt: skip
+
+#: A picture is drawn in bands of at most so many pixels, so that its size does not decide how much memory that takes.
+BAND = 2_000_000
+
+Colour = tuple[int, int, int]
 
 
 def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:
@@ -34,7 +39,7 @@ def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float
 
 
 class Scene:
-    """Blocks and their marks, drawn off-screen frame after frame.
+    """Blocks and their marks, drawn frame after frame.
 
     Parameters
     ----------
@@ -45,191 +50,168 @@ class Scene:
         Width and height of the pictures in pixels.
     block_fill : (n_blocks, 3) uint8 array
         Colours of the blocks.
-    supersampling : int
-        Factor by which the picture is rendered larger and averaged down: cheaper in software OpenGL than its own
-        anti-aliasing.
-
-    Raises
-    ------
-    RenderingUnavailable
-        Where there is no usable OpenGL.
     """
 
     def __init__(
-        self,
-        assembly: solver.Assembly,
-        frame: Frame,
-        size: tuple[int, int],
-        block_fill: np.ndarray,
-        supersampling: int = 2,
+        self, assembly: solver.Assembly, frame: Frame, size: tuple[int, int], block_fill: np.ndarray
     ) -> None:
-        missing = rendering_available()
-        if missing:
-            raise RenderingUnavailable(missing)
-        import pyvista as pv
-
-        self.assembly, self.size, self._fine = assembly, size, supersampling
+        self.assembly, self.size = assembly, size
         self.frame = frame.fitted(*size)
         #: Size of a pixel in the world [m].
         self.pixel = float(self.frame.size[0]) / size[0]
-        self._pv = pv
-        window = [self._fine * size[0], self._fine * size[1]]
-        self._plotter = pv.Plotter(off_screen=True, window_size=window, lighting="none")
-        self._plotter.ren_win.SetMultiSamples(0)
-        self._plotter.set_background([c / 255.0 for c in palette.PAPER])
         self._layers: dict[str, _Layer] = {}
-        self._block = assembly.block_of_vertex
-        self._shown = solver.Pose.initial(assembly)
-        self._add_blocks(block_fill)
-        self._add_hatch()
-        self._fix_camera()
-
-    def __enter__(self) -> Scene:
-        """Open the scene."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Free the window."""
-        self.close()
-
-    def close(self) -> None:
-        """Free the window."""
-        self._plotter.close()
+        self._fills: list[_Layer] = []
+        self._outlines = _rings(np.diff(assembly.offsets))
+        self._paint(block_fill)
+        self._layers["outline"] = _Layer(palette.OUTLINE, *self._outlines, width=self._outline_width())
+        self._hatch()
+        self.pose(solver.Pose.initial(assembly))
 
     @property
     def layers(self) -> tuple[str, ...]:
         """Names of the layers drawn so far."""
         return tuple(self._layers)
 
-    def pose(self, shown: solver.Pose, vertex_colours: np.ndarray | None = None) -> None:
+    def pose(self, shown: solver.Pose, block_fill: np.ndarray | None = None) -> None:
         """Put the blocks where they are drawn.
 
         Parameters
         ----------
         shown : solver.Pose
-        vertex_colours : (n_vertices, 3) uint8 array, optional
-            New fills.
+        block_fill : (n_blocks, 3) uint8 array, optional
+            New colours.
         """
-        self._shown = shown
+        if block_fill is not None:
+            self._paint(block_fill)
         corners = solver.moved_vertices(self.assembly, shown)
-        for name in ("fill", "outline"):
-            self._layers[name].move(corners)
-        if vertex_colours is not None:
-            self._layers["fill"].colour(vertex_colours)
+        for layer in (*self._fills, self._layers["outline"]):
+            layer.move(corners)
         if "hatch" in self._layers:
-            points, blocks = self._hatch
+            points, blocks = self._hatched
             self._layers["hatch"].move(solver.carried(points, blocks, solver.Pose.initial(self.assembly), shown))
 
-    def polygons(self, layer: str, corners: np.ndarray, colour: tuple[int, int, int]) -> None:
-        """Fill convex polygons, (n, k, 2) [m], in one layer, instead of those before."""
+    def polygons(self, layer: str, corners: np.ndarray, colour: Colour) -> None:
+        """Fill polygons, (n, k, 2) [m], in one layer, instead of those before."""
         n, k = corners.shape[:2] if corners.size else (0, 4)
-        faces = np.column_stack([np.full(n, k), np.arange(n * k).reshape(n, k)]) if n else None
-        self._layer(layer, colour).replace(corners.reshape(-1, 2), faces=faces)
+        # Where polygons of both senses overlap, they would cut holes into each other.
+        x, y = np.moveaxis(corners.reshape(n, k, 2), 2, 0)
+        backwards = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) < 0.0
+        turned = np.where(backwards[:, None, None], corners.reshape(n, k, 2)[:, ::-1], corners.reshape(n, k, 2))
+        self._layers[layer] = _Layer(colour, *_rings(np.full(n, k)))
+        self._layers[layer].move(turned.reshape(-1, 2))
 
-    def lines(self, layer: str, points: np.ndarray, colour: tuple[int, int, int], width: float) -> None:
+    def lines(self, layer: str, points: np.ndarray, colour: Colour, width: float) -> None:
         """Draw polylines, (n, k, 2) [m], ``width`` pixels wide, in one layer, instead of those before."""
         n, k = points.shape[:2] if points.size else (0, 2)
-        cells = np.column_stack([np.full(n, k), np.arange(n * k).reshape(n, k)]) if n else None
-        target = self._layer(layer, colour)
-        target.width(width * self._fine)
-        target.replace(points.reshape(-1, 2), lines=cells)
+        codes = np.full((n, k), Path.LINETO, dtype=Path.code_type)
+        codes[:, :1] = Path.MOVETO
+        self._layers[layer] = _Layer(colour, np.arange(n * k), codes.ravel(), width=width)
+        self._layers[layer].move(points.reshape(-1, 2))
 
-    def discs(self, layer: str, centres: np.ndarray, radius: float, colour: tuple[int, int, int]) -> None:
+    def discs(self, layer: str, centres: np.ndarray, radius: float, colour: Colour) -> None:
         """Draw discs, centres (n, 2) [m], ``radius`` in pixels, in one layer, instead of those before."""
         angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
         rim = radius * self.pixel * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         self.polygons(layer, centres[:, None, :] + rim[None, :, :], colour)
 
     def image(self) -> Image.Image:
-        """Render the picture."""
-        self._plotter.render()
-        pixels = self._plotter.screenshot(return_img=True)
-        return Image.fromarray(np.ascontiguousarray(pixels[..., :3])).reduce(self._fine)
+        """Draw the picture."""
+        width, height = self.size
+        rows = max(1, min(height, BAND // width))
+        picture = Image.new("RGB", self.size, palette.PAPER)
+        for top in range(0, height, rows):
+            picture.paste(self._band(top, min(rows, height - top)), (0, top))
+        return picture
 
     def at_pixel(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array: pixel (column, row) of points (n, 2) [m]."""
         place = (np.asarray(points) - self.frame.low) / self.pixel
         return np.column_stack([place[:, 0], self.size[1] - place[:, 1]])
 
-    def _add_blocks(self, block_fill: np.ndarray) -> None:
-        corners = self.assembly.vertices
-        fill = self._layer("fill", None)
-        fill.replace(corners, faces=triangles(self.assembly))
-        fill.colour(block_fill[self._block])
-        offsets, counts = self.assembly.offsets, np.diff(self.assembly.offsets)
-        closed = np.insert(np.arange(offsets[-1]), offsets[1:], offsets[:-1])
-        cells = np.insert(closed, np.concatenate([[0], np.cumsum(counts + 1)[:-1]]), counts + 1)
-        outline = self._layer("outline", palette.OUTLINE)
-        outline.width(self._fine * self._outline_width())
-        outline.replace(corners, lines=cells)
+    def _band(self, top: int, rows: int) -> Image.Image:
+        renderer = RendererAgg(self.size[0], rows, 72.0)
+        pixels = renderer.buffer_rgba()
+        np.asarray(pixels).view(np.uint32)[...] = np.array([*palette.PAPER, 255], np.uint8).view(np.uint32)
+        below = self.size[1] - top - rows
+        place = Affine2D().translate(*-self.frame.low).scale(1.0 / self.pixel).translate(0.0, -below)
+        for colour, width, path in self._paths():
+            pen = renderer.new_gc()
+            pen.set_snap(False)
+            pen.set_linewidth(width)
+            pen.set_joinstyle("miter")
+            pen.set_capstyle("butt")
+            rgb = tuple(c / 255.0 for c in colour)
+            pen.set_foreground(rgb)
+            renderer.draw_path(pen, path, place, None if width else rgb)
+        return Image.frombuffer("RGBA", (self.size[0], rows), pixels, "raw", "RGBA", 0, 1).convert("RGB")
+
+    def _paths(self) -> Iterator[tuple[Colour, float, Path]]:
+        """Colour, width of the line (0 where it is filled) and outlines, back to front.
+
+        What is filled alike, layer upon layer, is one path: between two that share an edge the background would shine
+        through.
+        """
+        names = sorted(self._layers.keys() | {"fill"}, key=lambda name: ORDER.index(name.split("/")[0]))
+        layers = [layer for name in names for layer in (self._fills if name == "fill" else [self._layers[name]])]
+        for (colour, width), alike in groupby(layers, key=lambda layer: (layer.colour, layer.width)):
+            drawn = [layer.path for layer in alike if len(layer.path.vertices)]
+            if drawn:
+                yield colour, width, drawn[0] if len(drawn) == 1 else Path.make_compound_path(*drawn)
+
+    def _paint(self, block_fill: np.ndarray) -> None:
+        """Set the colours of the blocks: one layer for each colour."""
+        colours, which = np.unique(block_fill, axis=0, return_inverse=True)
+        corners, codes = self._outlines
+        owner = np.repeat(which.ravel(), np.diff(self.assembly.offsets) + 1)
+        self._fills = [
+            _Layer((int(r), int(g), int(b)), corners[owner == k], codes[owner == k])
+            for k, (r, g, b) in enumerate(colours)
+        ]
 
     def _outline_width(self) -> float:
         """Pixels; thinner where the blocks are small, so that a façade does not turn dark."""
         return float(np.clip(self.assembly.block_size / self.pixel / 25.0, 0.6, self.size[1] / 540.0))
 
-    def _add_hatch(self) -> None:
+    def _hatch(self) -> None:
         supports = np.flatnonzero(~self.assembly.free)
         spacing = self.size[1] / 60.0 * self.pixel
         low, high = self.frame.low - self.frame.size, self.frame.high + self.frame.size
         points, blocks = hatch_lines(self.assembly, supports, low, high, spacing)
-        self._hatch = points, blocks
+        self._hatched = points, blocks
         if len(points):
-            layer = self._layer("hatch", palette.HATCH)
-            layer.width(self._fine * max(0.7, self.size[1] / 1000.0))
-            cells = np.column_stack([np.full(len(points) // 2, 2), np.arange(len(points)).reshape(-1, 2)])
-            layer.replace(points, lines=cells)
-
-    def _fix_camera(self) -> None:
-        plotter, (x, y) = self._plotter, (self.frame.low + self.frame.high) / 2.0
-        depth = float(self.frame.size.max())
-        plotter.enable_parallel_projection()
-        plotter.camera.position = (x, y, depth)
-        plotter.camera.focal_point = (x, y, 0.0)
-        plotter.camera.up = (0.0, 1.0, 0.0)
-        plotter.camera.parallel_scale = float(self.frame.size[1]) / 2.0
-        plotter.camera.clipping_range = (depth * 0.5, depth * 1.5)
-
-    def _layer(self, name: str, colour: tuple[int, int, int] | None) -> _Layer:
-        if name not in self._layers:
-            depth = DEPTHS[name.split("/")[0]] * float(self.frame.size.max())
-            self._layers[name] = _Layer(self._pv, depth)
-            self._plotter.renderer.AddActor(self._layers[name].actor)
-        if colour is not None:
-            self._layers[name].actor.prop.color = [c / 255.0 for c in colour]
-        return self._layers[name]
+            self.lines("hatch", points.reshape(-1, 2, 2), palette.HATCH, max(0.7, self.size[1] / 1000.0))
 
 
 class _Layer:
-    """One mesh at one depth."""
+    """Outlines or lines of one colour.
 
-    def __init__(self, pv: object, depth: float) -> None:
-        self._pv, self._depth = pv, depth
-        self.mesh = pv.PolyData()  # type: ignore[attr-defined]
-        self.actor = pv.Actor(mapper=pv.DataSetMapper(self.mesh))  # type: ignore[attr-defined]
-        self.actor.prop.lighting = False
-        self.actor.mapper.scalar_visibility = False
+    Parameters
+    ----------
+    colour : (int, int, int)
+    corners : (n,) int array
+        Number of the point at each corner of the path.
+    codes : (n,) array
+        What matplotlib's Path does there.
+    width : float
+        Of the lines in pixels; 0 where the outlines are filled.
+    """
 
-    def width(self, pixels: float) -> None:
-        self.actor.prop.line_width = pixels
-
-    def replace(self, points: np.ndarray, faces: np.ndarray | None = None, lines: np.ndarray | None = None) -> None:
-        self.actor.visibility = len(points) > 0
-        if len(points) == 0:
-            return
-        cells = {"faces": None if faces is None else faces.ravel(), "lines": None if lines is None else lines.ravel()}
-        self.mesh = self._pv.PolyData(self._lifted(points), **cells)  # type: ignore[attr-defined]
-        self.actor.mapper.dataset = self.mesh
+    def __init__(self, colour: Colour, corners: np.ndarray, codes: np.ndarray, width: float = 0.0) -> None:
+        self.colour, self.width, self.corners = colour, width, corners
+        self.path = Path(np.zeros((len(corners), 2)), codes)
+        self.path.should_simplify = False
 
     def move(self, points: np.ndarray) -> None:
-        self.mesh.points[:, :2] = points
-        self.mesh.GetPoints().Modified()
-        self.mesh.Modified()
+        """Put the points, (m, 2) [m], somewhere."""
+        self.path.vertices[:] = points[self.corners]
 
-    def colour(self, colours: np.ndarray) -> None:
-        self.mesh.point_data["colour"] = colours
-        self.mesh.point_data.active_scalars_name = "colour"
-        self.actor.mapper.scalar_visibility = True
-        self.actor.mapper.SetColorModeToDirectScalars()
 
-    def _lifted(self, points: np.ndarray) -> np.ndarray:
-        return np.column_stack([points, np.full(len(points), self._depth)])
+def _rings(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners and codes of closed rings of so many points each, one after another."""
+    starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    corners = np.insert(np.arange(starts[-1]), starts[1:], starts[:-1])
+    codes = np.full(len(corners), Path.LINETO, dtype=Path.code_type)
+    ends = starts[1:] + np.arange(len(counts))
+    codes[ends] = Path.CLOSEPOLY
+    codes[starts[:-1] + np.arange(len(counts))] = Path.MOVETO
+    return corners, codes

@@ -74,6 +74,7 @@ class Sheet:
         #: Left, top, right, bottom of the blocks' picture, in pixels.
         self.inside = (0, self.header, width - right, height - self.footer)
         self.beside = (width - beside_width, self.header, width, height - self.footer)
+        self._shared: tuple[tuple[Key, ...], float, Image.Image] | None = None
 
     @property
     def inside_size(self) -> tuple[int, int]:
@@ -108,17 +109,25 @@ class Sheet:
         beside : PIL.Image.Image, optional
             The picture to the right, as large as :attr:`beside`.
         """
-        page = Image.new("RGB", self.size, palette.PAPER)
+        page = self._sheet(tuple(keys), pixel).copy()
         page.paste(picture, self.inside[:2])
         if beside is not None:
             page.paste(beside, self.beside[:2])
         draw = ImageDraw.Draw(page)
         self._caption(draw, title, detail, badge)
-        end = self._scale_bar(draw, pixel)
-        self._legend(draw, keys, end + 2 * self.pad)
-        if self.colour_bar is not None:
-            self._colour_bar(page, draw, self.colour_bar)
         return page
+
+    def _sheet(self, keys: tuple[Key, ...], pixel: float) -> Image.Image:
+        """Draw what all pictures of a film share: scale bar, legend, colour bar."""
+        if self._shared is None or self._shared[:2] != (keys, pixel):
+            page = Image.new("RGB", self.size, palette.PAPER)
+            draw = ImageDraw.Draw(page)
+            end = self._scale_bar(draw, pixel)
+            self._legend(draw, keys, end + 2 * self.pad)
+            if self.colour_bar is not None:
+                self._colour_bar(page, draw, self.colour_bar)
+            self._shared = keys, pixel, page
+        return self._shared[2]
 
     def _caption(self, draw: ImageDraw.ImageDraw, title: str, detail: str, badge: str) -> None:
         right = self.size[0] - self.pad

@@ -1,4 +1,4 @@
-"""What fills the outlines: triangles of the blocks, hatch lines of the supports."""
+"""What fills the outlines: triangles of pockets, hatch lines of the supports."""
 
 from __future__ import annotations
 
@@ -9,25 +9,6 @@ import shapely
 
 import solver
 from blockvis.layout.triangulation import triangles_of_ring
-
-
-def triangles(assembly: solver.Assembly) -> np.ndarray:
-    """(n_triangles, 4) array of VTK cells over the vertices of the assembly; bent outlines included.
-
-    VTK fills a non-convex polygon as if it were convex, so the cutting is done here.
-    """
-    counts, offsets = np.diff(assembly.offsets), assembly.offsets
-    bent = np.zeros(assembly.n_blocks, dtype=bool)
-    bent[assembly.block_of_vertex[~assembly.convex_vertex]] = True
-    fans = []
-    for count in np.unique(counts[~bent]):
-        first = offsets[:-1][~bent & (counts == count)]
-        for k in range(1, count - 1):
-            fans.append(np.column_stack([np.full(len(first), 3), first, first + k, first + k + 1]))
-    for block in np.flatnonzero(bent):
-        corners = offsets[block] + triangles_of_ring(assembly.outline(int(block)))
-        fans.append(np.column_stack([np.full(len(corners), 3), corners]))
-    return np.concatenate(fans)
 
 
 def cut_into_triangles(outlines: Sequence[np.ndarray]) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,10 @@ from PIL import Image
 
 import solver
 from blockvis.atomic_files import whole_file
+from blockvis.fall import Fall, fall_of
 
 from .drawer import MOST_PARTS, Drawer, Look
-from .frame import framed
+from .swing import swing_of
 from .video import write_film
 
 STILL_SIZE = (1920, 1080)
@@ -44,7 +46,8 @@ def draw_still(
         Width and height in pixels.
     magnification : float
         Of displacements and rotations; 1 is true scale.
-    colour_by : {"material", "displacement"}
+    colour_by : {"material", "mechanism", "displacement"}
+        By "mechanism" the parts of the collapse mechanism have the tints of :func:`draw_mechanism`.
     forces : {"auto", "thrust", "points", "none"}
         Resultant of each joint, forces at the contact points, or neither; "auto" draws resultants where the blocks
         are few enough to see them.
@@ -56,17 +59,11 @@ def draw_still(
     Returns
     -------
     pathlib.Path
-
-    Raises
-    ------
-    RenderingUnavailable
-        Where there is no usable OpenGL; the message says what to install.
     """
     _check_response(response)
     chosen = response.increments[increment] if isinstance(increment, int) else increment
     look = Look(magnification, colour_by, forces, joints)
-    with Drawer(response, look, size, (chosen,), curve=curve) as drawer:
-        return _save(drawer.picture(chosen), path)
+    return _save(Drawer(response, look, size, (chosen,), curve=curve).picture(chosen), path)
 
 
 def draw_mechanism(
@@ -89,38 +86,11 @@ def draw_mechanism(
     pathlib.Path
     """
     _check_response(response)
-    last = response.governing or response.increments[0]
-    motion = last.velocity if response.collapse is None else response.collapse.mechanism
-    last = solver.with_motion(last, motion)
-    assembly = response.assembly
-    speeds = _speeds(assembly, last.pose, motion)
-    fastest = float(speeds.max(initial=0.0))
-    if response.collapse is None and fastest > 0.0:
-        # Without collapse a single loose brick may be the fastest: it would make the motion of the whole invisible.
-        fastest = _exceeded_by(0.01, speeds, assembly.areas) or fastest
-        motion = motion * np.minimum(1.0, fastest / np.maximum(speeds, fastest))[:, None]
-    reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
-    displaced = solver.swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
-    parts = solver.rigid_parts(assembly, last)
-    with Drawer(response, Look(forces="none"), size, (last,), extra=(displaced,)) as drawer:
-        if fastest > 0:
-            drawer.show_motion(last.pose, displaced, parts)
-        return _save(drawer.picture(last, note=_mechanism_note(response, parts)), path)
-
-
-def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
-    """(n_blocks,) array: speed of the fastest corner of each free block, zero for supports."""
-    block = assembly.block_of_vertex
-    velocity = solver.point_velocities(solver.moved_vertices(assembly, pose), block, pose, motion)
-    speeds = np.maximum.reduceat(np.hypot(*velocity.T), assembly.offsets[:-1])
-    return np.where(assembly.free, speeds, 0.0)
-
-
-def _exceeded_by(share: float, speeds: np.ndarray, areas: np.ndarray) -> float:
-    """Speed that blocks of this share of the moving area reach or exceed."""
-    order = np.argsort(speeds)[::-1]
-    moving = np.where(speeds[order] > 0.0, areas[order], 0.0).cumsum()
-    return float(speeds[order[np.searchsorted(moving, share * moving[-1])]])
+    swing = swing_of(response)
+    drawer = Drawer(response, Look(forces="none"), size, (swing.increment,), extra=(swing.displaced,))
+    if swing.moves:
+        drawer.show_motion(swing)
+    return _save(drawer.picture(swing.increment, note=_mechanism_note(response, swing.parts)), path)
 
 
 def animate(
@@ -131,15 +101,18 @@ def animate(
     fps: float = 25.0,
     seconds: float = 5.0,
     magnification: float = 1.0,
-    colour_by: str = "material",
+    colour_by: str = "mechanism",
     forces: str = "auto",
     joints: bool = True,
     curve: bool = False,
+    fall: Fall | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write the settlement and the fall as a film.
 
-    The settlement grows evenly over ``seconds``, the last equilibrium holds for a moment, then the frames of the
-    fall follow, marked as pseudo-time.
+    The settlement grows evenly over ``seconds``, the last equilibrium holds for a moment, then the fall follows in
+    real time: rigid-body dynamics without restitution. Without the extra ``fall``, or with a magnification, the
+    mechanism is followed step by step instead, marked as pseudo-time.
 
     Parameters
     ----------
@@ -154,6 +127,10 @@ def animate(
         Length of the part in equilibrium.
     magnification, colour_by, forces, joints, curve
         As in :func:`draw_still`.
+    fall : Fall, optional
+        Worked out already.
+    progress : callable, optional
+        Called with the frames drawn and their number.
 
     Returns
     -------
@@ -161,8 +138,13 @@ def animate(
     """
     _check_response(response)
     look = Look(magnification, colour_by, forces, joints)
-    with Drawer(response, look, size, response.increments, curve=curve) as drawer:
-        return write_film(drawer.frames(fps, seconds), path, size=size, fps=fps)
+    if magnification != 1.0:
+        fall = None
+    elif fall is None:
+        fall = fall_of(response)
+    shown = response.increments if fall is None else response.path
+    drawer = Drawer(response, look, size, shown, curve=curve, fall=fall)
+    return write_film(drawer.frames(fps, seconds, progress), path, size=size, fps=fps)
 
 
 def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:

@@ -245,7 +245,6 @@ def draw_results(
         What could not be drawn, and why; empty where all is there.
     """
     from blockvis.pictures.curves import draw_curve
-    from blockvis.pictures.opengl import RenderingUnavailable, rendering_available
     from blockvis.pictures.paraview import write_paraview_macro
     from blockvis.pictures.render import animate, draw_mechanism
     from blockvis.report.page import write_report
@@ -256,13 +255,7 @@ def draw_results(
     write_report(response, folder / "report.html", case_text)
     if response.path:
         draw_curve(response, folder / "curve.png")
-    problem = rendering_available()
-    if problem is not None:
-        return (problem,)
-    try:
-        draw_mechanism(response, folder / "mechanism.png")
-        if animation is not None:
-            animate(response, folder / animation)
-    except RenderingUnavailable as error:
-        return (str(error),)
+    draw_mechanism(response, folder / "mechanism.png")
+    if animation is not None:
+        animate(response, folder / animation)
     return ()

@@ -1,0 +1,71 @@
+"""The mechanism that follows the last equilibrium, as pictures and films show it: its parts, and where it takes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import solver
+
+from .frame import framed
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A mechanism and where it takes the blocks, out of scale.
+
+    Attributes
+    ----------
+    increment : solver.Increment
+        The state it begins at, with the motion that follows.
+    displaced : solver.Pose
+        After the motion; at the increment's own pose where nothing moves.
+    parts : (n_blocks,) int array
+        As ``solver.rigid_parts`` gives them.
+    moves : bool
+        Whether anything moves.
+    """
+
+    increment: solver.Increment
+    displaced: solver.Pose
+    parts: np.ndarray
+    moves: bool
+
+
+def swing_of(response: solver.Response) -> Swing:
+    """Find the mechanism that follows the last equilibrium, or the state that governs.
+
+    Parameters
+    ----------
+    response : solver.Response
+        With an increment at least.
+    """
+    last = response.governing or response.increments[0]
+    motion = last.velocity if response.collapse is None else response.collapse.mechanism
+    last = solver.with_motion(last, motion)
+    assembly = response.assembly
+    speeds = _speeds(assembly, last.pose, motion)
+    fastest = float(speeds.max(initial=0.0))
+    if response.collapse is None and fastest > 0.0:
+        # Without collapse a single loose brick may be the fastest: it would make the motion of the whole invisible.
+        fastest = _exceeded_by(0.01, speeds, assembly.areas) or fastest
+        motion = motion * np.minimum(1.0, fastest / np.maximum(speeds, fastest))[:, None]
+    reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
+    displaced = solver.swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
+    return Swing(last, displaced, solver.rigid_parts(assembly, last), fastest > 0.0)
+
+
+def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
+    """(n_blocks,) array: speed of the fastest corner of each free block, zero for supports."""
+    block = assembly.block_of_vertex
+    velocity = solver.point_velocities(solver.moved_vertices(assembly, pose), block, pose, motion)
+    speeds = np.maximum.reduceat(np.hypot(*velocity.T), assembly.offsets[:-1])
+    return np.where(assembly.free, speeds, 0.0)
+
+
+def _exceeded_by(share: float, speeds: np.ndarray, areas: np.ndarray) -> float:
+    """Speed that blocks of this share of the moving area reach or exceed."""
+    order = np.argsort(speeds)[::-1]
+    moving = np.where(speeds[order] > 0.0, areas[order], 0.0).cumsum()
+    return float(speeds[order[np.searchsorted(moving, share * moving[-1])]])
