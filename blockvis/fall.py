@@ -205,9 +205,7 @@ class _Engine:
         """Lay a slab, so that nothing falls through it, as wide as anything can get."""
         width = 100.0 * self.scale * float(np.ptp(self.assembly.vertices, axis=0).max())
         deep = 10.0 * SIZE
-        ground = engine.Poly(
-            self.space.static_body, [(-width, -deep), (width, -deep), (width, 0.0), (-width, 0.0)]
-        )
+        ground = engine.Poly(self.space.static_body, [(-width, -deep), (width, -deep), (width, 0.0), (-width, 0.0)])
         ground.elasticity = 0.0
         self.space.add(ground)
         self.ground = ground

@@ -8,18 +8,17 @@ import numpy as np
 import shapely
 
 import solver
-from blockvis.results.joints import InitialJoints
+from blockvis.results.joints import InitialJoints, faces_at
 
 #: A joint is shown open from this fraction of the block size on; on an ordinary brick it is a tenth of a millimetre.
 SMALLEST_OPENING = 1e-3
 
-#: What lies between faces is a crack up to this distance: on the path, in block sizes or lengths of the joint; in
-#: the fall, where blocks tumble apart, in lengths of the joint only, and up to this angle [rad].
-WIDEST_STANDING, WIDEST_FALLING, STEEPEST_FALLING = 1.5, 0.6, 1.0
+#: What lies between faces is a crack until they are apart by this many block sizes, or by their own length, or turned
+#: against each other by this angle [rad]. Then the blocks have parted, and what lies between them is air.
+WIDEST, STEEPEST = 0.5, 1.0
 
-#: What cracks and blocks enclose without covering it belongs to the cracks from this fraction of the block size squared
-#: (what is smaller is rounding) up to that: where several cracks meet.
-SMALLEST_POCKET, LARGEST_POCKET = 1e-5, 2.0
+#: A sliding joint is marked over this length at least, in block sizes.
+SHORTEST = 0.3
 
 #: Resultants below this fraction of the largest are not drawn.
 SMALLEST_RESULTANT = 2e-3
@@ -63,8 +62,6 @@ class Marks:
         Quadrilateral between the faces of each open joint: both ends on block a, then back along block b.
     openings : (n_cracks,) array [m]
         Largest distance of the two faces of each, unmagnified.
-    pockets : tuple of (n, 2) arrays [m]
-        Outlines of what is enclosed where cracks meet.
     sliding : (n_sliding, 2, 2) array [m]
         Ends of each sliding joint.
     hinges : (n_hinges, 2) array [m]
@@ -72,7 +69,6 @@ class Marks:
 
     cracks: np.ndarray
     openings: np.ndarray
-    pockets: tuple[np.ndarray, ...]
     sliding: np.ndarray
     hinges: np.ndarray
 
@@ -93,13 +89,11 @@ def marks_of(
     """
     contacts, mechanism = increment.contacts, solver.mechanism_of(assembly, increment)
     points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
-    falling = increment.status == solver.Status.FALLING
-    cracks, openings, cracked = _cracks(assembly, joints, increment.pose, shown, falling)
+    cracks, openings = _cracks(assembly, joints, increment.pose, shown)
     return Marks(
         cracks=cracks,
         openings=openings,
-        pockets=() if falling else _pockets(assembly, cracks, cracked, shown),
-        sliding=_sliding(contacts, mechanism.sliding_points, points),
+        sliding=_sliding(contacts, mechanism.sliding_points, points, assembly.block_size),
         hinges=points[mechanism.hinge_points],
     )
 
@@ -147,76 +141,70 @@ def length_per_force(sizes: np.ndarray, largest: float, usual_length: float, ext
 
 
 def _cracks(
-    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, shown: solver.Pose, falling: bool
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Quadrilaterals of the open joints, their openings [m], and the blocks beside them."""
-    initial = solver.Pose.initial(assembly)
-
-    def sides(at: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
-        on_a = np.stack([solver.carried(joints.ends[:, k], joints.block_a, initial, at) for k in (0, 1)], axis=1)
-        on_b = np.stack([solver.carried(joints.ends[:, k], joints.block_b, initial, at) for k in (0, 1)], axis=1)
-        return on_a, on_b
-
-    on_a, on_b = sides(pose)
-    normal = solver.turned(joints.normals, pose.rotations[joints.block_b])
+    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, shown: solver.Pose
+) -> tuple[np.ndarray, np.ndarray]:
+    """Quadrilaterals of the open joints, and their openings [m]."""
+    on_a, on_b, normal = faces_at(assembly, joints, pose)
     length = np.hypot(*(joints.ends[:, 1] - joints.ends[:, 0]).T)
     opening = np.einsum("nij,nj->ni", on_a - on_b, normal).max(axis=1)
     apart = np.hypot(*np.moveaxis(on_a - on_b, 2, 0)).min(axis=1)
-    # Blocks that have parted altogether have no joint any more: what lies between them is air, not a crack.
-    if falling:
-        turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])[:, 0]
-        together = (apart < WIDEST_FALLING * length) & (turn < STEEPEST_FALLING)
-    else:
-        together = apart < np.maximum(length, WIDEST_STANDING * assembly.block_size)
+    turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])[:, 0]
+    together = (apart < np.minimum(length, WIDEST * assembly.block_size)) & (turn < STEEPEST)
     is_open = (opening > SMALLEST_OPENING * assembly.block_size) & together
-    on_a, on_b = sides(shown)
-    beside = np.unique(np.concatenate([joints.block_a[is_open], joints.block_b[is_open]]))
-    return np.concatenate([on_a, on_b[:, ::-1]], axis=1)[is_open], opening[is_open], beside
+    on_a, on_b, _ = faces_at(assembly, joints, shown)
+    return np.concatenate([on_a, on_b[:, ::-1]], axis=1)[is_open], opening[is_open]
 
 
-def _pockets(
-    assembly: solver.Assembly, cracks: np.ndarray, cracked: np.ndarray, shown: solver.Pose
-) -> tuple[np.ndarray, ...]:
-    """Find what several cracks enclose that lies between no two faces: the corner that a brick has moved out of."""
-    if len(cracks) < 2:
-        return ()
-    size = assembly.block_size
-    corners = solver.moved_vertices(assembly, shown)
-    blocks = [corners[assembly.offsets[b] : assembly.offsets[b + 1]] for b in range(assembly.n_blocks)]
-    # A crack crosses itself where one end has closed up: its hull is taken. It is widened by the smallest opening, or a
-    # joint that is not quite open would leave the pocket without a wall on that side.
-    filled = shapely.buffer(
-        shapely.convex_hull(shapely.multipoints(cracks)), SMALLEST_OPENING * size, join_style="mitre", quad_segs=1
-    )
-    near = [shapely.Polygon(blocks[b]) for b in cracked]
-    covered = shapely.union_all([*shapely.buffer(near, 0.0), *filled])
-    holes = [
-        shapely.Polygon(ring)
-        for part in shapely.get_parts(covered)
-        for ring in part.interiors
-        if SMALLEST_POCKET * size**2 < shapely.Polygon(ring).area < LARGEST_POCKET * size**2
-    ]
-    if not holes:
-        return ()
-    # Openings of the layout are no pockets, nor are places where blocks without a crack stand.
-    tree = shapely.STRtree([shapely.Polygon(outline) for outline in blocks])
-    laid_out = shapely.STRtree([shapely.Polygon(assembly.outline(b)) for b in range(assembly.n_blocks)])
-    pockets = []
-    for hole in holes:
-        inside = hole.representative_point()
-        if len(tree.query(inside, predicate="intersects")) == 0 and len(laid_out.query(inside, predicate="intersects")):
-            pockets.append(shapely.get_coordinates(hole)[:-1])
-    return tuple(pockets)
-
-
-def joint_places(assembly: solver.Assembly, increment: solver.Increment) -> tuple[np.ndarray, np.ndarray]:
-    """Where the hinges are, and the middles of the sliding joints: (n, 2) arrays [m], at the increment's pose."""
+def joint_marks(assembly: solver.Assembly, increment: solver.Increment) -> tuple[np.ndarray, np.ndarray]:
+    """Where the hinges are, (n, 2) [m], and the ends of the sliding joints, (n, 2, 2) [m], at the increment's pose."""
     mechanism, contacts = solver.mechanism_of(assembly, increment), increment.contacts
-    stretches = _sliding(contacts, mechanism.sliding_points, contacts.points)
-    return contacts.points[mechanism.hinge_points], stretches.mean(axis=1)
+    return contacts.points[mechanism.hinge_points], _sliding(
+        contacts, mechanism.sliding_points, contacts.points, assembly.block_size
+    )
 
 
-def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray) -> np.ndarray:
+def settlement_arrows(
+    assembly: solver.Assembly, settlement: solver.Settlement, pose: solver.Pose, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find where arrows show how supports move in a settlement.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    settlement : solver.Settlement
+    pose : solver.Pose
+    low, high : (2,) arrays [m]
+        Corners of what the picture shows.
+
+    Returns
+    -------
+    blocks : (n,) int array
+        The supports; of more than four, the one in the middle stands for all.
+    places : (n, 2) array [m]
+        Inside the part of each that the picture shows.
+    directions : (n, 2) array
+        Unit vectors; zero where a support turns about that place.
+    """
+    part = np.flatnonzero(settlement.taking_part(assembly))
+    rate = settlement.rate(assembly, solver.Pose.initial(assembly), 0.0)
+    corners = solver.moved_vertices(assembly, pose)
+    outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in part]
+    shown = shapely.intersection(outlines, shapely.box(*low, *high))
+    seen = [k for k, outline in enumerate(shown) if not outline.is_empty]
+    if len(seen) > 4:
+        seen = [seen[len(seen) // 2]]
+    places = np.zeros((len(seen), 2))
+    for row, k in enumerate(seen):
+        # A bent support may have its centroid outside.
+        inside = shown[k].centroid if shown[k].contains(shown[k].centroid) else shown[k].point_on_surface()
+        places[row] = inside.coords[0]
+    blocks = part[seen]
+    speeds = solver.point_velocities(places, blocks, pose, rate)
+    sizes = np.hypot(*speeds.T)[:, None]
+    return blocks, places, np.divide(speeds, sizes, out=np.zeros_like(speeds), where=sizes > 0.0)
+
+
+def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray, size: float) -> np.ndarray:
     """(n, 2, 2) array [m]: ends of the part of each sliding joint that slides.
 
     Parameters
@@ -226,6 +214,8 @@ def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray) -> np
         Numbers of the contact points that slide.
     points : (n_contacts, 2) array [m]
         Where the contact points are drawn.
+    size : float [m]
+        Of a block.
     """
     if len(k) == 0:
         return np.zeros((0, 2, 2))
@@ -239,7 +229,7 @@ def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray) -> np
     np.minimum.at(lowest, which, place)
     np.maximum.at(highest, which, place)
     # A joint that slides on one point only still needs a length to be seen.
-    short = 0.15 * np.median(highest - lowest) if (highest > lowest).any() else 0.0
+    short = np.maximum(SHORTEST * size - (highest - lowest), 0.0) / 2.0
     lowest, highest = lowest - short, highest + short
     base = points[first]
     return np.stack([base + lowest[:, None] * tangent, base + highest[:, None] * tangent], axis=1)

@@ -136,3 +136,13 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
 def badge_of(response: solver.Response) -> str:
     """Warning on frames that are no equilibrium."""
     return "MECHANISM · pseudo-motion" if response.swings else "FALLING · pseudo-time"
+
+
+def failure_text(response: solver.Response) -> str:
+    """Say where the solver failed and why; empty where it did not."""
+    if response.stop is not solver.Status.SOLVER_FAILED:
+        return ""
+    where = ""
+    if response.path and response.parameter.is_path:
+        where = f" after {response.parameter.name} {parameter_text(response.path[-1].parameter, response)}"
+    return f"The solver failed{where}: {response.message}" if response.message else f"The solver failed{where}"

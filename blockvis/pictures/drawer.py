@@ -8,7 +8,6 @@ from functools import partial
 from itertools import chain, pairwise
 
 import numpy as np
-import shapely
 from PIL import Image
 
 import solver
@@ -24,14 +23,14 @@ from .annotations import (
     marks_of,
     part_outlines,
     resultants,
+    settlement_arrows,
 )
 from .captions import badge_of, matters, state_text
 from .curves import CurvePanel
 from .flat_scene import Scene, magnified
 from .frame import ColourBar, Key, Sheet, framed
-from .hatching import cut_into_triangles
 from .live_load import LiveLoads
-from .swing import Swing, swing_of
+from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
@@ -41,9 +40,6 @@ FINE_CRACK = 0.01
 
 #: Joints open by more than this fraction need no line: the middle of a wide crack may lie on a third block.
 WIDE_CRACK = 0.2
-
-#: Up to this many parts of a mechanism are tinted one by one.
-MOST_PARTS = 16
 
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
@@ -172,7 +168,7 @@ class Drawer:
             self._show_ground(fall.ground)
         self._swing = swing_of(response) if look.colour_by == "mechanism" else None
         if self._swing is not None and self._swing.moves:
-            self.tints = self._tints(self._swing)
+            self.tints = mechanism_colours(self.assembly, self.fill, self._swing)
         self._keys: list[Key] | None = None
 
     def _surveyed(self) -> Iterator[solver.Pose]:
@@ -226,7 +222,9 @@ class Drawer:
         self._draw_joints(at, shown)
         self._draw_forces(at, shown)
         self._draw_ground(shown)
-        self._draw_settlement_arrow(at, shown, hidden=self.fall is not None and increment.status == solver.Status.FALLING)
+        self._draw_settlement_arrow(
+            at, shown, hidden=self.fall is not None and increment.status == solver.Status.FALLING
+        )
         self._draw_live_load(increment, shown)
         falling = increment.status == solver.Status.FALLING
         head, detail = _caption(self.response, at, self.look, s)
@@ -315,7 +313,10 @@ class Drawer:
             pose=pose, contacts=nothing, forces=empty, displacements=empty, friction=np.zeros(0)
         )
         return self.picture(
-            falling, title=f"Fall   ·   {time:.2f} s after the last equilibrium", note=CAPTION, badge="FALLING · real time"
+            falling,
+            title=f"Fall   ·   {time:.2f} s after the last equilibrium",
+            note=CAPTION,
+            badge="FALLING · real time",
         )
 
     def show_motion(self, swing: Swing) -> None:
@@ -340,7 +341,7 @@ class Drawer:
             moves = np.flatnonzero(parts >= 0)
             _, first = np.unique(cell[moves], axis=0, return_index=True)
             chosen = [moves[[k]] for k in first]
-        self.tints = self._tints(swing)
+        self.tints = mechanism_colours(self.assembly, self.fill, swing)
         scene.pose(pose, self.tints)
         tails, tips = np.zeros((len(chosen), 2)), np.zeros((len(chosen), 2))
         for k, blocks in enumerate(chosen):
@@ -348,14 +349,6 @@ class Drawer:
             tails[k] = weight @ pose.positions[blocks]
             tips[k] = solver.carried(tails[[k]], blocks[:1], pose, displaced)[0]
         self._arrows("motion", tails, tips, 0.6)
-
-    def _tints(self, swing: Swing) -> np.ndarray:
-        """(n_blocks, 3) uint8 array: fills with the parts of a mechanism tinted, or darker where they are faster."""
-        if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
-            return palette.part_colours(self.fill, swing.parts)
-        travel = np.hypot(*(swing.displaced.positions - swing.increment.pose.positions).T)
-        tints = palette.displacement_colours(0.75 * travel / travel[self.assembly.free].max())
-        return np.where(self.assembly.free[:, None], tints, self.fill)
 
     def keys(self) -> list[Key]:
         """Return the legend: what is marked in any of the increments, so that it is the same in all pictures."""
@@ -396,7 +389,6 @@ class Drawer:
         scene, thin = self.scene, self.scene.size[1] / 1080.0
         found = marks_of(self.assembly, self.joints, increment, shown)
         scene.polygons("crack", found.cracks, palette.OPEN)
-        scene.polygons("crack/pocket", cut_into_triangles(found.pockets), palette.OPEN)
         middle = (found.cracks[:, [0, 1]] + found.cracks[:, [3, 2]]) / 2.0 if len(found.cracks) else found.cracks
         width = found.openings / self.assembly.block_size
         fine, wide = width < FINE_CRACK, width * self.look.magnification > WIDE_CRACK
@@ -458,7 +450,9 @@ class Drawer:
             "earth", np.array([[[left, height], [right, height]]]), palette.HATCH, max(1.2, self.scene.size[1] / 400.0)
         )
         x = np.arange(left, right + tick, tick)
-        ticks = np.stack([np.stack([x, x - tick], axis=1), np.broadcast_to([height, height - tick], (len(x), 2))], axis=2)
+        ticks = np.stack(
+            [np.stack([x, x - tick], axis=1), np.broadcast_to([height, height - tick], (len(x), 2))], axis=2
+        )
         self.scene.lines("earth/hatch", ticks, palette.HATCH, max(0.7, self.scene.size[1] / 1000.0))
 
     def _draw_ground(self, shown: solver.Pose) -> None:
@@ -484,26 +478,10 @@ class Drawer:
                 self._arrows("arrow", np.zeros((0, 2)), np.zeros((0, 2)), 1.0)
             return
         phase = self.response.settlements[min(increment.phase, len(self.response.settlements) - 1)]
-        part = np.flatnonzero(phase.taking_part(assembly))
-        rate = phase.rate(assembly, solver.Pose.initial(assembly), 0.0)
-        corners = solver.moved_vertices(assembly, shown)
-        window = shapely.box(*scene.frame.low, *scene.frame.high)
-        outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in part]
-        seen = [(b, o) for b, o in zip(part, shapely.intersection(outlines, window), strict=True) if not o.is_empty]
-        if len(seen) > 4:
-            seen = [seen[len(seen) // 2]]
-        length = 0.055 * float(scene.frame.size.max())
-        tails, tips = [], []
-        for block, outline in seen:
-            # A bent support may have its centroid outside.
-            inside = outline.centroid if outline.contains(outline.centroid) else outline.point_on_surface()
-            place = np.array(inside.coords[0])
-            speed = solver.point_velocities(place[None], np.array([block]), shown, rate)[0]
-            if np.hypot(*speed) > 0:
-                along = speed / np.hypot(*speed) * length
-                tails.append(place - along / 2.0)
-                tips.append(place + along / 2.0)
-        self._arrows("arrow", np.array(tails).reshape(-1, 2), np.array(tips).reshape(-1, 2), 1.0)
+        _, places, directions = settlement_arrows(assembly, phase, shown, scene.frame.low, scene.frame.high)
+        half = 0.0275 * float(scene.frame.size.max()) * directions[directions.any(axis=1)]
+        places = places[directions.any(axis=1)]
+        self._arrows("arrow", places - half, places + half, 1.0)
 
     def _arrows(
         self,

@@ -52,9 +52,7 @@ class Scene:
         Colours of the blocks.
     """
 
-    def __init__(
-        self, assembly: solver.Assembly, frame: Frame, size: tuple[int, int], block_fill: np.ndarray
-    ) -> None:
+    def __init__(self, assembly: solver.Assembly, frame: Frame, size: tuple[int, int], block_fill: np.ndarray) -> None:
         self.assembly, self.size = assembly, size
         self.frame = frame.fitted(*size)
         #: Size of a pixel in the world [m].

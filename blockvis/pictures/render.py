@@ -13,8 +13,8 @@ import solver
 from blockvis.atomic_files import whole_file
 from blockvis.fall import Fall, fall_of
 
-from .drawer import MOST_PARTS, Drawer, Look
-from .swing import swing_of
+from .drawer import Drawer, Look
+from .swing import MOST_PARTS, swing_of
 from .video import write_film
 
 STILL_SIZE = (1920, 1080)
