@@ -57,8 +57,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except solver.SolveError as error:
         print(f"blockvis: the linear program could not be solved: {error}", file=sys.stderr)
         return SOLVER_FAILED
-    except KeyboardInterrupt:
-        print("blockvis: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(f"blockvis: {stop}" if str(stop) else "blockvis: interrupted", file=sys.stderr)
         return INTERRUPTED
     return code
 
@@ -97,6 +97,10 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--resume", metavar="OUT", help="go on with the run in this results folder, however it was stopped"
     )
+    run.add_argument("--no-film", action="store_true", help="draw all but the film")
+    run.add_argument(
+        "--no-pictures", action="store_true", help="draw nothing and write no report; blockvis render OUT does later"
+    )
     run.set_defaults(verb=_run)
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
     info.add_argument("file", metavar="FILE")
@@ -130,7 +134,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("results", metavar="OUT")
     render.add_argument("--animation", default="collapse.mp4", help=".mp4, .gif or .webp in the folder; none to skip")
     render.add_argument("--magnification", type=float, default=1.0, help="of the displacements")
-    render.add_argument("--colour-by", choices=("material", "displacement"), default="material")
+    render.add_argument("--colour-by", choices=("material", "mechanism", "displacement"), default="mechanism")
     render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
     render.add_argument("--size", default="1280x720", metavar="WxH")
@@ -249,16 +253,17 @@ def _run(options: argparse.Namespace) -> int:
     from .cases.case import read_case
     from .runs.run import resume_run, run_case
 
+    drawn = {"film": not options.no_film, "pictures": not options.no_pictures}
     if options.resume is not None:
         if options.case is not None or options.output is not None or options.force or options.set:
             raise ValueError("--resume takes the results folder alone; the case is stored in it")
-        run = resume_run(options.resume)
+        run = resume_run(options.resume, **drawn)
         if run.had_finished:
             print(f"blockvis: this run had finished ({run.response.stop}); nothing was left to solve", file=sys.stderr)
     elif options.case is None:
         raise ValueError("name a case file: blockvis run CASE.toml, or go on with a run: blockvis run --resume OUT")
     else:
-        run = run_case(read_case(options.case, options.set), options.output, overwrite=options.force)
+        run = run_case(read_case(options.case, options.set), options.output, overwrite=options.force, **drawn)
     print(_in_words(run.response, run.folder))
     for problem in run.missing:
         print(f"blockvis: everything but the pictures is written: {problem}", file=sys.stderr)
@@ -311,17 +316,21 @@ def _layout(options: argparse.Namespace) -> int:
 
 
 def _render(options: argparse.Namespace) -> int:
+    from .fall import fall_of
     from .pictures.curves import draw_curve
     from .pictures.render import animate, draw_mechanism, draw_still
     from .report.page import write_report
+    from .results.fall_files import stored_fall
     from .results.folder import stored_case
+    from .runs.progress import DrawingProgress
     from .runs.reopen import open_results
 
     folder = Path(options.results)
     response = open_results(folder)
     width, _, height = options.size.partition("x")
     size = (int(_number(width)), int(_number(height or "0")))
-    write_report(response, folder / "report.html", stored_case(folder))
+    fall = stored_fall(folder) or fall_of(response)
+    write_report(response, folder / "report.html", stored_case(folder), fall=fall)
     drawn = ["report.html"]
     if response.path:
         draw_curve(response, folder / "curve.png")
@@ -338,7 +347,11 @@ def _render(options: argparse.Namespace) -> int:
     draw_mechanism(response, folder / "mechanism.png")
     drawn += ["last.png", "mechanism.png"]
     if options.animation != "none":
-        animate(response, folder / options.animation, size=size, **look)
+        progress = DrawingProgress()
+        try:
+            animate(response, folder / options.animation, size=size, fall=fall, progress=progress.frame, **look)
+        finally:
+            progress.done()
         drawn.append(options.animation)
     print(f"drawn in {folder}/: {', '.join(drawn)}")
     return 0

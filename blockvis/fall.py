@@ -6,7 +6,7 @@ friction; it says nothing about the settlement at collapse and nothing of the st
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,6 +44,10 @@ STILL, RESTING = 4e-3, 0.2
 
 #: Something has fallen where a block has moved by more than this part of the block size.
 FALLEN = 0.25
+
+#: Faces of supports steeper than 1 in this are walls, not places to lie on; the ground lies no deeper below the
+#: structure than this part of its height, however far supports reach down.
+STEEP, DEEPEST = 0.3, 0.25
 
 #: Clearance between the ground and the lowest corner, in block sizes: what stands on a support stands on that alone.
 CLEARANCE = 1e-3
@@ -118,6 +122,39 @@ def fall_of(response: solver.Response) -> Fall | None:
     return None
 
 
+def falling_increment(response: solver.Response, pose: solver.Pose) -> solver.Increment:
+    """Make what pictures, pages and files show of a fall at one pose: blocks alone, no joints and no forces.
+
+    Parameters
+    ----------
+    response : solver.Response
+    pose : solver.Pose
+    """
+    last = response.path[-1]
+    nothing = np.zeros((0, last.forces.shape[1]))
+    return replace(last, status=solver.Status.FALLING, checkpoint=None).with_arrays(
+        pose=pose,
+        contacts=last.contacts[np.zeros(0, dtype=int)],
+        forces=nothing,
+        displacements=nothing,
+        friction=np.zeros(0),
+        velocity=np.zeros_like(last.velocity),
+        support_forces=np.zeros_like(last.support_forces),
+    )
+
+
+def _ground(assembly: solver.Assembly, pose: solver.Pose) -> float:
+    """Height of the ground line [m]: of the lowest place on which something stands or may slide down to."""
+    corners, free = solver.moved_vertices(assembly, pose), assembly.free[assembly.block_of_vertex]
+    following = corners[assembly.next_vertex]
+    # The outward normal of an edge points up where the edge runs to the left.
+    upward = ~free & (corners[:, 0] - following[:, 0] > STEEP * np.abs(following[:, 1] - corners[:, 1]))
+    low, high = corners[free, 1].min(), corners[free, 1].max()
+    faces = np.minimum(corners[upward, 1], following[upward, 1])
+    ground = max(faces.min(initial=low), low - DEEPEST * (high - low))
+    return float(min(ground, low) - CLEARANCE * assembly.block_size)
+
+
 class _Engine:
     """The last equilibrium of a response as bodies of the engine, lengths scaled, the ground at height 0.
 
@@ -134,8 +171,7 @@ class _Engine:
         assembly, last = response.assembly, response.path[-1]
         self.assembly, self.pose = assembly, last.pose
         self.scale = SIZE / assembly.block_size
-        corners = solver.moved_vertices(assembly, self.pose)[assembly.free[assembly.block_of_vertex]]
-        self.origin = np.array([corners[:, 0].mean(), corners[:, 1].min() - CLEARANCE * assembly.block_size])
+        self.origin = np.array([self.pose.positions[assembly.free, 0].mean(), _ground(assembly, self.pose)])
         self.speed = float(np.sqrt(solver.GRAVITY * assembly.block_size))
         self.thinnest = float(assembly.widths[assembly.free].min())
         self.space = pymunk.Space()
@@ -181,7 +217,7 @@ class _Engine:
         positions, rotations = (np.stack(of) for of in zip(*samples, strict=True))
         return Fall(np.arange(len(samples)) / RATE, positions, rotations, float(self.origin[1]))
 
-    def _body(self, engine: pymunk, block: int, mass: float) -> pymunk.Body:  # type: ignore[valid-type]
+    def _body(self, engine: pymunk, block: int, mass: float) -> pymunk.Body:
         assembly = self.assembly
         outline = (assembly.outline(block) - assembly.centroids[block]) * self.scale
         ring = [tuple(map(float, corner)) for corner in outline]
@@ -201,7 +237,7 @@ class _Engine:
         self.space.add(body, *parts)
         return body
 
-    def _lay_ground(self, engine: pymunk) -> None:  # type: ignore[valid-type]
+    def _lay_ground(self, engine: pymunk) -> None:
         """Lay a slab, so that nothing falls through it, as wide as anything can get."""
         width = 100.0 * self.scale * float(np.ptp(self.assembly.vertices, axis=0).max())
         deep = 10.0 * SIZE

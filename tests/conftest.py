@@ -12,7 +12,7 @@ import blockvis
 import solver
 
 _RUN = sys.modules[blockvis.run_case.__module__]
-_DRAW_RESULTS = _RUN.draw_results
+_DRAW_RESULTS, _STARTED_FILM = _RUN.draw_results, _RUN.started_film
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -20,6 +20,7 @@ def undrawn() -> Iterator[None]:
     """Runs write no pictures and no report: most tests look at numbers, and pictures take longer than the solution."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(_RUN, "draw_results", lambda *_, **__: ())
+        patched.setattr(_RUN, "started_film", lambda *_, **__: None)
         yield
 
 
@@ -29,6 +30,7 @@ def drawn_where_marked(request: pytest.FixtureRequest, undrawn: None) -> Iterato
     with pytest.MonkeyPatch.context() as patched:
         if request.node.get_closest_marker("pictures"):
             patched.setattr(_RUN, "draw_results", _DRAW_RESULTS)
+            patched.setattr(_RUN, "started_film", _STARTED_FILM)
         yield
 
 

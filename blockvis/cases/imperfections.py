@@ -11,7 +11,6 @@ import scipy.sparse as sp
 import shapely
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
-from scipy.spatial import cKDTree
 
 import solver
 from blockvis.suggestions import nearest
@@ -169,6 +168,8 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
     share = np.full(n, np.inf)
     np.minimum.at(share, place, assembly.widths[owner])
     if n > 1:
+        from scipy.spatial import cKDTree
+
         share = np.minimum(share, cKDTree(positions).query(positions, k=2)[0][:, 1])
     drawn = imperfection.distribution.quantile(_uniform(imperfection, n, 2))
     held = np.zeros(n, dtype=bool)
@@ -209,6 +210,8 @@ def moved_corners(assembly: solver.Assembly, imperfection: Imperfection) -> solv
 
 def _places(vertices: np.ndarray, near: float) -> np.ndarray:
     """(n_vertices,) int array: number of the place of each corner; corners at one place share it."""
+    from scipy.spatial import cKDTree
+
     pairs = cKDTree(vertices).query_pairs(near, output_type="ndarray")
     graph = sp.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(vertices),) * 2)
     return connected_components(graph, directed=False)[1].astype(int)

@@ -7,6 +7,9 @@ import numpy as np
 import solver
 from blockvis.numbers import force_text
 
+#: Warning on frames of a fall in real time.
+FALL_BADGE = "FALLING · real time"
+
 #: Multipliers above this many times the lowest of an envelope are not shown: over a support a load may grow nearly
 #: without limit.
 MOST_OVER_LOWEST = 8.0

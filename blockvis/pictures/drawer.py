@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 import solver
-from blockvis.fall import CAPTION, Fall
+from blockvis.fall import CAPTION, Fall, falling_increment
 from blockvis.numbers import force_text, rounded_length
 from blockvis.results.joints import initial_joints
 
@@ -25,7 +25,7 @@ from .annotations import (
     resultants,
     settlement_arrows,
 )
-from .captions import badge_of, matters, state_text
+from .captions import FALL_BADGE, badge_of, matters, state_text
 from .curves import CurvePanel
 from .flat_scene import Scene, magnified
 from .frame import ColourBar, Key, Sheet, framed
@@ -200,6 +200,7 @@ class Drawer:
         title: str = "",
         note: str = "",
         badge: str = "",
+        joints: bool = True,
     ) -> Image.Image:
         """Draw one increment; for frames in between, with its blocks at another pose.
 
@@ -212,6 +213,8 @@ class Drawer:
             The parameter there.
         title, note, badge : str
             First and second line of the caption, and the warning, instead of those of the increment.
+        joints : bool
+            Mark the joints, as far as the look has them.
         """
         if self._swing is not None and pose is None and increment is self.response.governing:
             increment = self._swing.increment
@@ -219,7 +222,7 @@ class Drawer:
         shown = magnified(self.assembly, true, self.look.magnification)
         at = increment.with_arrays(pose=true, contacts=_contacts_at(increment, true)) if pose is not None else increment
         self.scene.pose(shown, self._block_colours(true))
-        self._draw_joints(at, shown)
+        self._draw_joints(at, shown, visible=joints)
         self._draw_forces(at, shown)
         self._draw_ground(shown)
         self._draw_settlement_arrow(
@@ -305,18 +308,12 @@ class Drawer:
     def falling_picture(self, time: float) -> Image.Image:
         """Draw the fall at a time [s] after the last equilibrium."""
         assert self.fall is not None
-        pose = self.fall.at(time)
-        last = self.response.path[-1]
-        nothing = last.contacts[np.zeros(0, dtype=int)]
-        empty = np.zeros((0, last.forces.shape[1]))
-        falling = replace(last, status=solver.Status.FALLING).with_arrays(
-            pose=pose, contacts=nothing, forces=empty, displacements=empty, friction=np.zeros(0)
-        )
         return self.picture(
-            falling,
+            falling_increment(self.response, self.fall.at(time)),
             title=f"Fall   ·   {time:.2f} s after the last equilibrium",
-            note=CAPTION,
-            badge="FALLING · real time",
+            note=f"{CAPTION}   ·   true scale",
+            badge=FALL_BADGE,
+            joints=False,
         )
 
     def show_motion(self, swing: Swing) -> None:
@@ -383,8 +380,11 @@ class Drawer:
         colours = palette.displacement_colours(np.hypot(*moved.T) / (self.largest or 1.0))
         return np.where(self.assembly.free[:, None], colours, self.fill)
 
-    def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> None:
+    def _draw_joints(self, increment: solver.Increment, shown: solver.Pose, *, visible: bool) -> None:
         if not self.look.joints:
+            return
+        if not visible:
+            self.scene.clear("crack", "crack edge", "sliding", "hinge", "hinge top")
             return
         scene, thin = self.scene, self.scene.size[1] / 1080.0
         found = marks_of(self.assembly, self.joints, increment, shown)
@@ -408,8 +408,7 @@ class Drawer:
         scene = self.scene
         if increment.status == solver.Status.FALLING:
             # Without equilibrium the forces have no meaning.
-            scene.polygons("force", np.zeros((0, 4, 2)), palette.FORCE)
-            scene.lines("force line", np.zeros((0, 2, 2)), palette.FORCE, 1.0)
+            scene.clear("force", "force line")
             return
         points, forces, blocks = _joint_forces(increment, self.look.forces)
         size = np.hypot(*forces.T)
@@ -474,8 +473,7 @@ class Drawer:
     def _draw_settlement_arrow(self, increment: solver.Increment, shown: solver.Pose, *, hidden: bool) -> None:
         assembly, scene = self.assembly, self.scene
         if hidden or not self.response.settlements:
-            if self.response.settlements:
-                self._arrows("arrow", np.zeros((0, 2)), np.zeros((0, 2)), 1.0)
+            scene.clear("arrow rim", "arrow top")
             return
         phase = self.response.settlements[min(increment.phase, len(self.response.settlements) - 1)]
         _, places, directions = settlement_arrows(assembly, phase, shown, scene.frame.low, scene.frame.high)

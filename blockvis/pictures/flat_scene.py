@@ -112,6 +112,12 @@ class Scene:
         rim = radius * self.pixel * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         self.polygons(layer, centres[:, None, :] + rim[None, :, :], colour)
 
+    def clear(self, *layers: str) -> None:
+        """Remove layers, parts of them (after a "/") included."""
+        for name in self.layers:
+            if name.split("/")[0] in layers:
+                del self._layers[name]
+
     def image(self) -> Image.Image:
         """Draw the picture."""
         width, height = self.size
@@ -152,7 +158,7 @@ class Scene:
         names = sorted(self._layers.keys() | {"fill"}, key=lambda name: ORDER.index(name.split("/")[0]))
         layers = [layer for name in names for layer in (self._fills if name == "fill" else [self._layers[name]])]
         for (colour, width), alike in groupby(layers, key=lambda layer: (layer.colour, layer.width)):
-            drawn = [layer.path for layer in alike if len(layer.path.vertices)]
+            drawn = [layer.path for layer in alike if len(layer.corners)]
             if drawn:
                 yield colour, width, drawn[0] if len(drawn) == 1 else Path.make_compound_path(*drawn)
 
@@ -196,12 +202,14 @@ class _Layer:
 
     def __init__(self, colour: Colour, corners: np.ndarray, codes: np.ndarray, width: float = 0.0) -> None:
         self.colour, self.width, self.corners = colour, width, corners
-        self.path = Path(np.zeros((len(corners), 2)), codes)
+        self.points = np.zeros((len(corners), 2))
+        # The path looks at the points, which move.
+        self.path = Path(self.points, codes)
         self.path.should_simplify = False
 
     def move(self, points: np.ndarray) -> None:
         """Put the points, (m, 2) [m], somewhere."""
-        self.path.vertices[:] = points[self.corners]
+        self.points[:] = points[self.corners]
 
 
 def _rings(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The mechanism that follows the last equilibrium, as pictures and films show it: its parts, and where it takes them."""
+"""The mechanism that follows the last equilibrium, as pictures and films show it: its parts, and where they go."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import os
 import time
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -21,7 +21,7 @@ from matplotlib.ticker import MaxNLocator
 
 import solver
 from blockvis.atomic_files import write_whole
-from blockvis.fall import CAPTION, Fall
+from blockvis.fall import CAPTION, Fall, falling_increment
 from blockvis.numbers import force_text, rounded_length
 from blockvis.pictures import palette
 from blockvis.pictures.annotations import (
@@ -35,6 +35,7 @@ from blockvis.pictures.annotations import (
     settlement_arrows,
 )
 from blockvis.pictures.captions import (
+    FALL_BADGE,
     badge_of,
     collapse_places,
     failure_text,
@@ -147,7 +148,7 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
         title=html.escape(title or " · ".join(filter(None, (about.name, headline_of(response))))),
         about=" · ".join(html.escape(part) for part in (about.file, about.finished, about.version) if part),
         failed=f'<p class="failed">{html.escape(failure_text(response))}</p>' if failed else "",
-        badge=html.escape(CAPTION if fall is not None else badge_of(response)),
+        badge=html.escape(FALL_BADGE if fall is not None else badge_of(response)),
         notes=_notes(response),
         style=(page / "player.css").read_text(encoding="utf-8"),
         script=(page / "player.js").read_text(encoding="utf-8"),
@@ -206,15 +207,7 @@ def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> li
         return [framed_at(increment) for increment in _thinned(response.increments, most)]
     n = min(round(float(fall.times[-1]) * FALL_RATE), most // 2)
     times = np.linspace(0.0, float(fall.times[-1]), n + 1)[1:]
-    last = path[-1]
-    none = np.zeros((0, last.forces.shape[1]))
-    state = replace(
-        last.state, contacts=last.contacts[np.zeros(0, dtype=int)], forces=none, displacements=none, friction=none[:, 0]
-    )
-    falling = [
-        _Frame(replace(last, status=solver.Status.FALLING, held=replace(state, pose=fall.at(at))), len(path), float(at))
-        for at in times
-    ]
+    falling = [_Frame(falling_increment(response, fall.at(at)), len(path), float(at)) for at in times]
     return [*map(framed_at, _thinned(path, most - n)), *falling]
 
 
@@ -266,6 +259,8 @@ def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
         },
         "frames": _frames(response, frames),
         "times": _times(frames),
+        # In a fall in time blocks part and meet anew: what lay between two of them is no joint any more.
+        "joints_of_fall": fall is None,
         "curve": _curve(response),
         "force_unit": FORCE_FINENESS * largest,
         "force_length": force_length,
@@ -438,7 +433,7 @@ def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, An
     for frame in shown:
         increment = frame.increment
         if frame.time is not None:
-            caption = f"Fall {frame.time:.2f} s after the last equilibrium"
+            caption = f"{CAPTION}  ·  {frame.time:.2f} s"
         else:
             caption = state_text(increment, response).replace("   ·   ", "  ·  ")
             if len(response.settlements) > 1:

@@ -175,7 +175,7 @@
   }
 
   // Fills the open joints; returns the middle lines of those too narrow to be seen as areas.
-  function drawCracks(pen, falling) {
+  function drawCracks(pen) {
     const lines = [], [widest, steepest] = model.widest;
     pen.fillStyle = model.colours.open;
     for (let j = 0; j < joints.n; j++) {
@@ -198,7 +198,7 @@
       pen.beginPath(); pen.moveTo(0, py(model.ground)); pen.lineTo(w, py(model.ground)); pen.stroke();
     }
     if (layers.start) drawStart(pen, colours);
-    const lines = layers.cracks ? drawCracks(pen, falling) : [];
+    const lines = layers.cracks && (!falling || model.joints_of_fall) ? drawCracks(pen) : [];
     pen.strokeStyle = model.colours.outline;
     pen.lineWidth = Math.max(0.4, Math.min(1.1, model.block_size * state.view.scale / 25));
     for (let b = 0; b < nBlocks; b++) {

@@ -84,13 +84,14 @@ class StoredIncrements:
         return len(list((self.folder / "increments").glob("state_*.npz")))
 
     def without_arrays(self, number: int, increment: solver.Increment) -> solver.Increment:
-        """Drop the arrays of an increment that has been written: it reads them from its file.
+        """Drop the arrays of an increment that has been written: it reads them from its file, or from those kept last.
 
         Parameters
         ----------
         number : int
         increment : solver.Increment
         """
+        self._keep(number, replace(increment, checkpoint=None))
         return replace(increment, held=StateInFile(self, number, _numbers(increment)), checkpoint=None)
 
     def opened(self, number: int) -> solver.Increment:
@@ -118,12 +119,17 @@ class StoredIncrements:
         if number in self._last:
             self._last.move_to_end(number)
         else:
-            found = self._read(number)
-            self._last[number] = found
-            self._bytes += _bytes_of(found)
-            while len(self._last) > AT_LEAST and self._bytes > CACHED:
-                self._bytes -= _bytes_of(self._last.popitem(last=False)[1])
+            self._keep(number, self._read(number))
         return self._last[number]
+
+    def _keep(self, number: int, increment: solver.Increment) -> None:
+        """Keep an increment with its arrays, and forget those used longest ago."""
+        if number in self._last:
+            self._bytes -= _bytes_of(self._last.pop(number))
+        self._last[number] = increment
+        self._bytes += _bytes_of(increment)
+        while len(self._last) > AT_LEAST and self._bytes > CACHED:
+            self._bytes -= _bytes_of(self._last.popitem(last=False)[1])
 
     def _read(self, number: int) -> solver.Increment:
         try:

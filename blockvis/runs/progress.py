@@ -1,4 +1,4 @@
-"""Progress of a run on stderr; nothing where stderr is no terminal."""
+"""Progress of a run on stderr: a bar on a terminal, elsewhere a line now and then."""
 
 from __future__ import annotations
 
@@ -13,6 +13,65 @@ from .kind import Course
 #: Seconds between two redrawings of the bar.
 REDRAW = 0.1
 
+#: Seconds between two lines where stderr is no terminal: short runs write none.
+LINES = 10.0
+
+
+class _Line:
+    """One line on stderr that is written again and again; where it is no terminal, lines now and then.
+
+    Parameters
+    ----------
+    stream : text stream, optional
+        stderr by default.
+    """
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self.stream = sys.stderr if stream is None else stream
+        self.watched = self.stream.isatty()
+        self.started = time.perf_counter()
+        self.last = -1.0 if self.watched else self.started
+
+    @property
+    def due(self) -> bool:
+        """Whether it is time to write again."""
+        return time.perf_counter() - self.last >= (REDRAW if self.watched else LINES)
+
+    def write(self, text: str) -> None:
+        """Write the line, with the seconds so far."""
+        self.last = time.perf_counter()
+        text = f"{text}, {self.last - self.started:.1f} s"
+        self.stream.write(f"\r\x1b[K{text}" if self.watched else f"blockvis: {text}\n")
+        self.stream.flush()
+
+    def clear(self) -> None:
+        """Clear the line."""
+        if self.watched:
+            self.stream.write("\r\x1b[K")
+            self.stream.flush()
+
+
+class DrawingProgress:
+    """A bar that counts the frames of the film.
+
+    Parameters
+    ----------
+    stream : text stream, optional
+        stderr by default.
+    """
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._line = _Line(stream)
+
+    def frame(self, done: int, total: int) -> None:
+        """Show how many frames are drawn."""
+        if self._line.due or (self._line.watched and done == total):
+            self._line.write(f"[{'#' * (24 * done // max(total, 1)):<24}] frame {done} of {total}")
+
+    def done(self) -> None:
+        """Clear the bar."""
+        self._line.clear()
+
 
 class Progress:
     """A bar that follows the parameter of an analysis towards its limit.
@@ -22,50 +81,34 @@ class Progress:
     course : Course
         What the increments run over.
     stream : text stream, optional
-        stderr by default; nothing is written unless it is a terminal.
+        stderr by default.
     """
 
     def __init__(self, course: Course, stream: TextIO | None = None) -> None:
-        self.course = course
-        self.stream = sys.stderr if stream is None else stream
-        self.shown = self.stream.isatty()
-        self.started = time.perf_counter()
-        self.last, self.count = -1.0, 0
+        self.course, self.count, self._line = course, 0, _Line(stream)
 
     def increment(self, increment: solver.Increment) -> None:
         """Show an increment."""
         self.count += 1
-        if not self.shown or time.perf_counter() - self.last < REDRAW:
+        if not self._line.due:
             return
         parameter, measured, drivers = self.course.parameter, self.course.measured, self.course.drivers
         what = f"{measured.name} {increment.measured:.5g} {measured.unit}".rstrip()
         if increment.status == solver.Status.FALLING:
             what = "falls"
         if not drivers:
-            self._line(f"{what}, {self.count} increments")
+            self._line.write(f"{what}, {self.count} increments")
             return
         driver = drivers[min(increment.phase, len(drivers) - 1)]
         part = min(increment.parameter / driver.limit, 1.0)
-        self._line(
+        self._line.write(
             f"[{'#' * int(24 * part):<24}] {parameter.name} {increment.parameter:.4g} of at most {driver.limit:g} "
             f"{driver.unit}, {what}, {self.count} increments"
         )
 
-    def picture(self, done: int, total: int) -> None:
-        """Show how many frames of the animation are drawn."""
-        if self.shown and (done == total or time.perf_counter() - self.last >= REDRAW):
-            self._line(f"[{'#' * (24 * done // max(total, 1)):<24}] frame {done} of {total}")
-
     def done(self) -> None:
         """Clear the bar."""
-        if self.shown:
-            self.stream.write("\r\x1b[K")
-            self.stream.flush()
-
-    def _line(self, text: str) -> None:
-        self.last = time.perf_counter()
-        self.stream.write(f"\r\x1b[K{text}, {self.last - self.started:.1f} s")
-        self.stream.flush()
+        self._line.clear()
 
 
 class StudyProgress:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import time
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,15 +17,20 @@ import solver
 from blockvis.atomic_files import PARTIAL
 from blockvis.cases.build import case_assembly
 from blockvis.cases.case import Case, parse_case, read_case
+from blockvis.fall import fall_of
+from blockvis.results.fall_files import remove_fall, stored_fall, write_fall
 from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
 
 from .kind import AnalysisRun
 from .kinds import KINDS
 from .plan import planned
-from .progress import Progress
+from .progress import DrawingProgress, Progress
 from .reopen import open_results
 from .write import finish
+
+if TYPE_CHECKING:
+    from blockvis.pictures.film_process import FilmProcess
 
 #: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
 AS_DRAWN = 0.02
@@ -55,6 +63,9 @@ class Run:
         What could not be drawn, and why.
     had_finished : bool
         Whether there was nothing left to solve when it was asked to go on.
+    stages : dict from str to float [s]
+        Wall-clock seconds of each part: read, solve, write, fall, report, curve, mechanism, film (the wait for it,
+        where another process draws it meanwhile).
     """
 
     response: solver.Response
@@ -62,9 +73,45 @@ class Run:
     summary: dict[str, Any]
     missing: tuple[str, ...] = field(default=())
     had_finished: bool = False
+    stages: dict[str, float] = field(default_factory=dict)
 
 
-def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overwrite: bool = False) -> Run:
+class DrawingInterrupted(KeyboardInterrupt):
+    """Ctrl-C while drawing: the results are complete; the message says which command draws the rest."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What a run draws: its film, and anything at all."""
+
+    film: bool = True
+    pictures: bool = True
+
+
+class Clock:
+    """Wall-clock seconds of each part of a run."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def counting(self, part: str) -> Iterator[None]:
+        """Count the seconds of a block to a part."""
+        started = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[part] = self.seconds.get(part, 0.0) + time.perf_counter() - started
+
+
+def run_case(
+    case: Case | str | Path,
+    folder: str | Path | None = None,
+    *,
+    overwrite: bool = False,
+    film: bool = True,
+    pictures: bool = True,
+) -> Run:
     """Solve a case and write everything: VTU, PVD, CSV, summary, pictures.
 
     Parameters
@@ -74,6 +121,8 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
         Results folder; the name of the case with "-results" in the working directory by default.
     overwrite : bool
         Whether results that are there already may be replaced.
+    film, pictures : bool
+        Draw the film of the case; draw anything at all, the report included.
 
     Returns
     -------
@@ -85,12 +134,16 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
     ValueError
         For bad input, before anything is written.
     """
+    clock = Clock()
     if not isinstance(case, Case):
         case = read_case(case)
     folder = Path(f"{case.source.stem}-results") if folder is None else Path(folder)
     refuse_results(folder, overwrite)
-    assembly = case_assembly(case)
-    run = planned(case, assembly)
+    drawing = Drawing(film=film, pictures=pictures)
+    with clock.counting("read"):
+        assembly = case_assembly(case)
+    with clock.counting("solve"):
+        run = planned(case, assembly)
     try:
         results = ResultsFolder(
             folder,
@@ -102,16 +155,19 @@ def run_case(case: Case | str | Path, folder: str | Path | None = None, *, overw
         )
     except OSError as error:
         raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
-    return _followed(case, results, run)
+    remove_fall(folder)
+    return _followed(case, results, run, drawing, clock)
 
 
-def resume_run(folder: str | Path) -> Run:
+def resume_run(folder: str | Path, *, film: bool = True, pictures: bool = True) -> Run:
     """Go on with a run that was stopped, from its results folder alone, to the result it would have had.
 
     Parameters
     ----------
     folder : str or Path
         That a run has written, whatever ended it.
+    film, pictures : bool
+        As in :func:`run_case`.
 
     Returns
     -------
@@ -133,18 +189,21 @@ def resume_run(folder: str | Path) -> Run:
     if not record.case:
         raise ValueError(f"'{folder}' was written from Python, without a case file; run it again from there")
     case = parse_case(record.case, Path(record.case_file or folder / "case.toml"))
+    drawing = Drawing(film=film, pictures=pictures)
     finished = _finished(folder)
     if finished is not None:
         response = open_results(folder)
         missing: tuple[str, ...] = ()
-        if not all((folder / name).is_file() for name in _drawn(case)):
-            missing = draw_results(response, folder, animation=case.animation, case_text=case.text)
+        if not all((folder / name).is_file() for name in _drawn(case, drawing)):
+            missing = _drawn_results(case, response, folder, drawing, Clock())
         return Run(response, folder, finished, missing, had_finished=True)
     for note in record.changes():
         warnings.warn(note, stacklevel=2)
     kind = KINDS[case.analysis]
     results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint, case.vtu)
-    return _followed(case, results, planned(case, results.assembly, checkpoint, tuple(results.increments)))
+    remove_fall(folder)
+    run = planned(case, results.assembly, checkpoint, tuple(results.increments))
+    return _followed(case, results, run, drawing, Clock())
 
 
 def _finished(folder: Path) -> dict[str, Any] | None:
@@ -155,11 +214,55 @@ def _finished(folder: Path) -> dict[str, Any] | None:
     return None if summary["status"] == solver.Status.INTERRUPTED else summary
 
 
-def _drawn(case: Case) -> list[str]:
-    return ["report.html", "mechanism.png", *([case.animation] if case.animation else [])]
+def _drawn(case: Case, drawing: Drawing) -> list[str]:
+    film = [case.animation] if case.animation and drawing.film else []
+    return ["report.html", "mechanism.png", *film] if drawing.pictures else []
 
 
-def _followed(case: Case, results: ResultsFolder, run: AnalysisRun) -> Run:
+def _drawn_results(
+    case: Case,
+    response: solver.Response,
+    folder: Path,
+    drawing: Drawing,
+    clock: Clock,
+    process: FilmProcess | None = None,
+) -> tuple[str, ...]:
+    """Draw what is wanted; what Ctrl-C leaves undrawn is said."""
+    try:
+        return draw_results(
+            response,
+            folder,
+            animation=case.animation if drawing.film else None,
+            case_text=case.text,
+            pictures=drawing.pictures,
+            film=process,
+            clock=clock,
+        )
+    except KeyboardInterrupt:
+        raise DrawingInterrupted(
+            f"interrupted while drawing; the results are complete, what is not drawn yet is by: "
+            f"blockvis run --resume {folder}"
+        ) from None
+
+
+def _followed(case: Case, results: ResultsFolder, run: AnalysisRun, drawing: Drawing, clock: Clock) -> Run:
+    """Follow the increments of a run and draw, the film in a process of its own."""
+    process = started_film(case, film=drawing.film, pictures=drawing.pictures)
+    try:
+        return _solved(case, results, run, drawing, clock, process)
+    finally:
+        if process is not None:
+            process.close()
+
+
+def _solved(
+    case: Case,
+    results: ResultsFolder,
+    run: AnalysisRun,
+    drawing: Drawing,
+    clock: Clock,
+    process: FilmProcess | None,
+) -> Run:
     """Follow the increments to their end or to Ctrl-C, write each, and draw what came out."""
     folder = results.path
     progress = Progress(run.course)
@@ -167,11 +270,13 @@ def _followed(case: Case, results: ResultsFolder, run: AnalysisRun) -> Run:
     try:
         while True:
             try:
-                increment = next(run.steps)
+                with clock.counting("solve"):
+                    increment = next(run.steps)
             except StopIteration as stop:
                 ending = stop.value
                 break
-            results.add(increment)
+            with clock.counting("write"):
+                results.add(increment)
             run.recorded(results.increments)
             if len(results.increments) == 1:
                 _note_settled(results.assembly, increment)
@@ -187,12 +292,13 @@ def _followed(case: Case, results: ResultsFolder, run: AnalysisRun) -> Run:
     response = run.response(results.increments, ending)
     missing: tuple[str, ...] = ()
     try:
-        summary = finish(results, response)
+        with clock.counting("write"):
+            summary = finish(results, response)
         if ending.stop is not solver.Status.INTERRUPTED:
-            missing = draw_results(response, folder, animation=case.animation, case_text=case.text)
+            missing = _drawn_results(case, response, folder, drawing, clock, process)
     except OSError as error:
         raise _given_up(folder, error) from None
-    return Run(response, folder, summary, missing)
+    return Run(response, folder, summary, missing, stages=dict(clock.seconds))
 
 
 def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
@@ -221,14 +327,26 @@ def _reason(error: OSError) -> str:
     return error.strerror or str(error).strip().partition("\n")[0]
 
 
+def started_film(case: Case, *, film: bool, pictures: bool) -> FilmProcess | None:
+    """Start the process that draws the film, so that it loads what it needs while the first one solves."""
+    if case.animation is None or not film or not pictures:
+        return None
+    from blockvis.pictures.film_process import FilmProcess
+
+    return FilmProcess()
+
+
 def draw_results(
     response: solver.Response,
     folder: Path,
     *,
     animation: str | None = "collapse.mp4",
     case_text: str = "",
+    pictures: bool = True,
+    film: FilmProcess | None = None,
+    clock: Clock | None = None,
 ) -> tuple[str, ...]:
-    """Draw the pictures of a results folder.
+    """Write the fall of a results folder, its pictures, its report and its film.
 
     Parameters
     ----------
@@ -238,24 +356,57 @@ def draw_results(
         File name in the folder; the suffix chooses mp4, gif or webp.
     case_text : str
         Shown in the report.
+    pictures : bool
+        Draw; the fall is written in any case.
+    film : FilmProcess, optional
+        That draws the film meanwhile; it is drawn here by default.
+    clock : Clock, optional
+        Counts the seconds of each part.
 
     Returns
     -------
     tuple of str
         What could not be drawn, and why; empty where all is there.
     """
-    from blockvis.pictures.curves import draw_curve
+    clock = Clock() if clock is None else clock
+    if not response.increments:
+        return ()
+    with clock.counting("fall"):
+        stored = stored_fall(folder)
+        fall = fall_of(response) if stored is None else stored
+    if film is not None and animation is not None:
+        film.draw(response, folder / animation, fall)
+    if fall is not None and stored is None:
+        with clock.counting("fall"):
+            write_fall(fall, response, folder)
+    if not pictures:
+        return ()
+    from blockvis.pictures.film_process import FilmFailed
     from blockvis.pictures.paraview import write_paraview_macro
     from blockvis.pictures.render import animate, draw_mechanism
     from blockvis.report.page import write_report
 
-    if not response.increments:
-        return ()
-    write_paraview_macro(folder)
-    write_report(response, folder / "report.html", case_text)
+    progress = DrawingProgress()
+    with clock.counting("report"):
+        write_paraview_macro(folder)
+        write_report(response, folder / "report.html", case_text, fall=fall)
     if response.path:
-        draw_curve(response, folder / "curve.png")
-    draw_mechanism(response, folder / "mechanism.png")
-    if animation is not None:
-        animate(response, folder / animation)
+        from blockvis.pictures.curves import draw_curve
+
+        with clock.counting("curve"):
+            draw_curve(response, folder / "curve.png")
+    with clock.counting("mechanism"):
+        draw_mechanism(response, folder / "mechanism.png")
+    if animation is None:
+        return ()
+    try:
+        with clock.counting("film"):
+            if film is not None:
+                film.wait(progress.frame)
+            else:
+                animate(response, folder / animation, fall=fall, progress=progress.frame)
+    except FilmFailed as error:
+        return (str(error),)
+    finally:
+        progress.done()
     return ()

@@ -109,7 +109,9 @@ def ran(name: str, folder: Path) -> Run:
     """
     with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patched:
         warnings.simplefilter("ignore")
-        patched.setattr(sys.modules[blockvis.run_case.__module__], "draw_results", lambda *_, **__: ())
+        run = sys.modules[blockvis.run_case.__module__]
+        patched.setattr(run, "draw_results", lambda *_, **__: ())
+        patched.setattr(run, "started_film", lambda *_, **__: None)
         return blockvis.run_case(CASES[name], folder)
 
 

@@ -77,7 +77,9 @@ OTHERS = {
 
 
 #: Code that has a process draw nothing, as in this one.
-UNDRAWN = "import sys, blockvis; sys.modules[blockvis.run_case.__module__].draw_results = lambda *_, **__: ()"
+UNDRAWN = """import sys, blockvis
+run = sys.modules[blockvis.run_case.__module__]
+run.draw_results, run.started_film = lambda *_, **__: (), lambda *_, **__: None"""
 
 
 def _command(folder, *arguments, code=""):

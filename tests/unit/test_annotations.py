@@ -10,7 +10,7 @@ import solver
 from blockvis.numbers import rounded_length
 from blockvis.pictures import annotations as marks
 from blockvis.pictures.annotations import part_outlines
-from blockvis.pictures.hatching import hatch_lines, triangles
+from blockvis.pictures.hatching import hatch_lines
 from blockvis.results.joints import initial_joints
 
 
@@ -154,16 +154,6 @@ def test_a_sinking_wall_is_one_part():
     response = parted(wall(8, 6), 2, 0)
     parts = solver.rigid_parts(response.assembly, response.increments[-1])
     assert set(parts) == {-1, 0}
-
-
-def test_bent_outlines_are_cut_into_triangles_of_the_same_area():
-    assembly = solver.Assembly.from_outlines([*BENT.values(), [[20, 0], [23, 0], [22, 4]]])
-    cells = triangles(assembly)
-    a, b, c = (assembly.vertices[cells[:, k]] for k in (1, 2, 3))
-    twice = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    assert (twice >= 0).all()
-    areas = np.bincount(assembly.block_of_vertex[cells[:, 1]], weights=twice / 2.0)
-    np.testing.assert_allclose(areas, assembly.areas, rtol=1e-12)
 
 
 def test_hatch_stays_inside_the_support():

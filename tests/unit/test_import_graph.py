@@ -31,6 +31,7 @@ ORDER = (
     "blockvis.runs.settlement",
     "blockvis.runs.kind",
     "blockvis.results",
+    "blockvis.fall",
     "blockvis.cases",
     "blockvis.generators",
     "blockvis.formats",

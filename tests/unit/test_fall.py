@@ -1,0 +1,247 @@
+"""The fall after the last equilibrium: where blocks come to rest, and that nothing else depends on it."""
+
+import sys
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista as pv
+import shapely
+from structures import parted, wall
+
+import blockvis
+import solver
+from blockvis import fall as fall_module
+from blockvis.cli import main
+from blockvis.fall import CAPTION, Fall, fall_of
+from blockvis.report.page import report_html
+from blockvis.results.fall_files import stored_fall, write_fall
+
+ARCH = Path(__file__).parents[2] / "assets" / "semicircular_arch.msh"
+
+
+@cache
+def shipped_arch():
+    arch = blockvis.read(ARCH, roles={"right springer": "moving", "left springer": "fixed"})
+    spread = solver.Settlement(direction=(1.0, 0.0), increment=0.02, limit=0.5)
+    return solver.settle(arch, spread, friction_coefficient=2.0, controls=solver.Controls(falling_frames=1))
+
+
+@cache
+def panel():
+    """A panel in running bond on a support that tilts, until it slides and turns over."""
+    outlines = []
+    for course in range(6):
+        joints = [0.0, 0.25, 0.5, 0.75] if course % 2 == 0 else [0.0, 0.125, 0.375, 0.625, 0.75]
+        low, high = 0.1 * course, 0.1 * course + 0.1
+        outlines += [[[a, low], [b, low], [b, high], [a, high]] for a, b in pairwise(joints)]
+    outlines.append([[-0.5, -0.3], [1.25, -0.3], [1.25, 0.0], [-0.5, 0.0]])
+    roles = ["free"] * (len(outlines) - 1) + ["moving"]
+    tilt = solver.Settlement(rotation_centre=(0.75, 0.0), rotation=-1.0, increment=0.05, limit=1.5)
+    assembly = solver.Assembly.from_outlines(outlines, roles=roles)
+    return solver.settle(assembly, tilt, friction_coefficient=0.9, controls=solver.Controls(falling_frames=1))
+
+
+@cache
+def fallen(structure):
+    return fall_of(structure())
+
+
+def outlines(assembly, pose):
+    corners = solver.moved_vertices(assembly, pose)
+    return np.array([shapely.Polygon(ring) for ring in np.split(corners, assembly.offsets[1:-1])])
+
+
+@pytest.mark.parametrize("structure", [shipped_arch, panel])
+def test_blocks_never_overlap_by_a_hundredth(structure):
+    response, fall = structure(), fallen(structure)
+    assembly = response.assembly
+    for k in range(len(fall)):
+        blocks = outlines(assembly, fall.pose(k))
+        one, other = shapely.STRtree(blocks).query(blocks)
+        pairs = (one < other) & (assembly.free[one] | assembly.free[other])
+        shared = shapely.area(shapely.intersection(blocks[one[pairs]], blocks[other[pairs]]))
+        assert (shared < 0.01 * np.minimum(assembly.areas[one], assembly.areas[other])[pairs]).all(), fall.times[k]
+        deep = fall.ground - shapely.bounds(blocks)[assembly.free, 1]
+        assert (deep < 0.01 * assembly.block_size).all(), fall.times[k]
+
+
+@pytest.mark.parametrize("structure", [shipped_arch, panel])
+def test_blocks_come_to_rest_on_something(structure):
+    response, fall = structure(), fallen(structure)
+    assembly = response.assembly
+    assert fall.times[-1] < fall_module.LONGEST
+    np.testing.assert_allclose(fall.positions[-1], fall.positions[-2], atol=1e-3 * assembly.block_size)
+    blocks = outlines(assembly, fall.pose(len(fall) - 1))
+    for k in np.flatnonzero(assembly.free):
+        to_ground = shapely.bounds(blocks[k])[1] - fall.ground
+        assert min(shapely.distance(blocks[k], np.delete(blocks, k)).min(), to_ground) < 2e-3 * assembly.block_size
+    # It has fallen: what was highest lies low, and no support has moved.
+    last = response.path[-1].pose
+    assert fall.positions[-1][assembly.free, 1].mean() < last.positions[assembly.free, 1].mean() - 0.1
+    np.testing.assert_array_equal(fall.positions[-1][~assembly.free], fall.positions[0][~assembly.free])
+    np.testing.assert_allclose(fall.positions[0], last.positions, atol=1e-12)
+
+
+def test_the_first_push_is_that_of_the_mechanism():
+    response, fall = shipped_arch(), fallen(shipped_arch)
+    moved = (fall.positions[1] - fall.positions[0])[response.assembly.free]
+    pushed = response.collapse.mechanism[response.assembly.free, :2]
+    assert (moved * pushed).sum() > 0.9 * np.linalg.norm(moved) * np.linalg.norm(pushed)
+
+
+def test_a_free_fall_is_that_of_gravity():
+    """A block pushed off nothing: what the time of the frames means."""
+    response = panel()
+    engine = fall_module._Engine(response, 0.0)
+    highest = int(np.argmax(response.path[-1].pose.positions[:, 1]))
+    for k in range(response.assembly.n_blocks):
+        if k != highest:
+            engine.space.remove(*engine.bodies[k].shapes, engine.bodies[k])
+    before = engine.bodies[highest].position.y / engine.scale
+    for _ in range(1000):
+        engine.space.step(1e-4)
+    dropped = before - engine.bodies[highest].position.y / engine.scale
+    assert dropped == pytest.approx(solver.GRAVITY * 0.1**2 / 2.0, rel=2e-3)
+
+
+def test_the_same_bytes_twice(tmp_path):
+    response = panel()
+    for name in ("one", "two"):
+        write_fall(fall_of(response), response, tmp_path / name)
+    files = sorted(path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*") if path.is_file())
+    assert len(files) == len(fallen(panel)) + 2
+    for file in files:
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), file
+
+
+def test_files_have_the_time_as_their_parameter(tmp_path):
+    response, fall = shipped_arch(), fallen(shipped_arch)
+    write_fall(fall, response, tmp_path)
+    reader = pv.PVDReader(tmp_path / "fall.pvd")
+    assert reader.time_values == pytest.approx(list(fall.times))
+    reader.set_active_time_value(reader.time_values[-1])
+    (mesh,) = reader.read()
+    corners = solver.moved_vertices(response.assembly, fall.pose(len(fall) - 1))
+    np.testing.assert_allclose(mesh.points[:, :2], corners, atol=1e-12)
+    assert mesh.field_data["time"] == pytest.approx(fall.times[-1])
+    assert not {"reaction", "settlement", "load_multiplier"} & set(mesh.field_data.keys())
+    again = stored_fall(tmp_path)
+    np.testing.assert_array_equal(again.positions, fall.positions)
+    assert again.ground == fall.ground
+
+
+def test_a_damaged_fall_is_named(tmp_path):
+    assert stored_fall(tmp_path) is None
+    (tmp_path / "fall.npz").write_bytes(b"no archive")
+    with pytest.raises(ValueError, match=r"fall\.npz' cannot be read .*; remove it and draw again"):
+        stored_fall(tmp_path)
+
+
+def test_poses_between_those_kept():
+    fall = Fall(np.array([0.0, 0.1]), np.array([[[0.0, 0.0]], [[1.0, 2.0]]]), np.array([[0.0], [0.4]]), 0.0)
+    pose = fall.at(0.025)
+    np.testing.assert_allclose((*pose.positions[0], pose.rotations[0, 0]), (0.25, 0.5, 0.1))
+    np.testing.assert_array_equal(fall.at(7.0).positions, [[1.0, 2.0]])
+
+
+def test_what_does_not_collapse_along_a_path_does_not_fall():
+    response = shipped_arch()
+    assert fall_of(replace(response, stop=solver.Status.LIMIT_REACHED, collapse=None)) is None
+    limits = solver.LimitLoad
+    assert fall_of(replace(response, limits=(limits,))) is None
+    assert fall_of(replace(response, parameter=solver.Quantity("position", "x", "m", is_path=False))) is None
+
+
+def test_without_the_engine_there_is_no_fall(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pymunk", None)
+    assert fall_of(shipped_arch()) is None
+
+
+def test_friction_of_each_pair_of_materials():
+    """A brick on a slope of 22°: by the friction of its pair it stays or slides."""
+    turn = np.array([[np.cos(0.384), -np.sin(0.384)], [np.sin(0.384), np.cos(0.384)]])
+    slope = [[-3.0, -1.0], [3.0, -1.0], [3.0, 0.0], [-3.0, 0.0]]
+    brick = [[0.0, 0.0], [0.4, 0.0], [0.4, 0.2], [0.0, 0.2]]
+    assembly = solver.Assembly.from_outlines(
+        [np.array(ring) @ turn.T for ring in (slope, brick)], roles=["moving", "free"], materials=["rock", "brick"]
+    )
+    base = parted(wall(3, 2), 2, 0)
+    pose = solver.Pose.initial(assembly)
+    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-3)
+    zeros = np.zeros((len(contacts), 2))
+    last = base.path[-1].with_arrays(
+        pose=pose, contacts=contacts, forces=zeros, displacements=zeros, friction=np.full(len(contacts), 0.3),
+        velocity=np.zeros((2, 3)), support_forces=np.zeros((2, 3)),
+    )  # fmt: skip
+    mechanism = np.array([[0.0, 0.0, 0.0], [*(turn @ [-1.0, 0.0]), 0.0]])
+    for friction, slides in ((0.3, True), (0.6, False)):
+        law = solver.InterfaceLaw(friction)
+        response = replace(
+            base, assembly=assembly, increments=(last,), loads=solver.self_weight(assembly),
+            interfaces=solver.Interfaces(solver.InterfaceLaw(0.9), {("rock", "brick"): law}),
+            collapse=replace(base.collapse, mechanism=mechanism),
+        )  # fmt: skip
+        fall = fall_module._Engine(response, 0.05).run()
+        way = np.hypot(*(fall.positions[-1] - fall.positions[0])[1])
+        assert (way > 0.3) == slides, (friction, way)
+
+
+def test_the_page_plays_the_fall_in_real_time():
+    response, fall = shipped_arch(), fallen(shipped_arch)
+    page = report_html(response, fall=fall)
+    assert page.count(CAPTION) == len(fall) - 1
+    assert CAPTION not in report_html(response)
+
+
+@pytest.mark.pictures
+@pytest.mark.slow
+def test_a_run_writes_the_fall_and_nothing_else_knows_of_it(tmp_path, monkeypatch):
+    case = tmp_path / "case.toml"
+    case.write_text(
+        '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.05\nlimit = 0.5\n'
+        "[material]\nfriction_coefficient = 0.7\n[analysis]\nfalling_frames = 2\n",
+        encoding="utf-8",
+    )
+    assert main(["run", str(case), "-o", str(tmp_path / "with")]) == 0
+    monkeypatch.setitem(sys.modules, "pymunk", None)
+    assert main(["run", str(case), "-o", str(tmp_path / "without"), "--no-film"]) == 0
+    for folder, there in ((tmp_path / "with", True), (tmp_path / "without", False)):
+        assert (folder / "fall.pvd").is_file() == there
+        assert (CAPTION in (folder / "report.html").read_text(encoding="utf-8")) == there
+        assert (folder / "collapse.mp4").is_file() == there
+    rows = [(tmp_path / one / "blocks.pvd").read_bytes() for one in ("with", "without")]
+    assert rows[0] == rows[1]
+    summaries = [(tmp_path / one / "summary.json").read_text(encoding="utf-8") for one in ("with", "without")]
+    assert len(summaries[0].splitlines()) == len(summaries[1].splitlines())
+    assert main(["run", str(case), "-o", str(tmp_path / "with"), "--force", "--no-pictures"]) == 0
+    assert not (tmp_path / "with" / "fall.pvd").exists()
+    assert not (tmp_path / "with" / "report.html").exists()
+
+
+def test_bent_blocks_fall_in_one_piece():
+    """An L that stands on its short leg next to nothing tips over and lies on its long one."""
+    shape = [[0.0, 0.0], [0.3, 0.0], [0.3, 1.0], [1.2, 1.0], [1.2, 1.3], [0.0, 1.3]]
+    assembly = solver.Assembly.from_outlines(
+        [shape, [[-0.5, -0.3], [0.6, -0.3], [0.6, 0.0], [-0.5, 0.0]]], roles=["free", "moving"]
+    )
+    base = parted(wall(3, 2), 2, 0)
+    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-3)
+    zeros = np.zeros((len(contacts), 2))
+    last = base.path[-1].with_arrays(
+        pose=solver.Pose.initial(assembly), contacts=contacts, forces=zeros, displacements=zeros,
+        friction=np.full(len(contacts), 0.6), velocity=np.zeros((2, 3)), support_forces=np.zeros((2, 3)),
+    )  # fmt: skip
+    response = replace(
+        base, assembly=assembly, increments=(last,), loads=solver.self_weight(assembly),
+        collapse=replace(base.collapse, mechanism=np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])),
+    )  # fmt: skip
+    fall = fall_of(response)
+    engine = fall_module._Engine(response, 0.0)
+    assert len(engine.bodies[0].shapes) > 1
+    assert fall.rotations[-1, 0] < -0.5
+    end = outlines(assembly, fall.pose(len(fall) - 1))
+    assert shapely.bounds(end[0])[1] == pytest.approx(fall.ground, abs=0.01)
