@@ -50,7 +50,7 @@ from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.swing import Swing, mechanism_colours, swing_of
 from blockvis.results.increments import folder_of
-from blockvis.results.joints import initial_joints, opening_and_slip
+from blockvis.results.joints import initial_joints
 from blockvis.results.record import Record, read_record, versions
 from blockvis.runs.kinds import KINDS
 
@@ -66,9 +66,6 @@ FORCE_FINENESS = 1e-3
 
 #: Seconds the path takes at even settlement, each frame of a fall without time, and the pause before a fall.
 PATH_SECONDS, FALL_SECONDS, PAUSE = 6.0, 0.06, 0.6
-
-#: Frames per second of a fall in time; the page moves the blocks between them.
-FALL_RATE = 12.5
 
 #: Above this many blocks dots of hinges and lines of sliding joints hide the cracks: they are off until asked for.
 FEW_BLOCKS = 300
@@ -205,9 +202,11 @@ def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> li
 
     if fall is None or not path:
         return [framed_at(increment) for increment in _thinned(response.increments, most)]
-    n = min(round(float(fall.times[-1]) * FALL_RATE), most // 2)
-    times = np.linspace(0.0, float(fall.times[-1]), n + 1)[1:]
-    falling = [_Frame(falling_increment(response, fall.at(at)), len(path), float(at)) for at in times]
+    n = min(len(fall) - 1, most // 2)
+    chosen = np.linspace(len(fall) - 1, 1, n).round().astype(int)[::-1]
+    falling = [
+        _Frame(falling_increment(response, fall.pose(k)), len(path), float(fall.times[k])) for k in chosen.tolist()
+    ]
     return [*map(framed_at, _thinned(path, most - n)), *falling]
 
 
@@ -246,7 +245,7 @@ def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
         "ramp": _hexadecimal(palette.RAMP.astype(int)),
         "largest_displacement": tables.largest_displacement,
         "arrows": _arrows(response, frame, origin),
-        "has": tables.has | {"live": live.largest > 0.0},
+        "has_forces": any(map(len, tables.sizes)),
         "live_words": live.words if live.largest > 0.0 else "",
         "ground": None if fall is None else float(fall.ground - origin[1]),
         "many": assembly.n_blocks > FEW_BLOCKS,
@@ -364,15 +363,12 @@ class _Tables:
         self.travel, self.turn = [], []
         self.places, self.vectors, self.sizes, self.pairs = _empty(2), _empty(2), [np.zeros(0)], _empty(2)
         self.mark_places, self.mark_kinds = _empty(4), [np.zeros(0, dtype=np.int32)]
-        self.largest_displacement, cracked = 0.0, False
-        joints = initial_joints(assembly)
+        self.largest_displacement = 0.0
         for increment in shown:
             moved = increment.pose.displacements(assembly)
             if increment.status != solver.Status.FALLING:
                 far = float(np.hypot(*moved[assembly.free, :2].T).max(initial=0.0))
                 self.largest_displacement = max(self.largest_displacement, far)
-                opening = opening_and_slip(assembly, joints, increment.pose)[:, 0].max(initial=0.0)
-                cracked = cracked or bool(opening > SMALLEST_OPENING * assembly.block_size)
             self.travel.append(_rounded(moved[:, :2], unit))
             self.turn.append(_rounded(moved[:, 2], TURN_UNIT))
             points, forces, pairs = resultants(increment)
@@ -386,9 +382,6 @@ class _Tables:
             ends = np.concatenate([np.repeat(hinges[:, None], 2, axis=1), sliding])
             self.mark_places.append(_rounded(ends - origin, unit).reshape(-1, 4))
             self.mark_kinds.append(np.repeat([1, 2], [len(hinges), len(sliding)]))
-        kinds = np.concatenate(self.mark_kinds)
-        self.has = {"cracks": cracked, "hinges": bool((kinds == 1).any()), "sliding": bool((kinds == 2).any())}
-        self.has["forces"] = any(len(sizes) for sizes in self.sizes[1:])
 
     def force_length(self, block_size: float, extent: float) -> float:
         """Length per force [m/N]."""

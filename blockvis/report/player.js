@@ -183,7 +183,7 @@
       // Blocks that have parted have no joint any more: what lies between them is air.
       if (f.opening < model.smallest_opening * m || f.apart > m * Math.min(f.length, widest) || f.bent > m * steepest) continue;
       ring(pen, [f.a0, f.a1, f.b1, f.b0]);
-      pen.fill();
+      pen.fill(); state.cracks++;
       if (f.opening * state.view.scale < 12) lines.push([(f.a0[0] + f.b0[0]) / 2, (f.a0[1] + f.b0[1]) / 2, (f.a1[0] + f.b1[0]) / 2, (f.a1[1] + f.b1[1]) / 2]);
     }
     return lines;
@@ -198,6 +198,7 @@
       pen.beginPath(); pen.moveTo(0, py(model.ground)); pen.lineTo(w, py(model.ground)); pen.stroke();
     }
     if (layers.start) drawStart(pen, colours);
+    state.cracks = 0;
     const lines = layers.cracks && (!falling || model.joints_of_fall) ? drawCracks(pen) : [];
     pen.strokeStyle = model.colours.outline;
     pen.lineWidth = Math.max(0.4, Math.min(1.1, model.block_size * state.view.scale / 25));
@@ -345,16 +346,16 @@
     const falling = model.frames[k].falling, entries = [];
     const add = (kind, text, colour) => entries.push([kind, text, colour]);
     const marked = state.magnify === 1;
-    if (layers.cracks && model.has.cracks) add("area", "open joint", model.colours.open);
-    if (layers.hinges && marked && model.has.hinges) add("dot", "hinge", model.colours.hinge);
-    if (layers.sliding && marked && model.has.sliding) add("line", "sliding joint", model.colours.sliding);
-    if (layers.forces && marked && !falling && model.has.forces) add("line", "resultant of a joint", model.colours.force);
+    if (state.cracks) add("area", "open joint", model.colours.open);
+    if (layers.hinges && marked && countOf(k, 1)) add("dot", "hinge", model.colours.hinge);
+    if (layers.sliding && marked && countOf(k, 2)) add("line", "sliding joint", model.colours.sliding);
+    if (layers.forces && marked && !falling && model.has_forces) add("line", "resultant of a joint", model.colours.force);
     if (layers.thrust && marked && !falling && thrustLine(k).length) add("line", "thrust line", model.colours.force);
     if (layers.start && model.arrows.length) add("line", "settlement; dashed: where the support was", model.colours.settlement);
     if (marked && model.live_words) add("line", model.live_words, model.colours.live);
     if (state.colours === "mechanism" && model.tints.length) add("area", model.tints_words, model.tints[model.roles.indexOf(0)]);
     if (state.colours === "displacement") add("ramp", `displacement, 0 to ${(1000 * model.largest_displacement).toPrecision(3)} mm`, `linear-gradient(90deg, ${model.ramp.join(",")})`);
-    const many = [["hinges", model.has.hinges], ["sliding", model.has.sliding]].filter(([name, has]) => model.many && has && !layers[name]);
+    const many = [["hinges", 1], ["sliding", 2]].filter(([name, kind]) => model.many && countOf(k, kind) && !layers[name]);
     if (many.length) add("", `${many.map(([name]) => (name === "hinges" ? "hinges" : "sliding joints")).join(" and ")} are off: they would hide the cracks of so many blocks`, "");
     if (!marked) add("", "hinges, sliding joints and forces are shown at true scale only", "");
     const told = JSON.stringify(entries);
@@ -422,7 +423,7 @@
     if (state.hover >= 0 && $("tip").style.display === "block") tell();
   }
 
-  function stop() { state.playing = false; $("play").textContent = "▶ Play"; words(Math.min(Math.round(state.frame), nFrames - 1)); }
+  function stop() { state.playing = false; $("play").textContent = "▶ Play"; $("state").setAttribute("aria-live", "polite"); }
 
   function step(now) {
     if (!state.playing) return;
@@ -704,7 +705,7 @@
   window.addEventListener("hashchange", wanted);
 
   $("frame").max = nFrames - 1;
-  $("forces").disabled = !model.has.forces;
+  $("forces").disabled = !model.has_forces;
   $("mechanism").disabled = !model.tints.length;
   $("start").disabled = !model.arrows.length;
   const some = model.frames.findIndex((f) => !f.falling);
