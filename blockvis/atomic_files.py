@@ -12,7 +12,7 @@ PARTIAL = ".*.part*"
 
 
 @contextmanager
-def whole_file(path: str | os.PathLike[str], *, last: bool = True) -> Iterator[Path]:
+def whole_file(path: str | os.PathLike[str], *, last: bool = True, durable: bool = True) -> Iterator[Path]:
     """Yield a temporary name to write a file under; move the file to its place at the end, or remove it on failure.
 
     Parameters
@@ -21,6 +21,8 @@ def whole_file(path: str | os.PathLike[str], *, last: bool = True) -> Iterator[P
         Its folder is made if it does not exist. A link stays a link; a pipe or device is written to directly.
     last : bool
         Whether this is the last of several files written together: only then the folder's list of names is flushed.
+    durable : bool
+        False for what can be made again from other files: it is whole, too, but nothing waits for the disk.
 
     Yields
     ------
@@ -41,29 +43,30 @@ def whole_file(path: str | os.PathLike[str], *, last: bool = True) -> Iterator[P
     partial = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
         yield partial
-        flush(partial)
+        if durable:
+            flush(partial)
         os.replace(partial, path)
     except BaseException:
         partial.unlink(missing_ok=True)
         raise
-    if last:
+    if last and durable:
         flush(path.parent)
 
 
-def write_whole(path: str | os.PathLike[str], content: str | bytes, *, last: bool = True) -> Path:
+def write_whole(path: str | os.PathLike[str], content: str | bytes, *, last: bool = True, durable: bool = True) -> Path:
     """Write a text in UTF-8, or bytes, whole or not at all; see :func:`whole_file`.
 
     Parameters
     ----------
     path : path
     content : str or bytes
-    last : bool
+    last, durable : bool
 
     Returns
     -------
     pathlib.Path
     """
-    with whole_file(path, last=last) as partial:
+    with whole_file(path, last=last, durable=durable) as partial:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)
     return Path(path)
 

@@ -13,7 +13,9 @@ from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 from .atomic_files import write_whole
 
 
-def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True) -> Path:
+def write_vtu(
+    dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True, durable: bool = True
+) -> Path:
     """Write a dataset as VTU, whole or not at all.
 
     Parameters
@@ -21,7 +23,7 @@ def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, las
     dataset : pyvista.UnstructuredGrid
     path : path
         Its folder is made if it does not exist.
-    last : bool
+    last, durable : bool
         As of :func:`blockvis.atomic_files.whole_file`.
 
     Returns
@@ -42,7 +44,7 @@ def write_vtu(dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, las
     writer.SetHeaderTypeToUInt64()
     if writer.Write() != 1:
         raise OSError(f"VTK could not write {path}")
-    return write_whole(path, writer.GetOutputString(), last=last)
+    return write_whole(path, writer.GetOutputString(), last=last, durable=durable)
 
 
 def write_pvd(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
-from itertools import chain, pairwise
+from itertools import chain
 
 import numpy as np
 from PIL import Image
@@ -43,13 +42,6 @@ WIDE_CRACK = 0.2
 
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
-
-
-#: Seconds for which the last equilibrium and the end of the film are held.
-PAUSE, END = 0.6, 0.8
-
-#: Nothing moves from one frame to the next where no corner moves by more than this [pixels].
-STILL = 0.3
 
 
 @dataclass(frozen=True)
@@ -240,70 +232,6 @@ class Drawer:
             pixel=self.scene.pixel,
             beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, parameter=s)),
         )
-
-    def frames(
-        self, fps: float, seconds: float, progress: Callable[[int, int], None] | None = None
-    ) -> Iterator[Image.Image]:
-        """Yield the frames of the film: even motion along the path, a pause, then the fall.
-
-        A picture is drawn where something has moved since the last, and held till then.
-
-        Parameters
-        ----------
-        fps : float
-            Frames per second.
-        seconds : float [s]
-            Of the path.
-        progress : callable, optional
-            Called with the pictures drawn and their number.
-        """
-        path = [i for i in self.increments if matters(i, self.response)]
-        lasting = max(2, round(fps * seconds))
-        distinct = self._distinct(path, lasting)
-        falling = list(self._falling(fps))
-        total, drawn = distinct + len(falling), 0
-
-        def told(picture: Image.Image) -> Image.Image:
-            nonlocal drawn
-            drawn += 1
-            if progress is not None:
-                progress(drawn, total)
-            return picture
-
-        picture, until = None, np.diff(np.linspace(0, lasting, distinct + 1).round().astype(int))
-        for held, (increment, pose, s) in zip(until, _even_motion(path, distinct), strict=False):
-            picture = told(self.picture(increment, pose, s))
-            yield from (picture for _ in range(held))
-        if picture is not None:
-            yield from (picture for _ in range(round(PAUSE * fps)))
-        for draw in falling:
-            picture = told(draw())
-            yield picture
-        if picture is not None:
-            yield from (picture for _ in range(round(END * fps)))
-
-    def _distinct(self, path: list[solver.Increment], most: int) -> int:
-        """How many pictures of the path differ: one for each pixel of the way of the block that goes farthest."""
-        way, before = 0.0, None
-        for increment in path:
-            corners = solver.moved_vertices(self.assembly, increment.pose)
-            if before is not None:
-                way += float(np.hypot(*(corners - before).T).max())
-            before = corners
-        pixels = way * self.look.magnification / self.scene.pixel
-        return int(np.clip(np.ceil(pixels), min(len(path), most), most))
-
-    def _falling(self, fps: float) -> Iterator[Callable[[], Image.Image]]:
-        """Yield what draws each frame of the fall, up to the last in which something moves."""
-        if self.fall is not None:
-            n = int(np.ceil(self.fall.times[-1] * fps))
-            yield from (partial(self.falling_picture, k / fps) for k in range(1, n + 1))
-            return
-        fall = [i for i in self.increments if i.status == solver.Status.FALLING]
-        corners = [solver.moved_vertices(self.assembly, increment.pose) for increment in fall]
-        moves = [np.abs(b - a).max() > STILL * self.scene.pixel for a, b in pairwise(corners)]
-        last = max((k + 1 for k, move in enumerate(moves) if move), default=0)
-        yield from (partial(self.picture, increment) for increment in fall[: last + 1])
 
     def falling_picture(self, time: float) -> Image.Image:
         """Draw the fall at a time [s] after the last equilibrium."""
@@ -550,28 +478,6 @@ def _contacts_at(increment: solver.Increment, pose: solver.Pose) -> solver.Conta
     contacts = increment.contacts
     points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
     return replace(contacts, points=points)
-
-
-def _even_motion(
-    path: list[solver.Increment], n: int
-) -> Iterator[tuple[solver.Increment, solver.Pose | None, float | None]]:
-    """``n`` frames at even steps of the parameter: the increment before each, its pose, and its parameter."""
-    if not path:
-        return
-    total = solver.path_parameters(path)
-    if total[-1] <= total[0]:
-        yield path[-1], None, None
-        return
-    for at in np.linspace(total[0], total[-1], n):
-        k = int(np.clip(np.searchsorted(total, at, side="right") - 1, 0, len(path) - 1))
-        if k == len(path) - 1 or at <= total[k]:
-            yield path[k], None, None
-            continue
-        t = (at - total[k]) / (total[k + 1] - total[k])
-        a, b = path[k].pose, path[k + 1].pose
-        pose = solver.Pose(a.positions + t * (b.positions - a.positions), a.rotations + t * (b.rotations - a.rotations))
-        start = path[k].parameter if path[k].phase == path[k + 1].phase else 0.0
-        yield path[k], pose, start + t * (path[k + 1].parameter - start)
 
 
 def _caption(response: solver.Response, increment: solver.Increment, look: Look, s: float | None) -> tuple[str, str]:

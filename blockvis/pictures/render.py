@@ -14,6 +14,7 @@ from blockvis.atomic_files import whole_file
 from blockvis.fall import Fall, fall_of
 
 from .drawer import Drawer, Look
+from .film import film_of
 from .swing import MOST_PARTS, swing_of
 from .video import write_film
 
@@ -144,7 +145,8 @@ def animate(
         fall = fall_of(response)
     shown = response.increments if fall is None else response.path
     drawer = Drawer(response, look, size, shown, curve=curve, fall=fall)
-    return write_film(drawer.frames(fps, seconds, progress), path, size=size, fps=fps)
+    holds, pictures = film_of(drawer, fps, seconds, progress)
+    return write_film(pictures, path, size=size, fps=fps, holds=holds)
 
 
 def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:

@@ -41,7 +41,7 @@ def write_fall(fall: Fall, response: solver.Response, folder: Path) -> None:
                 grid.field_data.remove(name)
         grid.field_data["time"] = np.array([time])
         entries.append((float(time), f"fall/blocks_{k:05d}.vtu"))
-        write_vtu(grid, folder / entries[-1][1], last=False)
+        write_vtu(grid, folder / entries[-1][1], durable=False)
     write_pvd(folder / FALL_LIST, entries, last=False)
     write_whole(folder / FALL_POSES, compressed(flat(fall)))
 

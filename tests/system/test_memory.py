@@ -14,6 +14,7 @@ from blockvis import generators
 from blockvis.cases.case import parse_case
 from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.drawer import Drawer, Look
+from blockvis.pictures.film import film_of
 from blockvis.pictures.video import write_film
 from blockvis.report.page import report_html
 from blockvis.results import increments
@@ -118,7 +119,8 @@ def test_results_are_read_one_at_a_time(use, folder, tmp_path, monkeypatch):
         assert f"{response.collapse.displacement:.6g} m" in report_html(response)
     else:
         drawer = Drawer(response, Look(), (320, 180), response.increments, curve=True)
-        write_film(drawer.frames(4.0, 2.0), tmp_path / "film.gif", size=(320, 180), fps=4.0)
+        holds, pictures = film_of(drawer, 4.0, 2.0)
+        write_film(pictures, tmp_path / "film.gif", size=(320, 180), fps=4.0, holds=holds)
     # Each is read, and no more than a few times.
     assert n < len(seen) < 6 * n
     assert max(most) <= AT_LEAST + 1, most

@@ -1,8 +1,8 @@
 """Stills, the mechanism and the film, pixel by pixel."""
 
-import itertools
+import os
+import subprocess
 import sys
-import tracemalloc
 from dataclasses import replace
 
 import imageio_ffmpeg
@@ -14,6 +14,7 @@ from structures import BENT, arch_response, parted, wall
 import solver
 from blockvis.pictures import flat_scene, palette
 from blockvis.pictures.drawer import Drawer, Look
+from blockvis.pictures.film import film_of
 from blockvis.pictures.flat_scene import Scene, magnified
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.render import animate, draw_mechanism, draw_still
@@ -158,10 +159,11 @@ def test_films_have_their_frames(tmp_path, suffix, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymunk", None)
     response = parted(wall(6, 5), 4, 3)
     path = animate(response, tmp_path / f"film.{suffix}", size=(320, 180), fps=10, seconds=1.0)
-    # 10 on the path, 6 held at the last equilibrium, 3 of the fall, 8 held at the end.
+    # 10 on the path, the last of them held for 6, 3 of the fall, held for 8 and shown again at the end.
     if suffix == "mp4":
         frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
-        assert (frames, seconds) == (27, pytest.approx(2.7, abs=0.05))
+        assert 8 <= frames < 27
+        assert seconds == pytest.approx(2.7, abs=0.05)
         reader = imageio_ffmpeg.read_frames(str(path))
         assert next(reader)["size"] == (320, 180)
         first = np.frombuffer(next(reader), np.uint8).astype(int)
@@ -213,32 +215,31 @@ def test_magnified_keeps_blocks_rigid():
 
 
 def drawn_frames(response, monkeypatch, **options):
-    """The frames of a film, those that are drawn in it, and what its progress says."""
+    """For how many frames each picture of a film stands, the pictures drawn, and what the progress says."""
     drawn, told = [], []
     picture = Drawer.picture
     monkeypatch.setattr(Drawer, "picture", lambda *a, **k: drawn.append(picture(*a, **k)) or drawn[-1])
     drawer = Drawer(response, Look(colour_by="mechanism"), SMALL, response.increments, **options)
-    frames = list(drawer.frames(25.0, 4.0, lambda *count: told.append(count)))
-    return frames, drawn, told
+    holds, pictures = film_of(drawer, 25.0, 4.0, lambda *count: told.append(count))
+    assert len(list(pictures)) == len(holds)
+    return holds, drawn, told
 
 
 def test_as_many_frames_are_drawn_as_something_moves(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymunk", None)
     still = parted(wall(6, 5), 4, 3, settlement=1e-3)
-    frames, drawn, told = drawn_frames(still, monkeypatch)
+    holds, drawn, told = drawn_frames(still, monkeypatch)
     # A millimetre is less than a pixel: one picture for each of the four increments, three of the fall.
     assert len(drawn) == 7
     assert told == [(k + 1, 7) for k in range(7)]
-    assert len(frames) == 100 + 15 + 3 + 20
-    assert all(a is not b for a, b in itertools.pairwise(drawn))
+    assert holds == [25, 25, 25, 25 + 15, 1, 1, 1 + 20]
 
 
 def test_frames_of_the_fall_end_where_nothing_moves(monkeypatch):
     falling = parted(wall(6, 5), 4, 3)
     resting = replace(falling, increments=(*falling.increments, *[falling.increments[-1]] * 9))
-    frames, _, told = drawn_frames(falling, monkeypatch)
-    again, _, told_again = drawn_frames(resting, monkeypatch)
-    assert (len(again), told_again) == (len(frames), told)
+    holds, _, told = drawn_frames(falling, monkeypatch)
+    assert drawn_frames(resting, monkeypatch)[::2] == (holds, told)
 
 
 def test_the_film_has_the_tints_and_dots_of_the_mechanism(tmp_path):
@@ -260,17 +261,28 @@ def test_the_film_has_the_tints_and_dots_of_the_mechanism(tmp_path):
     assert alike(picture[100:600], palette.HINGE).any()
 
 
-def test_a_large_picture_is_drawn_in_bands(tmp_path, monkeypatch):
-    tracemalloc.start()
-    try:
-        draw_still(arch_response(), 0, tmp_path / "large.png", size=(4500, 3000))
-        most = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    # Twice its 40 MB and a band, not the 216 MB of four bytes at twice its size each way.
-    assert pixels(tmp_path / "large.png").shape == (3000, 4500, 3)
-    assert most < 20e6
-    whole = pixels(draw_still(arch_response(), -1, tmp_path / "whole.png", size=SMALL))
+def test_drawing_takes_little_memory_at_any_size(tmp_path):
+    """In a process of its own: what the libraries of the pictures hold, Python does not see."""
+    code = f"""
+import resource
+from structures import parted, wall
+from blockvis import draw_still
+draw_still(parted(wall(12, 9), 2, 0), 0, {str(tmp_path / "large.png")!r}, size=(5000, 3500))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+    path = os.pathsep.join([*sys.path])
+    child = [sys.executable, "-c", code]
+    told = subprocess.run(child, check=True, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": path})
+    assert float(told.stdout) < 400.0
+    with Image.open(tmp_path / "large.png") as picture:
+        assert picture.size == (5000, 3500)
+
+
+def test_bands_of_a_picture_fit_together(monkeypatch):
+    response = arch_response()
+    drawer = Drawer(response, Look(), SMALL, response.path)
+    whole = np.asarray(drawer.picture(response.path[-1])).astype(int)
     monkeypatch.setattr(flat_scene, "BAND", 640 * 7)
-    bands = pixels(draw_still(arch_response(), -1, tmp_path / "bands.png", size=SMALL))
-    assert np.abs(whole - bands).max() <= 1
+    bands = np.asarray(drawer.picture(response.path[-1])).astype(int)
+    # Where a line is cut off at the edge of a band, its smoothing may differ by a shade.
+    assert np.abs(whole - bands).max() <= 16

@@ -1,8 +1,11 @@
 """Films: their frames, their memory, and what is said and left where one cannot be written."""
 
+import re
+import subprocess
 import weakref
 
 import imageio.v2 as imageio
+import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
@@ -57,8 +60,8 @@ def test_a_film_without_its_end_is_not_kept(tmp_path, monkeypatch, suffix):
     """An encoder that the system ends, or that finds the disk full at the end, does not say so to imageio."""
     encode = video._encode
 
-    def cut_off(given, path, fps):
-        encode(given, path, fps)
+    def cut_off(given, path, fps, holds):
+        encode(given, path, fps, holds)
         path.write_bytes(path.read_bytes()[:-5])
 
     (tmp_path / f"film{suffix}").write_bytes(b"the film before")
@@ -80,3 +83,14 @@ def test_what_fails_while_drawing_leaves_no_half_film(tmp_path, suffix):
     with pytest.raises(ValueError, match="this frame cannot be drawn"):
         write_film(failing(), tmp_path / f"film{suffix}", size=SIZE, fps=10.0)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+def test_a_picture_stands_as_long_as_it_is_held(tmp_path, suffix):
+    path = write_film(frames(), tmp_path / f"film{suffix}", size=SIZE, fps=10.0, holds=[3, 1, 4, 1, 6])
+    told = subprocess.run(
+        [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(path), "-vf", "showinfo", "-f", "null", "-"],
+        capture_output=True, text=True, check=True,
+    ).stderr  # fmt: skip
+    assert [float(time) for time in re.findall(r"pts_time:([0-9.]+)", told)] == [0.0, 0.3, 0.4, 0.8, 0.9, 1.4]
+    assert "Duration: 00:00:01.50" in told
