@@ -13,9 +13,10 @@ from blockvis.results.joints import InitialJoints, faces_at
 #: A joint is shown open from this fraction of the block size on; on an ordinary brick it is a tenth of a millimetre.
 SMALLEST_OPENING = 1e-3
 
-#: What lies between faces is a crack until they are apart by this many block sizes, or by their own length, or turned
-#: against each other by this angle [rad]. Then the blocks have parted, and what lies between them is air.
-WIDEST, STEEPEST = 0.5, 1.0
+#: What lies between faces is a crack until they are apart by this many block sizes, or by their own length: then the
+#: blocks have parted, and it is air. Of faces that are turned against each other by more than this angle [rad] only the
+#: edges have the colour of a crack: the wedge between them is open to the room.
+WIDEST, STEEPEST = 0.5, 0.5
 
 #: A sliding joint is marked over this length at least, in block sizes.
 SHORTEST = 0.3
@@ -62,6 +63,8 @@ class Marks:
         Quadrilateral between the faces of each open joint: both ends on block a, then back along block b.
     openings : (n_cracks,) array [m]
         Largest distance of the two faces of each, unmagnified.
+    faces : (n_faces, 2, 2) array [m]
+        Ends of the faces of joints that gape too wide to be filled, two of each.
     sliding : (n_sliding, 2, 2) array [m]
         Ends of each sliding joint.
     hinges : (n_hinges, 2) array [m]
@@ -69,6 +72,7 @@ class Marks:
 
     cracks: np.ndarray
     openings: np.ndarray
+    faces: np.ndarray
     sliding: np.ndarray
     hinges: np.ndarray
 
@@ -89,10 +93,11 @@ def marks_of(
     """
     contacts, mechanism = increment.contacts, solver.mechanism_of(assembly, increment)
     points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
-    cracks, openings = _cracks(assembly, joints, increment.pose, shown)
+    cracks, openings, faces = _cracks(assembly, joints, increment.pose, shown)
     return Marks(
         cracks=cracks,
         openings=openings,
+        faces=faces,
         sliding=_sliding(contacts, mechanism.sliding_points, points, assembly.block_size),
         hinges=points[mechanism.hinge_points],
     )
@@ -142,17 +147,19 @@ def length_per_force(sizes: np.ndarray, largest: float, usual_length: float, ext
 
 def _cracks(
     assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, shown: solver.Pose
-) -> tuple[np.ndarray, np.ndarray]:
-    """Quadrilaterals of the open joints, and their openings [m]."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Quadrilaterals of the open joints, their openings [m], and the faces of those that gape too wide."""
     on_a, on_b, normal = faces_at(assembly, joints, pose)
     length = np.hypot(*(joints.ends[:, 1] - joints.ends[:, 0]).T)
     opening = np.einsum("nij,nj->ni", on_a - on_b, normal).max(axis=1)
     apart = np.hypot(*np.moveaxis(on_a - on_b, 2, 0)).min(axis=1)
     turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])[:, 0]
-    together = (apart < np.minimum(length, WIDEST * assembly.block_size)) & (turn < STEEPEST)
-    is_open = (opening > SMALLEST_OPENING * assembly.block_size) & together
+    is_open = opening > SMALLEST_OPENING * assembly.block_size
+    is_open &= apart < np.minimum(length, WIDEST * assembly.block_size)
+    narrow, wide = is_open & (turn <= STEEPEST), is_open & (turn > STEEPEST)
     on_a, on_b, _ = faces_at(assembly, joints, shown)
-    return np.concatenate([on_a, on_b[:, ::-1]], axis=1)[is_open], opening[is_open]
+    filled = np.concatenate([on_a, on_b[:, ::-1]], axis=1)[narrow]
+    return filled, opening[narrow], np.concatenate([on_a[wide], on_b[wide]])
 
 
 def joint_marks(assembly: solver.Assembly, increment: solver.Increment) -> tuple[np.ndarray, np.ndarray]:
@@ -228,8 +235,29 @@ def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray, size:
     lowest, highest = np.zeros(n), np.zeros(n)
     np.minimum.at(lowest, which, place)
     np.maximum.at(highest, which, place)
-    # A joint that slides on one point only still needs a length to be seen.
-    short = np.maximum(SHORTEST * size - (highest - lowest), 0.0) / 2.0
-    lowest, highest = lowest - short, highest + short
+    # A joint that slides on one point only still needs a length to be seen, towards the others that it touches at.
+    short = np.maximum(SHORTEST * size - (highest - lowest), 0.0)
+    face_low, face_high = _extents(contacts, points, pairs, points[first], tangent)
+    alone = face_high - face_low < short
+    lowest = np.where(alone, lowest - short / 2.0, np.maximum(lowest - short, np.minimum(face_low, lowest)))
+    highest = np.where(alone, highest + short / 2.0, np.minimum(highest + short, np.maximum(face_high, highest)))
     base = points[first]
     return np.stack([base + lowest[:, None] * tangent, base + highest[:, None] * tangent], axis=1)
+
+
+def _extents(
+    contacts: solver.Contacts, points: np.ndarray, pairs: np.ndarray, base: np.ndarray, tangent: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest place, (n,) [m], of all contact points of pairs of blocks along their tangents."""
+    every, which = contacts.joints()
+    count = int(every.max(initial=0)) + 1
+    row = np.searchsorted(every[:, 0] * count + every[:, 1], pairs[:, 0] * count + pairs[:, 1])
+    number = np.full(len(every), -1)
+    number[row] = np.arange(len(pairs))
+    k = number[which]
+    here = k >= 0
+    place = ((points[here] - base[k[here]]) * tangent[k[here]]).sum(axis=1)
+    low, high = np.full(len(pairs), np.inf), np.full(len(pairs), -np.inf)
+    np.minimum.at(low, k[here], place)
+    np.maximum.at(high, k[here], place)
+    return low, high

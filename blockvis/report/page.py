@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import base64
-import contextlib
 import html
 import json
 import os
-import time
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -49,9 +47,8 @@ from blockvis.pictures.captions import (
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.swing import Swing, mechanism_colours, swing_of
-from blockvis.results.increments import folder_of
+from blockvis.results.about import about, loss_of
 from blockvis.results.joints import initial_joints
-from blockvis.results.record import Record, read_record, versions
 from blockvis.runs.kinds import KINDS
 
 #: Increments beyond this many are thinned out evenly; the page stays below 2 MB for a thousand blocks. Of more than
@@ -69,16 +66,6 @@ PATH_SECONDS, FALL_SECONDS, PAUSE = 6.0, 0.06, 0.6
 
 #: Above this many blocks dots of hinges and lines of sliding joints hide the cracks: they are off until asked for.
 FEW_BLOCKS = 300
-
-
-@dataclass(frozen=True)
-class _About:
-    """Where a response comes from: name and file of the case, when it was found, and by which version."""
-
-    name: str
-    file: str
-    finished: str
-    version: str
 
 
 @dataclass(frozen=True)
@@ -137,13 +124,13 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
         raise ValueError(f"there is no increment to show: {response.message or response.stop}")
     page = files("blockvis") / "report"
     # No "<" may survive in the data: a name with "</script>" in it would end the script.
-    about = _about(response)
-    model = _model(response, fall) | {"name": about.name}
+    origin = about(response)
+    model = _model(response, fall) | {"name": origin.name}
     data = json.dumps(model, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
     failed = response.stop is solver.Status.SOLVER_FAILED
     return Template((page / "player.html").read_text(encoding="utf-8")).substitute(
-        title=html.escape(title or " · ".join(filter(None, (about.name, headline_of(response))))),
-        about=" · ".join(html.escape(part) for part in (about.file, about.finished, about.version) if part),
+        title=html.escape(title or " · ".join(filter(None, (origin.name, headline_of(response))))),
+        about=" · ".join(html.escape(part) for part in (origin.file, origin.finished, origin.version) if part),
         failed=f'<p class="failed">{html.escape(failure_text(response))}</p>' if failed else "",
         badge=html.escape(FALL_BADGE if fall is not None else badge_of(response)),
         notes=_notes(response),
@@ -162,24 +149,6 @@ def headline_of(response: solver.Response) -> str:
     words = KINDS[response.analysis].title(response)
     failed = response.stop is solver.Status.SOLVER_FAILED and "failed" not in words
     return f"Solver failed: {words} so far" if failed else words
-
-
-def _about(response: solver.Response) -> _About:
-    """Find where a response comes from, by the results folder that its increments are in."""
-    folder, record, finished = folder_of(response.increments[0]), Record(versions=versions()), ""
-    if folder is not None:
-        with contextlib.suppress(ValueError):
-            record = read_record(folder)
-        with contextlib.suppress(OSError, ValueError):
-            finished = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["finished"]
-    stamp = finished or time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-    file = Path(record.case_file)
-    return _About(
-        name=file.stem,
-        file=file.name or "no case file",
-        finished=stamp.replace("T", " ").replace("Z", " UTC"),
-        version=f"blockvis {record.versions.get('blockvis', '')}".strip(),
-    )
 
 
 def _notes(response: solver.Response) -> str:
@@ -491,6 +460,11 @@ def _summary(response: solver.Response, fall: Fall | None) -> list[tuple[str, st
     status = "limit load found" if response.swings and response.limits else str(response.stop)
     rows = [("analysis", response.analysis), ("status", status), *KINDS[response.analysis].rows(response)]
     apart = len(response.increments) - len(path)
+    loss = loss_of(response)
+    if loss is not None:
+        rows.append(
+            ("falls", f"{force_text(loss.weight)} = {loss.share:.4f} W{', a local loss' if loss.local else ''}")
+        )
     follows = f", {apart} {'of pseudo-motion' if response.swings else 'falling'}" if apart and fall is None else ""
     rows += [
         ("weight W", force_text(response.total_weight)),

@@ -181,9 +181,12 @@
     for (let j = 0; j < joints.n; j++) {
       const f = faces(shown, j), m = state.magnify;
       // Blocks that have parted have no joint any more: what lies between them is air.
-      if (f.opening < model.smallest_opening * m || f.apart > m * Math.min(f.length, widest) || f.bent > m * steepest) continue;
+      if (f.opening < model.smallest_opening * m || f.apart > m * Math.min(f.length, widest)) continue;
+      state.cracks++;
+      // A wedge that gapes is open to the room: its faces have the colour.
+      if (f.bent > m * steepest) { lines.push([...f.a0, ...f.a1], [...f.b0, ...f.b1]); continue; }
       ring(pen, [f.a0, f.a1, f.b1, f.b0]);
-      pen.fill(); state.cracks++;
+      pen.fill();
       if (f.opening * state.view.scale < 12) lines.push([(f.a0[0] + f.b0[0]) / 2, (f.a0[1] + f.b0[1]) / 2, (f.a1[0] + f.b1[0]) / 2, (f.a1[1] + f.b1[1]) / 2]);
     }
     return lines;

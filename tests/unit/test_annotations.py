@@ -65,7 +65,22 @@ def test_blocks_that_have_parted_have_no_joint():
     assert len(cracks(*stacked(shift=(0.0, 0.4)))) == 1
     assert len(cracks(*stacked(shift=(0.0, 0.6)))) == 0
     assert len(cracks(*stacked(shift=(0.1, 0.3), turn=0.3))) == 1
-    assert len(cracks(*stacked(shift=(0.1, 0.3), turn=1.2))) == 0
+
+
+def test_of_a_wedge_that_gapes_only_the_faces_are_marked():
+    def marked(turn):
+        c, s = np.cos(turn), np.sin(turn)
+        # Rocked about the lower left corner.
+        assembly, pose = stacked(shift=(0.5 * c - 0.5 * s - 0.5, 0.5 * s + 0.5 * c - 0.5), turn=turn)
+        filled, _, faces = marks._cracks(assembly, initial_joints(assembly), pose, pose)
+        return len(filled), faces
+
+    assert marked(0.3)[0] == 1
+    count, faces = marked(0.8)
+    assert count == 0
+    ends = faces.reshape(-1, 2)
+    assert np.hypot(*(ends - [0.0, 1.0]).T).min() < 1e-9
+    assert np.hypot(*(ends - [np.cos(0.8), 1.0 + np.sin(0.8)]).T).min() < 1e-9
 
 
 def four_blocks(apart):
@@ -81,7 +96,7 @@ def four_blocks(apart):
 @given(st.floats(0.01, 0.2))
 def test_the_pocket_where_four_cracks_meet_is_air(apart):
     assembly, pose = four_blocks(apart)
-    found, openings = marks._cracks(assembly, initial_joints(assembly), pose, pose)
+    found, openings, _ = marks._cracks(assembly, initial_joints(assembly), pose, pose)
     assert len(found) == 4
     np.testing.assert_allclose(openings, 2.0 * apart, rtol=1e-9)
     covered = shapely.union_all([shapely.Polygon(crack) for crack in found])
