@@ -47,9 +47,9 @@ def one_run(blocks: int, increments: int, traced: bool) -> dict[str, Any]:
     solved: list[float] = []
     finish = ResultsFolder.finish
 
-    def finished(*arguments: Any) -> Any:
+    def finished(*arguments: Any, **options: Any) -> Any:
         solved.append(tracemalloc.get_traced_memory()[1] / 2**20 if traced else peak())
-        return finish(*arguments)
+        return finish(*arguments, **options)
 
     ResultsFolder.finish = finished  # type: ignore[method-assign]
     with tempfile.TemporaryDirectory() as name:

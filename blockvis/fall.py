@@ -6,6 +6,7 @@ friction; it says nothing about the settlement at collapse and nothing of the st
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -95,12 +96,14 @@ def engine_installed() -> bool:
     return not missing_packages("fall")
 
 
-def fall_of(response: solver.Response) -> Fall | None:
+def fall_of(response: solver.Response, progress: Callable[[float], None] | None = None) -> Fall | None:
     """Let a collapsed structure fall from its last equilibrium until all blocks rest.
 
     Parameters
     ----------
     response : solver.Response
+    progress : callable, optional
+        Called with the seconds [s] of the fall that are worked out.
 
     Returns
     -------
@@ -114,7 +117,7 @@ def fall_of(response: solver.Response) -> Fall | None:
         return None
     push = PUSH * np.sqrt(solver.GRAVITY * response.assembly.block_size)
     for _ in range(DOUBLINGS + 1):
-        fall = _Engine(response, push).run()
+        fall = _Engine(response, push).run(progress)
         moved = np.hypot(*(fall.positions[-1] - fall.positions[0]).T)
         if moved.max() > FALLEN * response.assembly.block_size:
             return fall
@@ -196,7 +199,7 @@ class _Engine:
         extra[np.abs(extra) < 1e-9 * np.abs(own).max()] = 0.0
         self.loaded = [(self.bodies[k], tuple(map(float, extra[k]))) for k in np.flatnonzero(extra.any(axis=1))]
 
-    def run(self) -> Fall:
+    def run(self, progress: Callable[[float], None] | None = None) -> Fall:
         """Follow the bodies until all rest or the time is over."""
         free = [self.bodies[block] for block in np.flatnonzero(self.assembly.free)]
         samples, calm = [self._sample()], 0
@@ -210,6 +213,8 @@ class _Engine:
                     body.torque += moment * self.scale
                 self.space.step(1.0 / RATE / steps)
             samples.append(self._sample())
+            if progress is not None:
+                progress((len(samples) - 1) / RATE)
             still = all(body.is_sleeping for body in free) or self._fastest() < STILL * self.speed
             calm = calm + 1 if still else 0
             if calm >= RESTING * RATE:

@@ -39,6 +39,12 @@ FINE_CRACK = 0.01
 #: Joints open by more than this fraction need no line: the middle of a wide crack may lie on a third block.
 WIDE_CRACK = 0.2
 
+#: Layers that a fall in time has not.
+OF_STATICS = (
+    *("crack", "crack edge", "sliding", "hinge", "hinge top", "force", "force line", "ground"),
+    *("arrow rim", "arrow top", "live rim", "live top"),
+)
+
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
 
@@ -193,7 +199,7 @@ class Drawer:
         title: str = "",
         note: str = "",
         badge: str = "",
-        joints: bool = True,
+        blocks_only: bool = False,
     ) -> Image.Image:
         """Draw one increment; for frames in between, with its blocks at another pose.
 
@@ -206,21 +212,22 @@ class Drawer:
             The parameter there.
         title, note, badge : str
             First and second line of the caption, and the warning, instead of those of the increment.
-        joints : bool
-            Mark the joints, as far as the look has them.
+        blocks_only : bool
+            Leave out what statics knows: joints, forces, what stands on what, and where supports go.
         """
         increment = increment if pose is not None else self._shown(increment)
         true = increment.pose if pose is None else pose
         shown = magnified(self.assembly, true, self.look.magnification)
         at = increment.with_arrays(pose=true, contacts=_contacts_at(increment, true)) if pose is not None else increment
         self.scene.pose(shown, self._block_colours(true))
-        self._draw_joints(at, shown, visible=joints)
-        self._draw_forces(at, shown)
-        self._draw_ground(shown)
-        self._draw_settlement_arrow(
-            at, shown, hidden=self.fall is not None and increment.status == solver.Status.FALLING
-        )
-        self._draw_live_load(increment, shown)
+        if blocks_only:
+            self.scene.clear(*OF_STATICS)
+        else:
+            self._draw_joints(at, shown)
+            self._draw_forces(at, shown)
+            self._draw_ground(shown)
+            self._draw_settlement_arrow(at, shown)
+            self._draw_live_load(increment, shown)
         falling = increment.status == solver.Status.FALLING
         failed = self.response.stop == solver.Status.SOLVER_FAILED
         head, detail = _caption(self.response, increment, self.look)
@@ -242,7 +249,7 @@ class Drawer:
             title=f"Fall   ·   {time:.2f} s after the last equilibrium",
             note=f"{CAPTION}   ·   true scale",
             badge=FALL_BADGE,
-            joints=False,
+            blocks_only=True,
         )
 
     def show_motion(self, swing: Swing) -> None:
@@ -280,6 +287,11 @@ class Drawer:
         """Return the legend: what is marked in any of the increments, so that it is the same in all pictures."""
         if self._keys is None:
             keys = []
+            if self._swing is not None and self._swing.moves:
+                together = int(self._swing.parts.max(initial=-1)) + 1 <= MOST_PARTS
+                colour = palette.PARTS[0] if together else palette.RAMP[5]
+                words = "parts of the last mechanism" if together else "faster in the last mechanism"
+                keys.append(Key("area", words, (int(colour[0]), int(colour[1]), int(colour[2]))))
             if self.look.joints:
                 seen = self._seen
                 keys += [Key("area", "open joint", palette.OPEN)] if seen.cracks else []
@@ -322,11 +334,8 @@ class Drawer:
         colours = palette.displacement_colours(np.hypot(*moved.T) / (self.largest or 1.0))
         return np.where(self.assembly.free[:, None], colours, self.fill)
 
-    def _draw_joints(self, increment: solver.Increment, shown: solver.Pose, *, visible: bool) -> None:
+    def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> None:
         if not self.look.joints:
-            return
-        if not visible:
-            self.scene.clear("crack", "crack edge", "sliding", "hinge", "hinge top")
             return
         scene, thin = self.scene, self.scene.size[1] / 1080.0
         found = marks_of(self.assembly, self.joints, increment, shown)
@@ -415,10 +424,9 @@ class Drawer:
         if self.live.largest > 0.0:
             self._arrows("live", *self.live.arrows(increment, shown), 0.55, palette.LIVE)
 
-    def _draw_settlement_arrow(self, increment: solver.Increment, shown: solver.Pose, *, hidden: bool) -> None:
+    def _draw_settlement_arrow(self, increment: solver.Increment, shown: solver.Pose) -> None:
         assembly, scene = self.assembly, self.scene
-        if hidden or not self.response.settlements:
-            scene.clear("arrow rim", "arrow top")
+        if not self.response.settlements:
             return
         phase = self.response.settlements[min(increment.phase, len(self.response.settlements) - 1)]
         _, places, directions = settlement_arrows(assembly, phase, shown, scene.frame.low, scene.frame.high)

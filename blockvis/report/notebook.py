@@ -6,6 +6,7 @@ import html
 from dataclasses import dataclass
 
 import solver
+from blockvis.fall import fall_of
 
 from .page import report_html
 
@@ -26,7 +27,7 @@ class Player:
 
     def _repr_html_(self) -> str:
         # A frame of its own keeps the page's names and styles apart from the notebook's.
-        page = html.escape(report_html(self.response), quote=True)
+        page = html.escape(report_html(self.response, fall=fall_of(self.response)), quote=True)
         style = f"width:100%;height:{self.height}px;border:0"
         return f'<iframe srcdoc="{page}" style="{style}" sandbox="allow-scripts allow-downloads"></iframe>'
 

@@ -7,6 +7,7 @@ import time
 from typing import TextIO
 
 import solver
+from blockvis.fall import LONGEST
 
 from .kind import Course
 
@@ -37,11 +38,12 @@ class _Line:
         """Whether it is time to write again."""
         return time.perf_counter() - self.last >= (REDRAW if self.watched else LINES)
 
-    def write(self, text: str) -> None:
-        """Write the line, with the seconds so far."""
+    def write(self, text: str, part: float | None = None) -> None:
+        """Write the line, with the seconds so far, and on a terminal a bar of the part that is done."""
         self.last = time.perf_counter()
         text = f"{text}, {self.last - self.started:.1f} s"
-        self.stream.write(f"\r\x1b[K{text}" if self.watched else f"blockvis: {text}\n")
+        bar = "" if part is None else f"[{'#' * int(24 * part):<24}] "
+        self.stream.write(f"\r\x1b[K{bar}{text}" if self.watched else f"blockvis: {text}\n")
         self.stream.flush()
 
     def clear(self) -> None:
@@ -52,7 +54,7 @@ class _Line:
 
 
 class DrawingProgress:
-    """A bar that counts the frames of the film.
+    """A bar that counts the seconds of the fall as it is worked out, then the frames of the film.
 
     Parameters
     ----------
@@ -63,10 +65,15 @@ class DrawingProgress:
     def __init__(self, stream: TextIO | None = None) -> None:
         self._line = _Line(stream)
 
+    def fall(self, time: float) -> None:
+        """Show how far the fall is worked out [s]."""
+        if self._line.due:
+            self._line.write(f"fall, {time:.1f} s of at most {LONGEST:g} s", time / LONGEST)
+
     def frame(self, done: int, total: int) -> None:
         """Show how many frames are drawn."""
         if self._line.due or (self._line.watched and done == total):
-            self._line.write(f"[{'#' * (24 * done // max(total, 1)):<24}] frame {done} of {total}")
+            self._line.write(f"frame {done} of {total}", done / max(total, 1))
 
     def done(self) -> None:
         """Clear the bar."""
@@ -102,8 +109,9 @@ class Progress:
         driver = drivers[min(increment.phase, len(drivers) - 1)]
         part = min(increment.parameter / driver.limit, 1.0)
         self._line.write(
-            f"[{'#' * int(24 * part):<24}] {parameter.name} {increment.parameter:.4g} of at most {driver.limit:g} "
-            f"{driver.unit}, {what}, {self.count} increments"
+            f"{parameter.name} {increment.parameter:.4g} of at most {driver.limit:g} {driver.unit}, {what}, "
+            f"{self.count} increments",
+            part,
         )
 
     def done(self) -> None:

@@ -371,9 +371,11 @@ def draw_results(
     clock = Clock() if clock is None else clock
     if not response.increments:
         return ()
+    progress = DrawingProgress()
     with clock.counting("fall"):
         stored = stored_fall(folder)
-        fall = fall_of(response) if stored is None else stored
+        fall = fall_of(response, progress.fall) if stored is None else stored
+        progress.done()
     if film is not None and animation is not None:
         film.draw(response, folder / animation, fall)
     if fall is not None and stored is None:
@@ -386,7 +388,6 @@ def draw_results(
     from blockvis.pictures.render import animate, draw_mechanism
     from blockvis.report.page import write_report
 
-    progress = DrawingProgress()
     with clock.counting("report"):
         write_paraview_macro(folder)
         write_report(response, folder / "report.html", case_text, fall=fall)

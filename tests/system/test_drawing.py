@@ -145,8 +145,8 @@ def test_a_bar_on_a_terminal_lines_elsewhere(monkeypatch):
     bar.frame(4, 8)
     bar.done()
     assert [line.rpartition(",")[0] for line in piped.getvalue().splitlines()] == [
-        "blockvis: [#########               ] frame 3 of 8",
-        "blockvis: [############            ] frame 4 of 8",
+        "blockvis: frame 3 of 8",
+        "blockvis: frame 4 of 8",
     ]
 
 
