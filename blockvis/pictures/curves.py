@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw
 
 import solver
 from blockvis.atomic_files import whole_file
-from blockvis.results.about import about
+from blockvis.results.about import about, collapse_mechanism
 
 from . import palette
 from .captions import (
@@ -296,11 +296,10 @@ def _mark_collapse(
 
 def _counts(response: solver.Response) -> str:
     """Count the hinges and sliding joints of the collapse mechanism, on a line of their own."""
-    collapse = response.collapse
-    if collapse is None or collapse.lost != "equilibrium":
+    mechanism = collapse_mechanism(response)
+    if mechanism is None or response.collapse is None or response.collapse.lost != "equilibrium":
         return ""
-    falling = solver.with_motion(response.path[-1], collapse.mechanism)
-    hinges, sliding = map(len, _joints(solver.mechanism_of(response.assembly, falling)))
+    hinges, sliding = map(len, _joints(mechanism))
     found = [(hinges, "hinge"), (sliding, "sliding joint")]
     words = ", ".join(f"{n} {word}{'' if n == 1 else 's'}" for n, word in found if n)
     return f"\n{words}" if words else ""

@@ -62,6 +62,32 @@ def about(response: solver.Response) -> About:
     )
 
 
+def collapse_mechanism(response: solver.Response) -> solver.Mechanism | None:
+    """Find the collapse mechanism at the last equilibrium: what words, tables, curves, pictures and pages count.
+
+    Parameters
+    ----------
+    response : solver.Response
+
+    Returns
+    -------
+    solver.Mechanism or None
+        None where nothing collapses.
+    """
+    collapse, path = response.collapse, response.path
+    if collapse is None or not path or not collapse.mechanism.any():
+        return None
+    return solver.mechanism_of(response.assembly, solver.with_motion(path[-1], collapse.mechanism))
+
+
+def mechanism_text(response: solver.Response) -> str:
+    """Say in words how a structure collapses; empty where it does not."""
+    mechanism = collapse_mechanism(response)
+    if mechanism is not None:
+        return str(mechanism)
+    return "" if response.collapse is None else response.collapse.words
+
+
 @dataclass(frozen=True)
 class Loss:
     """What a collapse mechanism takes with it.

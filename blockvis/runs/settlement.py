@@ -10,7 +10,7 @@ from typing import Any
 import solver
 from blockvis.cases.contents import Case
 from blockvis.numbers import force_text
-from blockvis.results.about import loss_of
+from blockvis.results.about import loss_of, mechanism_text
 
 from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, needs_dry_joints
 
@@ -69,7 +69,7 @@ class SettlementKind(AnalysisKind):
             lines += [
                 f"last reaction        {last:12.6g} N   {last / weight:.6f} W",
                 f"collapse displacement{at:12.6g} {unit}   between {low:.6g} and {high:.6g}",
-                f"mechanism: {response.collapse.words}",
+                f"mechanism: {mechanism_text(response)}",
             ]
             loss = loss_of(response)
             lines += [] if loss is None else [str(loss)]

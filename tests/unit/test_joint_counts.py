@@ -5,6 +5,7 @@ import csv
 import json
 import re
 import zlib
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -19,6 +20,7 @@ from blockvis.pictures.curves import events_of
 from blockvis.pictures.swing import swing_of
 from blockvis.report.page import report_html
 from blockvis.results.joints import initial_joints
+from blockvis.runs.kinds import KINDS
 
 SINKS = (0.0, -1.0)
 
@@ -114,6 +116,18 @@ def test_collapse_has_one_count(name, tmp_path):
     assert counted(response, response.increments[len(response.path)]) == expected
     summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
     assert (summary["hinges"], summary["sliding_joints"]) == expected
+
+
+def test_console_and_summary_count_what_the_picture_shows(tmp_path):
+    """Not the first frame of the fall, whose contact points and forces are others."""
+    response = portal()
+    shown = swing_of(response).increment
+    collapse = replace(response.collapse, words="9 macro-blocks; hinge at a | b")
+    response = replace(response, collapse=collapse)
+    said = next(line for line in KINDS["settlement"].lines(response) if line.startswith("mechanism: "))
+    assert said == f"mechanism: {solver.mechanism_of(response.assembly, shown)}"
+    summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
+    assert f"mechanism: {summary['mechanism']}" == said
 
 
 def test_creeping_counts_for_nothing():
