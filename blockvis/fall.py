@@ -33,8 +33,9 @@ SIZE = 100.0
 #: the thinnest block.
 SLOP, STRIDE = 2e-4, 1e-2
 
-#: Steps per second at least, sweeps over the contacts in each, and the part of an overlap that is left after a second.
-SLOWEST, SWEEPS, BIAS = 1000, 30, 1e-12
+#: Steps per second at least and at most (a sliver would ask for any number), sweeps over the contacts in each, and the
+#: part of an overlap that is left after a second.
+SLOWEST, FASTEST, SWEEPS, BIAS = 1000, 12_000, 30, 1e-12
 
 #: The first push: speed of the fastest block, in sqrt(g × block size). Where everything stands after it, it is doubled,
 #: up to so many times.
@@ -206,7 +207,7 @@ class _Engine:
         for _ in range(round(LONGEST * RATE)):
             fastest = self._fastest()
             speed = fastest + solver.GRAVITY / RATE
-            steps = int(np.ceil(max(SLOWEST, speed / (STRIDE * self.thinnest)) / RATE))
+            steps = int(np.ceil(np.clip(speed / (STRIDE * self.thinnest), SLOWEST, FASTEST) / RATE))
             for _ in range(steps):
                 for body, (x, y, moment) in self.loaded:
                     body.apply_force_at_world_point((x, y), body.position)
