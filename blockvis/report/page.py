@@ -46,7 +46,7 @@ from blockvis.pictures.captions import (
 )
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
-from blockvis.pictures.swing import Swing, mechanism_colours, swing_of
+from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 from blockvis.results.about import about, loss_of
 from blockvis.results.joints import initial_joints
 from blockvis.runs.kinds import KINDS
@@ -210,7 +210,8 @@ def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
         "roles": [roles[str(role)] for role in assembly.roles],
         "fills": _hexadecimal(fills),
         "tints": _hexadecimal(mechanism_colours(assembly, fills, swing)) if swing.moves else [],
-        "tints_words": "parts of the mechanism" + ("" if response.parameter.is_path else " of the lowest state"),
+        "tints_words": _tints_text(response, swing),
+        "moving": int(np.argmax(swing.parts >= 0)),
         "ramp": _hexadecimal(palette.RAMP.astype(int)),
         "largest_displacement": tables.largest_displacement,
         "arrows": _arrows(response, frame, origin),
@@ -239,6 +240,14 @@ def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
 
 def _hexadecimal(colours: np.ndarray) -> list[str]:
     return [palette.hexadecimal((int(r), int(g), int(b))) for r, g, b in colours]
+
+
+def _tints_text(response: solver.Response, swing: Swing) -> str:
+    """Say what the colours of the mechanism mean."""
+    whose = "" if response.parameter.is_path else " of the lowest state"
+    if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
+        return f"parts of the mechanism{whose}"
+    return f"mechanism{whose}, darker where faster"
 
 
 def _arrows(response: solver.Response, frame: Frame, origin: np.ndarray) -> list[list[list[float]]]:

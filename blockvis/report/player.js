@@ -306,7 +306,8 @@
     pen.moveTo(x + wide, y - 5); pen.lineTo(x + wide, y + 5); pen.stroke();
     pen.font = `14px ${FONT}`; pen.textAlign = "center"; pen.textBaseline = "bottom";
     pen.fillText(`${+length.toPrecision(3)} m`, x + wide / 2, y - 5);
-    if (!layers.forces || state.magnify !== 1) return;
+    const falling = model.frames[Math.min(Math.round(state.frame), nFrames - 1)].falling;
+    if (!layers.forces || falling || state.magnify !== 1) return;
     const start = x + wide + 34, [force, text] = model.force_scale, bar = force * model.force_length * state.view.scale;
     pen.strokeStyle = model.colours.force; pen.beginPath(); pen.moveTo(start, y); pen.lineTo(start + bar, y); pen.stroke();
     pen.textAlign = "left"; pen.fillText(text, start, y - 5);
@@ -354,9 +355,9 @@
     if (layers.sliding && marked && countOf(k, 2)) add("line", "sliding joint", model.colours.sliding);
     if (layers.forces && marked && !falling && model.has_forces) add("line", "resultant of a joint", model.colours.force);
     if (layers.thrust && marked && !falling && thrustLine(k).length) add("line", "thrust line", model.colours.force);
-    if (layers.start && model.arrows.length) add("line", "settlement; dashed: where the support was", model.colours.settlement);
+    if (layers.start && model.arrows.length) add("line", falling ? "dashed: where the support was" : "settlement; dashed: where the support was", falling ? model.colours.hatch : model.colours.settlement);
     if (marked && model.live_words) add("line", model.live_words, model.colours.live);
-    if (state.colours === "mechanism" && model.tints.length) add("area", model.tints_words, model.tints[model.roles.indexOf(0)]);
+    if (state.colours === "mechanism" && model.tints.length) add("area", model.tints_words, model.tints[model.moving]);
     if (state.colours === "displacement") add("ramp", `displacement, 0 to ${(1000 * model.largest_displacement).toPrecision(3)} mm`, `linear-gradient(90deg, ${model.ramp.join(",")})`);
     const many = [["hinges", 1], ["sliding", 2]].filter(([name, kind]) => model.many && countOf(k, kind) && !layers[name]);
     if (many.length) add("", `${many.map(([name]) => (name === "hinges" ? "hinges" : "sliding joints")).join(" and ")} are off: they would hide the cracks of so many blocks`, "");
