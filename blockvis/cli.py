@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import warnings
 from collections.abc import Sequence
@@ -16,18 +17,20 @@ import solver
 
 from .extras import MissingExtra
 from .generators import LAYOUTS, help_text
+from .layout.views import VIEWS
 
-#: Exit codes: bad input or a missing extra, a solver failure, everything written but the pictures, Ctrl-C.
-BAD_INPUT, SOLVER_FAILED, NO_PICTURES, INTERRUPTED = 2, 3, 4, 130
-
+#: Exit codes: bad input or a missing extra, a solver failure, everything written but the pictures, no equilibrium to
+#: start from, Ctrl-C.
+BAD_INPUT, SOLVER_FAILED, NO_PICTURES, NO_EQUILIBRIUM, INTERRUPTED = 2, 3, 4, 5, 130
 
 #: What the exit codes mean, for ``--help``.
-EXIT_CODES = """exit codes:
-  0    done, also where the structure collapses or does not stand at all
-  2    bad input, or a package that is not installed
-  3    the solver failed; what it had found is written
-  4    everything is written but the pictures
-  130  interrupted by Ctrl-C; blockvis run --resume OUT goes on"""
+EXIT_CODES = f"""exit codes:
+  0    done, also when the structure collapses
+  {BAD_INPUT}    bad input, or a package that is not installed
+  {SOLVER_FAILED}    the solver failed; what it had found is written
+  {NO_PICTURES}    everything is written but the pictures
+  {NO_EQUILIBRIUM}    no initial equilibrium: the structure does not stand as drawn
+  {INTERRUPTED}  interrupted by Ctrl-C; blockvis run --resume OUT goes on"""
 
 #: What ``blockvis completion`` writes for, and where it goes.
 SHELLS = {
@@ -48,6 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = _show_warning
     try:
         code: int = options.verb(options)
+    except BrokenPipeError:
+        raise
     except (ValueError, OSError, MissingExtra) as error:
         print(f"blockvis: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -65,7 +70,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def entry() -> None:
     """Console script."""
-    sys.exit(main())
+    try:
+        code = main()
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whatever reads the output, such as head, has enough of it; Python would complain again as it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 0
+    sys.exit(code)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -103,14 +115,18 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.set_defaults(verb=_run)
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
-    info.add_argument("file", metavar="FILE")
+    info.add_argument("file", metavar="FILE", help="or a folder or a pattern of files, one per stone")
     info.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    _add_view(info)
+    _add_choice(info)
     info.add_argument("--picture", metavar="PNG", help="draw what was found")
     info.set_defaults(verb=_info)
     convert = verbs.add_parser("convert", help="any layout file to any other")
-    convert.add_argument("source", metavar="IN")
+    convert.add_argument("source", metavar="IN", help="or a folder or a pattern of files, one per stone")
     convert.add_argument("target", metavar="OUT")
     convert.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    _add_view(convert)
+    _add_choice(convert)
     convert.add_argument(
         "--joint-thickness", default="0", metavar="M", help='close mortar joints up to this, or "auto"'
     )
@@ -179,6 +195,21 @@ def _version() -> str:
         return version("blockvis")
     except PackageNotFoundError:
         return "(not installed)"
+
+
+def _add_view(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("--view", choices=tuple(VIEWS), help="coordinates to take, of a drawing in space")
+
+
+def _add_choice(verb: argparse.ArgumentParser) -> None:
+    for flag, what in (("--ignore", "leave out"), ("--only", "read nothing but")):
+        verb.add_argument(
+            flag,
+            action="append",
+            default=[],
+            metavar="PATTERN",
+            help=f"{what} this layer, group or name; may be given again",
+        )
 
 
 def _add_sweep(verbs: Any) -> None:
@@ -273,6 +304,8 @@ def _run(options: argparse.Namespace) -> int:
         return INTERRUPTED
     if stop is solver.Status.SOLVER_FAILED:
         return SOLVER_FAILED
+    if stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
+        return NO_EQUILIBRIUM
     return NO_PICTURES if run.missing else 0
 
 
@@ -280,7 +313,7 @@ def _info(options: argparse.Namespace) -> int:
     from .formats.read import inspect
     from .pictures.inspection import draw_inspection
 
-    found = inspect(options.file, unit=options.unit)
+    found = inspect(options.file, unit=options.unit, view=options.view, ignore=options.ignore, only=options.only)
     print(found)
     if options.picture:
         print(f"drawn in {draw_inspection(found, options.picture)}")
@@ -292,7 +325,7 @@ def _convert(options: argparse.Namespace) -> int:
     from .layout.assemble import assemble
 
     target = _new_file(options.target, options.force)
-    layout = read_layout(options.source, unit=options.unit)
+    layout = read_layout(options.source, unit=options.unit, view=options.view, ignore=options.ignore, only=options.only)
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)
     joint = options.joint_thickness
@@ -390,9 +423,13 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         response.assembly.vertices[response.assembly.free[response.assembly.block_of_vertex]], axis=0
     )
     weight = response.total_weight
+    assembly = response.assembly
+    largest = assembly.outline(int(np.argmax(np.where(assembly.free, assembly.areas, 0.0))))
+    across = float(np.hypot(*(largest[:, None, :] - largest[None, :, :]).T).max())
     lines = [
         f"{response.assembly.n_blocks} blocks ({int(response.assembly.free.sum())} free), "
-        f"{width:.4g} m wide, {height:.4g} m high, weight {weight:.6g} N",
+        f"{width:.4g} m wide, {height:.4g} m high, weight {weight:.6g} N, "
+        f"largest block {across:.3g} m across",
         f"{kind.headline(response)}, {sum(i.programs for i in response.increments)} linear "
         f"programs, {sum(i.seconds for i in response.increments):.2f} s of solver time",
     ]

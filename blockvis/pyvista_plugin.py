@@ -4,7 +4,8 @@
     mesh = pyvista.read("wall.dxf")
     response = mesh.blockvis.settle({"right": "moving", "left": "fixed"}, direction=(1, 0), friction_coefficient=0.6)
 
-Importing this module registers everything. Suffixes that PyVista reads or writes itself stay with PyVista.
+Importing this module registers everything. Suffixes that PyVista reads or writes itself stay with PyVista, and so do
+``.msh`` files of anything but flat blocks.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ import pyvista as pv
 
 import solver
 
+from .formats.gmsh_mesh import holds_flat_blocks
 from .formats.pyvista_files import dataset_of, layout_of_dataset
 from .formats.read import read_layout, write_layout
 from .layout.assemble import assemble
 from .layout.layout import Layout
+from .layout.selection import sorted_out
 from .pictures import palette
 from .results.datasets import block_dataset
 
@@ -34,9 +37,27 @@ def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:
     return dataset_of(read_layout(path, **options))
 
 
+def _mesh_reader(path: str, **options: Any) -> Any:
+    """Read a .msh file of flat blocks as a layout; leave every other to PyVista."""
+    try:
+        if holds_flat_blocks(Path(path)):
+            return _reader(path, **options)
+    except ValueError as error:
+        problem: ValueError | None = error
+    else:
+        problem = None
+    try:
+        return pv.read_meshio(path)
+    except (SystemExit, Exception):
+        # meshio ends the process for some files; what PyVista cannot read either is refused with our reason.
+        if problem is not None:
+            raise problem from None
+        raise
+
+
 def _writer(dataset: Any, path: str, **options: Any) -> None:
     """Write the blocks of a dataset to a layout file."""
-    write_layout(layout_of_dataset(dataset), path)
+    write_layout(BlockvisAccessor(dataset).layout(), path)
 
 
 def _registered(register: Any, suffixes: Sequence[str], handler: Any) -> tuple[str, ...]:
@@ -50,7 +71,10 @@ def _registered(register: Any, suffixes: Sequence[str], handler: Any) -> tuple[s
 
 
 #: Suffixes that ``pyvista.read`` now reads through blockvis.
-READS = _registered(pv.register_reader, (".dxf", ".json", ".msh", ".svg"), _reader)
+READS = (
+    *_registered(pv.register_reader, (".dxf", ".json", ".svg"), _reader),
+    *_registered(pv.register_reader, (".msh",), _mesh_reader),
+)
 
 #: Suffixes that ``dataset.save`` now writes through blockvis.
 WRITES = _registered(pv.register_writer, (".dxf", ".json", ".msh", ".svg"), _writer)
@@ -73,7 +97,8 @@ class BlockvisAccessor:
 
     def layout(self) -> Layout:
         """Read the blocks as a layout, lengths in m."""
-        return layout_of_dataset(self._mesh)
+        layout = layout_of_dataset(self._mesh)
+        return sorted_out(replace(layout, unit=layout.unit or "m"))
 
     def save(self, path: str | Path) -> Path:
         """Write the blocks to a layout file of any format that blockvis writes."""

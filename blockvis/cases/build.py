@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from blockvis import generators
 from blockvis.formats.read import read_layout
 from blockvis.layout import layout
 from blockvis.layout.assemble import assemble
+from blockvis.layout.units import doubt
 from blockvis.suggestions import nearest
 
 from .contents import Case
@@ -22,8 +24,12 @@ from .loads import loads_of
 #: The weight of a block lighter than this fraction of the whole may be lost in rounding errors of the other forces.
 LIGHTEST = 1e-14
 
-#: If all blocks are smaller than this [m], the unit of the file is probably another one.
-SMALLEST_BLOCKS = 2e-3
+#: Friction steeper than this (72 degrees) is probably an angle in degrees, and masonry lighter than this [kg/m³]
+#: probably in t/m³ or kN/m³.
+STEEPEST, LIGHTEST_STONE = 3.0, 100.0
+
+#: A settlement of more than this fraction of a block in one step passes over what happens within it.
+LONGEST_STEP = 0.1
 
 #: Defaults of blocks for which neither file nor case has a value [kg/m³, m].
 DENSITY, THICKNESS = 2000.0, 1.0
@@ -47,6 +53,7 @@ def case_assembly(case: Case) -> solver.Assembly:
         For a layout that cannot be read or built, and for settlements without a moving support.
     """
     sketch = _case_layout(case)
+    _note_density(case, sketch)
     if case.densities:
         sketch = _with_densities(case, sketch)
     assembly = assemble(
@@ -57,6 +64,8 @@ def case_assembly(case: Case) -> solver.Assembly:
         thickness=case.thickness or THICKNESS,
         joint_thickness=case.joint_thickness,
         overlap_tolerance=case.overlap_tolerance,
+        closing=case.closing,
+        outline_tolerance=case.outline_tolerance,
     )
     if case.settlements and not assembly.moving.any():
         groups = sorted({g for g in sketch.groups if g} | {s["name"] for s in case.supports}) or list(sketch.names[:12])
@@ -65,11 +74,12 @@ def case_assembly(case: Case) -> solver.Assembly:
             f"[[supports]]: {', '.join(groups)}"
         )
     _note_numbers(assembly, case.source)
+    _note_units(case, assembly)
     return imperfect(assembly, case.imperfections)
 
 
 def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
-    """Warn of blocks too light for double precision, and of a unit that is probably wrong."""
+    """Warn of blocks too light for double precision."""
     weight = np.where(assembly.free, assembly.masses, 0.0)
     light = np.flatnonzero(assembly.free & (weight < LIGHTEST * weight.sum()))
     if len(light):
@@ -79,18 +89,62 @@ def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
             "errors of the others: they may stay in the air; remove them or check their size and density",
             stacklevel=3,
         )
-    largest = float(np.sqrt(assembly.areas[assembly.free].max(initial=0.0)))
-    if 0.0 < largest < SMALLEST_BLOCKS:
+
+
+def _note_density(case: Case, sketch: layout.Layout) -> None:
+    """Warn where the density of the case loses against the file's."""
+    if case.density is None or case.file is None or sketch.density is None:
+        return
+    own = sketch.density[np.isfinite(sketch.density)]
+    if len(own) and (own != case.density).any():
         warnings.warn(
-            f"{source}: the largest block is {largest:.3g} m across; if the file is not in the unit it was read in, "
-            "say so under [geometry] unit",
+            f"{case.source}: [material] density = {case.density:g} is that of {sketch.n_blocks - len(own)} blocks; "
+            f"{len(own)} of {sketch.n_blocks} keep what '{case.file.name}' says, {own.min():g} to {own.max():g} kg/m³; "
+            "[materials.NAME] density replaces it",
             stacklevel=3,
         )
 
 
+def _note_units(case: Case, assembly: solver.Assembly) -> None:
+    """Warn of numbers that are probably in another unit."""
+    sizes = np.sqrt(assembly.areas[assembly.free])
+    notes = []
+    if case.file is None and len(sizes):
+        notes.append(doubt("m", float(np.median(sizes)), remedy="the parameters of layouts are in m"))
+    steep = {"[material]": case.friction_coefficient}
+    steep |= {f"[[interfaces]] {' and '.join(pair)}": law.friction_coefficient for pair, law in case.interfaces.items()}
+    for where, friction in steep.items():
+        if friction > STEEPEST:
+            angle = f"; if it is an angle in degrees, give its tangent, {math.tan(math.radians(friction)):.3g}"
+            notes.append(
+                f"{where} friction_coefficient = {friction:g} is a slope of {math.degrees(math.atan(friction)):.3g} "
+                f"degrees{angle if friction < 90.0 else ''}"
+            )
+    light = float(assembly.density[assembly.free].min(initial=np.inf))
+    if light < LIGHTEST_STONE:
+        # 2 t/m³ or 20 kN/m³ are those of stone.
+        unit, factor = ("t/m³", 1000.0) if light < 10.0 else ("kN/m³", 1000.0 / solver.GRAVITY)
+        notes.append(
+            f"density {light:g} kg/m³ is lighter than masonry; if it is in {unit}, give {factor * light:.4g} kg/m³"
+        )
+    steps = [s.increment for s in case.settlements if s.unit == "m"]
+    free = np.flatnonzero(assembly.free).tolist()
+    across = [float(np.hypot(*np.ptp(assembly.outline(i), axis=0))) for i in free]
+    block = float(np.median(across)) if across else np.inf
+    if steps and max(steps) > LONGEST_STEP * block:
+        notes.append(
+            f"[settlement] increment = {max(steps):g} m is {max(steps) / block:.3g} of the median block, "
+            f"{block:.3g} m across: a step passes over what happens within it; at most {LONGEST_STEP * block:.2g} m"
+            + (f", or is it in mm? {1e-3 * max(steps):g} m" if max(steps) > block else "")
+        )
+    for note in notes:
+        if note:
+            warnings.warn(f"{case.source}: {note}", stacklevel=3)
+
+
 def _case_layout(case: Case) -> layout.Layout:
     if case.file is not None:
-        return read_layout(case.file, unit=case.unit)
+        return read_layout(case.file, unit=case.unit, view=case.view, ignore=case.ignore, only=case.only)
     assert case.layout is not None
     try:
         sketch = layout.layout_of(generators.build(case.layout, case.parameters))

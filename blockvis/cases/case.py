@@ -14,6 +14,8 @@ import tomlkit
 import solver
 from blockvis import generators
 from blockvis.formats import FORMATS
+from blockvis.layout.joints.close import WAYS
+from blockvis.layout.views import VIEWS
 from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import files_like
 from blockvis.video_suffixes import VIDEO_SUFFIXES
@@ -116,6 +118,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         raise geometry.error("file", problem + f", or a layout: {', '.join(generators.LAYOUTS)}" * (file is None))
     if file is not None and parameters:
         raise geometry.error("parameters", "belong to a layout, not to a file")
+    view, ignore, only = _chosen(geometry, file)
     joint = geometry.take("joint_thickness", 0.0)
     if joint != "auto":
         joint = geometry.number("joint_thickness", 0.0)
@@ -153,8 +156,13 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         layout=layout,
         parameters=dict(parameters),
         unit=geometry.text("unit"),
+        view=view,
+        ignore=ignore,
+        only=only,
         thickness=geometry.number("thickness", positive=True),
         joint_thickness=joint,
+        outline_tolerance=_tolerance(geometry),
+        closing=geometry.text("closing", "auto", among=WAYS),
         overlap_tolerance=geometry.number("overlap_tolerance", positive=True),
         roles=dict(roles),
         supports=tuple(_support(entry) for entry in top.tables("supports")),
@@ -175,6 +183,24 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     for table in (geometry, material, analysis, output, top):
         table.finish()
     return _checked(case, settings)
+
+
+def _tolerance(geometry: Table) -> float | None:
+    """Tolerance of outlines [m]: 0 keeps every corner; None where the case does not say."""
+    value = geometry.number("outline_tolerance")
+    if value is not None and value < 0.0:
+        raise geometry.error("outline_tolerance", f"is {value:g}; give a length in m of at least 0")
+    return None if value is None else float(value)
+
+
+def _chosen(geometry: Table, file: str | None) -> tuple[str | None, tuple[str, ...], tuple[str, ...]]:
+    """Read what is chosen of a file: view, ignore and only."""
+    view = geometry.text("view", among=tuple(VIEWS))
+    ignore, only = geometry.texts("ignore"), geometry.texts("only")
+    for key, value in (("view", view), ("ignore", ignore), ("only", only)):
+        if file is None and value:
+            raise geometry.error(key, "belongs to a file, not to a layout")
+    return view, ignore, only
 
 
 def _checked(case: Case, settings: Mapping[str, Any]) -> Case:

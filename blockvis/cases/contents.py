@@ -38,8 +38,13 @@ class Case:
     layout: str | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     unit: str | None = None
+    view: str | None = None
+    ignore: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
     thickness: float | None = None
     joint_thickness: float | str = 0.0
+    closing: str = "auto"
+    outline_tolerance: float | None = None
     overlap_tolerance: float | None = None
     roles: Mapping[str, str] = field(default_factory=dict)
     supports: tuple[Mapping[str, Any], ...] = ()

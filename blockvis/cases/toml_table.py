@@ -80,6 +80,14 @@ class Table:
             raise self.error(key, f"is {value!r}; give a list of numbers")
         return tuple(float(v) for v in value)
 
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Read a text, or a list of texts; empty if it is missing."""
+        value = self.take(key, [])
+        words = [value] if isinstance(value, str) else value
+        if not isinstance(words, list | tuple) or not all(isinstance(word, str) for word in words):
+            raise self.error(key, f'is {shortened(value)}; give texts in quotes, ["first", "second *"]')
+        return tuple(words)
+
     def whole(self, key: str, least: int) -> int | None:
         """Read a whole number of at least ``least``."""
         value = self.number(key)

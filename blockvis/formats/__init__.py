@@ -1,8 +1,8 @@
 """The table of layout formats: which module reads and writes which suffix.
 
-A reader takes the path and a :class:`~blockvis.formats.reading.Reading` and returns a ``Layout`` in the file's own unit
-of length, which it names in ``Layout.unit`` ("" if the file does not state it). A writer takes a ``Layout`` in m and
-the path.
+A reader takes the path and a :class:`~blockvis.formats.reading.Reading` and returns a ``Layout``, or the ``Bodies`` of
+a file that draws them in space, in the file's own unit of length, which it names in ``unit`` ("" if the file does not
+state it). A writer takes a ``Layout`` in m and the path.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ FORMATS = {
     ".vtp": Format("pyvista_files", writes=True),
     ".vtk": Format("pyvista_files", writes=True),
     ".vtm": _PYVISTA,
+    ".vtmb": _PYVISTA,
     ".pvd": _PYVISTA,
     ".stl": _SOLID,
     ".obj": _SOLID,

@@ -12,28 +12,31 @@ import numpy as np
 import solver
 from blockvis.layout.block_table import with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import flattened, outlines_of_cells
+from blockvis.layout.left_out import LeftOut
+from blockvis.layout.outlines import UPRIGHT, flattened, is_flat, outlines_of_cells
+
+from .bodies import Bodies, Body
+from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
 
 #: Names of the cell array that numbers the blocks, in order of preference.
 BLOCK_ARRAYS = ("block_id", "BlockId", "block", "gmsh:geometrical", "CellEntityIds", "medit:ref", "cell_tags")
 
 
-def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
-    """(n_cells,) int array: number of the connected piece of each cell; shared points connect cells."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    first = np.concatenate([ring for ring in rings])
-    second = np.concatenate([np.full(len(ring), ring[0]) for ring in rings])
-    graph = coo_matrix((np.ones(len(first)), (first, second)), shape=(n_points, n_points))
-    piece = connected_components(graph, directed=False)[1]
-    return np.unique(piece[[ring[0] for ring in rings]], return_inverse=True)[1]
+def block_array(data: Mapping[str, np.ndarray]) -> str | None:
+    """Name of the cell array that numbers the blocks; None if there is none."""
+    numbered = [name for name in BLOCK_ARRAYS if name in data and np.ndim(data[name]) == 1]
+    # An array with one value everywhere, as some programs write by default, does not distinguish blocks.
+    return next((name for name in numbered if name == "block_id" or (data[name] != data[name][0]).any()), None)
 
 
 def layout_of_cells(
-    points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray], path: Path | str
-) -> Layout:
-    """Make a layout of surface cells.
+    points: np.ndarray,
+    rings: Sequence[np.ndarray],
+    data: Mapping[str, np.ndarray],
+    path: Path | str,
+    view: str | None = None,
+) -> Layout | Bodies:
+    """Make a layout of surface cells; if they do not lie in a plane, find the bodies that they enclose.
 
     Parameters
     ----------
@@ -46,6 +49,8 @@ def layout_of_cells(
         ``thickness`` and ``density`` are optional.
     path : Path or str
         Named in messages.
+    view : {"xy", "xz", "yz"}, optional
+        As of :func:`blockvis.layout.outlines.flattened`.
 
     Raises
     ------
@@ -54,13 +59,13 @@ def layout_of_cells(
     """
     if not rings:
         raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
-    flat, note = flattened(points, f"'{path}'")
     used = np.unique(np.concatenate(list(rings)))
     if used.min() < 0 or used.max() >= len(points):
         raise ValueError(f"'{path}': a cell uses point {int(used.max())}, but there are {len(points)}; export it again")
-    numbered = [name for name in BLOCK_ARRAYS if name in data and np.ndim(data[name]) == 1]
-    # An array with one value everywhere, as some programs write by default, does not distinguish blocks.
-    key = next((name for name in numbered if name == "block_id" or (data[name] != data[name][0]).any()), None)
+    key = block_array(data)
+    if not is_flat(points):
+        return _enclosed(points, rings, data, key, path)
+    flat, note = flattened(points, f"'{path}'", view)
     if key is not None:
         ids, owner = np.unique(np.asarray(data[key]), return_inverse=True)
         names = [f"block {value}" for value in ids.tolist()]
@@ -73,11 +78,31 @@ def layout_of_cells(
         owner = components(rings, len(points))
         names = [f"block {k}" for k in range(int(owner.max()) + 1)]
         how = f"{len(names)} blocks, one per connected piece: no cell array 'block_id' says which cells are one block"
-    outlines = outlines_of_cells(flat, rings, owner, names)
+    unusable: dict[int, LeftOut] = {}
+    outlines = outlines_of_cells(flat, rings, owner, names, unusable)
     first = np.unique(owner, return_index=True)[1]
     notes = tuple(text for text in (how, note) if text)
     layout = Layout(outlines=tuple(outlines), names=tuple(names), unit="", notes=notes)
-    return with_rows(layout, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
+    layout = with_rows(layout, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
+    return layout.leaving_out(unusable)
+
+
+def _enclosed(
+    points: np.ndarray, rings: Sequence[np.ndarray], data: Mapping[str, np.ndarray], key: str | None, path: Path | str
+) -> Bodies:
+    """Find the bodies that surface cells in space enclose, one per value of a cell array, or one per piece."""
+    values, owner = np.unique(data[key] if key else np.zeros(len(rings), dtype=np.int64), return_inverse=True)
+    names = [f"block {value}" for value in values.tolist()] if key else ["block"]
+    try:
+        bodies, owners = bodies_of_surfaces(points, rings, owner, names, path)
+    except OpenSurface:
+        # A drawing that is meant to be flat: the error says how far it is not.
+        flattened(points, f"'{path}'")
+        raise
+    first = np.unique(owner, return_index=True)[1]
+    rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
+    how = f"one per value of the cell array '{key}'" if key else "one per closed surface"
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, {how}",))
 
 
 def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, Any]:
@@ -110,26 +135,63 @@ def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, An
     return row
 
 
-def merged(layouts: Sequence[Layout], labels: Sequence[str], path: Path | str) -> Layout:
-    """Join layouts to one; blocks without a name of their own are named after their part of the file.
+def merged(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path | str) -> Layout | Bodies:
+    """Join the parts of a file to one; blocks without a name of their own are named after their part.
 
     Parameters
     ----------
-    layouts : sequence of Layout
+    found : sequence of Layout or Bodies
     labels : sequence of str
-        Names of the parts of the file, "" for none.
+        Names of the parts, "" for none.
     path : Path or str
         Named in messages.
+
+    Raises
+    ------
+    ValueError
+        If there are none, if some are flat and others are bodies in space, and if flat ones lie in different planes.
     """
-    if not layouts:
+    if not found:
         raise ValueError(f"'{path}' has no surface cells; mesh the surfaces, or save polygons")
-    if len(layouts) == 1:
-        return layouts[0]
-    named = []
-    for layout, label in zip(layouts, labels, strict=True):
-        plain = all(name.startswith("block ") for name in layout.names)
-        own = (label,) if layout.n_blocks == 1 else tuple(f"{label} {k + 1}" for k in range(layout.n_blocks))
-        named.append(replace(layout, names=own if plain and label else layout.names))
+    if len(found) == 1:
+        return found[0]
+    flat = [(part, label) for part, label in zip(found, labels, strict=True) if isinstance(part, Layout)]
+    solid = [(part, label) for part, label in zip(found, labels, strict=True) if isinstance(part, Bodies)]
+    if flat and solid:
+        raise ValueError(
+            f"'{path}' has flat blocks ('{flat[0][1] or 'the first'}') and bodies in space "
+            f"('{solid[0][1] or 'the first'}'); give one kind"
+        )
+    return _merged_bodies(solid) if solid else _merged_layouts(flat, path)
+
+
+def _own_names(names: Sequence[str], label: str) -> tuple[str, ...]:
+    """Name the blocks of a part after it, unless they have names of their own."""
+    if not label or not all(name.startswith("block ") for name in names):
+        return tuple(names)
+    return (label,) if len(names) == 1 else tuple(f"{label} {k + 1}" for k in range(len(names)))
+
+
+def _merged_bodies(parts: Sequence[tuple[Bodies, str]]) -> Bodies:
+    bodies: list[Body] = []
+    rows: list[dict[str, Any]] = []
+    for part, label in parts:
+        names = _own_names(
+            [str(row.get("name", body.name)) for body, row in zip(part.bodies, part.rows, strict=True)], label
+        )
+        bodies += [replace(body, name=name) for body, name in zip(part.bodies, names, strict=True)]
+        group = {"group": label} if label else {}
+        rows += [{**group, **row, "name": name} for row, name in zip(part.rows, names, strict=True)]
+    notes = tuple(dict.fromkeys(note for part, _ in parts for note in part.notes))
+    return Bodies(tuple(bodies), tuple(rows), parts[0][0].unit, notes)
+
+
+def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> Layout:
+    upright = {note for part, _ in parts for note in part.notes if note.startswith(UPRIGHT)}
+    lying = any(not any(note.startswith(UPRIGHT) for note in part.notes) for part, _ in parts)
+    if len(upright) + lying > 1:
+        raise ValueError(f"'{path}' has flat parts that lie in different planes; draw them in one")
+    named = [replace(part, names=_own_names(part.names, label)) for part, label in parts]
 
     def joined(key: str) -> tuple[Any, ...]:
         return tuple(value for layout in named for value in getattr(layout, key))
@@ -143,11 +205,39 @@ def merged(layouts: Sequence[Layout], labels: Sequence[str], path: Path | str) -
     return Layout(
         outlines=joined("outlines"),
         names=joined("names"),
-        groups=tuple(group or label for d, label in zip(named, labels, strict=True) for group in d.groups),
+        groups=tuple(group or label for d, (_, label) in zip(named, parts, strict=True) for group in d.groups),
         roles=joined("roles"),
         materials=joined("materials"),
         thickness=numbers("thickness"),
         density=numbers("density"),
         unit=named[0].unit,
         notes=tuple(dict.fromkeys(joined("notes"))),
+        left_out=joined("left_out"),
     )
+
+
+def of_files(found: Sequence[Layout | Bodies], files: Sequence[Path], path: Path | str) -> Layout | Bodies:
+    """Join what several files hold; the block of a file that holds one is named after it.
+
+    Raises
+    ------
+    ValueError
+        If the files state different units, and as of :func:`merged`.
+    """
+    units = {part.unit: file for part, file in zip(found, files, strict=True)}
+    if len(units) > 1:
+        listed = ", ".join(f"'{file.name}' {unit or 'none'}" for unit, file in units.items())
+        raise ValueError(f"'{path}': its files state different units ({listed}); export them in one")
+    parts, labels = [], []
+    for part, file in zip(found, files, strict=True):
+        if isinstance(part, Bodies):
+            alone = len(part.bodies) == 1
+            if alone:
+                row = {**part.rows[0], "name": file.stem}
+                part = replace(part, bodies=(replace(part.bodies[0], name=file.stem),), rows=(row,))
+        else:
+            alone = part.n_blocks == 1
+            part = replace(part, names=(file.stem,)) if alone else part
+        parts.append(part)
+        labels.append("" if alone else file.stem)
+    return merged(parts, labels, path)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,12 @@ import numpy as np
 
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import arc_points
+from blockvis.layout.left_out import LeftOut, matches
+from blockvis.layout.outlines import FLAT, UPRIGHT, arc_points
 from blockvis.layout.units import metres_per
+from blockvis.layout.views import VIEWS, axis_across
 
-from .loose_lines import Line, faces_of_lines
+from .loose_lines import Faces, Line, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
 #: Units by the header variable $INSUNITS.
@@ -29,7 +32,10 @@ APPLICATION = "BLOCKVIS"
 #: Inserted blocks that are nested deeper than this insert themselves.
 DEEPEST_INSERT = 16
 
-#: A polyline whose ends are closer than this fraction of its size is closed.
+#: Layer of AutoCAD that holds the points of dimensions and is never printed.
+NEVER_DRAWN = "Defpoints"
+
+#: Outlines closer than this fraction of their size are the same.
 CLOSES = 1e-6
 
 _CURVES = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE", "ARC", "LINE", "SOLID", "TRACE", "3DFACE"}
@@ -46,6 +52,9 @@ class _Found:
     loose: list[Line] = field(default_factory=list)
     skipped: Counter[str] = field(default_factory=Counter)
     hidden: Counter[str] = field(default_factory=Counter)
+    misses: list[float] = field(default_factory=list)
+    left_out: list[LeftOut] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     def add(self, ring: np.ndarray, entity: Any, handle: str) -> None:
         self.rings.append(ring)
@@ -56,11 +65,22 @@ class _Found:
 
 def read(path: Path, reading: Reading) -> Layout:
     """Read a .dxf drawing; its unit is that of the header variable $INSUNITS."""
+    log = logging.getLogger("ezdxf")
+    level = log.level
+    # What ezdxf would print to the terminal is counted in a note.
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        return _read(path, reading)
+    finally:
+        log.setLevel(level)
+
+
+def _read(path: Path, reading: Reading) -> Layout:
     import ezdxf
     from ezdxf import recover
 
     try:
-        document, _ = recover.readfile(path)
+        document, audit = recover.readfile(path)
     except (OSError, ezdxf.DXFError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         raise ValueError(
             f"'{path}' is not a readable DXF file ({error}); save it again as DXF R2000 or later"
@@ -82,35 +102,84 @@ def read(path: Path, reading: Reading) -> Layout:
             )
         if entity.dxf.layer in shut:
             found.hidden[entity.dxf.layer] += 1
+        elif entity.dxf.layer == NEVER_DRAWN:
+            found.skipped[f"{entity.dxftype()} on {NEVER_DRAWN}"] += 1
         elif entity.dxftype() in ("HATCH", "MPOLYGON"):
-            _add_hatch(entity, handle, found, tolerance, path)
+            _add_hatch(entity, handle, found, tolerance)
         elif entity.dxftype() in _CURVES:
             _add_curve(entity, handle, found, tolerance)
         else:
             found.skipped[entity.dxftype()] += 1
-    notes = _with_loose(found, path)
-    if not found.rings:
-        seen = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items()) or "nothing"
+    found.notes += _turned(found, reading.view, path)
+    faces = _with_loose(found, reading)
+    if not found.rings and all(item.kind == "open" for item in found.left_out):
+        seen = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
+        listed = "; ".join(words for words in (nothing_closed(faces), seen) if words) or "nothing"
         raise ValueError(
-            f"'{path}' has no closed outline in its model space (found: {seen}); draw each block as a closed polyline"
+            f"'{path}' has no closed outline in its model space (found: {listed}); draw each block as a closed polyline"
         )
+    found.notes += _faults(audit) + _elevations(found, reading.view)
+    return _layout(found, faces, stated)
+
+
+def _layout(found: _Found, faces: Faces, stated: str) -> Layout:
+    """Make a layout of what was found; ``stated`` is the unit that the file states."""
+    notes = found.notes + faces.notes + joined_note(found.misses, _size(found))
     if found.skipped:
         notes.append("skipped: " + ", ".join(f"{n} {kind}" for kind, n in found.skipped.items()))
     if found.hidden:
         notes.append("skipped on layers that are off or frozen: " + _listed(found.hidden))
-    if any(abs(ring[:, 2]).max() > 0 for ring in found.rings):
-        notes.append("elevations were ignored: the drawing was read as seen from above")
     layout = Layout(
         outlines=tuple(ring[:, :2] for ring in found.rings),
         names=tuple(found.names),
         unit=stated,
         notes=tuple(notes),
+        left_out=tuple(item.seen([0, 1]) for item in found.left_out),
     )
     rows = [
         {"group": layer, **({"material": layer} if layer != "0" else {}), "name": name, **row}
         for layer, name, row in zip(found.layers, found.names, found.rows, strict=True)
     ]
     return with_rows(layout, rows)
+
+
+def _faults(audit: Any) -> list[str]:
+    """Count the faults that ezdxf found in a note."""
+    faults = len(audit.fixes) + len(audit.errors)
+    return [f"{faults} faults of the file were repaired or passed over"] if faults else []
+
+
+def _elevations(found: _Found, view: str | None) -> list[str]:
+    """Say in a note that a drawing in space was read as a plane one."""
+    upright = any(note.startswith(UPRIGHT) for note in found.notes)
+    if not any(abs(ring[:, 2] - (ring[0, 2] if upright else 0.0)).max() > 0 for ring in found.rings):
+        return []
+    seen = "from above" if view in (None, "xy") else f"along {'xyz'[axis_across(view)]}"
+    return [f"elevations were ignored: the drawing was read as seen {seen}"]
+
+
+def _turned(found: _Found, view: str | None, path: Path) -> list[str]:
+    """Turn a drawing that stands upright into the plane of x and y, and return the note on it.
+
+    Of a drawing that lies in no plane, that of x and y is taken unless the caller asks for another.
+    """
+    every = [*found.rings, *(line.points for line in found.loose)]
+    if not every or not all(np.isfinite(points).all() for points in every):
+        return []
+    spread = np.ptp(np.concatenate(every), axis=0)
+    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
+    if view is not None and flat and view not in flat:
+        raise ValueError(
+            f"'{path}' lies in {flat[0]}: seen as {view} it has no area; give view = \"{flat[0]}\", or none"
+        )
+    chosen = view or (flat[0] if flat else "xy")
+    if chosen == "xy":
+        return []
+    order = [*VIEWS[chosen], axis_across(chosen)]
+    found.rings = [ring[:, order] for ring in found.rings]
+    found.loose = [replace(line, points=line.points[:, order]) for line in found.loose]
+    found.left_out = [item.seen(order) for item in found.left_out]
+    return [f"{UPRIGHT}: its ({chosen[0]}, {chosen[1]}) were read as (x, y)"]
 
 
 def _flat(entities: Any, depth: int, path: Path, parent: str = "") -> Iterator[tuple[Any, str]]:
@@ -130,6 +199,9 @@ def _flat(entities: Any, depth: int, path: Path, parent: str = "") -> Iterator[t
 
 def _inserted(insert: Any, path: Path) -> Iterator[Any]:
     """Yield the entities of an inserted block at its place; ezdxf raises errors of any kind for a damaged one."""
+    if insert.dxf.get("zscale", 1.0) == 0.0:
+        # QCAD writes 0 for plane drawings, with which no transformation can be made.
+        insert.dxf.zscale = 1.0
     try:
         yield from insert.virtual_entities()
     except (TypeError, AttributeError, ValueError, KeyError, IndexError, ArithmeticError) as error:
@@ -170,11 +242,16 @@ def _add_curve(entity: Any, handle: str, found: _Found, tolerance: float | None)
         raise ValueError(
             f"{kind} {handle} on layer '{entity.dxf.layer}' has a point at {bad}; coordinates must be finite numbers"
         )
-    gap = float(np.abs(points[0] - points[-1]).max())
     closes = bool(getattr(entity, "is_closed", False) or getattr(entity, "closed", False))
-    if kind not in ("LINE", "ARC") and len(points) > 3 and (closes or gap <= CLOSES * float(np.ptp(points, 0).max())):
-        ring = points[:-1] if gap <= CLOSES * float(np.ptp(points, axis=0).max()) else points
-        found.add(ring, entity, handle)
+    joined = joined_ends(points) if kind not in ("LINE", "ARC") else None
+    if joined is not None:
+        ring, miss = joined
+        # A closed polyline may have a short last edge: it stays.
+        found.add(points if closes and miss > CLOSES * float(np.ptp(points, axis=0).max()) else ring, entity, handle)
+        found.misses += [] if closes else [miss]
+        return
+    if closes and kind not in ("LINE", "ARC") and len(points) > 3:
+        found.add(points, entity, handle)
         return
     found.loose.append(Line(points, str(entity.dxf.layer), handle, must_close=kind not in ("LINE", "ARC")))
 
@@ -237,24 +314,35 @@ def _hatch_rings(entity: Any, tolerance: float | None) -> list[np.ndarray]:
     return rings
 
 
-def _add_hatch(entity: Any, handle: str, found: _Found, tolerance: float | None, path: Path) -> None:
+def _add_hatch(entity: Any, handle: str, found: _Found, tolerance: float | None) -> None:
     rings = _hatch_rings(entity, tolerance)
     rings = [ring[:-1] if (ring[0] == ring[-1]).all() else ring for ring in rings if len(ring) > 2]
     if not rings:
         found.skipped["HATCH without boundary"] += 1
         return
-    for k, ring in enumerate(rings):
-        for other in rings[:k]:
-            inner, outer = (ring, other) if np.ptp(ring, 0).max() < np.ptp(other, 0).max() else (other, ring)
-            if (inner.min(0) >= outer.min(0)).all() and (inner.max(0) <= outer.max(0)).all():
-                x, y = inner[:, :2].mean(axis=0)
-                raise ValueError(
-                    f"'{path}': HATCH {handle} on layer '{entity.dxf.layer}' has a hole around ({x:.6g}, {y:.6g}); "
-                    "cut the block in two, or fill the hole with a block"
-                )
+    inside = [k for k, ring in enumerate(rings) if any(_within(ring, other) for other in rings if other is not ring)]
+    if inside:
+        x, y = rings[inside[0]][:, :2].mean(axis=0)
+        message = (
+            f"HATCH {handle} on layer '{entity.dxf.layer}' has a hole around ({x:.6g}, {y:.6g}); "
+            "cut the block in two, or fill the hole with a block"
+        )
+        outer = max(
+            (ring for k, ring in enumerate(rings) if k not in inside), key=lambda ring: float(np.ptp(ring, 0).max())
+        )
+        holes = tuple(rings[k] for k in inside)
+        layer, name = str(entity.dxf.layer), f"hatch {handle}"
+        found.left_out.append(LeftOut("hole", outer, message, layer, name, holes=holes))
+        return
     outlined = [ring for ring in rings if not _drawn_already(ring, found)]
     for k, ring in enumerate(outlined):
         found.add(ring, entity, handle if len(rings) == 1 else f"{handle}.{k}")
+
+
+def _within(inner: np.ndarray, outer: np.ndarray) -> bool:
+    """Whether the box around a boundary lies within the larger box around another."""
+    smaller = np.ptp(inner, 0).max() < np.ptp(outer, 0).max()
+    return bool(smaller and (inner.min(0) >= outer.min(0)).all() and (inner.max(0) <= outer.max(0)).all())
 
 
 def _drawn_already(ring: np.ndarray, found: _Found) -> bool:
@@ -264,24 +352,46 @@ def _drawn_already(ring: np.ndarray, found: _Found) -> bool:
     return bool(np.abs(found.rings[-1].mean(0) - ring.mean(0)).max() <= CLOSES * float(np.ptp(ring, axis=0).max()))
 
 
-def _with_loose(found: _Found, path: Path) -> list[str]:
-    if not found.loose:
-        return []
-    faces, layers, dangling = faces_of_lines(found.loose, path)
-    for k, (ring, layer) in enumerate(zip(faces, layers, strict=True)):
+def _with_loose(found: _Found, reading: Reading) -> Faces:
+    """Add the faces between loose lines, and cut outlines along the lines within them."""
+    wanted = []
+    chosen = any(matches([layer], reading.only) for layer in {*found.layers, *(line.layer for line in found.loose)})
+    for line in found.loose:
+        if matches([line.layer], reading.ignore) or (chosen and not reading.wants([line.layer])):
+            name = f"line {line.handle}"
+            found.left_out.append(LeftOut("asked line", line.points[:, :2], "", line.layer, name, closed=False))
+        else:
+            wanted.append(line)
+    # Outlines that will be left out are not cut.
+    able = [i for i, layer in enumerate(found.layers) if not matches([layer], reading.ignore)]
+    faces = faces_of_lines(wanted, [found.rings[i][:, :2] for i in able])
+    found.left_out += faces.left_out
+    for k, pieces in sorted(faces.pieces.items(), reverse=True):
+        i = able[k]
+        level = float(found.rings[i][0, 2])
+        for number, piece in enumerate(pieces):
+            found.rings.append(np.column_stack([piece, np.full(len(piece), level)]))
+            found.layers.append(found.layers[i])
+            found.names.append(f"{found.names[i]}.{number}")
+            found.rows.append({})
+        for values in (found.rings, found.layers, found.names, found.rows):
+            del values[i]
+    for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
         found.rings.append(np.column_stack([ring, np.zeros(len(ring))]))
         found.layers.append(layer)
-        found.names.append(f"face {k}")
+        found.names.append(f"face {number}")
         found.rows.append({})
-    notes = []
-    if faces:
-        notes.append(
-            f"{len(faces)} blocks are faces between {len(found.loose)} loose lines; an opening enclosed by lines "
+    if faces.rings:
+        faces.notes.append(
+            f"{len(faces.rings)} blocks are faces between {len(wanted)} loose lines; an opening enclosed by lines "
             "counts as a block too: erase it or draw closed outlines"
         )
-    if dangling:
-        notes.append(f"{dangling} loose lines enclose nothing and were dropped")
-    return notes
+    return faces
+
+
+def _size(found: _Found) -> float:
+    drawn = [points[:, :2] for points in (*found.rings, *(line.points for line in found.loose))]
+    return float(np.ptp(np.concatenate(drawn), axis=0).max()) if drawn else 0.0
 
 
 def _listed(counter: Counter[str]) -> str:

@@ -15,14 +15,21 @@ import numpy as np
 
 from blockvis.extras import install_command
 from blockvis.layout.layout import Layout
+from blockvis.layout.units import metres_per
 
 from . import gmsh_mesh
-from .gmsh_process import NO_LIBRARY
+from .bodies import Bodies, Body
+from .gmsh_process import NO_LIBRARY, NO_MEMORY
 from .reading import Reading
-from .solids import Body, layout_of_bodies
 
 #: A geometry script that takes longer is stopped: it may never end.
 LONGEST_SECONDS = 120
+
+#: Memory [bytes] that gmsh may take: a script can ask for any number of points.
+MOST_MEMORY = 4 * 2**30
+
+#: Prefixes of the metre in STEP files.
+_SI_PREFIXES = {"": "m", "MILLI": "mm", "CENTI": "cm", "DECI": "dm", "KILO": "km"}
 
 #: Words of gmsh's script language that run programs, or read or write other files.
 _REACHES_OUT = re.compile(
@@ -32,8 +39,8 @@ _REACHES_OUT = re.compile(
 _PACKAGES = "libglu1-mesa libxcursor1 libxft2 libxinerama1 libxrender1 libxi6 libxfixes3"
 
 
-def read(path: Path, reading: Reading) -> Layout:
-    """Read a geometry file; gmsh converts .step and .brep to m, a .geo states no unit."""
+def read(path: Path, reading: Reading) -> Layout | Bodies:
+    """Read a geometry file; .step states its unit, .brep and .geo state none."""
     script = path.suffix.lower().startswith(".geo")
     if script:
         text = re.sub(r"//[^\n]*|/\*.*?\*/", "", path.read_text(encoding="utf-8", errors="replace"), flags=re.DOTALL)
@@ -48,7 +55,8 @@ def read(path: Path, reading: Reading) -> Layout:
     chords = math.ceil(math.pi / math.acos(1.0 - allowed))
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "found"
-        command = [sys.executable, "-m", "blockvis.formats.gmsh_process", str(path.resolve()), str(target), str(chords)]
+        command = [sys.executable, "-m", "blockvis.formats.gmsh_process", str(path.resolve()), str(target)]
+        command += [str(chords), str(MOST_MEMORY)]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_SECONDS, check=False)
         except subprocess.TimeoutExpired:
@@ -59,16 +67,48 @@ def read(path: Path, reading: Reading) -> Layout:
                 f"{install_command('cad')} and, on Debian, apt-get install {_PACKAGES}"
             )
         if done.returncode:
-            reason = " ".join(done.stderr.split())[-300:] or f"it ended with code {done.returncode}"
-            raise ValueError(f"'{path}' cannot be read by gmsh: {reason}; repair it or give it as .msh")
+            raise _failed(path, done, str(target))
+        unit, per_mm = ("", 1.0) if path.suffix.lower() not in (".step", ".stp") else _step_unit(path)
         if done.stdout.strip().endswith("json"):
-            layout = _layout_of_volumes(json.loads(target.with_suffix(".json").read_text(encoding="utf-8")), path)
-        else:
-            layout = gmsh_mesh.read(target.with_suffix(".msh"), reading)
-    return replace(layout, unit="" if script else "m")
+            content = json.loads(target.with_suffix(".json").read_text(encoding="utf-8"))
+            return _bodies_of_volumes(content, path, unit, per_mm)
+        surfaces = gmsh_mesh.layout_of_mesh(target.with_suffix(".msh").read_bytes(), path, reading)
+    assert isinstance(surfaces, Layout)
+    return replace(surfaces, outlines=tuple(ring * per_mm for ring in surfaces.outlines), unit=unit)
 
 
-def _layout_of_volumes(found: list[dict[str, object]], path: Path) -> Layout:
+def _failed(path: Path, done: subprocess.CompletedProcess[str], target: str) -> ValueError:
+    """Make the error for a process that ended with a code other than 0."""
+    reason = " ".join(done.stderr.split())[-300:].replace(target, "the mesh")
+    most = f"{MOST_MEMORY / 2**30:.3g} GiB of memory"
+    remedy = "run gmsh on it yourself, with a coarser mesh, and give the .msh"
+    if done.returncode == NO_MEMORY or "bad_alloc" in reason or "MemoryError" in reason:
+        return ValueError(f"'{path}': gmsh needs more than {most} for it; {remedy}")
+    if not reason:
+        # Where gmsh cannot have more memory, it mostly ends without a word.
+        return ValueError(f"'{path}': gmsh gave up without a reason, perhaps because it may take {most}; {remedy}")
+    return ValueError(f"'{path}' cannot be read by gmsh: {reason}; repair it or give it as .msh")
+
+
+def _step_unit(path: Path) -> tuple[str, float]:
+    """Find the unit of length that a STEP file states, mm where it states none, and how many of it make a mm."""
+    text = path.read_text(encoding="latin-1")
+    stated = re.findall(r"LENGTH_UNIT\s*\(\s*\)[^;]*;", text)
+    found = []
+    for entity in stated:
+        named = re.search(r"CONVERSION_BASED_UNIT\s*\(\s*'([^']*)'", entity)
+        metric = re.search(r"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.\s*\)", entity)
+        if named:
+            found.append(named[1].strip().lower())
+        elif metric:
+            found.append(_SI_PREFIXES.get(metric[1] or "", ""))
+    # A file in inches also defines the millimetre that an inch is measured in: the one that is built on others counts.
+    known = [unit for unit in found if unit in ("inch", "foot", "in", "ft")] or [unit for unit in found if unit]
+    unit = {"inch": "in", "foot": "ft"}.get(known[0], known[0]) if known else "mm"
+    return unit, metres_per("mm") / metres_per(unit)
+
+
+def _bodies_of_volumes(found: list[dict[str, object]], path: Path, unit: str, per_mm: float) -> Bodies:
     bodies, rows = [], []
     for part in found:
         if int(str(part["groups"])) > 1:
@@ -76,9 +116,9 @@ def _layout_of_volumes(found: list[dict[str, object]], path: Path) -> Layout:
                 f"'{path}': '{part['name']}' is in {part['groups']} physical groups; keep it in one of them"
             )
         points, faces = np.array(part["points"], dtype=float), np.array(part["faces"], dtype=np.int64)
-        bodies.append(Body(str(part["name"]), points.reshape(-1, 3), faces.reshape(-1, 3)))
+        bodies.append(Body(str(part["name"]), per_mm * points.reshape(-1, 3), faces.reshape(-1, 3)))
         row = {"name": str(part["name"])}
         if part["group"]:
             row |= {"group": str(part["group"]), "material": str(part["group"])}
         rows.append(row)
-    return layout_of_bodies(bodies, path, rows)
+    return Bodies(tuple(bodies), tuple(rows), unit)

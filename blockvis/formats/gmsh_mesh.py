@@ -1,4 +1,4 @@
-"""Meshes of gmsh, .msh 2.2 and 4.1, ASCII and binary: one surface entity is one block.
+"""Meshes of gmsh, .msh 1, 2.2 and 4.1, ASCII and binary: one surface or volume entity is one block.
 
 This reader replaces that of meshio, which keeps one of two physical groups of an entity, one of two groups of the same
 name in different dimensions, and reserves whatever memory the file asks for. It follows the description of the format, https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format.
@@ -14,11 +14,15 @@ import numpy as np
 
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import flattened, outlines_of_cells
+from blockvis.layout.left_out import LeftOut
+from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
 from blockvis.layout.triangulation import cells_of_ring
 
+from .bodies import Bodies
+from .closed_surfaces import OpenSurface, bodies_of_surfaces
 from .node_order import GMSH, ring_of_nodes
 from .reading import Reading
+from .volumes import GMSH_SOLIDS, Faces, bodies_of_cells
 
 #: Number of nodes of each element type.
 N_NODES = {
@@ -33,14 +37,20 @@ TABLE = "BlockvisBlocks"
 
 @dataclass
 class _Mesh:
-    """Content of the sections of a file; of elements only those of surfaces."""
+    """Content of the sections of a file; of elements only those of surfaces and volumes.
+
+    Groups are those of an entity by its dimension and number. Cells of volumes are kept by their shape, with the
+    number of the volume of each.
+    """
 
     points: dict[int, int] = field(default_factory=dict)
     coordinates: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     group_names: dict[tuple[int, int], str] = field(default_factory=dict)
-    groups_of_surface: dict[int, list[int]] = field(default_factory=dict)
+    groups: dict[tuple[int, int], list[int]] = field(default_factory=dict)
     rings: list[np.ndarray] = field(default_factory=list)
     surfaces: list[np.ndarray] = field(default_factory=list)
+    solids: list[tuple[Faces, np.ndarray]] = field(default_factory=list)
+    volumes: list[np.ndarray] = field(default_factory=list)
     other_elements: int = 0
 
 
@@ -91,10 +101,16 @@ class _Numbers:
         return int(text)
 
 
-def read(path: Path, reading: Reading) -> Layout:
+def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a .msh file, which states no unit."""
-    data = path.read_bytes()
-    mesh, table = _sections(data, path)
+    return layout_of_mesh(path.read_bytes(), path, reading)
+
+
+def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies:
+    """Read the content of a .msh file; the path is named in messages."""
+    mesh, table = _content(data, path)
+    if mesh.solids:
+        return _bodies(mesh, path)
     if not mesh.rings:
         rest = f" of its {mesh.other_elements} elements" if mesh.other_elements else ""
         raise ValueError(
@@ -104,12 +120,13 @@ def read(path: Path, reading: Reading) -> Layout:
     surface = np.concatenate(mesh.surfaces)
     tags, owner = np.unique(surface, return_inverse=True)
     rings = [ring for block in mesh.rings for ring in block]
-    _check_twice(mesh, tags, path)
-    members = {int(tag): mesh.groups_of_surface.get(int(tag), []) for tag in tags}
-    groups = [mesh.group_names.get((2, g[0]), f"group {g[0]}") if g else "" for g in members.values()]
-    names = _surface_names(groups, tags)
-    flat, note = flattened(mesh.coordinates, f"'{path}'")
-    outlines = outlines_of_cells(flat, rings, owner, names)
+    groups = _group_names(mesh, 2, tags, path)
+    if not is_flat(mesh.coordinates):
+        return _enclosed(mesh, rings, [groups[k] for k in owner], path)
+    names = _entity_names(groups, tags, "surface")
+    flat, note = flattened(mesh.coordinates, f"'{path}'", reading.view)
+    unusable: dict[int, LeftOut] = {}
+    outlines = outlines_of_cells(flat, rings, owner, names, unusable)
     notes = [f"{len(tags)} blocks, one per meshed surface; a surface in no physical group may be missing from the file"]
     if "" in groups:
         notes.append(f"{groups.count('')} of {len(tags)} surfaces are in no physical group")
@@ -122,27 +139,89 @@ def read(path: Path, reading: Reading) -> Layout:
         unit="",
         notes=tuple(notes),
     )
-    return _with_table(layout, table, tags)
+    return _with_table(layout, table, tags).leaving_out(unusable)
 
 
-def _surface_names(groups: list[str], tags: np.ndarray) -> list[str]:
+def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Path) -> Bodies:
+    """Find the bodies that surfaces in space enclose: those of each physical group, or else of all together."""
+    named, owner = np.unique(groups, return_inverse=True)
+    names = [str(name) or "body" for name in named]
+    try:
+        bodies, owners = bodies_of_surfaces(mesh.coordinates, rings, owner, names, path)
+    except ValueError:
+        try:
+            names = ["body"]
+            bodies, owners = bodies_of_surfaces(mesh.coordinates, rings, np.zeros_like(owner), names, path)
+        except OpenSurface:
+            # A drawing that is meant to be flat: the error says how far it is not.
+            flattened(mesh.coordinates, f"'{path}'")
+            raise
+    rows = []
+    for body, whose in zip(bodies, owners.tolist(), strict=True):
+        group = str(named[whose]) if len(names) > 1 else ""
+        rows.append({"name": body.name, **({"group": group, "material": group} if group else {})})
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, one per closed surface",))
+
+
+def holds_flat_blocks(path: Path) -> bool:
+    """Whether a .msh file has surface cells in a plane and none with a volume."""
+    mesh, _ = _content(path.read_bytes(), path)
+    return bool(mesh.rings) and not mesh.solids and is_flat(mesh.coordinates)
+
+
+def _bodies(mesh: _Mesh, path: Path) -> Bodies:
+    """Find the bodies of a mesh of volumes; surface cells beside them are their skin."""
+    cells: list[tuple[Faces, np.ndarray]] = []
+    volumes = []
+    for shape in dict.fromkeys(shape for shape, _ in mesh.solids):
+        chosen = [k for k, (one, _) in enumerate(mesh.solids) if one == shape]
+        cells.append((shape, np.concatenate([mesh.solids[k][1] for k in chosen])))
+        volumes += [mesh.volumes[k] for k in chosen]
+    tags, owner = np.unique(np.concatenate(volumes), return_inverse=True)
+    groups = _group_names(mesh, 3, tags, path)
+    bodies, owners = bodies_of_cells(mesh.coordinates, cells, owner, _entity_names(groups, tags, "volume"))
+    rows = []
+    for body, whose in zip(bodies, owners.tolist(), strict=True):
+        group = {"group": groups[whose], "material": groups[whose]} if groups[whose] else {}
+        rows.append({"name": body.name, **group})
+    notes = [f"{len(bodies)} bodies, one per meshed volume; a volume in no physical group may be missing from the file"]
+    if len(bodies) > len(tags):
+        notes = [f"{len(bodies)} bodies, the pieces of {len(tags)} meshed volumes"]
+    if "" in groups:
+        notes.append(f"{groups.count('')} of {len(tags)} volumes are in no physical group")
+    return Bodies(tuple(bodies), tuple(rows), notes=tuple(notes))
+
+
+def _group_names(mesh: _Mesh, dimension: int, tags: np.ndarray, path: Path) -> list[str]:
+    """Name the physical group of each entity, "" for none; one entity may be in one group only."""
+    named = []
+    for tag in tags.tolist():
+        groups = sorted(set(mesh.groups.get((dimension, tag), [])))
+        if len(groups) > 1:
+            listed = " and ".join(f"'{mesh.group_names.get((dimension, g), str(g))}'" for g in groups)
+            kind = "surface" if dimension == 2 else "volume"
+            raise ValueError(
+                f"'{path}': {kind} {tag} is in {len(groups)} physical groups, {listed}; keep it in one of them"
+            )
+        named.append(mesh.group_names.get((dimension, groups[0]), f"group {groups[0]}") if groups else "")
+    return named
+
+
+def _entity_names(groups: list[str], tags: np.ndarray, kind: str) -> list[str]:
     total = {group: groups.count(group) for group in set(groups)}
     seen: dict[str, int] = {}
     names = []
     for group, tag in zip(groups, tags, strict=True):
         seen[group] = seen.get(group, 0) + 1
-        names.append(f"surface {tag}" if not group else group if total[group] == 1 else f"{group} {seen[group]}")
+        names.append(f"{kind} {tag}" if not group else group if total[group] == 1 else f"{group} {seen[group]}")
     return names
 
 
-def _check_twice(mesh: _Mesh, tags: np.ndarray, path: Path) -> None:
-    for tag in tags:
-        groups = sorted(set(mesh.groups_of_surface.get(int(tag), [])))
-        if len(groups) > 1:
-            listed = " and ".join(f"'{mesh.group_names.get((2, g), str(g))}'" for g in groups)
-            raise ValueError(
-                f"'{path}': surface {tag} is in {len(groups)} physical groups, {listed}; keep it in one of them"
-            )
+def _content(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, object]]]:
+    """Read the sections of a file of any version, and our own."""
+    if _section(data, "MeshFormat") is None and _section(data, "NOD") is not None:
+        return _sections_1(data, path), {}
+    return _sections(data, path)
 
 
 def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, object]]]:
@@ -190,26 +269,47 @@ def _sections(data: bytes, path: Path) -> tuple[_Mesh, dict[str, dict[str, objec
     return mesh, table if isinstance(table, dict) else {}
 
 
-def _section(data: bytes, name: str) -> bytes | None:
+def _sections_1(data: bytes, path: Path) -> _Mesh:
+    """Read the sections of version 1, which is always ASCII and names no groups."""
+    mesh = _Mesh()
+    nodes, elements = (_section_between(data, name, end) for name, end in (("NOD", "ENDNOD"), ("ELM", "ENDELM")))
+    if elements is None or nodes is None:
+        raise ValueError(f"'{path}' has no section $ELM; mesh the surfaces (gmsh -2) and export again")
+    _nodes_22(_Numbers(nodes, "NOD", path, False, "<", "<i8"), mesh)
+    numbers = _Numbers(elements, "ELM", path, False, "<", "<i8")
+    for _ in range(numbers.line()):
+        _number, kind, group, entity, n = map(int, numbers.take("int", 5))
+        row = numbers.take("int", n).reshape(1, -1)
+        dimension = 2 if kind in GMSH else 3 if kind in GMSH_SOLIDS else 0
+        if group and group not in mesh.groups.setdefault((dimension, entity), []):
+            mesh.groups[dimension, entity].append(group)
+        _add(mesh, numbers, dimension, kind, row, np.array([entity]))
+    return mesh
+
+
+def _section_between(data: bytes, name: str, end: str) -> bytes | None:
     start = data.find(f"${name}".encode())
     if start < 0:
         return None
     start = data.find(b"\n", start) + 1
-    end = data.find(f"$End{name}".encode(), start)
-    return data[start : end if end >= 0 else len(data)]
+    stop = data.find(f"${end}".encode(), start)
+    return data[start : stop if stop >= 0 else len(data)]
+
+
+def _section(data: bytes, name: str) -> bytes | None:
+    return _section_between(data, name, f"End{name}")
 
 
 def _entities_41(numbers: _Numbers, mesh: _Mesh) -> None:
     counts = numbers.take("size", 4)
-    for dimension in range(3):
+    for dimension in range(4):
         for _ in range(counts[dimension]):
             tag = numbers.one("int")
             numbers.take("double", 3 if dimension == 0 else 6)
             groups = numbers.take("int", numbers.one("size"))
             if dimension:
                 numbers.take("int", numbers.one("size"))
-            if dimension == 2:
-                mesh.groups_of_surface[tag] = [int(abs(group)) for group in groups]
+            mesh.groups[dimension, tag] = [int(abs(group)) for group in groups]
 
 
 def _nodes_41(numbers: _Numbers, mesh: _Mesh) -> None:
@@ -233,7 +333,7 @@ def _nodes_22(numbers: _Numbers, mesh: _Mesh) -> None:
         record = np.dtype([("tag", numbers.types["int"]), ("x", numbers.types["double"], 3)])
         assert isinstance(numbers.body, bytes)
         if n * record.itemsize > len(numbers.body) - numbers.position:
-            numbers.take("double", 3 * n)
+            numbers.take("int", record.itemsize // 4 * n)
         found = np.frombuffer(numbers.body, record, n, numbers.position)
         tags, mesh.coordinates = found["tag"].astype(np.int64), found["x"].astype(float)
     else:
@@ -264,7 +364,6 @@ def _elements_41(numbers: _Numbers, mesh: _Mesh) -> None:
 def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
     n = numbers.line()
     remaining = n
-    seen: dict[tuple[int, ...], int] = {}
     while remaining > 0:
         if numbers.binary:
             kind, follow, n_tags = map(int, numbers.take("int", 3))
@@ -276,18 +375,16 @@ def _elements_22(numbers: _Numbers, mesh: _Mesh) -> None:
         if follow < 1:
             raise ValueError(f"'{numbers.path}': its section $Elements has a header of {follow} elements; export again")
         remaining -= follow
-        if kind in GMSH:
-            surface = rows[:, 1] if n_tags > 1 else np.zeros(follow, dtype=np.int64)
-            for row, tag in zip(rows, surface, strict=True):
-                group = int(row[0]) if n_tags else 0
-                groups = mesh.groups_of_surface.setdefault(int(tag), [])
-                if group and group not in groups:
-                    groups.append(group)
-                key = (int(tag), *sorted(map(int, row[n_tags:])))
-                seen[key] = seen.get(key, 0) + 1
-            _add(mesh, numbers, 2, kind, rows[:, n_tags:], surface)
-        else:
+        dimension = 2 if kind in GMSH else 3 if kind in GMSH_SOLIDS else 0
+        if dimension == 0:
             mesh.other_elements += follow
+            continue
+        entity = rows[:, 1] if n_tags > 1 else np.zeros(follow, dtype=np.int64)
+        for tag, group in zip(entity.tolist(), rows[:, 0].tolist() if n_tags else [0] * follow, strict=True):
+            groups = mesh.groups.setdefault((dimension, tag), [])
+            if group and group not in groups:
+                groups.append(group)
+        _add(mesh, numbers, dimension, kind, rows[:, n_tags:], entity)
 
 
 def _width(kind: int, numbers: _Numbers) -> int:
@@ -299,18 +396,25 @@ def _width(kind: int, numbers: _Numbers) -> int:
 
 
 def _add(mesh: _Mesh, numbers: _Numbers, dimension: int, kind: int, nodes: np.ndarray, tags: np.ndarray) -> None:
-    if dimension != 2 or kind not in GMSH:
+    if dimension == 2 and kind in GMSH:
+        mesh.rings.append(_known(mesh, numbers, ring_of_nodes(nodes, GMSH[kind])))
+        mesh.surfaces.append(tags)
+    elif dimension == 3 and kind in GMSH_SOLIDS:
+        corners = 1 + max(corner for face in GMSH_SOLIDS[kind] for corner in face)
+        mesh.solids.append((GMSH_SOLIDS[kind], _known(mesh, numbers, nodes[:, :corners])))
+        mesh.volumes.append(tags)
+    else:
         mesh.other_elements += len(nodes)
-        return
-    rings = ring_of_nodes(nodes, GMSH[kind])
+
+
+def _known(mesh: _Mesh, numbers: _Numbers, nodes: np.ndarray) -> np.ndarray:
+    """Replace the numbers of nodes by their positions among the coordinates."""
     try:
-        known = [mesh.points[int(node)] for node in rings.ravel()]
+        return np.array([mesh.points[int(node)] for node in nodes.ravel()], dtype=np.int64).reshape(nodes.shape)
     except KeyError as error:
         raise ValueError(
             f"'{numbers.path}': an element uses node {error}, which the file lacks; export again"
         ) from None
-    mesh.rings.append(np.array(known, dtype=np.int64).reshape(rings.shape))
-    mesh.surfaces.append(tags)
 
 
 def _with_table(layout: Layout, table: dict[str, dict[str, object]], tags: np.ndarray) -> Layout:

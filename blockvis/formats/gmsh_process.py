@@ -1,21 +1,31 @@
-"""Gmsh in a process of its own: ``python -m blockvis.formats.gmsh_process IN OUT CHORDS``.
+"""Gmsh in a process of its own: ``python -m blockvis.formats.gmsh_process IN OUT CHORDS MEMORY``.
 
 A geometry script can loop for ever, fill the memory or crash the library; in its own process it harms nothing else.
 OUT is a mesh (.msh) if the file has surfaces only, or bodies of triangles (.json) if it has volumes; the last line on
-standard output says which. CHORDS is the number of chords of a full circle.
+standard output says which. CHORDS is the number of chords of a full circle, MEMORY the most bytes that may be taken.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import sys
 
-#: Exit code for a library that cannot be loaded.
-NO_LIBRARY = 3
+import numpy as np
+
+#: Exit codes: the library cannot be loaded; the memory did not suffice.
+NO_LIBRARY, NO_MEMORY = 3, 4
+
+#: Points of a curve at which its direction is looked at.
+SAMPLES = 129
+
+#: Chords of one curve: finer than any drawing.
+MOST_CHORDS = 4096
 
 
-def main(source: str, target: str, chords: str) -> int:
+def main(source: str, target: str, chords: str, memory: str) -> int:
     """Mesh a geometry file and write its surfaces or bodies; return the exit code, 0 on success."""
+    _limit_memory(int(memory))
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -26,30 +36,79 @@ def main(source: str, target: str, chords: str) -> int:
         options = {
             "General.Terminal": 0,
             "General.NumThreads": 1,
-            "Mesh.MeshSizeFromCurvature": float(chords),
-            "Mesh.MeshSizeExtendFromBoundary": 1,
             "Mesh.MshFileVersion": 4.1,
             "Mesh.Binary": 0,
         }
         for name, value in options.items():
             gmsh.option.setNumber(name, value)
-        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+        # The numbers of a STEP file come in mm, whatever its unit; a BREP file states none.
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
         gmsh.open(source)
         volumes = [tag for _, tag in gmsh.model.getEntities(3)]
+        _only_outlines(gmsh, int(chords))
         gmsh.model.mesh.generate(2)
         if volumes:
             with open(target + ".json", "w", encoding="utf-8") as stream:
                 json.dump([_body(gmsh, tag) for tag in volumes], stream)
         else:
             gmsh.write(target + ".msh")
+    except MemoryError:
+        return NO_MEMORY
     except Exception as error:  # noqa: BLE001
         # gmsh raises a bare Exception with the last line of its log.
         sys.stderr.write(str(error))
-        return 1
+        return NO_MEMORY if "alloc" in str(error) else 1
     finally:
         gmsh.finalize()
     sys.stdout.write("json" if volumes else "msh")
     return 0
+
+
+def _limit_memory(most: int) -> None:
+    """Limit the memory of this process, where the platform can."""
+    try:
+        import resource
+    except ImportError:  # Windows has no such limits
+        return
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    try:
+        resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+    except (ValueError, OSError):  # macOS refuses some
+        return
+
+
+def _only_outlines(gmsh, chords: int) -> None:  # type: ignore[no-untyped-def]
+    """Have curves meshed by as many chords as their bends ask for, and nothing finer than them within the surfaces.
+
+    Sizes from the curvature, which gmsh would compute itself, take its built-in kernel a minute for a quarter circle.
+    """
+    low = np.reshape([gmsh.model.getBoundingBox(*entity)[:3] for entity in gmsh.model.getEntities(2)], (-1, 3))
+    high = np.reshape([gmsh.model.getBoundingBox(*entity)[3:] for entity in gmsh.model.getEntities(2)], (-1, 3))
+    size = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0))) if len(low) else 1.0
+    gmsh.model.mesh.removeConstraints()
+    for name in ("FromPoints", "FromCurvature", "ExtendFromBoundary", "FromParametricPoints"):
+        gmsh.option.setNumber(f"Mesh.MeshSize{name}", 0)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 1e3 * size)
+    for _, tag in gmsh.model.getEntities(1):
+        gmsh.model.mesh.setTransfiniteCurve(tag, 1 + _chords(gmsh, tag, 2.0 * math.pi / chords))
+
+
+def _chords(gmsh, curve: int, widest: float) -> int:  # type: ignore[no-untyped-def]
+    """Count the equal chords of a curve: none may turn by more than the widest angle [rad]."""
+    first, last = (float(end[0]) for end in gmsh.model.getParametrizationBounds(1, curve))
+    along = np.reshape(gmsh.model.getDerivative(1, curve, np.linspace(first, last, SAMPLES)), (-1, 3))
+    speed = np.linalg.norm(along, axis=1)
+    direction = along[speed > 0] / speed[speed > 0][:, None]
+    length = (speed[1:] + speed[:-1])[: max(len(direction) - 1, 0)] / 2.0
+    turn = np.arccos(np.clip((direction[1:] * direction[:-1]).sum(axis=1), -1.0, 1.0))
+    if not len(turn) or turn.sum() < 1e-9:
+        return 1
+    even = float(turn.sum()) / widest
+    # Chords are of equal length: where a curve bends more than elsewhere, more of them are needed.
+    sharpest = float((turn / np.maximum(length, 1e-300)).max() * length.sum()) / widest
+    return min(math.ceil(min(sharpest, 4.0 * even) - 1e-6), MOST_CHORDS)
 
 
 def _body(gmsh, tag: int) -> dict[str, object]:  # type: ignore[no-untyped-def]
@@ -64,14 +123,25 @@ def _body(gmsh, tag: int) -> dict[str, object]:  # type: ignore[no-untyped-def]
         place = {int(node): coordinates[3 * k : 3 * k + 3].tolist() for k, node in enumerate(nodes)}
         kinds, _, connected = gmsh.model.mesh.getElements(2, surface)
         for kind, ring in zip(kinds, connected, strict=True):
-            for face in ring.reshape(-1, 3) if kind == 2 else []:
+            for face in _triangles(int(kind), ring):
                 for node in face:
                     if int(node) not in number:
                         number[int(node)] = len(points)
                         points.append(place[int(node)])
                 faces.append([number[int(node)] for node in face])
+    # Where a STEP file names no solid, gmsh gives the name of the translator.
+    name = "" if name.startswith("Open CASCADE STEP translator") else name
     return {"name": name or f"volume {tag}", "group": group, "groups": len(groups), "points": points, "faces": faces}
 
 
+def _triangles(kind: int, nodes: np.ndarray) -> np.ndarray:
+    """(n, 3) int array: elements of triangles, and of quadrangles that extruded or recombined surfaces have."""
+    if kind == 2:
+        return nodes.reshape(-1, 3)
+    if kind == 3:
+        return nodes.reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return np.zeros((0, 3), dtype=np.int64)
+
+
 if __name__ == "__main__":
-    raise SystemExit(main(*sys.argv[1:4]))
+    raise SystemExit(main(*sys.argv[1:5]))

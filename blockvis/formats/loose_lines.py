@@ -1,14 +1,25 @@
-"""From loose lines of a drawing to outlines: the faces between the lines."""
+"""From loose lines of a drawing to outlines: the faces between the lines, and outlines that lines cut into blocks."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-#: Ends of lines closer than this fraction of the size of the drawing meet.
-MEETS = 1e-6
+from blockvis.layout.left_out import LeftOut
+
+#: Lines are intersected on a grid of this fraction of the size of the drawing.
+GRID = 1e-6
+
+#: Ends of lines that miss another line by up to this fraction of the size of the drawing meet it, and so do the ends of
+#: an outline that misses itself by this fraction of its own size: what drawing by hand, or in single precision, leaves.
+MEETS = 1e-4
+
+#: An end moves at most by this fraction of the length of its line.
+SHORTENED = 0.05
 
 
 @dataclass(frozen=True)
@@ -29,71 +40,247 @@ class Line:
     must_close: bool
 
 
-def faces_of_lines(lines: list[Line], path: Path) -> tuple[list[np.ndarray], list[str], int]:
-    """Find the faces between lines.
+@dataclass
+class Faces:
+    """What lines enclose.
+
+    Attributes
+    ----------
+    rings : list of (n, 2) arrays
+        Faces between lines.
+    layers : list of str
+        The layer of most of the lines around each face.
+    pieces : {int: list of (n, 2) arrays}
+        The pieces into which lines cut an outline, by its number.
+    left_out : list of LeftOut
+    notes : list of str
+    """
+
+    rings: list[np.ndarray] = field(default_factory=list)
+    layers: list[str] = field(default_factory=list)
+    pieces: dict[int, list[np.ndarray]] = field(default_factory=dict)
+    left_out: list[LeftOut] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -> Faces:
+    """Find the faces between lines, and the pieces into which they cut outlines.
 
     Parameters
     ----------
-    lines : list of Line
-    path : Path
-        Named in messages.
+    lines : sequence of Line
+    outlines : sequence of (n, 2) arrays
+        Closed outlines of the same drawing.
 
     Returns
     -------
-    faces : list of (n, 2) arrays
-    layers : list of str
-        The layer of most of the lines around each face.
-    dangling : int
-        Lines that enclose nothing.
+    Faces
 
-    Raises
-    ------
-    ValueError
-        For an open polyline, with its layer, handle and the ends of the gap; for a face with a hole.
+    Notes
+    -----
+    Lines cut an outline if they lie within it and it has two or more pieces along its border then; a line that reaches
+    beyond, as an axis or a dimension does, cuts nothing. An outline around lines that do not reach it stays whole.
     """
     import shapely
+    from scipy.spatial import cKDTree
 
+    found = Faces()
     flat = [line.points[:, :2] for line in lines]
-    every = np.concatenate(flat)
-    size = float(np.ptp(every, axis=0).max())
-    segments = shapely.set_precision([shapely.LineString(points) for points in flat], MEETS * size)
-    noded = shapely.union_all(segments, grid_size=MEETS * size)
-    faces, cuts, dangles, _ = shapely.polygonize_full([noded])
-    faces = list(faces.geoms)
-    loose = shapely.union_all([dangles, cuts]).buffer(2 * MEETS * size)
-    dangling = [k for k, segment in enumerate(segments) if shapely.covers(loose, segment)]
-    for k in dangling:
-        if lines[k].must_close:
-            raise ValueError(_open_message(lines[k], path))
+    if not flat:
+        return found
+    every = cKDTree(np.concatenate([*flat, *outlines]))
+    size = float(np.ptp(every.data, axis=0).max())
+    usable = [float(np.ptp(ring, axis=0).max()) > GRID * size for ring in outlines]
+    borders = [shapely.LinearRing(ring) for ring, good in zip(outlines, usable, strict=True) if good]
+    flat = _joined(flat, borders, size, found)
+    segments = shapely.set_precision([shapely.LineString(points) for points in flat], GRID * size)
+    rest = set(range(len(lines)))
     tree = shapely.STRtree(segments)
-    rings, layers = [], []
-    for face in faces:
-        if len(face.interiors):
-            x, y = np.array(face.interiors[0].coords).mean(axis=0)
-            raise ValueError(
-                f"'{path}': the lines around ({x:.6g}, {y:.6g}) leave a face with a hole; cut the block in two, "
-                "or draw the blocks as closed outlines"
+    for i, ring in enumerate(outlines):
+        if not usable[i]:
+            continue
+        area = shapely.Polygon(ring)
+        around = area.buffer(2 * MEETS * size) if area.is_valid else None
+        inside = [] if around is None else [int(k) for k in tree.query(around, "contains")]
+        pieces = _cut(area, [segments[k] for k in inside], GRID * size) if inside else []
+        if pieces:
+            found.pieces[i] = [_sharpened(piece, every, GRID * size) for piece in pieces]
+            rest -= set(inside)
+    if found.pieces:
+        n, cutting = sum(map(len, found.pieces.values())), len(lines) - len(rest)
+        around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
+        found.notes.append(
+            f"cut: {cutting} lines within {around} into {n} blocks; leave their layer out "
+            "(ignore) if they are no joints"
+        )
+    _add_faces([lines[k] for k in sorted(rest)], [segments[k] for k in sorted(rest)], outlines, every, size, found)
+    return found
+
+
+def joined_ends(points: np.ndarray) -> tuple[np.ndarray, float] | None:
+    """Close a line whose ends meet, or miss each other by little.
+
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) array
+
+    Returns
+    -------
+    ring : (n - 1, 2) or (n - 1, 3) array
+    miss : float
+        Distance between the ends.
+    """
+    gap = float(np.abs(points[0] - points[-1]).max())
+    return (points[:-1], gap) if len(points) > 3 and gap <= MEETS * float(np.ptp(points, axis=0).max()) else None
+
+
+def joined_note(misses: Sequence[float], size: float) -> list[str]:
+    """Say how many outlines did not quite close, where that was more than rounding; ``size`` is that of the drawing."""
+    far = [miss for miss in misses if miss > GRID * size]
+    words = f"joined: the ends of {len(far)} outlines, which missed each other by up to {max(far, default=0):.3g} units"
+    return [words] if far else []
+
+
+def nothing_closed(faces: Faces) -> str:
+    """Say what lines there are where nothing closed is, for an error message."""
+    lines = [item for item in faces.left_out if item.kind == "open"]
+    if not lines:
+        return ""
+    layers = Counter(item.layer for item in lines)
+    listed = ", ".join(f"{n} on layer '{layer}'" if layer else f"{n}" for layer, n in layers.most_common(6))
+    ends = np.array([item.points[k] for item in lines for k in (0, -1)])
+    words = f"{len(lines)} lines close nothing ({listed})"
+    if len(lines) > 1:
+        from scipy.spatial import cKDTree
+
+        # The ends of one line are neighbours in this list; the nearest end of another line is the second or third.
+        distance, near = cKDTree(ends).query(ends, k=min(4, len(ends)))
+        other = near // 2 != np.arange(len(ends))[:, None] // 2
+        apart = np.where(other, distance, np.inf).min(axis=1)
+        words += f"; their ends are {np.min(apart):.3g} to {np.max(apart):.3g} from the nearest end of another line"
+    if lines[0].miss:
+        words += f"; {lines[0].message}"
+    return words
+
+
+def _joined(flat: list[np.ndarray], borders: list[Any], size: float, found: Faces) -> list[np.ndarray]:
+    """Move ends of lines that miss another line or outline by little onto it."""
+    import shapely
+
+    flat = [points.copy() for points in flat]
+    others = [*(shapely.LineString(points) for points in flat), *borders]
+    tree = shapely.STRtree(others)
+    ends = [(k, e) for k in range(len(flat)) for e in (0, -1)]
+    places = shapely.points(np.array([flat[k][e] for k, e in ends]))
+    which, other = tree.query(places, "dwithin", GRID * size)
+    own = np.array([k for k, _ in ends])
+    meeting = set(which[other != own[which]].tolist())
+    moved = []
+    for number, (k, e) in enumerate(ends):
+        if number in meeting:
+            continue
+        end = flat[k][e]
+        reach = min(MEETS * size, SHORTENED * float(shapely.length(others[k])))
+        near = [int(j) for j in tree.query(shapely.Point(end), "dwithin", MEETS * size) if j != k]
+        best, distance = end, reach
+        for j in near:
+            # Corners and ends first, then any point of the line; a line that has moved is taken where it is now.
+            line = shapely.LineString(flat[j]) if j < len(flat) else others[j]
+            corners = np.array(line.coords)
+            apart = np.hypot(*(corners - end).T)
+            point = line.interpolate(line.project(shapely.Point(end)))
+            for candidate, d in (
+                (corners[apart.argmin()], apart.min()),
+                ((point.x, point.y), point.distance(shapely.Point(end))),
+            ):
+                if d <= distance:
+                    best, distance = np.array(candidate), float(d)
+                    break
+        if distance < reach and distance > 0.0:
+            flat[k][e] = best
+            moved.append(distance)
+    if moved:
+        found.notes.append(f"joined: {len(moved)} ends of lines that missed another by up to {max(moved):.3g} units")
+    return flat
+
+
+def _cut(area: Any, segments: list[Any], grid: float) -> list[np.ndarray]:
+    """Pieces of an outline along its border, two or more; empty where the lines do not cut it."""
+    import shapely
+
+    border = shapely.set_precision(area.exterior, grid)
+    noded = shapely.union_all([border, *segments], grid_size=grid)
+    faces = list(shapely.polygonize([*shapely.get_parts(noded)]).geoms)
+    faces = [face for face in faces if area.buffer(2 * grid).contains(face)]
+    at_border = [face for face in faces if face.exterior.intersection(border.buffer(2 * grid)).length > 10 * grid]
+    if len(at_border) < 2 or any(len(face.interiors) for face in faces):
+        return []
+    return [np.array(shapely.orient_polygons(face).exterior.coords)[:-1] for face in faces]
+
+
+def _add_faces(
+    lines: list[Line],
+    segments: list[Any],
+    outlines: Sequence[np.ndarray],
+    every: Any,
+    size: float,
+    found: Faces,
+) -> None:
+    """Add the faces between lines that cut no outline, and the lines that enclose nothing."""
+    import shapely
+
+    if not lines:
+        return
+    grid = GRID * size
+    faces, cuts, dangles, _ = shapely.polygonize_full([shapely.union_all(segments, grid_size=grid)])
+    loose = shapely.union_all([dangles, cuts]).buffer(2 * grid)
+    shapely.prepare(loose)
+    for line, segment in zip(lines, segments, strict=True):
+        if shapely.covers(loose, segment):
+            found.left_out.append(
+                LeftOut(
+                    "open", line.points[:, :2], _open_message(line), line.layer, f"line {line.handle}", closed=False
+                )
             )
+    tree = shapely.STRtree(segments)
+    drawn = shapely.STRtree([shapely.Polygon(ring).buffer(0) for ring in outlines])
+    for face in faces.geoms:
         ring = np.array(shapely.orient_polygons(face).exterior.coords)[:-1]
         middles = shapely.points((ring + np.roll(ring, -1, axis=0)) / 2.0)
         nearest = [lines[int(k)].layer for k in tree.nearest(middles)]
-        rings.append(_sharpened(ring, every, MEETS * size))
-        layers.append(max(sorted(set(nearest)), key=nearest.count))
-    return rings, layers, len(dangling)
+        layer = max(sorted(set(nearest)), key=nearest.count)
+        ring = _sharpened(ring, every, grid)
+        if len(face.interiors):
+            x, y = np.array(face.interiors[0].coords).mean(axis=0)
+            message = (
+                f"the lines around ({x:.6g}, {y:.6g}) leave a face with a hole; cut the block in two, "
+                "or draw the blocks as closed outlines"
+            )
+            holes = tuple(np.array(inner.coords)[:-1] for inner in face.interiors)
+            found.left_out.append(LeftOut("hole", ring, message, layer, "face", holes=holes))
+            continue
+        inner = face.buffer(-10 * grid)
+        over = [drawn.geometries[k] for k in drawn.query(inner, "intersects")]
+        # Within an outline it may be a block in a frame: that is judged when all outlines are there.
+        if over and not all(outline.covers(inner) for outline in over):
+            message = "loose lines enclose a face across closed outlines; leave their layer out (ignore)"
+            found.left_out.append(LeftOut("across", ring, message, layer, "face"))
+            continue
+        found.rings.append(ring)
+        found.layers.append(layer)
 
 
-def _open_message(line: Line, path: Path) -> str:
+def _open_message(line: Line) -> str:
     first, last = line.points[0], line.points[-1]
     gap = float(np.hypot(*(first - last)[:2]))
+    kind = "polyline" if line.must_close else "line"
     return (
-        f"'{path}': the polyline {line.handle} on layer '{line.layer}' is open: it starts at ({first[0]:.6g}, "
+        f"the {kind} {line.handle} on layer '{line.layer}' is open: it starts at ({first[0]:.6g}, "
         f"{first[1]:.6g}) and ends at ({last[0]:.6g}, {last[1]:.6g}), {gap:.4g} apart; close it"
     )
 
 
-def _sharpened(ring: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
-    """Move the corners from the grid on which lines were intersected back to the drawn points beside them."""
-    from scipy.spatial import cKDTree
-
-    distance, nearest = cKDTree(points).query(ring)
-    return np.where((distance <= 2 * reach)[:, None], points[nearest], ring)
+def _sharpened(ring: np.ndarray, points: Any, reach: float) -> np.ndarray:
+    """Move the corners from the grid on which lines were intersected back to the points beside them (a cKDTree)."""
+    distance, nearest = points.query(ring)
+    return np.where((distance <= 2 * reach)[:, None], points.data[nearest], ring)

@@ -12,12 +12,14 @@ import numpy as np
 
 from blockvis.layout.layout import Layout
 
-from .cells import layout_of_cells
+from .bodies import Bodies
+from .cells import block_array, layout_of_cells, row_of
 from .node_order import MESHIO, ring_of_nodes
 from .reading import Reading
+from .volumes import MESHIO_SOLIDS, Faces, bodies_of_cells
 
 
-def read(path: Path, reading: Reading) -> Layout:
+def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a mesh through meshio; it states no unit."""
     import meshio
 
@@ -37,20 +39,49 @@ def read(path: Path, reading: Reading) -> Layout:
         raise ValueError(
             f"'{path}' cannot be read by meshio as {path.suffix}: {reason[:300]}; export it again"
         ) from None
+    points = np.asarray(mesh.points, dtype=float)
+    solid = [(k, shape) for k, block in enumerate(mesh.cells) if (shape := _shape(block.type))]
+    if solid:
+        # Surface cells beside cells with a volume are their skin.
+        chosen = [(k, len(mesh.cells[k].data)) for k, _ in solid]
+        cells = [(shape, np.asarray(mesh.cells[k].data, dtype=np.int64)) for k, shape in solid]
+        return _bodies(points, cells, _cell_data(mesh, chosen))
     rings: list[np.ndarray] = []
-    chosen: list[tuple[int, int]] = []
+    chosen = []
     for k, block in enumerate(mesh.cells):
         kind = "polygon" if block.type.startswith("polygon") else block.type
         if kind not in MESHIO:
             continue
         rings += [ring_of_nodes(np.asarray(cell, dtype=np.int64), MESHIO[kind]) for cell in block.data]
         chosen.append((k, len(block.data)))
+    return layout_of_cells(points, rings, _cell_data(mesh, chosen), path, reading.view)
+
+
+def _shape(kind: str) -> Faces | None:
+    """Faces of meshio's type of cell; None for one without a volume."""
+    return MESHIO_SOLIDS.get(kind.rstrip("0123456789"))
+
+
+def _cell_data(mesh: Any, chosen: list[tuple[int, int]]) -> dict[str, np.ndarray]:
+    """Cell arrays of the chosen blocks of cells, given by number and count."""
     data: dict[str, np.ndarray] = {}
     for key, arrays in mesh.cell_data.items():
         data[key] = np.concatenate([np.asarray(arrays[k]) for k, _ in chosen]) if chosen else np.zeros(0)
     if "block_id" not in data:
         data.update(_sets(mesh, chosen))
-    return layout_of_cells(np.asarray(mesh.points, dtype=float), rings, data, path)
+    return data
+
+
+def _bodies(points: np.ndarray, cells: list[tuple[Faces, np.ndarray]], data: dict[str, np.ndarray]) -> Bodies:
+    key = block_array(data)
+    total = sum(len(nodes) for _, nodes in cells)
+    values, owner = np.unique(data[key] if key else np.zeros(total, dtype=np.int64), return_inverse=True)
+    names = [f"block {value}" for value in values.tolist()] if key else ["block"]
+    bodies, owners = bodies_of_cells(points, cells, owner, names)
+    first = np.unique(owner, return_index=True)[1]
+    rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
+    how = f"one per value of the cell array '{key}'" if key else "one per piece that hangs together"
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, {how}",))
 
 
 class _Ending(io.StringIO):

@@ -6,6 +6,7 @@ import math
 import re
 import warnings
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.parsers import expat
@@ -15,18 +16,19 @@ import numpy as np
 
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import FLAT
 
-from .cells import layout_of_cells, merged, row_of
+from .bodies import Bodies, Body, body_of_polygons, layout_of_bodies
+from .cells import block_array, layout_of_cells, merged, row_of
 from .node_order import VTK, ring_of_nodes
 from .reading import Reading
-from .vtk_arrays import largest_number
+from .volumes import VTK_SOLIDS, bodies_of_cells
+from .vtk_arrays import announced_bytes, largest_number
 
 if TYPE_CHECKING:
     import pyvista
 
-#: VTK's types of cells with a volume.
-SOLID_CELLS = {10, 11, 12, 13, 14, 15, 16, 24, 25, 26, 27, 29, 41, 42, 71, 72}
+#: VTK's type of cell with a volume that lists its faces, which do not follow from the type.
+POLYHEDRON = 42
 
 #: zlib compresses at most 1032 to 1: a file cannot hold more than this many numbers per byte.
 MOST_PER_BYTE = 1100
@@ -34,17 +36,20 @@ MOST_PER_BYTE = 1100
 #: Numbers that all arrays of a file may hold together: 400 MB, a thousand times a large drawing.
 MOST_NUMBERS = 50_000_000
 
+#: Pieces of text, as the parser hands them out, in which the header of a binary array surely lies.
+LINES_OF_HEADER = 8
+
 #: XML elements nested deeper than this are refused; VTK nests a handful.
 DEEPEST = 64
 
 
-def read(path: Path, reading: Reading) -> Layout:
+def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a file of VTK, which states no unit."""
     import pyvista
     from vtkmodules.vtkCommonCore import vtkObject
 
     _check_counts(path)
-    if path.suffix.lower() in (".pvd", ".vtm"):
+    if path.suffix.lower() in (".pvd", ".vtm", ".vtmb"):
         _check_parts(path)
     try:
         # VTK would print every fault of a file to the terminal as well; the message below has the reason.
@@ -59,7 +64,7 @@ def read(path: Path, reading: Reading) -> Layout:
         raise ValueError(f"'{path}' cannot be read as {path.suffix} ({error}); export it again") from None
     finally:
         vtkObject.GlobalWarningDisplayOn()
-    return layout_of_dataset(data, path)
+    return found_in_dataset(data, path, reading.view)
 
 
 def _check_counts(path: Path) -> None:
@@ -133,6 +138,7 @@ class _Held:
         self.appended = ""
         self.later: list[dict[str, str]] = []
         self.offsets: dict[str, str] | None = None
+        self.binary: dict[str, str] | None = None
         self.content: list[str] = []
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
@@ -159,28 +165,47 @@ class _Held:
             self.points = int(counts.pop("NumberOfPoints", self.points))
             self.cells = sum(int(value) for value in counts.values())
         elif tag in ("DataArray", "Array"):
-            components = int(counts.get("NumberOfComponents", 1))
-            self.numbers += components * int(counts.get("NumberOfTuples", max(self.points, self.cells)))
-            self._bound(self.numbers)
-            if attributes.get("Name") == "offsets":
-                if attributes.get("format") == "appended":
-                    self.later.append(attributes)
-                else:
-                    self.offsets, self.content = attributes, []
+            self._array(attributes, counts)
         elif tag == "AppendedData":
             self.appended = attributes.get("encoding", "base64")
+
+    def _array(self, attributes: dict[str, str], counts: dict[str, str]) -> None:
+        """Check the counts of an array, and prepare to read its header, or all of it if it holds offsets."""
+        components = int(counts.get("NumberOfComponents", 1))
+        self.numbers += components * int(counts.get("NumberOfTuples", max(self.points, self.cells)))
+        self._bound(self.numbers)
+        if attributes.get("format") == "binary":
+            self.binary, self.content = attributes, []
+        if attributes.get("Name", "").endswith("offsets"):
+            if attributes.get("format") == "appended":
+                self.later.append(attributes)
+            else:
+                self.offsets, self.content = attributes, []
 
     def end(self, tag: str) -> None:
         """Check the offsets of cells when their element ends."""
         self.depth -= 1
+        if self.binary is not None:
+            self.check_header("".join(self.content).strip().encode(), self.binary)
+            self.binary = None
         if self.offsets is not None:
             self.check_offsets("".join(self.content).strip().encode(), self.offsets)
             self.offsets = None
 
     def text(self, data: str) -> None:
-        """Collect the text of an element of offsets."""
-        if self.offsets is not None:
+        """Collect the text of an element of offsets, and the beginning of that of any binary array."""
+        if self.offsets is not None or (self.binary is not None and len(self.content) < LINES_OF_HEADER):
             self.content.append(data)
+
+    def check_header(self, content: bytes, attributes: dict[str, str]) -> None:
+        """Check the size that the header of a binary array announces: VTK reserves as much memory."""
+        try:
+            size = announced_bytes(content, attributes, self.file)
+        except (ValueError, KeyError, OverflowError) as error:
+            raise ValueError(
+                f"'{self.path}' has an array whose size cannot be read ({error}); export it again"
+            ) from None
+        _refuse(self.path, [size] if size > 8 * MOST_NUMBERS else [], self.size)
 
     def check_offsets(self, content: bytes, attributes: dict[str, str]) -> None:
         """Check the last offset: VTK reserves memory for so many numbers."""
@@ -217,16 +242,16 @@ def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
         target = path.parent / name
         if Path(name).is_absolute() or not target.resolve().is_relative_to(path.parent.resolve()):
             raise ValueError(f"'{path}' names '{name}', which is outside its folder; keep the files together")
-        if target.suffix.lower() not in (".vtu", ".vtp", ".vtk", ".vtm"):
-            raise ValueError(f"'{path}' names '{name}', which is no .vtu, .vtp, .vtk or .vtm; export it again")
+        if target.suffix.lower() not in (".vtu", ".vtp", ".vtk", ".vtm", ".vtmb"):
+            raise ValueError(f"'{path}' names '{name}', which is no .vtu, .vtp, .vtk, .vtm or .vtmb; export it again")
         if not target.is_file():
             raise ValueError(f"'{path}' names '{name}', which does not exist; keep the files together")
         _check_counts(target)
-        if target.suffix.lower() == ".vtm":
+        if target.suffix.lower() in (".vtm", ".vtmb"):
             _check_parts(target, (*seen, path))
 
 
-def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
+def layout_of_dataset(data: Any, path: Path | str = "dataset", view: str | None = None) -> Layout:
     """Make a layout of a pyvista dataset: a mesh, or a multiblock of meshes.
 
     Parameters
@@ -234,24 +259,23 @@ def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
     data : pyvista.DataSet or pyvista.MultiBlock
     path : Path or str
         Named in messages.
+    view : {"xy", "xz", "yz"}, optional
+        As of :func:`blockvis.read_layout`.
     """
+    found = found_in_dataset(data, path, view)
+    return layout_of_bodies(found, path, view) if isinstance(found, Bodies) else found
+
+
+def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | Bodies:
+    """Read the blocks of a pyvista dataset, flat or in space; the parameters are those of ``layout_of_dataset``."""
     import pyvista
 
     if isinstance(data, pyvista.MultiBlock):
-        parts, labels = [], []
-        for k, part in enumerate(data):
-            if part is None or (isinstance(part, pyvista.DataSet) and part.n_cells == 0):
-                continue
-            parts.append(part)
-            name = data.get_block_name(k) or ""
-            labels.append("" if re.fullmatch(r"Block-\d+", name) else name)
-        if parts and all(_is_solid(part) for part in parts):
-            return _layout_of_solids(_one_grid(parts, labels), path)
-        return merged([layout_of_dataset(part, path) for part in parts], labels, path)
+        return _found_in_parts(data, path, view)
     grid = _as_cells(data, path)
     types = np.asarray(grid.celltypes)
-    if _is_solid(grid):
-        return _layout_of_solids(grid, path)
+    if np.isin(types, [*VTK_SOLIDS, POLYHEDRON]).any():
+        return _bodies_of_solids(grid, path)
     offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
     surface = np.flatnonzero(np.isin(types, list(VTK)))
     rings = []
@@ -259,42 +283,42 @@ def layout_of_dataset(data: Any, path: Path | str = "dataset") -> Layout:
         nodes = connectivity[offset[cell] : offset[cell + 1]].astype(np.int64)
         rings.append(ring_of_nodes(nodes, VTK[int(types[cell])]))
     cell_data = {str(key): np.asarray(grid.cell_data[key])[surface] for key in grid.cell_data}
-    return layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path)
+    return layout_of_cells(np.asarray(grid.points, dtype=float), rings, cell_data, path, view)
 
 
-def _is_solid(data: Any) -> bool:
-    """Whether a mesh has cells with a volume, or closed surfaces around some."""
+def _found_in_parts(data: Any, path: Path | str, view: str | None) -> Layout | Bodies:
+    """Read the parts of a multiblock; those that hold no blocks, such as centres and contact points, are left out."""
     import pyvista
 
-    if not isinstance(data, pyvista.DataSet) or data.n_cells == 0:
-        return False
-    grid = _as_cells(data, "")
-    if np.isin(np.asarray(grid.celltypes), list(SOLID_CELLS)).any():
-        return True
-    spread = np.ptp(np.asarray(grid.points, dtype=float), axis=0)
-    if spread.min() <= FLAT * spread.max():
-        return False
-    return bool(grid.extract_surface(algorithm="dataset_surface").n_open_edges == 0)
+    flat: list[tuple[Layout | Bodies, str]] = []
+    solid: list[tuple[Layout | Bodies, str]] = []
+    left_out = []
+    for k, part in enumerate(data):
+        if part is None or (isinstance(part, pyvista.DataSet) and part.n_cells == 0):
+            continue
+        name = data.get_block_name(k) or ""
+        name = "" if re.fullmatch(r"Block-\d+", name) else name
+        if not _has_blocks(part):
+            left_out.append(f"'{name or k}'")
+            continue
+        found = found_in_dataset(part, path, view)
+        (solid if isinstance(found, Bodies) else flat).append((found, name))
+    if solid and flat:
+        # Flat cells beside bodies are faces in contact, as LMGC90 writes them.
+        left_out += [f"'{name or 'a flat part'}'" for _, name in flat]
+    chosen = solid or flat
+    joined = merged([found for found, _ in chosen], [name for _, name in chosen], path)
+    note = (f"left out: {', '.join(left_out)}, which draw no blocks",) if left_out else ()
+    return replace(joined, notes=joined.notes + note)
 
 
-def _one_grid(parts: list[Any], labels: list[str]) -> Any:
-    """Put solid parts into one grid: together they say in which direction the structure is extruded."""
+def _has_blocks(part: Any) -> bool:
     import pyvista
 
-    grids, n = [], 0
-    for part, label in zip(parts, labels, strict=True):
-        grid = _as_cells(part, "").copy()
-        given = "block_id" in grid.cell_data
-        ids = grid.cell_data["block_id"] if given else grid.connectivity().cell_data["RegionId"]
-        _, ids = np.unique(np.asarray(ids), return_inverse=True)
-        if "name" not in grid.cell_data:
-            several = ids.max() > 0
-            names = [f"{label or 'block'} {n + i}" if several or not label else label for i in ids]
-            grid.cell_data["name"] = np.array(names)
-        grid.cell_data["block_id"] = ids + n
-        n += int(ids.max()) + 1
-        grids.append(grid)
-    return pyvista.merge(grids, merge_points=False)
+    if isinstance(part, pyvista.MultiBlock):
+        return any(one is not None and _has_blocks(one) for one in part)
+    types = np.asarray(part.cast_to_unstructured_grid().celltypes) if part.n_cells else np.zeros(0)
+    return bool(np.isin(types, [*VTK, *VTK_SOLIDS, POLYHEDRON]).any())
 
 
 def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
@@ -307,22 +331,82 @@ def _as_cells(data: Any, path: Path | str) -> pyvista.UnstructuredGrid:
     return data.cast_to_unstructured_grid()
 
 
-def _layout_of_solids(grid: Any, path: Path | str) -> Layout:
-    from .solids import Body, layout_of_bodies
+def _bodies_of_solids(grid: Any, path: Path | str) -> Bodies:
+    """Read the bodies of the cells with a volume; surface cells beside them are their skin."""
+    types = np.asarray(grid.celltypes)
+    solid = np.flatnonzero(np.isin(types, [*VTK_SOLIDS, POLYHEDRON]))
+    data = {str(key): np.asarray(grid.cell_data[key])[solid] for key in grid.cell_data}
+    key = block_array(data)
+    if key is not None:
+        values, owner = np.unique(data[key], return_inverse=True)
+        names = [f"block {value}" for value in values.tolist()]
+        note = f"one per value of the cell array '{key}'"
+    elif (types[solid] == POLYHEDRON).all():
+        owner, names = np.arange(len(solid)), [f"block {k}" for k in range(len(solid))]
+        note = "one per cell: no cell array 'block_id' says which cells are one block"
+    else:
+        owner, names = np.zeros(len(solid), dtype=np.int64), ["block"]
+        note = "one per piece that hangs together: no cell array 'block_id' says which cells are one block"
+    faceted = types[solid] == POLYHEDRON
+    if faceted.any() and not faceted.all():
+        raise ValueError(f"'{path}' has polyhedra beside other cells with a volume; write all blocks as polyhedra")
+    found = _faceted_bodies if faceted.any() else _bodies_by_shape
+    try:
+        bodies, owners = found(grid, np.asarray(grid.points, dtype=float), solid, owner, names)
+    except IndexError as error:
+        raise ValueError(f"'{path}' has a damaged cell ({error}); export it again") from None
+    first = np.unique(owner, return_index=True)[1]
+    rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, {note}",))
 
-    rows: list[dict[str, Any]] = []
-    bodies = []
-    ids = np.asarray(grid.cell_data["block_id"]) if "block_id" in grid.cell_data else None
-    if ids is None:
-        ids = np.asarray(grid.connectivity().cell_data["RegionId"])
-    for value in np.unique(ids):
-        cells = np.flatnonzero(ids == value)
-        surface = grid.extract_cells(cells).extract_surface(algorithm="dataset_surface").triangulate()
-        faces = np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
-        bodies.append(Body(f"block {value}", np.asarray(surface.points, dtype=float), faces))
-        named = {key: np.asarray(grid.cell_data[key])[cells] for key in grid.cell_data}
-        rows.append(row_of(named, 0, f"block {value}"))
-    return layout_of_bodies(bodies, path, rows)
+
+def _bodies_by_shape(
+    grid: Any, points: np.ndarray, solid: np.ndarray, owner: np.ndarray, names: list[str]
+) -> tuple[list[Body], np.ndarray]:
+    """Find the bodies of cells whose faces follow from their type."""
+    types = np.asarray(grid.celltypes)
+    offset, connectivity = np.asarray(grid.cell_offsets), np.asarray(grid.cell_connectivity)
+    if not _within(connectivity, len(points)):
+        raise IndexError("it uses a point that does not exist")
+    cells, owners = [], []
+    for kind in np.unique(types[solid]).tolist():
+        chosen = np.flatnonzero(types[solid] == kind)
+        corners = 1 + max(corner for face in VTK_SOLIDS[kind] for corner in face)
+        nodes = connectivity[offset[solid[chosen]][:, None] + np.arange(corners)]
+        cells.append((VTK_SOLIDS[kind], nodes.astype(np.int64)))
+        owners.append(owner[chosen])
+    return bodies_of_cells(points, cells, np.concatenate(owners), names)
+
+
+def _faceted_bodies(
+    grid: Any, points: np.ndarray, solid: np.ndarray, owner: np.ndarray, names: list[str]
+) -> tuple[list[Body], np.ndarray]:
+    """Find the bodies of polyhedra, which list their faces."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    def lists(array: Any) -> tuple[np.ndarray, np.ndarray]:
+        return vtk_to_numpy(array.GetOffsetsArray()), vtk_to_numpy(array.GetConnectivityArray())
+
+    if grid.GetPolyhedronFaces() is None or grid.GetPolyhedronFaceLocations() is None:
+        raise IndexError("a polyhedron has no faces")
+    corner_of, corners = lists(grid.GetPolyhedronFaces())
+    face_of, faces = lists(grid.GetPolyhedronFaceLocations())
+    if not (_within(corners, len(points)) and _within(faces, len(corner_of) - 1)):
+        raise IndexError("a face of a polyhedron uses a point that does not exist")
+    outside: list[dict[tuple[int, ...], list[int]]] = [{} for _ in names]
+    for cell, whose in zip(solid.tolist(), owner.tolist(), strict=True):
+        for face in faces[face_of[cell] : face_of[cell + 1]].tolist():
+            ring = corners[corner_of[face] : corner_of[face + 1]].tolist()
+            key = tuple(sorted(ring))
+            # A face that two cells of one body share is inside it.
+            if outside[whose].pop(key, None) is None:
+                outside[whose][key] = ring
+    bodies = [body_of_polygons(name, points, list(mine.values())) for name, mine in zip(names, outside, strict=True)]
+    return bodies, np.arange(len(names))
+
+
+def _within(numbers: np.ndarray, end: int) -> bool:
+    return len(numbers) == 0 or bool(numbers.min() >= 0 and numbers.max() < end)
 
 
 def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:

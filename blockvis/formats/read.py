@@ -17,9 +17,14 @@ from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of
 from blockvis.layout.outlines import ring_area, without_collinear
+from blockvis.layout.selection import sorted_out
 from blockvis.layout.units import chosen_unit, metres_per
-from blockvis.suggestions import files_like
+from blockvis.layout.views import checked_view
 
+from .bodies import Bodies, layout_of_bodies
+from .cells import of_files
+from .files import MissingFile as MissingFile
+from .files import files_of
 from .reading import Reading
 
 #: Largest coordinate [m], larger than the Earth; double precision resolves 1e-8 m there.
@@ -29,26 +34,37 @@ LARGEST_COORDINATE = 1e8
 MOST_CORNERS = 2000
 
 
-class MissingFile(FileNotFoundError, ValueError):
-    """There is no file of that name."""
-
-
-def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: float | None = None) -> Layout:
+def read_layout(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    chord_tolerance: float | None = None,
+    view: str | None = None,
+    ignore: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
+) -> Layout:
     """Read the blocks of a layout file.
 
     Parameters
     ----------
     path : str or Path
-        The suffix chooses the format; see :data:`blockvis.formats.FORMATS`.
+        The suffix chooses the format; see :data:`blockvis.formats.FORMATS`. A folder, or a pattern such as
+        ``"stones/*.stl"``, stands for files of one format, as of one stone each.
     unit : str, optional
         Unit of the file's lengths; it replaces the one that the file states.
     chord_tolerance : float, optional [m]
         Largest distance of an arc from the chords that replace it; by default a thousandth of its radius.
+    view : {"xy", "xz", "yz"}, optional
+        Coordinates that become x and y, of drawings in space; by default those in which the blocks lie side by side.
+    ignore, only : str or sequence of str, optional
+        Layers, groups, materials and names, or patterns of them (``"dim*"``), that are left out, and beside which all
+        others are left out. What ``only`` names is not left out for looking like a frame, a title block or mortar.
 
     Returns
     -------
     Layout
-        Lengths in m, outlines without collinear points.
+        Lengths in m, outlines without collinear points. What the drawing holds beside its blocks is in ``left_out``,
+        and in a note per kind and layer.
 
     Raises
     ------
@@ -56,18 +72,16 @@ def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: f
         With the reason and the remedy, for a file that is missing, damaged or no layout.
     """
     path = Path(path)
-    if not path.exists():
-        near = files_like(path)
-        hint = f"; did you mean {' or '.join(near)}?" if near else "; check the path"
-        raise MissingFile(f"there is no file '{path}'{hint}")
-    if path.is_dir():
-        raise ValueError(f"'{path}' is a folder; give a layout file")
-    if path.stat().st_size == 0:
-        raise ValueError(f"'{path}' is empty (0 bytes); export it again")
     if unit is not None:
         metres_per(unit)
-    layout = _read_by_suffix(path, Reading(unit=unit, chord_tolerance=chord_tolerance))
-    if layout.n_blocks == 0:
+    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
+    reading = Reading(unit=unit, chord_tolerance=chord_tolerance, view=checked_view(view), ignore=ignore, only=only)
+    files = files_of(path)
+    found = [_read_by_suffix(file, reading) for file in files]
+    content = found[0] if files == [path] else of_files(found, files, path)
+    layout = layout_of_bodies(content, path, view, ignore, only) if isinstance(content, Bodies) else content
+    layout = replace(layout, source=str(path))
+    if layout.n_blocks == 0 and not layout.left_out:
         raise ValueError(f"'{path}' draws no block; draw each block as one closed outline or meshed surface")
     for i, ring in enumerate(layout.outlines):
         if not np.isfinite(ring).all():
@@ -80,20 +94,27 @@ def read_layout(path: str | Path, *, unit: str | None = None, chord_tolerance: f
     chosen, note = chosen_unit(unit, layout.unit, sizes)
     factor = metres_per(chosen)
     outlines = tuple(without_collinear(ring * factor) for ring in layout.outlines)
-    for name, ring in zip(layout.names, outlines, strict=True):
-        if len(ring) > MOST_CORNERS:
-            raise ValueError(
-                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
-            )
-    largest = max(float(np.abs(ring).max()) for ring in outlines)
+    layout = replace(
+        layout,
+        outlines=outlines,
+        thickness=None if layout.thickness is None else layout.thickness * factor,
+        unit=chosen,
+        notes=layout.notes + ((note,) if note else ()),
+        left_out=tuple(item.mapped(factor) for item in layout.left_out),
+    )
+    largest = max((float(np.abs(ring).max()) for ring in layout.outlines), default=0.0)
     if largest > LARGEST_COORDINATE:
         raise ValueError(
             f"'{path}' has a coordinate of {largest:.3g} m; corners must lie within {LARGEST_COORDINATE:.0e} m of the "
             "origin: check the unit or repair the file"
         )
-    thickness = None if layout.thickness is None else layout.thickness * factor
-    notes = layout.notes + ((note,) if note else ())
-    return replace(layout, outlines=outlines, thickness=thickness, unit=chosen, notes=notes, source=str(path))
+    layout = sorted_out(layout, ignore, only)
+    for name, ring in zip(layout.names, layout.outlines, strict=True):
+        if len(ring) > MOST_CORNERS:
+            raise ValueError(
+                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
+            )
+    return layout
 
 
 def write_layout(layout: Layout, path: str | Path) -> None:
@@ -114,22 +135,30 @@ def read(
     joint_thickness: float | str = 0.0,
     overlap_tolerance: float | None = None,
     chord_tolerance: float | None = None,
+    view: str | None = None,
+    ignore: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
+    closing: str = "auto",
+    outline_tolerance: float | None = None,
 ) -> solver.Assembly:
     """Read a layout file into an assembly.
 
     Parameters
     ----------
     path : str or Path
-    roles, supports, density, thickness, joint_thickness, overlap_tolerance
+    roles, supports, density, thickness, joint_thickness, overlap_tolerance, closing, outline_tolerance
         As of :func:`blockvis.layout.assemble.assemble`.
-    unit, chord_tolerance
+    unit, chord_tolerance, view, ignore, only
         As of :func:`read_layout`.
 
     Returns
     -------
     solver.Assembly
     """
-    layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance)
+    layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance, view=view, ignore=ignore, only=only)
+    if chord_tolerance is not None and outline_tolerance is None:
+        # Who says how fine arcs are wants their chords.
+        outline_tolerance = 0.0
     return assemble(
         layout,
         roles=roles,
@@ -138,6 +167,8 @@ def read(
         thickness=thickness,
         joint_thickness=joint_thickness,
         overlap_tolerance=overlap_tolerance,
+        closing=closing,
+        outline_tolerance=outline_tolerance,
     )
 
 
@@ -146,7 +177,14 @@ def save_layout(assembly: solver.Assembly, path: str | Path, *, pose: solver.Pos
     write_layout(layout_of(assembly, pose=pose), path)
 
 
-def inspect(path: str | Path, *, unit: str | None = None) -> Inspection:
+def inspect(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    view: str | None = None,
+    ignore: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
+) -> Inspection:
     """Read a layout file and measure it.
 
     Parameters
@@ -154,13 +192,19 @@ def inspect(path: str | Path, *, unit: str | None = None) -> Inspection:
     path : str or Path
     unit : str, optional
         Unit of the file's lengths; it replaces the one that the file states.
+    view : {"xy", "xz", "yz"}, optional
+    ignore, only : str or sequence of str, optional
+        As of :func:`read_layout`.
     """
-    return inspected(read_layout(path, unit=unit))
+    return inspected(read_layout(path, unit=unit, view=view, ignore=ignore, only=only))
 
 
-def _read_by_suffix(path: Path, reading: Reading) -> Layout:
+def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a file with the module of its suffix."""
-    return _module_of(path, "read").read(path, reading)
+    if path.stat().st_size == 0:
+        raise ValueError(f"'{path}' is empty (0 bytes); export it again")
+    found: Layout | Bodies = _module_of(path, "read").read(path, reading)
+    return found
 
 
 def _write_by_suffix(layout: Layout, path: Path) -> None:

@@ -1,10 +1,9 @@
-"""Bodies in space, .stl .obj .ply .off .glb through trimesh: prismatic ones become outlines with a thickness."""
+"""Bodies in space or flat meshes, .stl .obj .ply .off .glb, through trimesh."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,29 +11,16 @@ import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.outlines import FLAT, outlines_of_cells
+from blockvis.layout.outlines import FLAT
 from blockvis.layout.triangulation import triangles_of_ring
 
-from .cells import components, layout_of_cells, merged
+from .bodies import Bodies
+from .cells import layout_of_cells, merged
+from .closed_surfaces import closed_bodies
 from .reading import Reading
 
-#: Points closer than this fraction of the size of the drawing are one: single precision is accurate to 6e-8.
-SAME_POINT = 2e-6
 
-#: In a prism the sine of the angle between a face's normal and the axis, or the plane across it, is at most this.
-SQUARE = 1e-3
-
-
-@dataclass(frozen=True)
-class Body:
-    """A closed surface of triangles: name, (n, 3) points, (m, 3) faces."""
-
-    name: str
-    points: np.ndarray
-    faces: np.ndarray
-
-
-def read(path: Path, reading: Reading) -> Layout:
+def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read bodies or a flat mesh; .glb is in metres, the other formats state no unit."""
     import trimesh
 
@@ -73,14 +59,14 @@ def read(path: Path, reading: Reading) -> Layout:
     unit = "m" if suffix == ".glb" else ""
     rows = _own_rows(path)
     if float(np.ptp(every, axis=0).min()) <= FLAT * size:
-        return replace(_flat(parts, size, path, rows), unit=unit)
-    bodies = [body for part in parts for body in _bodies(*part, size, path)]
+        return replace(_flat(parts, path, rows, reading.view), unit=unit)
+    bodies = [body for part in parts for body in closed_bodies(*part, size, path)]
     if suffix == ".obj":
         # The reader returns the objects in an order of its own: rows are matched to them by name.
         by_name = {row.get("name"): row for row in rows}
         rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
-    return replace(layout_of_bodies(bodies, path, known), unit=unit)
+    return Bodies(tuple(bodies), tuple(known), unit)
 
 
 def _placed(scene: Any) -> list[tuple[str, Any]]:
@@ -109,123 +95,12 @@ def _numbered(parts: list[tuple[str, np.ndarray, np.ndarray]], scene: Any) -> li
     return [(f"block {value}", points, faces[ids == value]) for value in np.unique(ids).tolist()]
 
 
-def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Merge points that coincide, and drop the faces that have no area then."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
-    # Exact copies first: a million of them would make a million squared pairs.
-    unique, inverse = np.unique(points, axis=0, return_inverse=True)
-    pairs = cKDTree(unique).query_pairs(SAME_POINT * size, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(unique), len(unique)))
-    _, label = connected_components(graph, directed=False)
-    first = np.unique(label, return_index=True)[1]
-    faces = label[inverse.ravel()][faces]
-    alive = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    return unique[first], faces[alive]
-
-
-def _bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path: Path) -> list[Body]:
-    points, faces = _with_points_merged(points, faces, size)
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    if (counts == 1).any():
-        x, y, z = points[unique[counts == 1][0]].mean(axis=0)
-        raise ValueError(
-            f"'{path}': body '{name}' is not closed: {int((counts == 1).sum())} edges belong to one face only, "
-            f"one around ({x:.6g}, {y:.6g}, {z:.6g}); export closed bodies"
-        )
-    if (counts > 2).any():
-        x, y, z = points[unique[counts > 2][0]].mean(axis=0)
-        raise ValueError(
-            f"'{path}': body '{name}' holds bodies that touch and cannot be told apart: {int((counts > 2).sum())} "
-            f"edges belong to more than two faces, one around ({x:.6g}, {y:.6g}, {z:.6g}); "
-            "export one file or one named object per block (.obj, .glb, .step)"
-        )
-    # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.
-    inverse = inverse.ravel().reshape(-1, 3)
-    piece = components(list(inverse), len(unique))
-    n = int(piece.max()) + 1
-    return [Body(name if n == 1 else f"{name} {k + 1}", points, faces[piece == k]) for k in range(n)]
-
-
-def layout_of_bodies(bodies: Sequence[Body], path: Path | str, rows: Sequence[dict[str, Any]] = ()) -> Layout:
-    """Make a layout of prismatic bodies: outlines across the axis of their extrusion, thicknesses along it.
-
-    Parameters
-    ----------
-    bodies : sequence of Body
-        Closed.
-    path : Path or str
-        Named in messages.
-    rows : sequence of dict
-        Rows of the block table, one per body.
-
-    Raises
-    ------
-    ValueError
-        If the bodies are not all prisms along one axis.
-    """
-    if not bodies:
-        raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
-    every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
-    size = float(np.ptp(every, axis=0).max())
-    best: tuple[float, int] | None = None
-    worst = ("", 0.0)
-    for axis in (2, 1, 0):
-        wrong = next((body for body in bodies if not _is_prism(body, axis, size)), None)
-        if wrong is not None:
-            worst = (wrong.name, size)
-            continue
-        depths = np.array([np.ptp(body.points[np.unique(body.faces)][:, axis]) for body in bodies])
-        ends = np.array([body.points[np.unique(body.faces)][:, axis].min() for body in bodies])
-        # Along the axis of extrusion all bodies lie between the same two planes: take the axis that comes closest.
-        scatter = float(np.ptp(depths) + np.ptp(ends)) / size
-        if best is None or scatter < best[0] - 1e-4:
-            best = (scatter, axis)
-    if best is None:
-        raise ValueError(
-            f"'{path}' is not prismatic: body '{worst[0]}' is no extrusion along x, y or z; "
-            "export extrusions of the blocks' outlines, or draw them in the plane"
-        )
-    axis = best[1]
-    # The view from +z, -y or +x, which mirrors nothing.
-    first, second = {2: (0, 1), 1: (0, 2), 0: (1, 2)}[axis]
-    outlines, depth = [], []
-    for body in bodies:
-        points = body.points
-        used = points[np.unique(body.faces)]
-        level = used[:, axis].max()
-        cap = (np.abs(points[body.faces][:, :, axis] - level) <= 1e-5 * size).all(axis=1)
-        owner = np.zeros(int(cap.sum()), dtype=np.int64)
-        outlines += outlines_of_cells(points[:, [first, second]], list(body.faces[cap]), owner, [body.name])
-        depth.append(float(np.ptp(used[:, axis])))
-    notes = [f"{len(bodies)} bodies were read as outlines in {'xyz'[first]}{'xyz'[second]}; their depth along "
-             f"{'xyz'[axis]} is the thickness"]  # fmt: skip
-    layout = Layout(outlines=tuple(outlines), names=tuple(body.name for body in bodies), unit="", notes=tuple(notes))
-    layout = with_rows(layout, rows) if len(rows) == len(bodies) else layout
-    return replace(layout, thickness=np.array(depth))
-
-
-def _is_prism(body: Body, axis: int, size: float) -> bool:
-    corners = body.points[body.faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.hypot(np.hypot(normal[:, 0], normal[:, 1]), normal[:, 2])
-    wide = area > 1e-9 * size**2
-    along = np.abs(normal[wide, axis]) / area[wide]
-    square = (along > 1 - SQUARE) | (along < SQUARE)
-    levels = corners[:, :, axis]
-    caps = levels[wide][along > 1 - SQUARE]
-    on_caps = (np.abs(caps - levels.min()) <= 1e-5 * size) | (np.abs(caps - levels.max()) <= 1e-5 * size)
-    return bool(square.all() and on_caps.all())
-
-
 def _flat(
-    parts: list[tuple[str, np.ndarray, np.ndarray]], size: float, path: Path, rows: list[dict[str, Any]]
+    parts: list[tuple[str, np.ndarray, np.ndarray]], path: Path, rows: list[dict[str, Any]], view: str | None
 ) -> Layout:
-    layouts = [layout_of_cells(points, list(faces), {}, path) for _, points, faces in parts]
+    layouts = [layout_of_cells(points, list(faces), {}, path, view) for _, points, faces in parts]
     layout = merged(layouts, [name for name, _, _ in parts], path)
+    assert isinstance(layout, Layout)
     return with_rows(layout, rows) if len(rows) == layout.n_blocks else layout
 
 

@@ -21,9 +21,11 @@ import numpy as np
 import solver
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.outlines import LARGEST_CHORD
 from blockvis.layout.units import UNITS, metres_per
 
+from .loose_lines import Faces, Line, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -51,23 +53,34 @@ class _Found:
 
     rings: list[np.ndarray] = field(default_factory=list)
     rows: list[dict[str, Any]] = field(default_factory=list)
+    labels: list[tuple[str, ...]] = field(default_factory=list)
+    loose: list[Line] = field(default_factory=list)
+    loose_labels: list[tuple[str, ...]] = field(default_factory=list)
+    misses: list[float] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    open_lines: int = 0
+    left_out: list[LeftOut] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class _Where:
-    """Context of an element: transform of its parents, layer, and largest distance of chords from a curve."""
+    """Context of an element: transform of its parents, layers, and largest distance of chords from a curve."""
 
     matrix: np.ndarray
-    layer: str
+    layers: tuple[str, ...]
     tolerance: float | None
     path: Path
     depth: int = 0
 
+    @property
+    def layer(self) -> str:
+        """The innermost layer, "" for none."""
+        return self.layers[-1] if self.layers else ""
+
 
 def read(path: Path, reading: Reading) -> Layout:
     """Read a .svg drawing; its unit follows from its width and its viewBox."""
+    if reading.view not in (None, "xy"):
+        raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
     text = path.read_bytes()
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise ValueError(f"'{path}' is not in UTF-8; save it as plain SVG")
@@ -84,15 +97,54 @@ def read(path: Path, reading: Reading) -> Layout:
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
     found = _Found()
-    _walk(root, _Where(np.eye(3), "", tolerance, path), found)
-    if not found.rings:
-        rest = f"; {found.open_lines} lines enclose nothing" if found.open_lines else ""
-        raise ValueError(f"'{path}' has no closed shape{rest}; draw each block as a closed path or polygon")
-    if found.open_lines:
-        found.notes.append(f"{found.open_lines} lines without area were skipped")
+    _walk(root, _Where(np.eye(3), (), tolerance, path), found)
+    faces = _with_loose(found, reading)
+    if not found.rings and all(item.kind == "open" for item in found.left_out):
+        rest = nothing_closed(faces)
+        raise ValueError(
+            f"'{path}' has no closed shape{f': {rest}' if rest else ''}; draw each block as a closed path or polygon"
+        )
+    every = np.concatenate([*found.rings, *(item.points for item in found.left_out)])
+    found.notes += faces.notes + joined_note(found.misses, float(np.ptp(every, axis=0).max()))
     turned = tuple(ring * [1.0, -1.0] for ring in found.rings)
     names = tuple(row.get("name", f"block {k}") for k, row in enumerate(found.rows))
-    return with_rows(Layout(outlines=turned, names=names, unit=stated, notes=tuple(found.notes)), found.rows)
+    left_out = tuple(item.mapped((1.0, -1.0)) for item in found.left_out)
+    layout = Layout(outlines=turned, names=names, unit=stated, notes=tuple(found.notes), left_out=left_out)
+    return with_rows(layout, found.rows)
+
+
+def _with_loose(found: _Found, reading: Reading) -> Faces:
+    """Leave out what is not wanted, add the faces between loose lines, cut outlines along the lines within them."""
+    every = [*found.labels, *found.loose_labels]
+    chosen = any(matches(labels, reading.only) for labels in every)
+    asked = replace(reading, only=reading.only if chosen else ())
+    for k in reversed([k for k, labels in enumerate(found.labels) if not asked.wants(labels)]):
+        ring, row, labels = found.rings.pop(k), found.rows.pop(k), found.labels.pop(k)
+        found.left_out.append(LeftOut("asked", ring, "", row.get("group", ""), row.get("name", "")))
+    wanted = []
+    for line, labels in zip(found.loose, found.loose_labels, strict=True):
+        if asked.wants(labels):
+            wanted.append(line)
+        else:
+            left = LeftOut("asked line", line.points, "", line.layer, line.handle, closed=False)
+            found.left_out.append(left)
+    faces = faces_of_lines(wanted, found.rings)
+    found.left_out += faces.left_out
+    for k, pieces in sorted(faces.pieces.items(), reverse=True):
+        row = found.rows[k]
+        del found.rings[k], found.rows[k]
+        for number, piece in enumerate(pieces):
+            found.rings.append(piece)
+            found.rows.append({**row, "name": f"{row.get('name', 'block')} {number + 1}"})
+    for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
+        found.rings.append(ring)
+        found.rows.append(_row(layer, f"face {number}"))
+    if faces.rings:
+        faces.notes.append(
+            f"{len(faces.rings)} blocks are faces between {len(wanted)} loose lines; an opening enclosed by lines "
+            "counts as a block too: erase it or draw closed outlines"
+        )
+    return faces
 
 
 def _unit(root: ElementTree.Element) -> str:
@@ -128,7 +180,7 @@ def _walk(element: ElementTree.Element, where: _Where, found: _Found) -> None:
     )
     if tag == "g":
         label = element.get(f"{_INKSCAPE}label") or element.get("id") or ""
-        where = replace(where, layer=label or where.layer)
+        where = replace(where, layers=(*where.layers, label) if label else where.layers)
     shape = _SHAPES.get(tag)
     if shape is not None:
         try:
@@ -145,25 +197,6 @@ def _called(element: ElementTree.Element) -> str:
 
 
 def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], where: _Where, found: _Found) -> None:
-    rings = []
-    for points, closed in parts:
-        if len(points) < 3:
-            found.open_lines += len(points) > 1
-            continue
-        if not np.isfinite(points).all():
-            raise ValueError(f"'{where.path}': {_called(element)} has a point that is not a finite number; repair it")
-        ends = float(np.abs(points[0] - points[-1]).max())
-        closes = ends <= 1e-6 * float(np.ptp(points, axis=0).max())
-        if not closed and not closes:
-            first, last = points[0], points[-1]
-            raise ValueError(
-                f"'{where.path}': {_called(element)} in layer '{where.layer}' is open: it starts at ({first[0]:.6g}, "
-                f"{first[1]:.6g}) and ends at ({last[0]:.6g}, {last[1]:.6g}), {np.hypot(*(first - last)):.4g} apart; "
-                "close it"
-            )
-        rings.append(points[:-1] if closes else points)
-    if len(rings) > 1:
-        _check_holes(element, rings, where)
     own = element.get("data-blockvis")
     try:
         kept = json.loads(own) if own else {}
@@ -171,30 +204,58 @@ def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], whe
         kept = {}
     title = next((child.text or "" for child in element if _tag(child) == "title"), "")
     name = title.strip() or element.get(f"{_INKSCAPE}label") or element.get("id") or ""
+    labels = (*where.layers, *(x for x in (title.strip(), element.get(f"{_INKSCAPE}label"), element.get("id")) if x))
+    rings = []
+    for points, closed in parts:
+        if len(points) < 2:
+            continue
+        if not np.isfinite(points).all():
+            raise ValueError(f"'{where.path}': {_called(element)} has a point that is not a finite number; repair it")
+        placed = points @ where.matrix[:2, :2].T + where.matrix[:2, 2]
+        joined = joined_ends(placed)
+        if joined is None and not (closed and len(placed) > 2):
+            handle = name or f"<{_tag(element)}>"
+            found.loose.append(Line(placed, where.layer, handle, must_close=len(placed) > 2))
+            found.loose_labels.append(labels)
+            continue
+        # A closed path may have a short last edge: it stays.
+        short = joined is None or (closed and joined[1] > 1e-6 * float(np.ptp(placed, axis=0).max()))
+        rings.append(placed if short or joined is None else joined[0])
+        found.misses += [] if joined is None or closed else [joined[1]]
+    hole = _hole(rings)
+    if hole is not None:
+        x, y = rings[hole].mean(axis=0)
+        message = (
+            f"{_called(element)} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a "
+            "block"
+        )
+        outer = max(range(len(rings)), key=lambda k: float(np.ptp(rings[k], axis=0).max()))
+        holes = tuple(ring for k, ring in enumerate(rings) if k != outer)
+        found.left_out.append(LeftOut("hole", rings[outer], message, where.layer, name, holes=holes))
+        return
     for k, ring in enumerate(rings):
-        row: dict[str, Any] = {"group": where.layer, "material": where.layer}
-        if where.layer.lower() in solver.ROLES:
-            row["material"] = ""
-        if name:
-            row["name"] = name if len(rings) == 1 else f"{name} {k + 1}"
-        found.rings.append(ring @ where.matrix[:2, :2].T + where.matrix[:2, 2])
-        if isinstance(kept, dict) and kept:
-            row = kept
-        found.rows.append(row)
+        row = _row(where.layer, "" if not name else name if len(rings) == 1 else f"{name} {k + 1}")
+        found.rings.append(ring)
+        found.rows.append(kept if isinstance(kept, dict) and kept else row)
+        found.labels.append(labels)
 
 
-def _check_holes(element: ElementTree.Element, rings: list[np.ndarray], where: _Where) -> None:
+def _row(layer: str, name: str) -> dict[str, Any]:
+    """Write the row of the block table of an outline that has none of its own."""
+    row: dict[str, Any] = {"group": layer, "material": "" if layer.lower() in solver.ROLES else layer}
+    return row | ({"name": name} if name else {})
+
+
+def _hole(rings: list[np.ndarray]) -> int | None:
+    """Find the number of an outline that lies within another one."""
     import shapely
 
-    shapes = [shapely.Polygon(ring) for ring in rings]
+    shapes = [shapely.Polygon(ring) for ring in rings] if len(rings) > 1 else []
     for i, outer in enumerate(shapes):
         for j, inner in enumerate(shapes):
             if i != j and outer.is_valid and inner.is_valid and outer.contains(inner):
-                x, y = rings[j].mean(axis=0)
-                raise ValueError(
-                    f"'{where.path}': {_called(element)} has a hole around ({x:.6g}, {y:.6g}); cut the block in two, "
-                    "or fill the hole with a block"
-                )
+                return j
+    return None
 
 
 def _matrix(text: str, path: Path) -> np.ndarray:
@@ -254,6 +315,11 @@ def _polygon(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarr
     if len(numbers) % 2:
         raise ValueError(f"has {len(numbers)} coordinates, an odd number; repair it")
     return [(np.array(numbers).reshape(-1, 2), _tag(element) == "polygon")]
+
+
+def _segment(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
+    ends = np.array([[_length(element, f"{axis}{end}") for axis in "xy"] for end in (1, 2)])
+    return [(ends, False)]
 
 
 def _chords(sweep: float, radius: float, where: _Where) -> int:
@@ -376,6 +442,7 @@ _SHAPES: dict[str, Callable[[ElementTree.Element, _Where], list[tuple[np.ndarray
     "ellipse": _ellipse,
     "polygon": _polygon,
     "polyline": _polygon,
+    "line": _segment,
     "path": _path,
 }
 

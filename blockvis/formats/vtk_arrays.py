@@ -39,6 +39,27 @@ def largest_number(text: bytes, attributes: dict[str, str], file: dict[str, str]
     return max((abs(int(numbers.max())), abs(int(numbers.min()))), default=0) if len(numbers) else 0
 
 
+def announced_bytes(text: bytes, attributes: dict[str, str], file: dict[str, str]) -> int:
+    """Read how many bytes the header of a binary array announces; VTK reserves as much memory.
+
+    Parameters
+    ----------
+    text : bytes
+        Beginning of the array's content.
+    attributes, file : dict of str to str
+        As of :func:`largest_number`.
+    """
+    order = "<" if file.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
+    word = np.dtype(order + ("u8" if file.get("header_type") == "UInt64" else "u4"))
+    raw = attributes.get("format") == "raw"
+    if not file.get("compressor", ""):
+        return _words(text, raw, word, 1)[0]
+    if _words(text, raw, word, 1)[0] == 0:
+        return 0
+    count, chunk, last = _words(text, raw, word, 3)
+    return count * max(chunk, last)
+
+
 def _unpacked(text: bytes, raw: bool, word: np.dtype, compressor: str, most: int) -> bytes:
     """Unpack an array: a header of words, then the data, in one piece or in compressed chunks."""
     if not compressor:

@@ -15,6 +15,11 @@ from blockvis.suggestions import by_similarity
 
 from .layout import Layout
 from .repair import duplicates, repaired
+from .selection import drawn_mortar
+from .simplify import default_tolerance, simplified
+
+#: Beginnings of the notes of a layout that change what is analysed.
+TOLD = ("unit", "left out", "ignore", "cut", "joined", "the middle planes", "elevations were ignored")
 
 
 def assemble(
@@ -26,6 +31,8 @@ def assemble(
     thickness: float = 1.0,
     joint_thickness: float | str = 0.0,
     overlap_tolerance: float | None = None,
+    closing: str = "auto",
+    outline_tolerance: float | None = None,
 ) -> solver.Assembly:
     """Make an assembly of a layout.
 
@@ -47,6 +54,12 @@ def assemble(
     overlap_tolerance : float, optional [m]
         Overlaps up to this depth are resolved to their midline, deeper ones are an error; see
         :func:`blockvis.layout.repair.repaired` for the default.
+    closing : {"auto", "faces", "voronoi"}
+        How joints are closed: edges move to the midline between faces, or mortar goes to the nearest stone; "auto"
+        takes the second where faces are not straight.
+    outline_tolerance : float, optional [m]
+        Corners within this distance of a simpler outline are dropped; by default a hundredth of the size of a block
+        where outlines have more than 24 corners in the mean, else 0.
 
     Returns
     -------
@@ -58,7 +71,7 @@ def assemble(
         For an unknown role, a key of ``roles`` that matches no block, and an overlap deeper than the tolerance.
     """
     for note in layout.notes:
-        if note.startswith("unit clash"):
+        if note.startswith(TOLD):
             warnings.warn(f"{layout.source}: {note}", stacklevel=2)
     n_drawn = layout.n_blocks
     twins = duplicates(layout.outlines)
@@ -71,21 +84,31 @@ def assemble(
         )
         layout = layout.chosen([i for i in range(n_drawn) if i not in later])
         n_drawn = layout.n_blocks
-    layout = _with_supports(layout, supports)
+    tolerance = default_tolerance(layout.outlines) if outline_tolerance is None else float(outline_tolerance)
+    if not (np.isfinite(tolerance) and tolerance >= 0):
+        raise ValueError(f"outline_tolerance is {tolerance:g} m; it must be a length of at least 0")
+    outlines, note = simplified(_counter_clockwise(layout), tolerance) if tolerance else (layout.outlines, "")
+    if note:
+        warnings.warn(f"{layout.source or 'layout'}: {note}", stacklevel=2)
+    layout = _with_supports(replace(layout, outlines=tuple(outlines)), supports)
     assembly = solver.Assembly.from_outlines(
         layout.outlines,
         names=layout.names,
-        roles=_matched_roles(layout, roles or {}),
+        roles=roles_of(layout, roles or {}),
         density=_filled(layout.density, density, layout.n_blocks),
         thickness=_filled(layout.thickness, thickness, layout.n_blocks),
         materials=layout.materials,
     )
-    outlines, _ = repaired(
+    outlines, repairs = repaired(
         assembly,
         joint_thickness=joint_thickness,
         overlap_tolerance=overlap_tolerance,
         anchored=np.arange(layout.n_blocks) >= n_drawn,
+        closing=closing,
+        mortar=drawn_mortar(layout),
     )
+    for note in repairs:
+        warnings.warn(f"{layout.source or 'layout'}: {note}", stacklevel=2)
     return solver.Assembly.from_outlines(
         outlines,
         names=assembly.names,
@@ -94,6 +117,12 @@ def assemble(
         thickness=assembly.thickness,
         materials=assembly.materials,
     )
+
+
+def _counter_clockwise(layout: Layout) -> tuple[np.ndarray, ...]:
+    """Outlines counter-clockwise and checked, with the names of their blocks in messages."""
+    assembly = solver.Assembly.from_outlines(layout.outlines, names=layout.names)
+    return tuple(assembly.outline(i) for i in range(assembly.n_blocks))
 
 
 def _filled(given: np.ndarray | None, default: float, n: int) -> np.ndarray:
@@ -145,7 +174,7 @@ def _checked_role(role: str, whose: str) -> str:
     return role
 
 
-def _matched_roles(layout: Layout, roles: Mapping[str, str]) -> list[str]:
+def roles_of(layout: Layout, roles: Mapping[str, str]) -> list[str]:
     """Role of every block: the caller's, else the file's, else its group or name if that is a role, else free."""
     found = []
     for name, group, role in zip(layout.names, layout.groups, layout.roles, strict=True):

@@ -9,9 +9,12 @@ import numpy as np
 
 import solver
 
-from .joints.facing_edges import Facing, proposed_thickness
+from .assemble import roles_of
+from .joints.close import Proposal, proposed
+from .joints.facing_edges import Facing
 from .layout import Layout
 from .repair import DEFAULT_OVERLAP, ROUNDING, duplicates, overlaps
+from .simplify import default_tolerance, simplified
 
 #: Classes of joint thickness in the report.
 CLASSES = 8
@@ -38,8 +41,12 @@ class Inspection:
         Corners of the box around all blocks.
     joints : Facing
         Stretches where edges face each other across a gap; block numbers count the kept outlines.
-    joint_thickness : float [m]
-        Joint thickness that closes all of them; 0 if there are none.
+    proposal : Proposal
+        Joint thickness, and how joints are closed.
+    roles : tuple of str
+        Role of each outline, as a run takes it from roles, groups and names.
+    finer : str
+        The note on outlines that are finer than needed, or "".
     """
 
     layout: Layout
@@ -51,7 +58,14 @@ class Inspection:
     low: np.ndarray
     high: np.ndarray
     joints: Facing
-    joint_thickness: float
+    proposal: Proposal
+    roles: tuple[str, ...]
+    finer: str = ""
+
+    @property
+    def joint_thickness(self) -> float:
+        """Joint thickness that closes the joints [m]; 0 if there are none."""
+        return self.proposal.thickness
 
     @property
     def unit_clash(self) -> str:
@@ -69,11 +83,13 @@ class Inspection:
             f"unit            {self.layout.unit}",
             f"areas           {self.areas.min():.4g} to {self.areas.max():.4g} m², median "
             f"{np.median(self.areas):.4g}, sum {self.areas.sum():.6g} m²",
+            f"corners         {sum(len(self.layout.outlines[i]) for i in self.kept)}"
+            + (f"; in a run {self.finer}" if self.finer else ""),
         ]
         for title, words in (
             ("groups", self.layout.groups),
             ("materials", self.layout.materials),
-            ("roles", self.layout.roles),
+            ("roles", self.roles),
         ):
             counted = Counter(words[i] for i in self.kept)
             listed = [f"'{word}' {n}" if word else f"none {n}" for word, n in counted.most_common(12)]
@@ -93,7 +109,7 @@ class Inspection:
             return ["mortar joints   none: no gaps between facing edges"]
         widest = self.joints.gaps.max(axis=1) * 1e3
         lengths = self.joints.lengths
-        edges = np.linspace(0.0, self.joint_thickness * 1e3, CLASSES + 1)
+        edges = np.linspace(0.0, max(self.joint_thickness * 1e3, widest.max()), CLASSES + 1)
         edges[-1] *= 1.0 + 1e-6
         metres = np.histogram(widest, edges, weights=lengths)[0]
         counts = np.histogram(widest, edges)[0]
@@ -104,6 +120,11 @@ class Inspection:
         for k in np.flatnonzero(counts):
             lines.append(f"  {edges[k]:6.1f} to {edges[k + 1]:6.1f} mm  {counts[k]:6d} stretches  {metres[k]:9.3f} m")
         lines.append(f'proposed        joint_thickness = {self.joint_thickness:g}   (m, or "auto")')
+        if self.proposal.way == "voronoi":
+            lines.append(
+                '                closing = "voronoi": faces are not straight, mortar goes to the nearest stone'
+            )
+        lines += [f"                {self.proposal.note}"] if self.proposal.note else []
         return lines
 
     def _overlap_lines(self) -> list[str]:
@@ -138,7 +159,8 @@ def inspected(layout: Layout) -> Inspection:
     assembly = solver.Assembly.from_outlines([layout.outlines[i] for i in kept], names=[layout.names[i] for i in kept])
     width = float(np.median(assembly.widths))
     found = overlaps(assembly, ROUNDING * width)
-    thickness, joints = proposed_thickness([assembly.outline(i) for i in range(assembly.n_blocks)])
+    outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
+    proposal = proposed(outlines)
     return Inspection(
         layout=layout,
         kept=kept,
@@ -148,6 +170,8 @@ def inspected(layout: Layout) -> Inspection:
         areas=assembly.areas,
         low=assembly.vertices.min(axis=0),
         high=assembly.vertices.max(axis=0),
-        joints=joints,
-        joint_thickness=thickness,
+        joints=proposal.stretches,
+        proposal=proposal,
+        roles=tuple(roles_of(layout, {})),
+        finer=simplified(outlines, default_tolerance(outlines))[1],
     )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 import solver
+
+from .left_out import LeftOut
 
 #: Surrogate halves of characters, which escaped JSON and bytes that are no text leave behind.
 _HALVES = re.compile("[\ud800-\udfff]")
@@ -39,6 +41,8 @@ class Layout:
         What the reader assumed or dropped.
     source : str
         The file, "" for a layout that was not read from a file.
+    left_out : tuple of LeftOut
+        What the file draws beside its blocks.
     """
 
     outlines: tuple[np.ndarray, ...]
@@ -51,6 +55,7 @@ class Layout:
     unit: str = "m"
     notes: tuple[str, ...] = ()
     source: str = ""
+    left_out: tuple[LeftOut, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that there is one entry per block, and replace broken characters."""
@@ -88,6 +93,16 @@ class Layout:
             thickness=None if self.thickness is None else self.thickness[keep],
             density=None if self.density is None else self.density[keep],
         )
+
+    def leaving_out(self, reasons: Mapping[int, LeftOut]) -> Layout:
+        """Leave out these blocks, each for its reason."""
+        if not reasons:
+            return self
+        named = [
+            replace(item, name=self.names[i], layer=self.groups[i] or self.materials[i]) for i, item in reasons.items()
+        ]
+        others = self.chosen([i for i in range(self.n_blocks) if i not in reasons])
+        return replace(others, left_out=(*self.left_out, *named))
 
 
 def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> Layout:

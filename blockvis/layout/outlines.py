@@ -7,12 +7,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .left_out import LeftOut
+from .views import VIEWS, axis_across
+
 #: A point this close to the line between its neighbours, as a fraction of the size of the block, lies on it: in files
 #: of single precision (VTK, STL) a coordinate is accurate to 6e-8 of its size.
 COLLINEAR = 1e-6
 
 #: Spread of the third coordinate, as a fraction of the size of the drawing, that still counts as flat.
 FLAT = 1e-6
+
+#: Beginning of the note on a flat drawing that does not lie in the plane of x and y.
+UPRIGHT = "the drawing stands upright"
 
 #: Largest angle of a chord, whatever the tolerance: twelve chords make a circle.
 LARGEST_CHORD = math.pi / 6.0
@@ -34,7 +40,15 @@ def ring_width(ring: np.ndarray) -> float:
     return 2.0 * abs(ring_area(ring)) / float(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).sum())
 
 
-def flattened(points: np.ndarray, where: str) -> tuple[np.ndarray, str]:
+def is_flat(points: np.ndarray) -> bool:
+    """Whether (n, 2) or (n, 3) points lie in a plane across an axis; also if their coordinates are not finite."""
+    if points.shape[1] == 2 or len(points) == 0:
+        return True
+    spread = np.ptp(points, axis=0)
+    return not np.isfinite(spread).all() or bool((spread <= FLAT * spread.max()).any())
+
+
+def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[np.ndarray, str]:
     """Take the two coordinates in which a flat drawing extends.
 
     Parameters
@@ -42,6 +56,8 @@ def flattened(points: np.ndarray, where: str) -> tuple[np.ndarray, str]:
     points : (n, 2) or (n, 3) array
     where : str
         The file, for messages.
+    view : {"xy", "xz", "yz"}, optional
+        The coordinates to take; by default those in which the drawing extends.
 
     Returns
     -------
@@ -53,26 +69,35 @@ def flattened(points: np.ndarray, where: str) -> tuple[np.ndarray, str]:
     Raises
     ------
     ValueError
-        For coordinates that are not finite, and for points that are not in a plane.
+        For coordinates that are not finite, and for points that are not in a plane, or not in that of the view.
     """
-    if points.shape[1] == 2 or len(points) == 0:
+    if points.shape[1] == 2 and len(points):
+        points = np.column_stack([points, np.zeros(len(points))])
+    if len(points) == 0:
         return points[:, :2], ""
     if not np.isfinite(points).all():
         bad = points[~np.isfinite(points).all(axis=1)][0]
         raise ValueError(f"{where} has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
     spread = np.ptp(points, axis=0)
-    for axis, (kept, names) in {2: ((0, 1), ""), 1: ((0, 2), "(x, z)"), 0: ((1, 2), "(y, z)")}.items():
-        if spread[axis] <= FLAT * spread.max():
-            note = f"the drawing stands upright: its {names} were read as (x, y)" if names else ""
-            return points[:, kept], note
-    raise ValueError(
-        f"{where} is not flat: its points spread over {spread[0]:.4g} × {spread[1]:.4g} × {spread[2]:.4g}; "
-        "draw the blocks in the plane, or give closed prismatic bodies"
-    )
+    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
+    if not flat:
+        raise ValueError(
+            f"{where} is not flat: its points spread over {spread[0]:.4g} × {spread[1]:.4g} × {spread[2]:.4g}; "
+            "draw the blocks in the plane, or give closed prismatic bodies"
+        )
+    if view is not None and view not in flat:
+        raise ValueError(f'{where} lies in {flat[0]}: seen as {view} it has no area; give view = "{flat[0]}", or none')
+    chosen = view or flat[0]
+    note = "" if chosen == "xy" else f"{UPRIGHT}: its ({chosen[0]}, {chosen[1]}) were read as (x, y)"
+    return points[:, VIEWS[chosen]], note
 
 
 def outlines_of_cells(
-    points: np.ndarray, cells: Sequence[Sequence[int]] | Sequence[np.ndarray], owner: np.ndarray, names: Sequence[str]
+    points: np.ndarray,
+    cells: Sequence[Sequence[int]] | Sequence[np.ndarray],
+    owner: np.ndarray,
+    names: Sequence[str],
+    unusable: dict[int, LeftOut] | None = None,
 ) -> list[np.ndarray]:
     """Find the outline of each block: the edges that belong to one of its cells only.
 
@@ -85,6 +110,8 @@ def outlines_of_cells(
         Block of each cell, 0 to n_blocks - 1.
     names : sequence of str
         One per block, for messages.
+    unusable : dict, optional
+        Takes up the blocks that are not one piece with one outline; their outlines are those of their largest piece.
 
     Returns
     -------
@@ -94,7 +121,8 @@ def outlines_of_cells(
     Raises
     ------
     ValueError
-        For a block with a hole, in several pieces, with an outline that meets itself, or with no outline.
+        For a block with a hole, in several pieces, with an outline that meets itself, or with no outline, unless
+        ``unusable`` takes it up.
     """
     counts = np.array([len(cell) for cell in cells])
     flat = np.concatenate([np.asarray(cell, dtype=np.int64) for cell in cells])
@@ -114,44 +142,59 @@ def outlines_of_cells(
     edges: list[list[tuple[int, int]]] = [[] for _ in names]
     for i in once:
         edges[block[i]].append((int(start[i]), int(end[i])))
-    return [_ring(points, edges[b], names[b]) for b in range(len(names))]
+    rings = []
+    for b, name in enumerate(names):
+        ring, problem = _ring(points, edges[b], name)
+        if problem is not None:
+            if unusable is None:
+                raise ValueError(problem.message)
+            unusable[b] = problem
+        rings.append(ring)
+    return rings
 
 
-def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> np.ndarray:
-    loops = _loops(edges, points, name)
+def _ring(points: np.ndarray, edges: list[tuple[int, int]], name: str) -> tuple[np.ndarray, LeftOut | None]:
+    """Outline of a block, and why it cannot be used if so."""
+    loops, crossing = _loops(edges)
+    if crossing is not None:
+        x, y = points[crossing]
+        around = points[np.unique(edges)]
+        meeting = sum(crossing in edge for edge in edges)
+        message = (
+            f"the outline of block '{name}' meets itself at ({x:.6g}, {y:.6g}), where {meeting} of its edges "
+            "end; a block is one piece with one outline"
+        )
+        return around, LeftOut("pieces", around, message, serious=True)
     if not loops:
-        raise ValueError(
+        message = (
             f"block '{name}' has no outline: each of its edges belongs to two cells; its cells are in the file twice"
         )
-    rings = [points[loop] for loop in loops]
-    if len(rings) > 1:
-        by_area = sorted(rings, key=lambda ring: abs(ring_area(ring)))
-        outer, inner = by_area[-1], by_area[-2]
-        x, y = inner.mean(axis=0)
-        if _contains(outer, inner[0]):
-            raise ValueError(
-                f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, "
-                "or fill the hole with a block"
-            )
-        raise ValueError(
-            f"block '{name}' is in {len(rings)} separate pieces, one around ({x:.6g}, {y:.6g}); give each its own block"
+        return np.zeros((0, 2)), LeftOut("no outline", np.zeros((0, 2)), message, serious=True)
+    rings = sorted((points[loop] for loop in loops), key=lambda ring: -abs(ring_area(ring)))
+    ring = without_collinear(rings[0] if ring_area(rings[0]) > 0 else rings[0][::-1])
+    if len(rings) == 1:
+        return ring, None
+    x, y = rings[1].mean(axis=0)
+    if _contains(rings[0], rings[1][0]):
+        message = (
+            f"block '{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
         )
-    ring = rings[0]
-    return without_collinear(ring if ring_area(ring) > 0 else ring[::-1])
+        return ring, LeftOut("hole", ring, message, holes=tuple(rings[1:]))
+    message = (
+        f"block '{name}' is in {len(rings)} separate pieces, one around ({x:.6g}, {y:.6g}); give each its own block"
+    )
+    return ring, LeftOut("pieces", ring, message, serious=True)
 
 
-def _loops(edges: list[tuple[int, int]], points: np.ndarray, name: str) -> list[list[int]]:
+def _loops(edges: list[tuple[int, int]]) -> tuple[list[list[int]], int | None]:
+    """Find the closed loops of edges; or a point in which more than two of them end."""
     neighbours: dict[int, list[int]] = {}
     for a, b in edges:
         neighbours.setdefault(a, []).append(b)
         neighbours.setdefault(b, []).append(a)
     for node, others in neighbours.items():
         if len(others) != 2:
-            x, y = points[node]
-            raise ValueError(
-                f"the outline of block '{name}' meets itself at ({x:.6g}, {y:.6g}), where {len(others)} of its edges "
-                "end; a block is one piece with one outline"
-            )
+            return [], node
     loops, seen = [], set()
     for first in neighbours:
         if first in seen:
@@ -164,7 +207,7 @@ def _loops(edges: list[tuple[int, int]], points: np.ndarray, name: str) -> list[
             one, other = neighbours[node]
             previous, node = node, (other if one == previous else one)
         loops.append(loop)
-    return loops
+    return loops, None
 
 
 def _contains(ring: np.ndarray, point: np.ndarray) -> bool:

@@ -8,8 +8,8 @@ import numpy as np
 
 import solver
 
-from .joints.close import Closing, close_joints
-from .joints.facing_edges import proposed_thickness
+from .joints.close import WAYS, Closing, FoldedOutline, close_joints, proposed
+from .left_out import LeftOut
 
 #: Two outlines closer than this fraction of the size of a block, corner by corner, are one block drawn twice.
 SAME = 1e-6
@@ -80,6 +80,8 @@ def repaired(
     joint_thickness: float | str,
     overlap_tolerance: float | None,
     anchored: np.ndarray,
+    closing: str = "auto",
+    mortar: Sequence[LeftOut] = (),
 ) -> tuple[list[np.ndarray], list[str]]:
     """Resolve the overlaps of the outlines of an assembly and close its joints.
 
@@ -93,6 +95,10 @@ def repaired(
         perimeter).
     anchored : (n_blocks,) bool array
         Blocks that keep their outline.
+    closing : {"auto", "faces", "voronoi"}
+        How joints are closed; see :func:`blockvis.layout.joints.close.close_joints`.
+    mortar : sequence of LeftOut
+        Surfaces of mortar as drawn, with the stones as their holes.
 
     Returns
     -------
@@ -103,8 +109,10 @@ def repaired(
     Raises
     ------
     ValueError
-        For an overlap deeper than the tolerance, naming both blocks.
+        For an overlap deeper than the tolerance, naming both blocks, and for an outline that cannot be closed.
     """
+    if closing not in WAYS:
+        raise ValueError(f"closing is '{closing}'; choose from {', '.join(WAYS)}")
     outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
     free = ~anchored if not anchored.all() else anchored
     width = float(np.median(assembly.widths[free]))
@@ -121,21 +129,32 @@ def repaired(
             f"block {i} ('{assembly.names[i]}') overlaps block {j} ('{assembly.names[j]}') by {depth:.3g} m near "
             f"({x:.6g}, {y:.6g}); move them apart or raise overlap_tolerance ({tolerance:.3g} m){others}"
         )
-    thickness, notes = _thickness(joint_thickness, [outlines[i] for i in np.flatnonzero(free)], width)
+    thickness, closing, notes = _thickness(joint_thickness, closing, [outlines[i] for i in np.flatnonzero(free)], width)
     if not found and thickness == 0:
         return outlines, notes
     depth = min(tolerance, 1.01 * found[0][2]) if found else 0.0
-    closing = close_joints(outlines, thickness, overlap=depth, anchored=anchored)
-    notes += _notes(closing, thickness, found)
-    return list(closing.outlines), notes
+    try:
+        closed = close_joints(outlines, thickness, overlap=depth, anchored=anchored, way=closing, mortar=mortar)
+    except FoldedOutline as error:
+        raise ValueError(
+            f"closing the joints of block {error.block} ('{assembly.names[error.block]}') face by face folds its "
+            f'outline; give closing = "voronoi", or a joint_thickness other than {thickness:g} m'
+        ) from None
+    notes += _notes(closed, thickness, found, assembly, bool(mortar))
+    return list(closed.outlines), notes
 
 
-def _thickness(asked: float | str, outlines: list[np.ndarray], width: float) -> tuple[float, list[str]]:
+def _thickness(
+    asked: float | str, closing: str, outlines: list[np.ndarray], width: float
+) -> tuple[float, str, list[str]]:
+    """Find the joint thickness [m] and the way of closing, and what to say of them."""
     if isinstance(asked, str):
         if asked.strip().lower() != "auto":
             raise ValueError(f"joint_thickness is '{asked}'; give a length in m or \"auto\"")
-        thickness, _ = proposed_thickness(outlines)
-        return thickness, [f'joint_thickness "auto" found {thickness:g} m']
+        found = proposed(outlines, closing)
+        notes = [f'joint_thickness "auto" found {found.thickness:g} m' + (f": {found.note}" if found.note else "")]
+        # Faces that turn out not to close edge by edge may still be closed in the other way.
+        return found.thickness, closing if found.way == "faces" else found.way, notes
     thickness = float(asked)
     if not (np.isfinite(thickness) and thickness >= 0):
         raise ValueError(f"joint_thickness is {thickness:g} m; it must be a length of at least 0")
@@ -144,14 +163,30 @@ def _thickness(asked: float | str, outlines: list[np.ndarray], width: float) -> 
             f"joint_thickness is {thickness:g} m, more than {THICKEST_JOINT:g} times the width of a typical block "
             f"({width:.3g} m); give the width of the mortar joints in m"
         )
-    return thickness, []
+    return thickness, closing, []
 
 
-def _notes(closing: Closing, thickness: float, found: list[tuple[int, int, float]]) -> list[str]:
+def _notes(
+    closing: Closing,
+    thickness: float,
+    found: list[tuple[int, int, float]],
+    assembly: solver.Assembly,
+    drawn: bool,
+) -> list[str]:
     notes = []
     if found:
-        notes.append(f"{len(found)} overlaps of up to {found[0][2]:.3g} m were resolved to their midline")
-    if thickness:
+        i, j, depth = found[0]
+        notes.append(
+            f"{len(found)} overlaps of up to {depth:.3g} m were cut away, the deepest between '{assembly.names[i]}' "
+            f"and '{assembly.names[j]}'; redraw them, or lower overlap_tolerance to have them refused"
+        )
+    if thickness and closing.way == "voronoi":
+        notes.append(
+            f"joints of up to {thickness:g} m{', and the mortar as drawn,' if drawn else ''} were closed by giving the "
+            "mortar to the nearest stone: faces are not straight, or corners blunt; "
+            f"{sum(map(len, closing.outlines)) / len(closing.outlines):.3g} corners a block"
+        )
+    elif thickness:
         notes.append(
             f"{closing.n_joints} stretches of joints of up to {max(closing.largest_gap, 0.0):.3g} m were closed to "
             f"their midline, {closing.n_cut} of them by cutting one side along the other"

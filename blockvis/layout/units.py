@@ -28,6 +28,12 @@ _OTHER_NAMES = {
 #: Median size (root of the area) of a masonry block [m]: from a mosaic-sized chip to a megalith.
 PLAUSIBLE_SIZE = (0.02, 20.0)
 
+#: Median size of a block [m] from which on, or below which, the unit is doubted.
+DOUBTED = (0.02, 10.0)
+
+#: Median size of the blocks of common masonry [m], from a split brick to an ashlar.
+COMMON = (0.04, 3.0)
+
 
 def metres_per(unit: str) -> float:
     """Metres per unit of length.
@@ -82,3 +88,38 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
             f"m was assumed, which makes it {in_metres:.3g} m; give unit=... to settle it"
         )
     return stated, ""
+
+
+def doubt(unit: str, size: float, *, remedy: str = 'say so under [geometry] unit = "{}", or by --unit {}') -> str:
+    """Doubt the unit of a drawing whose blocks are far larger or smaller than those of masonry.
+
+    Parameters
+    ----------
+    unit : str
+        In which the drawing was read.
+    size : float [m]
+        Root of the area of the median block, as read.
+    remedy : str
+        How to give another unit.
+
+    Returns
+    -------
+    str
+        A note that names the unit that would make the blocks masonry; "" if there is nothing to doubt.
+
+    Examples
+    --------
+    >>> doubt("m", 130.0, remedy="unit = '{}'")
+    "unit m in doubt: it makes the median block 130 m across; mm would make it 0.13 m: unit = 'mm'"
+    """
+    if DOUBTED[0] <= size <= DOUBTED[1] or size <= 0.0:
+        return ""
+    own = metres_per(unit)
+    for other in ("mm", "cm", "m", "in", "ft", "km"):
+        better = size / own * metres_per(other)
+        if COMMON[0] <= better <= COMMON[1]:
+            return (
+                f"unit {unit} in doubt: it makes the median block {size:.3g} m across; {other} would make it "
+                f"{better:.3g} m: {remedy.format(other, other)}"
+            )
+    return f"unit {unit} in doubt: it makes the median block {size:.3g} m across; no other unit makes it masonry"

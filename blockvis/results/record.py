@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -51,23 +52,32 @@ class Record:
             "layout_sha256": self.layout_sha256 or None,
         }
 
-    def changes(self) -> list[str]:
-        """Say which files and versions have changed since the run began."""
+    def changes(self, sum_of_layout: Callable[[Path], str]) -> list[str]:
+        """Say which files and versions have changed since the run began.
+
+        Parameters
+        ----------
+        sum_of_layout : callable
+            Checksum of a layout by its path, which may stand for several files.
+        """
         notes = []
-        for what, file, checksum in (
-            ("case", self.case_file, self.case_sha256),
-            ("layout", self.layout_file, self.layout_sha256),
+        for what, file, checksum, sum_of in (
+            ("case", self.case_file, self.case_sha256, checksum_of),
+            ("layout", self.layout_file, self.layout_sha256, sum_of_layout),
         ):
             if not file:
                 continue
-            if not Path(file).is_file():
+            try:
+                changed = sum_of(Path(file)) != checksum
+            except (OSError, ValueError):
                 notes.append(f"the {what} file '{file}' is gone; the run goes on with what it read from it")
-            elif checksum_of(Path(file)) != checksum:
+                continue
+            if changed:
                 notes.append(f"the {what} file '{file}' has changed; the run goes on with what it read from it")
         now = versions()
-        changed = [f"{name} {self.versions.get(name)} → {now[name]}" for name in _DECIDING if self.differs(name, now)]
-        if changed:
-            notes.append(f"not what the run began with: {', '.join(changed)}; the last digits may differ")
+        newer = [f"{name} {self.versions.get(name)} → {now[name]}" for name in _DECIDING if self.differs(name, now)]
+        if newer:
+            notes.append(f"not what the run began with: {', '.join(newer)}; the last digits may differ")
         return notes
 
     def differs(self, name: str, now: dict[str, str]) -> bool:

@@ -18,6 +18,7 @@ from blockvis.atomic_files import PARTIAL
 from blockvis.cases.build import case_assembly
 from blockvis.cases.case import Case, parse_case, read_case
 from blockvis.fall import fall_of
+from blockvis.formats.files import checksum_of_files
 from blockvis.results.fall_files import remove_fall, stored_fall, write_fall
 from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from blockvis.pictures.film_process import FilmProcess
 
 #: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
-AS_DRAWN = 0.02
+AS_DRAWN = 0.002
 
 
 def record_of(case: Case) -> Record:
@@ -43,7 +44,7 @@ def record_of(case: Case) -> Record:
         case_file=str(case.source.resolve()) if case.source.is_file() else "",
         case_sha256=checksum_of(case.source) if case.source.is_file() else "",
         layout_file="" if case.file is None else str(case.file.resolve()),
-        layout_sha256="" if case.file is None else checksum_of(case.file),
+        layout_sha256="" if case.file is None else checksum_of_files(case.file),
         versions=versions(),
     )
 
@@ -197,7 +198,7 @@ def resume_run(folder: str | Path, *, film: bool = True, pictures: bool = True) 
         if not all((folder / name).is_file() for name in _drawn(case, drawing)):
             missing = _drawn_results(case, response, folder, drawing, Clock())
         return Run(response, folder, finished, missing, had_finished=True)
-    for note in record.changes():
+    for note in record.changes(checksum_of_files):
         warnings.warn(note, stacklevel=2)
     kind = KINDS[case.analysis]
     results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint, case.vtu)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import logging
 import multiprocessing
 import queue
@@ -278,7 +279,7 @@ def _check_workers(client: Client, file: str) -> None:
 
 def _probe(file: str) -> tuple[str, bool]:
     """Version of blockvis on a worker, and whether it sees a file; this module imports all that a run needs."""
-    return version("blockvis"), not file or Path(file).is_file()
+    return version("blockvis"), not file or Path(file).exists() or bool(glob.glob(file, recursive=True))
 
 
 def carry_out(records: StudyFolder, todo: Sequence[int], client: Client, progress: bool) -> None:

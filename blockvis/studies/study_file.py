@@ -19,6 +19,7 @@ from blockvis.cases.distributions import Distribution, read_distribution
 from blockvis.cases.imperfections import read_imperfection
 from blockvis.cases.toml_table import is_number
 from blockvis.cases.value_paths import parse_path, put
+from blockvis.formats.files import checksum_of_files
 from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import nearest, refuse_unknown
 
@@ -168,7 +169,7 @@ class Study:
             "runs": self.runs,
             "repeats": self.repeats,
             "seed": self.seed,
-            "layout file": "" if file is None else hashlib.sha256(file.read_bytes()).hexdigest(),
+            "layout file": "" if file is None else checksum_of_files(file),
         }
         return {what: hashlib.sha256(repr(_sorted(part)).encode()).hexdigest()[:16] for what, part in parts.items()}
 

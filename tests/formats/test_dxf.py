@@ -82,7 +82,7 @@ def test_loose_lines_enclose_blocks(tmp_path):
     drawing = read_layout(saved(tmp_path, draw))
     assert drawing.groups == ("stone", "stone")
     assert any("2 blocks are faces between 6 loose lines" in note for note in drawing.notes)
-    assert any("1 loose lines enclose nothing" in note for note in drawing.notes)
+    assert any("left out: 1 line that closes no outline on layer '0'" in note for note in drawing.notes)
 
 
 def test_open_polyline_names_layer_handle_and_gap(tmp_path):
@@ -155,3 +155,52 @@ def test_no_outline(tmp_path):
     path = saved(tmp_path, lambda document, space: space.add_text("nothing"))
     with pytest.raises(ValueError, match=r"has no closed outline in its model space \(found: 1 TEXT\)"):
         read(path)
+
+
+def test_inserts_with_a_z_scale_of_zero(tmp_path):
+    """As QCAD writes them."""
+
+    def draw(document, space):
+        stone = document.blocks.new("stone")
+        stone.add_lwpolyline(SQUARE, close=True)
+        for k in range(2):
+            space.add_blockref("stone", (2 * k, 0), dxfattribs={"xscale": 2, "yscale": 1, "zscale": 0})
+
+    assembly = read(saved(tmp_path, draw))
+    assert assembly.areas.tolist() == [2.0, 2.0]
+    assert assembly.centroids.tolist() == [[1.0, 0.5], [3.0, 0.5]]
+
+
+def test_a_drawing_that_stands_upright(tmp_path):
+    def draw(document, space):
+        for k in range(2):
+            space.add_polyline3d([(x + k, 5, z) for x, z in SQUARE], close=True)
+
+    path = saved(tmp_path, draw)
+    layout = read_layout(path)
+    assert any("stands upright: its (x, z) were read as (x, y)" in note for note in layout.notes)
+    assert not any("elevations" in note for note in layout.notes)
+    assert read(path, view="xz").areas == pytest.approx([1, 1])
+    with pytest.raises(ValueError, match="lies in xz: seen as xy it has no area"):
+        read(path, view="xy")
+
+
+def test_the_view_of_a_drawing_in_space(tmp_path):
+    def draw(document, space):
+        space.add_polyline3d([(0, 0, 0), (1, 0.2, 0), (1, 0.2, 2), (0, 0, 2)], close=True)
+
+    path = saved(tmp_path, draw)
+    layout = read_layout(path, view="xz")
+    assert read(path, view="xz").areas == pytest.approx([2])
+    assert any("elevations were ignored: the drawing was read as seen along y" in note for note in layout.notes)
+
+
+def test_faults_of_a_file_are_noted_and_not_printed(tmp_path, capfd):
+    def draw(document, space):
+        space.add_lwpolyline(SQUARE, close=True)
+        space.add_text("north", dxfattribs={"style": "not there"})
+
+    layout = read_layout(saved(tmp_path, draw))
+    assert layout.n_blocks == 1
+    assert any("faults of the file were repaired or passed over" in note for note in layout.notes)
+    assert capfd.readouterr() == ("", "")

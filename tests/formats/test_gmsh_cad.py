@@ -1,11 +1,15 @@
 """Geometry through gmsh: scripts and STEP, surfaces and volumes."""
 
+import math
 import sys
+import time
 
+import numpy as np
 import pytest
 
 from blockvis.formats import gmsh_cad
 from blockvis.formats.read import read, read_layout
+from blockvis.layout.outlines import ring_area
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is an extra", exc_type=(ImportError, OSError))
 pytestmark = pytest.mark.cad
@@ -62,3 +66,116 @@ def test_a_script_with_a_fault_gives_the_reason(tmp_path):
     (tmp_path / "a.geo").write_text("Plane Surface(1) = {77};")
     with pytest.raises(ValueError, match="cannot be read by gmsh"):
         read(tmp_path / "a.geo")
+
+
+def step(tmp_path, size=1000, unit=".MILLI."):
+    """Three boxes in a STEP file that states a unit; the numbers stay those of the boxes."""
+    gmsh.initialize(["gmsh", "-nopopup"], interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    for k in range(3):
+        gmsh.model.occ.addBox(size * k, 0, 0, size, 0.3 * size, 0.25 * size)
+    gmsh.model.occ.synchronize()
+    path = tmp_path / "a.step"
+    gmsh.write(str(path))
+    gmsh.finalize()
+    text = path.read_text()
+    assert "SI_UNIT(.MILLI.,.METRE.)" in text
+    path.write_text(text.replace("SI_UNIT(.MILLI.,.METRE.)", f"SI_UNIT({unit},.METRE.)"))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("stated", "asked", "metres"),
+    [
+        (".MILLI.", None, 1e-3),
+        (".MILLI.", "m", 1.0),
+        (".MILLI.", "cm", 1e-2),
+        (".MILLI.", "mm", 1e-3),
+        (".CENTI.", None, 1e-2),
+        (".CENTI.", "mm", 1e-3),
+        ("$", None, 1.0),
+    ],
+)
+def test_the_unit_of_a_step_file_and_the_one_asked_for(tmp_path, stated, asked, metres):
+    size = 1000 if metres < 1.0 or asked else 1
+    path = step(tmp_path, size, stated)
+    assert read(path, unit=asked, view="xy").areas == pytest.approx([0.3 * (size * metres) ** 2] * 3)
+    assert read_layout(path, unit=asked, view="xy").thickness == pytest.approx([0.25 * size * metres] * 3)
+    assert read_layout(path, unit=asked).names == ("volume 1", "volume 2", "volume 3")
+
+
+def test_a_step_file_in_mm_with_the_numbers_of_metres(tmp_path):
+    """Gmsh writes mm whatever the numbers mean."""
+    path = step(tmp_path, size=1)
+    with pytest.warns(UserWarning, match=r"unit clash: the file says its unit is mm, .* m was assumed"):
+        assert read(path).areas == pytest.approx([0.3] * 3)
+
+
+CURVES = """
+Point(1) = {0, 0, 0, 1e-3}; Point(2) = {1, 0, 0, 1e-3}; Point(3) = {0, 1, 0, 1e-3};
+Line(1) = {1, 2}; Circle(2) = {2, 1, 3}; Line(3) = {3, 1};
+Curve Loop(1) = {1, 2, 3}; Plane Surface(1) = {1};
+Point(11) = {3, 0, 0}; Point(12) = {5, 0, 0}; Point(13) = {3, 1, 0};
+Line(11) = {11, 12}; Ellipse(12) = {12, 11, 12, 13}; Line(13) = {13, 11};
+Curve Loop(11) = {11, 12, 13}; Plane Surface(11) = {11};
+Point(21) = {7, 0, 0}; Point(22) = {8, 0, 0}; Point(23) = {8, 1, 0}; Point(24) = {7.5, 1.5, 0}; Point(25) = {7, 1, 0};
+Line(21) = {21, 22}; Line(22) = {22, 23}; Bezier(23) = {23, 24, 25}; Line(24) = {25, 21};
+Curve Loop(21) = {21, 22, 23, 24}; Plane Surface(21) = {21};
+Point(33) = {9, 1, 0}; Point(34) = {9.5, 1.5, 0}; Point(35) = {10, 1, 0}; Point(36) = {9.5, 0, 0};
+Spline(31) = {33, 34, 35}; BSpline(32) = {35, 36, 33};
+Curve Loop(31) = {31, 32}; Plane Surface(31) = {31};
+Physical Surface("stone") = {1, 11, 21, 31};
+"""
+
+
+def test_curves_of_the_built_in_kernel_in_a_second(tmp_path):
+    """Sizes from curvature took gmsh 40 s and 2.7 GB for one quarter circle."""
+    (tmp_path / "a.geo").write_text(CURVES)
+    start = time.perf_counter()
+    layout = read_layout(tmp_path / "a.geo")
+    assert time.perf_counter() - start < 10.0
+    assert layout.groups == ("stone",) * 4
+    areas = [ring_area(ring) for ring in layout.outlines]
+    # A quarter circle, a quarter ellipse, a square and the segment of a parabola: two thirds of 1 × 0.25.
+    assert areas[:3] == pytest.approx([math.pi / 4, math.pi / 2, 1 + 2 / 3 * 0.25], rel=2e-3)
+    assert all(10 < len(ring) < 200 for ring in layout.outlines)
+    radii = np.hypot(*layout.outlines[0].T)
+    assert sorted(np.round(radii, 9))[1:] == pytest.approx([1.0] * (len(radii) - 1))
+
+
+def test_transfinite_surfaces_and_fields_of_the_script_are_not_in_the_way(tmp_path):
+    (tmp_path / "a.geo").write_text(
+        CURVES + "Transfinite Curve {21, 22, 23, 24} = 400; Transfinite Surface {21}; Recombine Surface {21};\n"
+        "Field[1] = MathEval; Field[1].F = '0.0005'; Background Field = 1;\n"
+    )
+    start = time.perf_counter()
+    assert read(tmp_path / "a.geo").areas[2] == pytest.approx(1 + 2 / 3 * 0.25, rel=2e-3)
+    assert time.perf_counter() - start < 10.0
+
+
+def test_a_script_that_asks_for_too_much_memory_is_stopped(tmp_path, monkeypatch):
+    monkeypatch.setattr(gmsh_cad, "MOST_MEMORY", 600 * 2**20)
+    (tmp_path / "a.geo").write_text(CURVES)
+    assert read(tmp_path / "a.geo").n_blocks == 4
+    (tmp_path / "b.geo").write_text("For i In {0 : 3e7}\n  Point(i + 1) = {i, 0, 0};\nEndFor\n")
+    with pytest.raises(ValueError, match=r"b.geo': gmsh .* 0.586 GiB of memory.*; run gmsh on it yourself"):
+        read(tmp_path / "b.geo")
+
+
+def test_messages_name_the_file_and_no_other(tmp_path):
+    (tmp_path / "a.geo").write_text("Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Line(1) = {1, 2};")
+    with pytest.raises(ValueError, match=r"a.geo' has no surface cells") as problem:
+        read(tmp_path / "a.geo")
+    assert "found.msh" not in str(problem.value)
+
+
+def test_extruded_and_recombined_volumes(tmp_path):
+    (tmp_path / "a.geo").write_text(
+        "Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Point(3) = {1, 1, 0}; Point(4) = {0, 1, 0};\n"
+        "Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1};\n"
+        "Curve Loop(1) = {1, 2, 3, 4}; Plane Surface(1) = {1}; Transfinite Surface {1}; Recombine Surface {1};\n"
+        "Extrude {0, 0, 0.5} { Surface{1}; Layers{2}; Recombine; }\n"
+    )
+    layout = read_layout(tmp_path / "a.geo", view="xz")
+    assert layout.thickness == pytest.approx([1.0])
+    assert read(tmp_path / "a.geo", view="xz").areas == pytest.approx([0.5])

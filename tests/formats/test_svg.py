@@ -60,7 +60,7 @@ def test_paths(tmp_path, d, area):
     [
         (
             '<g id="wall"><path id="q" d="M0 0 L1 0 L1 1"/></g>',
-            r"'q' in layer 'wall' is open: .* \(1, 1\), 1.414 apart",
+            r"polyline q on layer 'wall' is open: .* \(1, 1\), 1.414 apart",
         ),
         ('<path d="M0 0 L3 0 L3 3 L0 3Z M1 1 L2 1 L2 2 L1 2Z"/>', r"has a hole around \(1.5, 1.5\)"),
         ('<path d="M0 0 L3 3 L3 0 L0 4Z"/>', "crosses itself"),

@@ -171,7 +171,7 @@ def test_help_says_what_every_exit_code_means(arguments, capsys):
     code, printed = _printed(capsys, *arguments)
     assert code == 0
     listed = dict(re.findall(r"(?m)^  (\d+) +(\S.*)$", printed.out.partition("exit codes:")[2]))
-    codes = {cli.BAD_INPUT, cli.SOLVER_FAILED, cli.NO_PICTURES, cli.INTERRUPTED}
+    codes = {cli.BAD_INPUT, cli.SOLVER_FAILED, cli.NO_PICTURES, cli.NO_EQUILIBRIUM, cli.INTERRUPTED}
     assert set(map(int, listed)) == {0} | codes
     assert "interrupted" in listed["130"]
 
@@ -260,3 +260,22 @@ def test_set_makes_tables_and_takes_plain_words_and_lists(case):
     assert found.joint_thickness == "auto"
     assert found.settlements[0].direction == (0.0, -1.0)
     assert found.controls.falling_frames == 7
+
+
+def test_no_initial_equilibrium_has_its_own_exit_code(case, capsys):
+    """A row of voussoirs whose springer is moving only: the other end has nothing to stand on."""
+    _changed(case, '"left springer" = "fixed"', '"left springer" = "free"')
+    assert main(["run", str(case), "-o", str(case.parent / "out")]) == 5
+    summary = json.loads((case.parent / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["status"] == "no initial equilibrium"
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "5 no initial equilibrium" in " ".join(capsys.readouterr().out.split())
+
+
+def test_output_that_nobody_reads_to_its_end_is_no_error(case):
+    command = f"{sys.executable} -m blockvis info {case.parent / 'arch.msh'} | true"
+    done = subprocess.run(
+        ["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert (done.returncode, done.stderr) == (0, "")

@@ -106,3 +106,34 @@ def test_the_blocks_are_drawn_with_their_supports_apart(tmp_path):
     assert row[1][0] - row[1][2] > 15, "free blocks have that of stone"
     flat_arch().blockvis.save(tmp_path / "blocks.dxf")
     assert read(tmp_path / "blocks.dxf").n_blocks == 4
+
+
+def test_meshes_without_flat_blocks_stay_with_pyvista(tmp_path):
+    ball = pv.Sphere(theta_resolution=8, phi_resolution=8).delaunay_3d()
+    pv.save_meshio(tmp_path / "ball.msh", ball, file_format="gmsh22")
+    assert ".msh" in pyvista_plugin.READS
+    again = pv.read(tmp_path / "ball.msh")
+    assert again.n_cells == ball.n_cells
+    assert set(np.asarray(again.celltypes)) == {10}
+    skin = ball.extract_surface(algorithm="dataset_surface").triangulate()
+    pv.save_meshio(tmp_path / "skin.msh", skin, file_format="gmsh22")
+    assert pv.read(tmp_path / "skin.msh").n_cells == skin.n_cells
+    (tmp_path / "broken.msh").write_text("no mesh")
+    with pytest.raises(ValueError, match="is not a gmsh mesh: it has no section"):
+        pv.read(tmp_path / "broken.msh")
+
+
+def test_a_block_in_pieces_is_refused_and_one_with_a_hole_is_left_out_with_a_note():
+    corners = np.array([[x, y, 0.0] for y in range(4) for x in range(5)])
+
+    def mesh(cells, blocks):
+        faces = np.array([[4, 5 * y + x, 5 * y + x + 1, 5 * y + x + 6, 5 * y + x + 5] for x, y in cells])
+        grid = pv.PolyData(corners, faces=faces.ravel()).cast_to_unstructured_grid()
+        grid.cell_data["block_id"] = blocks
+        return grid
+
+    ring = [(x, y) for x in range(3) for y in range(3) if (x, y) != (1, 1)]
+    with pytest.warns(UserWarning, match="left out: 1 face with a hole"):
+        assert mesh([*ring, (3, 0)], [0] * 8 + [1]).blockvis.assembly().n_blocks == 1
+    with pytest.raises(ValueError, match="is in 2 separate pieces"):
+        mesh([(0, 0), (2, 2), (3, 0)], [0, 0, 1]).blockvis.assembly()

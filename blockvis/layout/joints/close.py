@@ -14,9 +14,101 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .facing_edges import CLOSED, edges_of, facing_edges
+from blockvis.layout.left_out import LeftOut
+
+from .facing_edges import (
+    CLOSED,
+    Facing,
+    edges_of,
+    facing_edges,
+    proposed_thickness,
+    rounded_up,
+    search_reach,
+    straight_share,
+)
 from .midlines import common_lines, moved_outlines
+from .nearest_stone import proposed_gap, share_out
 from .trimming import LONGEST_MITRE, extended_to_lines, separated
+
+#: Ways of closing: edges moved to the midline between faces, mortar to the nearest stone, or whichever fits.
+WAYS = ("auto", "faces", "voronoi")
+
+#: Faces are closed edge by edge where at least this share of the length of joints runs between straight ones.
+STRAIGHT = 0.85
+
+#: More pockets than this fraction of the area of the joints that are closed between faces, and mortar is shared out.
+POCKETS = 0.03
+
+#: A block that loses more of its area than this has not been closed but cut.
+LOST = 0.3
+
+#: A proposed thickness above this fraction of how far was looked is the limit of the search.
+LIMIT = 0.95
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """How the joints of a drawing can be closed.
+
+    Attributes
+    ----------
+    thickness : float [m]
+        0 if there are no gaps.
+    way : str
+        "faces" or "voronoi".
+    reach : float [m]
+        How far gaps were looked for.
+    stretches : Facing
+        Stretches of edges that face each other across a gap.
+    """
+
+    thickness: float
+    way: str
+    reach: float
+    stretches: Facing
+
+    @property
+    def note(self) -> str:
+        """What is uncertain about the thickness, or ""."""
+        wider = (
+            self.stretches.gaps.max(axis=1) > 1.0001 * self.thickness
+            if len(self.stretches)
+            else np.zeros(0, dtype=bool)
+        )
+        if self.thickness >= LIMIT * self.reach:
+            return (
+                f"gaps were looked for up to {self.reach:.3g} m, and there are joints of that width: wider ones stay "
+                "open; give joint_thickness in m to close them"
+            )
+        if self.way == "faces" and wider.any():
+            return (
+                f"{self.stretches.lengths[wider].sum():.3g} of {self.stretches.lengths.sum():.3g} m of gaps are wider "
+                f"than joint_thickness {self.thickness:g} m, up to {self.stretches.gaps.max():.3g} m, and stay open"
+            )
+        return ""
+
+
+def proposed(outlines: Sequence[np.ndarray], way: str = "auto") -> Proposal:
+    """Propose how the joints of a drawing are closed.
+
+    Parameters
+    ----------
+    outlines : sequence of (n, 2) arrays [m]
+        Counter-clockwise.
+    way : {"auto", "faces", "voronoi"}
+    """
+    thickness, found = proposed_thickness(outlines)
+    if way == "auto":
+        way = chosen_way(outlines, found)
+    if way == "faces":
+        return Proposal(thickness, way, search_reach(outlines), found)
+    gap, reach = proposed_gap(outlines)
+    return Proposal(rounded_up(gap) if gap else 0.0, way, reach, found)
+
+
+def chosen_way(outlines: Sequence[np.ndarray], found: Facing) -> str:
+    """Choose the way of closing that fits the faces of a drawing."""
+    return "faces" if straight_share(outlines, found) >= STRAIGHT else "voronoi"
 
 
 @dataclass(frozen=True)
@@ -34,6 +126,8 @@ class Closing:
         Widest gap that was closed.
     residual : float [m]
         Widest remaining gap or overlap along them.
+    way : str
+        "faces" or "voronoi".
     """
 
     outlines: tuple[np.ndarray, ...]
@@ -41,6 +135,7 @@ class Closing:
     n_cut: int
     largest_gap: float
     residual: float
+    way: str = "faces"
 
 
 def close_joints(
@@ -49,8 +144,10 @@ def close_joints(
     *,
     overlap: float = 0.0,
     anchored: np.ndarray | None = None,
+    way: str = "faces",
+    mortar: Sequence[LeftOut] = (),
 ) -> Closing:
-    """Move facing edges onto the line midway between them.
+    """Move facing edges onto the line midway between them, or give the mortar to the nearest stone.
 
     Parameters
     ----------
@@ -62,11 +159,95 @@ def close_joints(
         Deepest overlap that is resolved in the same way.
     anchored : (n_blocks,) bool array, optional
         Blocks that keep their outline; edges that face them move across the whole gap.
+    way : {"auto", "faces", "voronoi"}
+        Whether edges move to the midline between faces, or mortar goes to the nearest stone. "auto" takes the second
+        where faces are not straight, where corners are so blunt that pockets would stay open between them, and where
+        edges that move would fold an outline.
+    mortar : sequence of LeftOut
+        Surfaces of mortar as drawn, with the stones as their holes; the nearest stone takes all of it, however wide.
 
     Returns
     -------
     Closing
+
+    Raises
+    ------
+    ValueError
+        With the number of the outline, if "faces" would fold one.
     """
+    if way == "auto":
+        # Judged as far as joints may reach: corners too blunt for this thickness count, too.
+        reach = max(thickness, search_reach(outlines))
+        way = chosen_way(outlines, facing_edges(outlines, reach)) if thickness else "faces"
+        if way == "faces":
+            closing = _between_faces(outlines, thickness, overlap, anchored)
+            whole = _folded(outlines, closing.outlines) is None
+            if not thickness or (whole and _pockets(outlines, closing.outlines, thickness) <= POCKETS):
+                return closing
+        way = "voronoi"
+    if way == "voronoi":
+        return _to_nearest_stone(outlines, thickness, overlap, anchored, mortar)
+    closing = _between_faces(outlines, thickness, overlap, anchored)
+    folded = _folded(outlines, closing.outlines)
+    if folded is not None:
+        raise FoldedOutline(folded)
+    return closing
+
+
+class FoldedOutline(ValueError):
+    """Closing joints edge by edge folds an outline.
+
+    Parameters
+    ----------
+    block : int
+    """
+
+    def __init__(self, block: int) -> None:
+        super().__init__(f"moving the edges of outline {block} to the midlines of its joints folds it")
+        self.block = block
+
+
+def _folded(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray]) -> int | None:
+    """Find the first outline that crosses itself, or loses much area, by closing; None if all are whole."""
+    import shapely
+
+    before = shapely.area(np.array([shapely.Polygon(ring) for ring in drawn]))
+    after = np.array([shapely.Polygon(ring) if len(ring) > 2 else shapely.Polygon() for ring in closed])
+    folded = np.flatnonzero(~shapely.is_valid(after) | (shapely.area(after) < (1.0 - LOST) * before))
+    return int(folded[0]) if len(folded) else None
+
+
+def _pockets(drawn: Sequence[np.ndarray], closed: Sequence[np.ndarray], thickness: float) -> float:
+    """Area of the pockets that stay open between blunt corners, as a fraction of that of the joints closed."""
+    import shapely
+
+    union = shapely.union_all(np.array([shapely.Polygon(ring) for ring in closed]))
+    holes = [shapely.Polygon(ring) for part in shapely.get_parts(union) for ring in part.interiors]
+    # An opening holds a disc of the radius of a joint and a half.
+    pockets = sum(hole.area for hole in holes if hole.buffer(-1.5 * thickness).is_empty)
+    joints = union.area - sum(shapely.Polygon(ring).area for ring in drawn)
+    return float(pockets / joints) if joints > 0.0 else 0.0
+
+
+def _to_nearest_stone(
+    outlines: Sequence[np.ndarray],
+    thickness: float,
+    overlap: float,
+    anchored: np.ndarray | None,
+    mortar: Sequence[LeftOut],
+) -> Closing:
+    still = np.zeros(len(outlines), dtype=bool) if anchored is None else np.asarray(anchored, dtype=bool)
+    found = facing_edges(outlines, thickness, overlap)
+    scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
+    n_open = int((np.abs(found.gaps).max(axis=1) > CLOSED * scale).sum()) if len(found) else 0
+    closed = share_out(outlines, thickness, still, mortar)
+    return Closing(tuple(closed), n_open, 0, float(found.gaps.max(initial=0.0)), 0.0, "voronoi")
+
+
+def _between_faces(
+    outlines: Sequence[np.ndarray], thickness: float, overlap: float, anchored: np.ndarray | None
+) -> Closing:
+    """Move facing edges onto the line midway between them."""
     origin = np.concatenate(outlines).mean(axis=0)
     rings = [ring - origin for ring in outlines]
     still = np.zeros(len(rings), dtype=bool) if anchored is None else np.asarray(anchored, dtype=bool)
@@ -79,9 +260,10 @@ def close_joints(
     if n_open == 0:
         return Closing(tuple(outlines), 0, 0, 0.0, 0.0)
     lines, uncommon = common_lines(found, edges, still, closed)
-    base = moved_outlines(edges, lines, LONGEST_MITRE * max(thickness, overlap))
+    base = _without_repeats(moved_outlines(edges, lines, LONGEST_MITRE * max(thickness, overlap)), closed)
     final = extended_to_lines(base, edges, found, uncommon, lines, still, max(thickness, overlap))
-    final = separated(final, still, max(thickness, overlap), 10.0 * closed)
+    final = separated(_without_repeats(final, closed), still, max(thickness, overlap), 10.0 * closed)
+    final = _without_repeats(final, closed)
     remaining = facing_edges(final, thickness, max(overlap, closed))
     residual = float(np.abs(remaining.gaps).max()) if len(remaining) else 0.0
     return Closing(
@@ -91,3 +273,9 @@ def close_joints(
         largest_gap=float(found.gaps.max()),
         residual=residual,
     )
+
+
+def _without_repeats(rings: Sequence[np.ndarray], closed: float) -> list[np.ndarray]:
+    """Drop corners that coincide with the one before: an edge without length has no direction."""
+    kept = [ring[np.hypot(*(ring - np.roll(ring, 1, axis=0)).T) > closed] for ring in rings]
+    return [some if len(some) > 2 else ring for some, ring in zip(kept, rings, strict=True)]

@@ -13,6 +13,15 @@ from blockvis.layout.outlines import ring_width
 #: Edges face each other when their outward normals point at each other within acos(0.8) = 37 degrees.
 FACING = -0.8
 
+#: Share of the length of all joints that is no wider than the proposed thickness, wedges apart.
+JOINTS = 0.98
+
+#: Wedges between voussoirs widen by up to this factor beyond the joints.
+WEDGE = 1.5
+
+#: Faces are parallel within this angle [rad]; a face is long from this fraction of the width of its block on.
+PARALLEL, LONG = math.radians(3.0), 0.5
+
 #: Gaps below this fraction of the size of the drawing are rounding errors of drawing programs, and count as closed.
 CLOSED = 1e-9
 
@@ -175,7 +184,7 @@ def _nearest(found: Facing, edges: Edges) -> Facing:
 
 
 def proposed_thickness(outlines: Sequence[np.ndarray]) -> tuple[float, Facing]:
-    """Propose the joint thickness that closes all mortar joints of a drawing.
+    """Propose the joint thickness that closes the mortar joints of a drawing.
 
     Parameters
     ----------
@@ -192,14 +201,54 @@ def proposed_thickness(outlines: Sequence[np.ndarray]) -> tuple[float, Facing]:
     Notes
     -----
     Edges face each other across at most half the width of a typical block (twice its area over its perimeter): a
-    wider gap is an opening. The thickness is the widest gap found, rounded up to two digits.
+    wider gap is an opening. Joints are longer than wide; what is not, such as the way across a crossing from one
+    bevelled corner to another, says nothing of them. Of the joints, the share JOINTS of their length bounds the
+    thickness, and wedges up to WEDGE times wider still belong to it. The thickness is rounded up to two digits.
     """
-    found = facing_edges(outlines, 0.5 * float(np.median([ring_width(ring) for ring in outlines])))
+    found = facing_edges(outlines, search_reach(outlines))
     scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
     widest = found.gaps.max(axis=1)
     found = found.chosen(widest > 10 * CLOSED * scale)
     if len(found) == 0:
         return 0.0, found
-    largest = float(found.gaps.max())
-    digit = 10.0 ** (math.floor(math.log10(largest)) - 1)
-    return float(np.round(math.ceil(largest / digit - 1e-6) * digit, 12)), found
+    widest = found.gaps.max(axis=1)
+    joints = found.lengths >= widest
+    joints = joints if joints.any() else np.ones(len(found), dtype=bool)
+    order = np.argsort(widest[joints])
+    width, share = widest[joints][order], np.cumsum(found.lengths[joints][order])
+    common = width[np.searchsorted(share, JOINTS * share[-1])]
+    return rounded_up(float(width[width <= WEDGE * common].max())), found
+
+
+def search_reach(outlines: Sequence[np.ndarray]) -> float:
+    """Find how far from each other edges are still looked for as sides of a joint [m]."""
+    return 0.5 * float(np.median([ring_width(ring) for ring in outlines]))
+
+
+def rounded_up(length: float) -> float:
+    """Round a length [m] up to two digits."""
+    digit = 10.0 ** (math.floor(math.log10(length)) - 1)
+    return float(np.round(math.ceil(length / digit - 1e-6) * digit, 12))
+
+
+def straight_share(outlines: Sequence[np.ndarray], found: Facing) -> float:
+    """Share of the length of joints between straight faces: parallel, or long compared with their blocks.
+
+    Parameters
+    ----------
+    outlines : sequence of (n, 2) arrays [m]
+    found : Facing
+
+    Returns
+    -------
+    float
+        1 without joints.
+    """
+    if len(found) == 0:
+        return 1.0
+    edges = edges_of(outlines)
+    widths = np.array([ring_width(ring) for ring in outlines])
+    cosine = -(edges.directions[found.edge_a] * edges.directions[found.edge_b]).sum(axis=1)
+    narrower = np.minimum(widths[edges.block[found.edge_a]], widths[edges.block[found.edge_b]])
+    straight = (cosine > math.cos(PARALLEL)) | (found.lengths > LONG * narrower)
+    return float(found.lengths[straight].sum() / found.lengths.sum())

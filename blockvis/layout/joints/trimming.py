@@ -205,7 +205,7 @@ def merge_close_corners(
     near = sorted({int(j) for i in involved for j in tree.query(shapely.Polygon(rings[i]).buffer(2 * reach))})
     points = np.concatenate([rings[i] for i in near])
     index = cKDTree(points)
-    shared = {i: _with_corners_on_edges(rings[i], points, index, max(10 * closed, 1e-7 * reach)) for i in near}
+    shared = {i: with_corners_on_edges(rings[i], points, index, max(10 * closed, 1e-7 * reach)) for i in near}
     movable = np.concatenate([np.zeros((0, 2)), *(shared[i] for i in involved if not still[i] and i in shared)])
     movable = np.unique(np.round(movable, 12), axis=0)
     if len(movable) < 2:
@@ -235,8 +235,17 @@ def merge_close_corners(
     return result
 
 
-def _with_corners_on_edges(ring: np.ndarray, points: np.ndarray, index: Any, closed: float) -> np.ndarray:
-    """Add every given point that lies on an edge of the ring to its corners."""
+def with_corners_on_edges(ring: np.ndarray, points: np.ndarray, index: Any, closed: float) -> np.ndarray:
+    """Add every given point that lies on an edge of the ring to its corners.
+
+    Parameters
+    ----------
+    ring, points : (n, 2) arrays [m]
+    index : scipy.spatial.cKDTree
+        Of the points.
+    closed : float [m]
+        A point closer than this to an edge lies on it.
+    """
     result = []
     for start, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
         along = end - start

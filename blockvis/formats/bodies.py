@@ -1,0 +1,271 @@
+"""From closed bodies in space to a layout: prisms side by side become outlines with a thickness."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blockvis.layout.block_table import with_rows
+from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import LeftOut, matches
+from blockvis.layout.outlines import outlines_of_cells, rectangle
+from blockvis.layout.views import VIEWS, axis_across, view_along
+
+#: In a prism the sine of the angle between a face's normal and the axis, or the plane across it, is at most this.
+SQUARE = 1e-3
+
+#: Points this close to each other along an axis, as a fraction of the size of the drawing, lie in one plane across it.
+LEVEL = 1e-5
+
+#: A body lies behind another if it covers more than this fraction of the smaller outline of the two: less is how
+#: inexactly neighbours are drawn.
+COVERS = 0.01
+
+#: Sizes beyond this are damage: their squares, or those of their products, could not be computed.
+LARGEST_SIZE = 1e50
+
+#: Bodies compared with all others at a time.
+AT_A_TIME = 20
+
+#: Middle planes further apart than this fraction of the size of the drawing are noted.
+ECCENTRIC = 1e-3
+
+
+@dataclass(frozen=True)
+class Body:
+    """A closed surface of triangles: name, (n, 3) points, (m, 3) faces."""
+
+    name: str
+    points: np.ndarray
+    faces: np.ndarray
+
+
+def body_of_polygons(name: str, points: np.ndarray, faces: Sequence[Sequence[int]]) -> Body:
+    """Make a body of the polygons around it.
+
+    Parameters
+    ----------
+    name : str
+    points : (n, 3) array
+    faces : sequence of sequences of int
+        Points around each face, three or more, plane.
+    """
+    used, triangles = np.unique(fans(faces), return_inverse=True)
+    return Body(name, points[used], triangles.reshape(-1, 3))
+
+
+def fans(faces: Sequence[Sequence[int]]) -> np.ndarray:
+    """(m, 3) int array: polygons cut into triangles from their first corner, which keeps the edges around each."""
+    triangles = [(ring[0], ring[k], ring[k + 1]) for ring in faces for k in range(1, len(ring) - 1)]
+    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Blocks of a file that draws them in space.
+
+    Attributes
+    ----------
+    bodies : tuple of Body
+    rows : tuple of dict
+        Rows of the block table, one per body.
+    unit : str
+        Unit of length that the file states, "" for none.
+    notes : tuple of str
+    """
+
+    bodies: tuple[Body, ...]
+    rows: tuple[dict[str, Any], ...]
+    unit: str = ""
+    notes: tuple[str, ...] = field(default=())
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """The bodies as seen along one axis: their outlines and the planes between which they lie, or why it cannot be."""
+
+    axis: int
+    outlines: tuple[np.ndarray, ...] = ()
+    low: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    high: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    refused: str = ""
+
+    @property
+    def scatter(self) -> float:
+        """How far the bodies are from lying between the same two planes."""
+        return float(np.ptp(self.low) + np.ptp(self.high - self.low))
+
+
+def layout_of_bodies(
+    found: Bodies,
+    path: Path | str,
+    view: str | None = None,
+    ignore: Sequence[str] = (),
+    only: Sequence[str] = (),
+) -> Layout:
+    """Make a layout of prismatic bodies: outlines across the axis of their extrusion, thicknesses along it.
+
+    Parameters
+    ----------
+    found : Bodies
+    path : Path or str
+        Named in messages.
+    view : {"xy", "xz", "yz"}, optional
+        The view to take; by default one in which no body lies behind another, of several that in which the bodies
+        come closest to lying between the same two planes.
+    ignore, only : sequences of str, optional
+        Groups, materials and names of bodies, or patterns of them, that are left out, and beside which all others are.
+
+    Raises
+    ------
+    ValueError
+        If the bodies are not prisms side by side.
+    """
+    if not found.bodies:
+        raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
+    labels = [[str(row.get(key, "")) for key in ("name", "group", "material")] for row in found.rows]
+    wanted = [not matches(words, ignore) and (not only or matches(words, only)) for words in labels]
+    dropped = [k for k, keep in enumerate(wanted) if not keep]
+    kept = [k for k, keep in enumerate(wanted) if keep]
+    if not kept:
+        raise ValueError(f"'{path}' draws no block: all that it draws is left out as asked (ignore, only)")
+    bodies, rows = [found.bodies[k] for k in kept], [found.rows[k] for k in kept]
+    every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
+    if not np.isfinite(every).all():
+        bad = every[~np.isfinite(every).all(axis=1)][0]
+        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+    size = float(np.ptp(every, axis=0).max())
+    if not 0.0 < size < LARGEST_SIZE:
+        raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
+    axes = (2, 1, 0) if view is None else (axis_across(view),)
+    seen = [_seen_along(axis, bodies, size) for axis in axes]
+    fitting = [one for one in seen if not one.refused]
+    if not fitting:
+        raise _not_flat(seen, bodies, path, view)
+    best = fitting[0]
+    for one in fitting[1:]:
+        if one.scatter < best.scatter - 1e-4 * size:
+            best = one
+    name, along = view_along(best.axis), "xyz"[best.axis]
+    notes = [f"{len(bodies)} bodies were read as outlines in {name}; their depth along {along} is the thickness"]
+    middle = (best.low + best.high) / 2.0
+    if np.ptp(middle) > ECCENTRIC * size:
+        first, last = bodies[int(middle.argmin())].name, bodies[int(middle.argmax())].name
+        notes.append(
+            f"the middle planes of the bodies along {along} differ by up to {np.ptp(middle):.3g} in the file's unit "
+            f"('{first}' and '{last}'): an analysis in the plane knows nothing of that eccentricity"
+        )
+    layout = Layout(
+        outlines=best.outlines,
+        names=tuple(body.name for body in bodies),
+        unit=found.unit,
+        notes=(*notes, *found.notes),
+    )
+    layout = replace(with_rows(layout, rows), thickness=best.high - best.low)
+    left_out = []
+    for k in dropped:
+        points = found.bodies[k].points[:, VIEWS[name]]
+        layer = next((word for word in labels[k][1:] if matches([word], ignore)), labels[k][1])
+        box = rectangle(*points.min(axis=0), *points.max(axis=0))
+        left_out.append(LeftOut("asked", box, "", layer, labels[k][0]))
+    return replace(layout, left_out=tuple(left_out))
+
+
+def _seen_along(axis: int, bodies: Sequence[Body], size: float) -> _Seen:
+    """See bodies along an axis, or find the reason why they cannot be outlines in that view."""
+    along = "xyz"[axis]
+    wrong = next((body for body in bodies if not _is_prism(body, axis, size)), None)
+    if wrong is not None:
+        return _Seen(axis, refused=f"body '{wrong.name}' is no extrusion along {along}")
+    levels = [body.points[np.unique(body.faces), axis] for body in bodies]
+    low, high = (np.array([float(pick(level)) for level in levels]) for pick in (np.min, np.max))
+    outlines = []
+    for body, top in zip(bodies, high, strict=True):
+        cap = (np.abs(body.points[body.faces][:, :, axis] - top) <= LEVEL * size).all(axis=1)
+        owner = np.zeros(int(cap.sum()), dtype=np.int64)
+        flat = body.points[:, VIEWS[view_along(axis)]]
+        try:
+            outlines += outlines_of_cells(flat, list(body.faces[cap]), owner, [body.name])
+        except ValueError as error:
+            return _Seen(axis, refused=f"seen along {along}, {error}")
+    return _Seen(axis, tuple(outlines), low, high, _hidden(axis, bodies, outlines, low, high, size))
+
+
+def _hidden(
+    axis: int,
+    bodies: Sequence[Body],
+    outlines: Sequence[np.ndarray],
+    low: np.ndarray,
+    high: np.ndarray,
+    size: float,
+) -> str:
+    """Say which body lies behind which, or that no plane cuts them all; "" if they are side by side in one leaf."""
+    import shapely
+
+    along = "xyz"[axis]
+    shapes = shapely.make_valid(shapely.polygons([shapely.linearrings(ring) for ring in outlines]))
+    area = shapely.area(shapes)
+    tree = shapely.STRtree(shapes)
+    # A few at a time: in a wrong view every body may cover every other, and the first such pair is enough.
+    for start in range(0, len(shapes), AT_A_TIME):
+        one, other = tree.query(shapes[start : start + AT_A_TIME], predicate="intersects")
+        one = one + start
+        apart = (one < other) & (np.maximum(low[one], low[other]) >= np.minimum(high[one], high[other]) - LEVEL * size)
+        one, other = one[apart], other[apart]
+        common = shapely.area(shapely.intersection(shapes[one], shapes[other]))
+        behind = np.flatnonzero(common > COVERS * np.minimum(area[one], area[other]))
+        if len(behind):
+            i, j = int(one[behind[0]]), int(other[behind[0]])
+            front, back = (i, j) if (low[i] < low[j]) == (axis == 1) else (j, i)
+            return f"seen along {along}, '{bodies[back].name}' lies behind '{bodies[front].name}'"
+    first, last = int(high.argmin()), int(low.argmax())
+    if low[last] >= high[first] - LEVEL * size:
+        return (
+            f"no plane across {along} cuts all bodies: '{bodies[first].name}' ends at {high[first]:.6g}, "
+            f"'{bodies[last].name}' begins at {low[last]:.6g}"
+        )
+    return ""
+
+
+def _not_flat(seen: Sequence[_Seen], bodies: Sequence[Body], path: Path | str, view: str | None) -> ValueError:
+    """Make the error for bodies that are not prisms side by side, with the reason in every view that was tried."""
+    remedy = (
+        "blocks in space cannot be analysed yet: leave out all but one leaf (ignore), or draw its outlines in the plane"
+    )
+    if view is None and not any(len(one.outlines) for one in seen):
+        holed = [one.refused for one in seen if "no extrusion" not in one.refused]
+        if holed:
+            return ValueError(f"'{path}': {holed[0]}")
+        name = seen[0].refused.split("'")[1]
+        return ValueError(
+            f"'{path}' is not prismatic: body '{name}' is no extrusion along x, y or z, and blocks in space cannot be "
+            "analysed yet; export extrusions of the blocks' outlines along an axis, or draw them in the plane"
+        )
+    if view is None:
+        # Views in which every body is a prism come first: they are what the model may have been meant for.
+        reasons = "; ".join(one.refused for one in sorted(seen, key=lambda one: not len(one.outlines)))
+        return ValueError(f"'{path}' is three-dimensional: {reasons}; {remedy}")
+    other = next((v for v in VIEWS if v != view and not _seen_along(axis_across(v), bodies, _size(bodies)).refused), "")
+    remedy = f'view = "{other}" shows them side by side' if other else remedy
+    return ValueError(f"'{path}' cannot be seen as {view}: {seen[0].refused}; {remedy}")
+
+
+def _size(bodies: Sequence[Body]) -> float:
+    return float(np.ptp(np.concatenate([body.points[np.unique(body.faces)] for body in bodies]), axis=0).max())
+
+
+def _is_prism(body: Body, axis: int, size: float) -> bool:
+    corners = body.points[body.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.hypot(np.hypot(normal[:, 0], normal[:, 1]), normal[:, 2])
+    wide = area > 1e-9 * size**2
+    along = np.abs(normal[wide, axis]) / area[wide]
+    square = (along > 1 - SQUARE) | (along < SQUARE)
+    levels = corners[:, :, axis]
+    caps = levels[wide][along > 1 - SQUARE]
+    on_caps = (np.abs(caps - levels.min()) <= LEVEL * size) | (np.abs(caps - levels.max()) <= LEVEL * size)
+    return bool(square.all() and on_caps.all())

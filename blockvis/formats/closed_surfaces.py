@@ -1,0 +1,127 @@
+"""Closed surfaces of triangles: the bodies that they enclose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from .bodies import Body, fans
+
+#: Points closer than this fraction of the size of the drawing are one: single precision is accurate to 6e-8.
+SAME_POINT = 2e-6
+
+
+class OpenSurface(ValueError):
+    """A surface that encloses nothing."""
+
+
+def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
+    """(n_cells,) int array: number of the connected piece of each cell; shared points connect cells."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    first = np.concatenate([ring for ring in rings])
+    second = np.concatenate([np.full(len(ring), ring[0]) for ring in rings])
+    graph = coo_matrix((np.ones(len(first)), (first, second)), shape=(n_points, n_points))
+    piece = connected_components(graph, directed=False)[1]
+    return np.unique(piece[[ring[0] for ring in rings]], return_inverse=True)[1]
+
+
+def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Merge points that coincide, and drop the faces that have no area then or are there already."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    # Exact copies first: a million of them would make a million squared pairs.
+    unique, inverse = np.unique(points, axis=0, return_inverse=True)
+    pairs = cKDTree(unique).query_pairs(SAME_POINT * size, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(unique), len(unique)))
+    _, label = connected_components(graph, directed=False)
+    first = np.unique(label, return_index=True)[1]
+    faces = label[inverse.ravel()][faces]
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    # Some files hold each face twice.
+    once = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]
+    return unique[first], faces[np.sort(once)]
+
+
+def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path: Path | str) -> list[Body]:
+    """Split a mesh of triangles into the closed bodies that it holds.
+
+    Parameters
+    ----------
+    name : str
+    points : (n, 3) array
+    faces : (m, 3) int array
+    size : float
+        Of the drawing, in the unit of the points.
+    path : Path or str
+        Named in messages.
+
+    Raises
+    ------
+    OpenSurface
+        For a mesh that is not closed.
+    ValueError
+        For bodies that touch along an edge.
+    """
+    points, faces = _with_points_merged(points, faces, size)
+    if len(faces) == 0:
+        raise OpenSurface(f"'{path}': body '{name}' has no face with an area; export closed bodies")
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    if (counts == 1).any():
+        x, y, z = points[unique[counts == 1][0]].mean(axis=0)
+        raise OpenSurface(
+            f"'{path}': body '{name}' is not closed: {int((counts == 1).sum())} edges belong to one face only, "
+            f"one around ({x:.6g}, {y:.6g}, {z:.6g}); export closed bodies"
+        )
+    if (counts > 2).any():
+        x, y, z = points[unique[counts > 2][0]].mean(axis=0)
+        raise ValueError(
+            f"'{path}': body '{name}' holds bodies that touch and cannot be told apart: {int((counts > 2).sum())} "
+            f"edges belong to more than two faces, one around ({x:.6g}, {y:.6g}, {z:.6g}); "
+            "export one file or one named object per block (.obj, .glb, .step)"
+        )
+    # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.
+    inverse = inverse.ravel().reshape(-1, 3)
+    piece = components(list(inverse), len(unique))
+    n = int(piece.max()) + 1
+    return [Body(name if n == 1 else f"{name} {k + 1}", points, faces[piece == k]) for k in range(n)]
+
+
+def bodies_of_surfaces(
+    points: np.ndarray, rings: Sequence[np.ndarray], owner: np.ndarray, names: Sequence[str], path: Path | str
+) -> tuple[list[Body], np.ndarray]:
+    """Find the bodies that surface cells enclose, of each owner by itself.
+
+    Parameters
+    ----------
+    points : (n_points, 3) array
+    rings : sequence of (n,) int arrays
+        Points around each cell.
+    owner : (n_cells,) int array
+        0 to n_names - 1.
+    names : sequence of str
+        One per owner.
+    path : Path or str
+        Named in messages.
+
+    Returns
+    -------
+    bodies : list of Body
+    owners : (n_bodies,) int array
+    """
+    size = float(np.ptp(points, axis=0).max())
+    bodies: list[Body] = []
+    owners: list[int] = []
+    for whose, name in enumerate(names):
+        found = closed_bodies(
+            name, points, fans([rings[k].tolist() for k in np.flatnonzero(owner == whose).tolist()]), size, path
+        )
+        bodies += found
+        owners += [whose] * len(found)
+    return bodies, np.array(owners)

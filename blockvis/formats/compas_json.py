@@ -1,0 +1,302 @@
+"""Assemblies, block models and lists of meshes of COMPAS, .json, as its versions from 0.15 to 2 write them.
+
+The parts of a file that hold blocks are found by their shape, not by the name of the class, which changed with the
+versions: a mesh is whatever has vertices and faces, an assembly a graph whose nodes have blocks, a model a list of
+elements with a geometry. https://compas.dev describes the data of each class.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.layout.layout import Layout
+from blockvis.layout.outlines import FLAT
+
+from .bodies import Bodies, fans
+from .cells import layout_of_cells
+from .closed_surfaces import closed_bodies
+
+#: Objects nested deeper than this are not looked into.
+DEEPEST = 40
+
+#: Keys of what lies between blocks, which may hold meshes of its own.
+_BETWEEN = {"edge", "adjacency", "interfaces", "interface", "contacts", "interactions", "facedata", "edgedata"}
+
+
+@dataclass(frozen=True)
+class _Context:
+    """What is known of a mesh from the objects around it."""
+
+    name: str = ""
+    group: str = ""
+    support: bool = False
+    material: Mapping[str, Any] = field(default_factory=dict)
+    matrix: np.ndarray = field(default_factory=lambda: np.eye(4))
+    depth: int = 0
+
+
+@dataclass(frozen=True)
+class _Mesh:
+    """One mesh: (n, 3) points in place, faces, and the row of the block table."""
+
+    points: np.ndarray
+    faces: list[list[int]]
+    row: dict[str, Any]
+
+
+def read_content(content: Any, path: Path, view: str | None) -> Layout | Bodies | None:
+    """Read the blocks of a parsed .json file; None if it holds no mesh.
+
+    Parameters
+    ----------
+    content : object
+        Of the parser.
+    path : Path
+        Named in messages.
+    view : {"xy", "xz", "yz"} or None
+
+    Raises
+    ------
+    ValueError
+        For damaged meshes, bodies that are not closed, and blocks whose geometry is no mesh.
+    """
+    try:
+        meshes = list(_meshes(content, _Context()))
+    except (LookupError, TypeError, AttributeError, OverflowError) as error:
+        raise ValueError(
+            f"'{path}' has a mesh of COMPAS that cannot be read ({type(error).__name__} {error}); export it again"
+        ) from None
+    except ValueError as error:
+        raise ValueError(f"'{path}': {error}") from None
+    if not meshes:
+        return None
+    every = np.concatenate([mesh.points for mesh in meshes])
+    if not np.isfinite(every).all():
+        bad = every[~np.isfinite(every).all(axis=1)][0]
+        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+    names = [str(mesh.row["name"]) for mesh in meshes]
+    if len(set(names)) < len(names):
+        # COMPAS names a mesh after its class unless it is told otherwise.
+        meshes = [replace(mesh, row={**mesh.row, "name": f"block {mesh.row['key']}"}) for mesh in meshes]
+    size = float(np.ptp(every, axis=0).max())
+    if float(np.ptp(every, axis=0).min()) <= FLAT * size:
+        return _flat(meshes, path, view)
+    planes = [mesh for mesh in meshes if len(mesh.faces) == 1]
+    if len(planes) < len(meshes):
+        # A single face among bodies is a ground without depth.
+        meshes = [mesh for mesh in meshes if len(mesh.faces) > 1]
+    bodies, rows, notes = [], [], [] if len(planes) == 0 else [_left_out(planes)]
+    for mesh in meshes:
+        row = {key: value for key, value in mesh.row.items() if key != "key"}
+        for body in closed_bodies(str(row["name"]), mesh.points, fans(mesh.faces), size, path):
+            bodies.append(body)
+            rows.append({**row, "name": body.name})
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} blocks of COMPAS", *notes))
+
+
+def _left_out(planes: Sequence[_Mesh]) -> str:
+    listed = ", ".join(f"'{mesh.row['name']}'" + " (a support)" * ("role" in mesh.row) for mesh in planes[:6])
+    more = f" and {len(planes) - 6} more" if len(planes) > 6 else ""
+    return f"left out: {listed}{more}, a single face without volume; draw a support that it stands for by [[supports]]"
+
+
+def _flat(meshes: Sequence[_Mesh], path: Path, view: str | None) -> Layout | Bodies:
+    """Make a layout of flat meshes: each is a block, but of a single one each face."""
+    points = np.concatenate([mesh.points for mesh in meshes])
+    starts = np.cumsum([0] + [len(mesh.points) for mesh in meshes])
+    rings = [np.array(face) + start for mesh, start in zip(meshes, starts[:-1], strict=True) for face in mesh.faces]
+    counts = [len(mesh.faces) for mesh in meshes]
+    if len(meshes) == 1:
+        return layout_of_cells(points, rings, {"block_id": np.arange(counts[0])}, path, view)
+    data = {"block_id": np.repeat(np.arange(len(meshes)), counts)}
+    for key in ("name", "group", "role", "material"):
+        data[key] = np.repeat([str(mesh.row.get(key, "")) for mesh in meshes], counts)
+    return layout_of_cells(points, rings, data, path, view)
+
+
+def _meshes(value: Any, context: _Context) -> Iterator[_Mesh]:
+    """Yield the meshes of an object and of those within it."""
+    if context.depth > DEEPEST:
+        return
+    context = replace(context, depth=context.depth + 1)
+    data, name = _unwrapped(value)
+    if isinstance(data, list):
+        for k, item in enumerate(data):
+            if isinstance(item, dict | list):
+                yield from _meshes(item, replace(context, name=f"{context.name}.{k}" if context.name else str(k)))
+        return
+    if not isinstance(data, dict):
+        return
+    shape = _shape(data)
+    if isinstance(data.get("elements"), dict | list) and "graph" in data:
+        yield from _of_model(data, context)
+    elif isinstance(data.get("assembly"), dict) and isinstance(data.get("blocks"), dict):
+        yield from _of_old_assembly(data, context)
+    elif isinstance(data.get("node"), dict):
+        yield from _of_graph(data, context)
+    elif shape is not None:
+        yield _mesh(*shape, data, name, context)
+    else:
+        for key, item in data.items():
+            if isinstance(item, dict | list) and key not in _BETWEEN:
+                support = context.support or "support" in key.lower()
+                named = key not in ("graph", "data", "model", "blocks")
+                within = replace(context, support=support, group=key if named else context.group)
+                yield from _meshes(item, within)
+
+
+def _unwrapped(value: Any) -> tuple[Any, str]:
+    """Take the data out of what COMPAS wraps around them, and the name that it gives."""
+    name = ""
+    for _ in range(4):
+        if not isinstance(value, dict) or not ("dtype" in value or "datatype" in value) or "node" in value:
+            break
+        inner = value.get("data", value.get("value"))
+        if inner is None:
+            break
+        name = str(value.get("name") or name)
+        value = inner
+    return value, name
+
+
+def _of_graph(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:
+    """Yield the blocks of the nodes of an assembly."""
+    default = data.get("default_node_attributes") or data.get("dna") or data.get("node_attributes") or {}
+    for key, node in data["node"].items():
+        attributes = {**default, **node}
+        if attributes.get("block") is not None:
+            support = context.support or bool(attributes.get("is_support"))
+            yield from _meshes(attributes["block"], replace(context, name=str(key), support=support))
+
+
+def _of_old_assembly(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:
+    """Yield the blocks of an assembly that keeps them apart from its nodes, as of before 1.0."""
+    graph, _ = _unwrapped(data["assembly"])
+    default = graph.get("node_attributes") or graph.get("dva") or {}
+    nodes = graph.get("node") or graph.get("vertex") or {}
+    for key, block in data["blocks"].items():
+        attributes = {**default, **(nodes.get(key) or {})}
+        support = context.support or bool(attributes.get("is_support"))
+        yield from _meshes(block, replace(context, name=str(key), support=support))
+
+
+def _of_model(data: dict[str, Any], context: _Context) -> Iterator[_Mesh]:
+    """Yield the elements of a model at their places."""
+    elements = data["elements"]
+    listed = list(elements.values()) if isinstance(elements, dict) else elements
+    known = [(str(element.get("guid", k)), *_unwrapped(element)) for k, element in enumerate(listed)]
+    materials = data.get("materials") or {}
+    listed = list(materials.values()) if isinstance(materials, dict) else materials
+    material_of = {str(material.get("guid", k)): _unwrapped(material)[0] for k, material in enumerate(listed)}
+    whose = data.get("element_material") or {}
+    matrices = _places(data, {guid: element for guid, element, _ in known}, context.matrix @ _matrix(data))
+    for k, (guid, element, name) in enumerate(known):
+        geometry = element.get("geometry") or element.get("shape")
+        if geometry is None:
+            continue
+        within = replace(
+            context,
+            name=str(k),
+            support=context.support or bool(element.get("is_support")),
+            material=material_of.get(str(whose.get(guid) or element.get("material")), {}),
+            matrix=matrices.get(guid, context.matrix),
+        )
+        found = list(_meshes(geometry, within))
+        if not found:
+            raise ValueError(
+                f"element {k} ('{name or element.get('name')}') of the model has a geometry that is no mesh "
+                f"({geometry.get('dtype', 'of another kind')}); export the blocks as meshes"
+            )
+        yield from found
+
+
+def _places(data: dict[str, Any], elements: Mapping[str, Any], root: np.ndarray) -> dict[str, np.ndarray]:
+    """Find the (4, 4) matrix of each element of a model: those of its parents in the tree, then its own."""
+    places = {guid: root @ _matrix(element) for guid, element in elements.items()}
+    tree = data.get("tree")
+    top = _unwrapped(tree)[0].get("root") if isinstance(tree, dict) else None
+    waiting = [(child, root) for child in (top or {}).get("children") or []]
+    while waiting:
+        node, matrix = waiting.pop()
+        guid = str(node.get("element"))
+        if guid in elements:
+            matrix = matrix @ _matrix(elements[guid])
+            places[guid] = matrix
+        waiting += [(child, matrix) for child in node.get("children") or []]
+    return places
+
+
+def _matrix(data: Mapping[str, Any]) -> np.ndarray:
+    """(4, 4) array: the transformation of an element or model, or that of its frame."""
+    transformation = _unwrapped(data.get("transformation"))[0]
+    if isinstance(transformation, dict):
+        return np.array(transformation["matrix"], dtype=float).reshape(4, 4)
+    return _of_frame(_unwrapped(data.get("frame"))[0])
+
+
+def _of_frame(frame: Any) -> np.ndarray:
+    """(4, 4) array: from the coordinates of a frame to those around it."""
+    matrix = np.eye(4)
+    if isinstance(frame, dict):
+        x, y = (np.array(_unwrapped(frame[key])[0], dtype=float) for key in ("xaxis", "yaxis"))
+        x = x / np.linalg.norm(x)
+        z = np.cross(x, y)
+        z = z / np.linalg.norm(z)
+        matrix[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+        matrix[:3, 3] = np.array(_unwrapped(frame["point"])[0], dtype=float)
+    return matrix
+
+
+def _shape(data: dict[str, Any]) -> tuple[np.ndarray, list[list[int]]] | None:
+    """(n, 3) points and faces of a mesh, a polyhedron, a box or a polygon; None for anything else."""
+    if data.get("vertex") and isinstance(data["vertex"], dict) and isinstance(data.get("face"), dict) and data["face"]:
+        default = data.get("default_vertex_attributes") or data.get("dva") or {}
+        number = {str(key): k for k, key in enumerate(data["vertex"])}
+        points = [[float({**default, **v}.get(axis, 0.0)) for axis in "xyz"] for v in data["vertex"].values()]
+        faces = [[number[str(key).strip("'\"")] for key in face] for face in data["face"].values() if face]
+        # Some files hold each face twice.
+        once = {frozenset(face): face for face in faces if len(face) > 2}
+        return np.array(points).reshape(-1, 3), list(once.values())
+    if data.get("vertices") and data.get("faces") and isinstance(data["vertices"], list):
+        corners = np.array([_unwrapped(point)[0] for point in data["vertices"]], dtype=float).reshape(-1, 3)
+        return corners, [[int(k) for k in face] for face in data["faces"]]
+    if {"xsize", "ysize", "zsize"} <= set(data):
+        half = np.array([float(data[key]) for key in ("xsize", "ysize", "zsize")]) / 2.0
+        corners = np.array([[x, y, z] for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]) * half
+        faces = [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+        matrix = _of_frame(_unwrapped(data.get("frame"))[0])
+        return corners @ matrix[:3, :3].T + matrix[:3, 3], faces
+    if isinstance(data.get("points"), list) and set(data) == {"points"} and len(data["points"]) > 2:
+        corners = np.array([_unwrapped(point)[0] for point in data["points"]], dtype=float).reshape(-1, 3)
+        corners = corners[:-1] if (corners[0] == corners[-1]).all() else corners
+        return corners, [list(range(len(corners)))]
+    return None
+
+
+def _mesh(points: np.ndarray, faces: list[list[int]], data: dict[str, Any], name: str, context: _Context) -> _Mesh:
+    attributes = data.get("attributes") or {}
+    support = context.support or bool(attributes.get("is_support"))
+    row: dict[str, Any] = {
+        "key": context.name or "0",
+        "name": name or str(attributes.get("name") or f"block {context.name or 0}"),
+    }
+    if context.group:
+        row["group"] = context.group
+    if support:
+        row["role"] = solver.FIXED
+    if context.material.get("name"):
+        row["material"] = str(context.material["name"])
+    density = context.material.get("density")
+    if isinstance(density, int | float) and density > 0:
+        row["density"] = float(density)
+    outside = [k for face in faces for k in face if not 0 <= k < len(points)]
+    if outside:
+        raise IndexError(f"a face uses point {outside[0]} of {len(points)}")
+    matrix = context.matrix
+    return _Mesh(points @ matrix[:3, :3].T + matrix[:3, 3], faces, row)

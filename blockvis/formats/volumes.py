@@ -1,0 +1,112 @@
+"""From volume cells of any mesh to bodies: the skin of each, the cells of one body kept together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .bodies import Body
+
+#: Faces of a cell by its corners, in the numbering that gmsh, VTK and meshio share.
+TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+HEXAHEDRON = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+WEDGE = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
+PYRAMID = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
+
+Faces = tuple[tuple[int, ...], ...]
+
+#: By gmsh's element type; cells of higher order have their corners first.
+GMSH_SOLIDS: dict[int, Faces] = {
+    4: TETRAHEDRON, 11: TETRAHEDRON, 29: TETRAHEDRON, 30: TETRAHEDRON, 31: TETRAHEDRON,
+    5: HEXAHEDRON, 12: HEXAHEDRON, 17: HEXAHEDRON, 92: HEXAHEDRON, 93: HEXAHEDRON,
+    6: WEDGE, 13: WEDGE, 18: WEDGE, 7: PYRAMID, 14: PYRAMID, 19: PYRAMID,
+}  # fmt: skip
+
+#: By VTK's cell type. VTK numbers the corners of a voxel row by row.
+VTK_SOLIDS: dict[int, Faces] = {
+    10: TETRAHEDRON, 24: TETRAHEDRON, 71: TETRAHEDRON,
+    12: HEXAHEDRON, 25: HEXAHEDRON, 29: HEXAHEDRON, 72: HEXAHEDRON,
+    11: ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (1, 3, 7, 5), (3, 2, 6, 7), (2, 0, 4, 6)),
+    13: WEDGE, 26: WEDGE, 73: WEDGE, 14: PYRAMID, 27: PYRAMID, 74: PYRAMID,
+}  # fmt: skip
+
+#: By the beginning of meshio's name of the cell type.
+MESHIO_SOLIDS: dict[str, Faces] = {
+    "tetra": TETRAHEDRON,
+    "hexahedron": HEXAHEDRON,
+    "wedge": WEDGE,
+    "pyramid": PYRAMID,
+}
+
+
+def bodies_of_cells(
+    points: np.ndarray,
+    cells: Sequence[tuple[Faces, np.ndarray]],
+    owner: np.ndarray,
+    names: Sequence[str],
+) -> tuple[list[Body], np.ndarray]:
+    """Find the skin of each body: the faces that belong to one of its cells only.
+
+    Parameters
+    ----------
+    points : (n_points, 3) array
+    cells : sequence of (faces, (n, n_nodes) int array)
+        Cells of one shape each: the corners of its faces, and the nodes of the cells.
+    owner : (n_cells,) int array
+        Which body each cell belongs to, 0 to n_names - 1, in the order of ``cells``. Cells of one owner that do not
+        hang together by faces are bodies of their own.
+    names : sequence of str
+        One per owner.
+
+    Returns
+    -------
+    bodies : list of Body
+    owners : (n_bodies,) int array
+        Which owner each body belongs to.
+    """
+    faces, cell_of_face, start = [], [], 0
+    for shape, nodes in cells:
+        for corners in shape:
+            missing = np.full((len(nodes), 4 - len(corners)), -1)
+            faces.append(np.column_stack([nodes[:, list(corners)], missing]))
+            cell_of_face.append(np.arange(start, start + len(nodes)))
+        start += len(nodes)
+    face, cell = np.concatenate(faces), np.concatenate(cell_of_face)
+    key = np.sort(face, axis=1)
+    piece = _pieces(key, cell, owner)
+    _, index, counts = np.unique(np.column_stack([piece[cell], key]), axis=0, return_index=True, return_counts=True)
+    skin = index[counts == 1]
+    skin = skin[np.argsort(piece[cell[skin]], kind="stable")]
+    owners = owner[np.unique(piece, return_index=True)[1]]
+    sizes = np.bincount(piece[cell[skin]], minlength=len(owners))
+    several = np.bincount(owners, minlength=len(names)) > 1
+    seen = np.zeros(len(names), dtype=np.int64)
+    bodies = []
+    for rows, whose in zip(np.split(skin, np.cumsum(sizes)[:-1]), owners.tolist(), strict=True):
+        seen[whose] += 1
+        used, triangles = np.unique(_triangles(face[rows]), return_inverse=True)
+        name = f"{names[whose]} {seen[whose]}" if several[whose] else names[whose]
+        bodies.append(Body(name, points[used], triangles.reshape(-1, 3)))
+    return bodies, owners
+
+
+def _pieces(faces: np.ndarray, cell_of_face: np.ndarray, owner: np.ndarray) -> np.ndarray:
+    """(n_cells,) int array: number of the piece of each cell, those of one owner one after another."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    order = np.lexsort(faces.T[::-1])
+    same = (faces[order][1:] == faces[order][:-1]).all(axis=1)
+    one, other = cell_of_face[order][:-1][same], cell_of_face[order][1:][same]
+    kept = owner[one] == owner[other]
+    one, other = one[kept], other[kept]
+    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(len(owner), len(owner)))
+    piece = connected_components(graph, directed=False)[1]
+    return np.unique(np.column_stack([owner, piece]), axis=0, return_inverse=True)[1].ravel()
+
+
+def _triangles(faces: np.ndarray) -> np.ndarray:
+    """(m, 3) int array: faces of four points cut in two, those of three as they are."""
+    square = faces[faces[:, 3] >= 0]
+    return np.concatenate([faces[faces[:, 3] < 0][:, :3], square[:, [0, 1, 2]], square[:, [0, 2, 3]]])

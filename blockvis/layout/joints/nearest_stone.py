@@ -1,0 +1,313 @@
+"""Mortar shared out to the nearest stone, for rubble, whose faces are not parallel.
+
+The border between two stones is where both are equally near: the edges of the Voronoi diagram of points along their
+outlines. All borders are cut from one drawing of lines, and simplified as one, so that neighbours share their edges to
+the last digit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from blockvis.layout.left_out import LeftOut
+
+#: Points along the outlines are this fraction of the joint thickness apart.
+SPACING = 0.2
+
+#: At most this many points: their triangulation takes a few seconds.
+MOST_POINTS = 200_000
+
+#: Borders are drawn on a grid of this fraction of the size of the drawing.
+GRID = 2e-9
+
+#: Two points face each other across mortar if outward normals there are more than acos(-0.3) = 107 degrees apart: the
+#: sides of a corner between two stones that touch do not.
+FACING = -0.3
+
+#: A corner of a border goes where the triangle with its neighbours has the area of a square of this fraction of the
+#: size of a typical stone: the solver's contacts are at corners, and more of them than stones need slow it.
+SIMPLER = 0.08
+
+#: Borders shorter than this fraction of the size of a typical stone shrink to a point.
+SHORTEST = 0.03
+
+#: Gaps are looked for up to this fraction of the size of a typical stone; wider ones are openings.
+REACH = 0.75
+
+#: The joints of a wall are no wider over this share of their length, and up to WIDER times wider over the rest: what is
+#: wider still are pockets, and the teeth at the end of a wall.
+JOINTS, WIDER = 0.8, 1.5
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Points along outlines, and the triangles between them.
+
+    Attributes
+    ----------
+    points : (n, 2) array [m]
+    owner : (n,) int array
+        Block of each point.
+    weights : (n,) array [m]
+        Length of outline that each point stands for.
+    triangles : (n_triangles, 3) int array
+        Delaunay triangles with corners on two or three blocks.
+    widths : (n_triangles,) array [m]
+        Longest side between two blocks; infinite where a side is between points that do not face each other.
+    """
+
+    points: np.ndarray
+    owner: np.ndarray
+    weights: np.ndarray
+    triangles: np.ndarray
+    widths: np.ndarray
+
+    @property
+    def local(self) -> np.ndarray:
+        """(n,) array [m]: distance of each point from the nearest one of another block that it faces, or infinite."""
+        found = np.full(len(self.points), np.inf)
+        for one, other in ((0, 1), (1, 2), (2, 0)):
+            a, b = self.triangles[:, one], self.triangles[:, other]
+            across = self.owner[a] != self.owner[b]
+            length = np.hypot(*(self.points[a] - self.points[b]).T)
+            for end in (a, b):
+                np.minimum.at(found, end[across], length[across])
+        return found
+
+
+def share_out(
+    outlines: Sequence[np.ndarray],
+    thickness: float,
+    anchored: np.ndarray,
+    mortar: Sequence[LeftOut] = (),
+    *,
+    simpler: float = SIMPLER,
+) -> list[np.ndarray]:
+    """Give mortar to the nearest stone.
+
+    Parameters
+    ----------
+    outlines : sequence of (n, 2) arrays [m]
+        Counter-clockwise.
+    thickness : float [m]
+        Gaps up to this width are mortar, and the pockets between such gaps.
+    anchored : (n_blocks,) bool array
+        Blocks that keep their place: the mortar beside them goes to the others.
+    mortar : sequence of LeftOut
+        Surfaces of mortar as drawn, with the stones as their holes; holes without a stone are openings.
+    simpler : float
+        Fraction of the size of a typical stone to which borders are simplified.
+
+    Returns
+    -------
+    list of (n, 2) arrays [m]
+    """
+    import shapely
+
+    scale = float(np.ptp(np.concatenate(outlines), axis=0).max())
+    # A power of ten, from a round origin: round coordinates stay what they are.
+    grid = float(10.0 ** np.floor(np.log10(GRID * scale)))
+    origin = np.round(np.concatenate(outlines).mean(axis=0) / (1e6 * grid)) * (1e6 * grid)
+    shapes = np.array([shapely.Polygon(ring - origin).buffer(0) for ring in outlines])
+    growing = np.flatnonzero(~anchored) if not anchored.all() else np.arange(len(shapes))
+    gaps = gaps_between(shapes, SPACING * thickness)
+    masonry = _with_mortar(shapes, gaps, thickness, growing)
+    masonry = shapely.union_all([masonry, *(_surface(item, origin, shapes) for item in mortar)])
+    grown = np.isin(gaps.owner, growing)
+    points, owner = gaps.points[grown], gaps.owner[grown]
+    borders = _borders(points, owner, scale)
+    lines = shapely.union_all([borders, *shapely.boundary(shapes), shapely.boundary(masonry)], grid_size=grid)
+    faces = np.array(shapely.polygonize([*shapely.get_parts(lines)]).geoms)
+    faces = faces[shapely.area(faces) > (10.0 * grid) ** 2]
+    holder = _holders(faces, shapes, masonry, points, owner, anchored)
+    cells = [_one(faces[holder == i], shapes[i], grid) for i in range(len(shapes))]
+    size = float(np.median(np.sqrt(shapely.area(shapes[growing]))))
+    simple = shapely.coverage_simplify(np.array(cells), simpler * size)
+    rings = [np.array(shapely.orient_polygons(cell).exterior.coords)[:-1] for cell in simple]
+    fixed = np.concatenate([np.zeros((0, 2)), *(rings[i] for i in np.flatnonzero(anchored))])
+    found = [ring + origin for ring in _without_short_edges(rings, SHORTEST * size, fixed)]
+    return [np.asarray(outlines[i]) if anchored[i] else ring for i, ring in enumerate(found)]
+
+
+def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
+    """Propose the joint thickness that closes the joints between stones of any shape.
+
+    Parameters
+    ----------
+    outlines : sequence of (n, 2) arrays [m]
+        Counter-clockwise.
+
+    Returns
+    -------
+    thickness : float [m]
+        0 without gaps.
+    reach : float [m]
+        How far was looked: a thickness near it is the limit of the search, not a measurement.
+    """
+    import shapely
+
+    origin = np.concatenate(outlines).mean(axis=0)
+    shapes = np.array([shapely.Polygon(ring - origin).buffer(0) for ring in outlines])
+    size = float(np.median(np.sqrt(shapely.area(shapes))))
+    gaps = gaps_between(shapes, 0.03 * size)
+    local = gaps.local
+    near = local <= REACH * size
+    if not near.any() or local[near].max() < 1e-6 * size:
+        return 0.0, REACH * size
+    order = np.argsort(local[near])
+    share = np.cumsum(gaps.weights[near][order])
+    common = local[near][order][np.searchsorted(share, JOINTS * share[-1])]
+    return float(local[local <= WIDER * common].max()), REACH * size
+
+
+def gaps_between(shapes: np.ndarray, spacing: float) -> Gaps:
+    """Triangulate the gaps between shapes from points along their outlines ``spacing`` [m] apart."""
+    import shapely
+    from scipy.spatial import Delaunay
+
+    spacing = max(spacing, float(shapely.length(shapes).sum()) / MOST_POINTS)
+    points, owner, before, after = [], [], [], []
+    for i, shape in enumerate(shapes):
+        ring = shapely.orient_polygons(shape).exterior
+        dense = shapely.get_coordinates(shapely.segmentize(ring, spacing))[:-1]
+        along = np.roll(dense, -1, axis=0) - dense
+        points.append(dense)
+        owner.append(np.full(len(dense), i))
+        after.append(along)
+        before.append(np.roll(along, 1, axis=0))
+    every, block = np.concatenate(points), np.concatenate(owner)
+    sides = [np.concatenate(part) for part in (before, after)]
+    lengths = [np.hypot(*side.T) for side in sides]
+    normals = np.stack(
+        [np.stack([s[:, 1], -s[:, 0]], axis=1) / h[:, None] for s, h in zip(sides, lengths, strict=True)]
+    )
+    corners = Delaunay(every).simplices
+    corners = corners[np.ptp(block[corners], axis=1) > 0]
+    widths = np.zeros(len(corners))
+    for one, other in ((0, 1), (1, 2), (2, 0)):
+        a, b = corners[:, one], corners[:, other]
+        across = block[a] != block[b]
+        # At a corner of a stone the normal is one of two, whichever faces the other point more.
+        cosine = np.min([(normals[i, a] * normals[j, b]).sum(axis=1) for i in (0, 1) for j in (0, 1)], axis=0)
+        length = np.where(cosine < FACING, np.hypot(*(every[a] - every[b]).T), np.inf)
+        widths = np.where(across, np.maximum(widths, length), widths)
+    return Gaps(every, block, (lengths[0] + lengths[1]) / 2.0, corners, widths)
+
+
+def _with_mortar(shapes: np.ndarray, gaps: Gaps, thickness: float, growing: np.ndarray) -> Any:
+    """All stones with the gaps between them up to a width, and the pockets where such gaps meet."""
+    import shapely
+
+    # The sides of triangles across a gap run from point to point, not quite square to it.
+    widest = 1.001 * float(np.hypot(thickness, SPACING * thickness))
+    narrow = (gaps.widths <= widest) & np.isin(gaps.owner[gaps.triangles], growing).any(axis=1)
+    corners = gaps.points[gaps.triangles[narrow]]
+    mortar = shapely.polygons(corners) if len(corners) else np.array([], dtype=object)
+    filled = shapely.union_all([*shapes, *mortar[shapely.area(mortar) > 0.0]])
+    # A pocket between stones is wider than the joints that meet there, and wider still between blunt ones; an opening
+    # holds a disc of the radius of a joint thickness.
+    kept = []
+    for part in shapely.get_parts(filled):
+        holes = [ring for ring in part.interiors if not shapely.Polygon(ring).buffer(-thickness).is_empty]
+        kept.append(shapely.Polygon(part.exterior, holes))
+    return shapely.union_all(kept)
+
+
+def _surface(mortar: LeftOut, origin: np.ndarray, shapes: np.ndarray) -> Any:
+    """Fill the holes in a surface of mortar that hold a stone."""
+    import shapely
+
+    holes = [shapely.Polygon(ring - origin).buffer(0) for ring in mortar.holes]
+    inside = shapely.STRtree(shapely.point_on_surface(shapes))
+    openings = [hole for hole in holes if len(inside.query(hole, "contains")) == 0]
+    return shapely.Polygon(mortar.points - origin).buffer(0).difference(shapely.union_all(openings))
+
+
+def _borders(points: np.ndarray, owner: np.ndarray, scale: float) -> Any:
+    """Lines between the cells of points of different blocks."""
+    import shapely
+    from scipy.spatial import Voronoi
+
+    # Points far around the drawing make every border finite.
+    angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+    far = points.mean(axis=0) + 4.0 * scale * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    diagram = Voronoi(np.vstack([points, far]))
+    block = np.concatenate([owner, np.full(len(far), -1)])
+    sides = np.array(diagram.ridge_points)
+    ends = np.array([ridge if len(ridge) == 2 else (-1, -1) for ridge in diagram.ridge_vertices])
+    keep = (block[sides[:, 0]] != block[sides[:, 1]]) & (ends >= 0).all(axis=1) & (block[sides] >= 0).all(axis=1)
+    return shapely.multilinestrings(shapely.linestrings(diagram.vertices[ends[keep]]))
+
+
+def _holders(
+    faces: np.ndarray, shapes: np.ndarray, masonry: Any, points: np.ndarray, owner: np.ndarray, anchored: np.ndarray
+) -> np.ndarray:
+    """(n_faces,) int array: block of each face; -1 for none."""
+    import shapely
+    from scipy.spatial import cKDTree
+
+    inside = shapely.point_on_surface(faces)
+    places = shapely.get_coordinates(inside)
+    nearest = owner[cKDTree(points).query(places)[1]]
+    shapely.prepare(masonry)
+    holder = np.where(shapely.contains(masonry, inside), nearest, -1)
+    face, block = shapely.STRtree(shapes).query(inside, "within")
+    # What is drawn as stone stays with its stone; where two overlap, with the nearer one, and first with a support.
+    several = np.bincount(face, minlength=len(faces))
+    single = (several[face] == 1) | anchored[block]
+    holder[face[single]] = block[single]
+    return holder
+
+
+def _one(faces: np.ndarray, drawn: Any, grid: float) -> Any:
+    """Join the faces of a block: the largest piece, without holes."""
+    import shapely
+
+    union = shapely.union_all(faces, grid_size=grid) if len(faces) else drawn
+    pieces = [piece for piece in shapely.get_parts(union) if piece.geom_type == "Polygon"] or [drawn]
+    return shapely.Polygon(max(pieces, key=lambda piece: float(piece.area)).exterior)
+
+
+def _without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.ndarray) -> list[np.ndarray]:
+    """Let edges shorter than a length [m] shrink to a point, in all outlines that share them.
+
+    Parameters
+    ----------
+    rings : list of (n, 2) arrays [m]
+        Neighbours share their corners to the last digit.
+    shortest : float [m]
+    fixed : (n, 2) array [m]
+        Corners that stay.
+    """
+    import shapely
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    corners, which = np.unique(np.concatenate(rings), axis=0, return_inverse=True)
+    around = np.split(which.ravel(), np.cumsum([len(ring) for ring in rings])[:-1])
+    ends = np.concatenate([np.stack([w, np.roll(w, -1)], axis=1) for w in around])
+    length = np.hypot(*(corners[ends[:, 0]] - corners[ends[:, 1]]).T)
+    stays = {tuple(corner) for corner in fixed}
+    limit = shortest
+    # Where shrinking would fold an outline, less of it is done.
+    for _ in range(4):
+        a, b = ends[length < limit].T
+        graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(corners),) * 2)
+        group = connected_components(graph, directed=False)[1]
+        count = np.bincount(group)
+        place = np.stack([np.bincount(group, corners[:, axis]) / count for axis in (0, 1)], axis=1)
+        for k, corner in enumerate(corners):
+            if count[group[k]] == 1 or tuple(corner) in stays:
+                place[group[k]] = corner
+        found = []
+        for w in around:
+            moved = group[w]
+            found.append(place[moved[moved != np.roll(moved, 1)]])
+        if all(len(ring) > 2 and shapely.Polygon(ring).is_valid for ring in found):
+            return found
+        limit /= 4.0
+    return rings

@@ -1,0 +1,126 @@
+"""What a drawing holds beside its blocks: what it was, where, and why it is left out; one line of words per kind."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+#: Kinds of what is left out, for one and for many.
+KINDS = {
+    "open": ("line that closes no outline", "lines that close no outline"),
+    "across": ("face of loose lines across outlines", "faces of loose lines across outlines"),
+    "hole": ("face with a hole", "faces with a hole"),
+    "pieces": ("face in several pieces", "faces in several pieces"),
+    "no outline": ("face without outline", "faces without outline"),
+    "no area": ("outline without area", "outlines without area"),
+    "sliver": ("sliver", "slivers"),
+    "background": ("frame or background around other blocks", "frames or backgrounds around other blocks"),
+    "inner": ("inner line of a block", "inner lines of blocks"),
+    "title": ("cell of a title block", "cells of a title block"),
+    "annotation": ("outline on a layer of annotations", "outlines on a layer of annotations"),
+    "mortar": ("mortar surface", "mortar surfaces"),
+    "asked": ("outline, as asked for", "outlines, as asked for"),
+    "asked line": ("line, as asked for", "lines, as asked for"),
+}
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something drawn that is no block.
+
+    Attributes
+    ----------
+    kind : str
+        One of :data:`KINDS`.
+    points : (n, 2) array [m]
+        Its outline or line; inside a format's reader in the unit of the file.
+    message : str
+        Refuses the file where no block is left.
+    layer, name : str
+    closed : bool
+        Whether the points are an outline.
+    serious : bool
+        Whether it refuses the file unless the caller asks to leave it out.
+    holes : tuple of (n, 2) arrays [m]
+        Outlines of its holes.
+    """
+
+    kind: str
+    points: np.ndarray
+    message: str
+    layer: str = ""
+    name: str = ""
+    closed: bool = True
+    serious: bool = False
+    holes: tuple[np.ndarray, ...] = ()
+
+    def mapped(self, factors: float | Sequence[float]) -> LeftOut:
+        """Multiply its coordinates."""
+        holes = tuple(ring * np.asarray(factors) for ring in self.holes)
+        return replace(self, points=self.points * np.asarray(factors), holes=holes)
+
+    def seen(self, order: Sequence[int]) -> LeftOut:
+        """Take these of its coordinates, in this order."""
+        return replace(self, points=self.points[:, order], holes=tuple(ring[:, order] for ring in self.holes))
+
+    @property
+    def place(self) -> np.ndarray:
+        """(2,) array [m]: a point of it, for messages."""
+        if len(self.points) == 0:
+            return np.full(2, np.nan)
+        middle: np.ndarray = (self.points.min(axis=0) + self.points.max(axis=0)) / 2.0
+        return middle if self.closed else self.points[0]
+
+    @property
+    def miss(self) -> float:
+        """Distance between both ends of a line [m]; 0 of an outline."""
+        return 0.0 if self.closed or len(self.points) < 3 else float(np.hypot(*(self.points[0] - self.points[-1])))
+
+
+def in_words(left_out: Sequence[LeftOut]) -> list[str]:
+    """Say what is left out: one line per kind and layer, with the number and the place of the first.
+
+    Parameters
+    ----------
+    left_out : sequence of LeftOut
+
+    Returns
+    -------
+    list of str
+
+    Examples
+    --------
+    >>> stroke = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.5]])
+    >>> in_words([LeftOut("open", stroke, "", "axes", "line 2F", closed=False)])
+    ["left out: 1 line that closes no outline on layer 'axes', 'line 2F' at (0, 0), its ends 1.12 apart"]
+    """
+    lines = []
+    for kind, layer in dict.fromkeys((item.kind, item.layer) for item in left_out):
+        members = [item for item in left_out if (item.kind, item.layer) == (kind, layer)]
+        first = members[0]
+        x, y = first.place
+        words = KINDS[kind][len(members) > 1]
+        where = f" on layer '{layer}'" if layer else ""
+        called = f"'{first.name}' " if first.name and first.name != layer else ""
+        misses = [item.miss for item in members if item.miss]
+        apart = f"{min(misses):.3g} to {max(misses):.3g}" if len(misses) > 1 else "".join(f"{m:.3g}" for m in misses)
+        ends = f", {'their' if len(members) > 1 else 'its'} ends {apart} apart" if misses else ""
+        lines.append(
+            f"left out: {len(members)} {words}{where}, {'the first ' if len(members) > 1 else ''}{called}"
+            f"at ({x:.6g}, {y:.6g}){ends}"
+        )
+    return lines
+
+
+def matches(labels: Iterable[str], patterns: Sequence[str]) -> bool:
+    """Whether a label is one of the patterns, or fits one.
+
+    Examples
+    --------
+    >>> matches(["stone 3"], ["mortar", "stone *"])
+    True
+    """
+    return any(label == pattern or fnmatch.fnmatchcase(label, pattern) for label in labels for pattern in patterns)

@@ -1,0 +1,247 @@
+"""Which outlines of a drawing are blocks: those asked for, without debris, frames, title blocks and mortar."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from blockvis.suggestions import by_similarity
+
+from .layout import Layout
+from .left_out import LeftOut, in_words, matches
+from .outlines import ring_area, ring_width
+from .units import doubt
+
+#: An outline with less area than this times its perimeter squared is a line: the solver takes no block of less.
+LINE = 1e-9
+
+#: A sliver is narrower than this fraction of the width of the median block ...
+SLIVER_WIDTH = 2e-3
+
+#: ... and longer than this many times its own width: a chip is none.
+SLIVER_SHAPE = 20.0
+
+#: A frame or background holds at least this share of all other outlines.
+BACKGROUND = 0.5
+
+#: Inner lines of blocks are left out from this many on; a single outline within another is refused by name.
+INNER = 3
+
+#: Layers that by their name hold what explains a drawing.
+ANNOTATIONS = re.compile(
+    r"(dims?|dimensions?|bema[sß]+ung|cotes?|titles?|title[ _-]?block|schriftfeld|guides?|rulers?|guide[ _-]?rulers?"
+    r"|backgrounds?|hintergrund|annotations?|viewports?|defpoints)",
+    re.IGNORECASE,
+)
+
+#: Names of mortar.
+MORTAR = re.compile(r"\b(mortar|mörtel|moertel|malta|mortier|mortero|argamassa)\b", re.IGNORECASE)
+
+
+def labels_of(layout: Layout, block: int) -> tuple[str, ...]:
+    """Group, material and name of a block, by which it can be asked for."""
+    return layout.groups[block], layout.materials[block], layout.names[block]
+
+
+def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] = ()) -> Layout:
+    """Leave out what is no block, with a note per kind and layer, and doubt the unit.
+
+    Parameters
+    ----------
+    layout : Layout
+        As a format's reader gives it, lengths in m.
+    ignore, only : sequences of str
+        Layers, groups, materials and names of blocks, or patterns of them.
+
+    Raises
+    ------
+    ValueError
+        If a pattern of ``only`` matches nothing, no block is left, or something cannot be left out unasked.
+    """
+    where = f"'{layout.source}'" if layout.source else "the drawing"
+    layout = as_asked(layout, ignore, only)
+    layout = without_surroundings(without_debris(layout), only)
+    for item in layout.left_out:
+        if item.serious:
+            raise ValueError(f"{where}: {item.message}; or leave it out (ignore)")
+    if layout.n_blocks == 0:
+        first = next((item for item in layout.left_out if item.message), None)
+        asked = "all that it draws is left out as asked (ignore, only)"
+        counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
+        raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}")
+    sizes = np.sqrt([abs(ring_area(ring)) for ring in layout.outlines])
+    notes = [*layout.notes, *in_words(layout.left_out), doubt(layout.unit, float(np.median(sizes)))]
+    return replace(layout, notes=tuple(note for note in notes if note))
+
+
+def as_asked(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:
+    """Leave out what the caller asks to leave out.
+
+    Parameters
+    ----------
+    layout : Layout
+    ignore, only : sequences of str
+        Layers, groups, materials and names of blocks, or patterns of them.
+
+    Raises
+    ------
+    ValueError
+        If a pattern of ``only`` matches nothing.
+    """
+    if not ignore and not only:
+        return layout
+    known = [labels_of(layout, i) for i in range(layout.n_blocks)]
+    beside = [(item.layer, item.name) for item in layout.left_out]
+    every = [label for labels in (*known, *beside) for label in labels if label]
+    notes = list(layout.notes)
+    for pattern in (*only, *ignore):
+        if matches(every, [pattern]):
+            continue
+        listed = ", ".join(f"'{label}'" for label in by_similarity(pattern, list(dict.fromkeys(every))[:2000])[:12])
+        message = f"'{pattern}' matches no layer, group or name; the drawing has {listed or 'none'}"
+        if pattern in only:
+            raise ValueError(f"{layout.source or 'the drawing'}: only: {message}; correct it")
+        notes.append(f"ignore: {message}")
+    reasons = {
+        i: LeftOut("asked", layout.outlines[i], "")
+        for i, labels in enumerate(known)
+        if matches(labels, ignore) or (only and not matches(labels, only))
+    }
+    asked = tuple(
+        replace(item, kind="asked" if item.closed else "asked line", serious=False)
+        if matches((item.layer, item.name), ignore) or (only and not matches((item.layer, item.name), only))
+        else item
+        for item in layout.left_out
+    )
+    return replace(layout, left_out=asked, notes=tuple(notes)).leaving_out(reasons)
+
+
+def without_debris(layout: Layout) -> Layout:
+    """Leave out outlines without area, and slivers.
+
+    Parameters
+    ----------
+    layout : Layout
+    """
+    reasons = {}
+    perimeters = [float(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).sum()) for ring in layout.outlines]
+    for i, ring in enumerate(layout.outlines):
+        area = abs(ring_area(ring)) if len(ring) > 2 else 0.0
+        if area <= LINE * perimeters[i] ** 2:
+            message = (
+                f"block '{layout.names[i]}' has an area of {area:.3g} m² for a perimeter of {perimeters[i]:.3g} m; it "
+                "is a line, not a block: remove it or redraw it"
+            )
+            reasons[i] = LeftOut("no area", ring, message)
+    widths = {i: ring_width(ring) for i, ring in enumerate(layout.outlines) if i not in reasons}
+    thin = SLIVER_WIDTH * float(np.median(list(widths.values()))) if widths else 0.0
+    for i, width in widths.items():
+        if width < thin and perimeters[i] > 2.0 * SLIVER_SHAPE * width:
+            reasons[i] = LeftOut("sliver", layout.outlines[i], f"block '{layout.names[i]}' is {width:.3g} m wide")
+    return layout.leaving_out(reasons)
+
+
+def without_surroundings(layout: Layout, only: Sequence[str] = ()) -> Layout:
+    """Leave out what by its name or place is no block: annotations, frames, backgrounds, title blocks, mortar.
+
+    Parameters
+    ----------
+    layout : Layout
+    only : sequence of str
+        What the caller asks for by name stays.
+
+    Notes
+    -----
+    An outline around others cannot be a block beside them, so nothing is left out that could be analysed. Mortar is
+    left out where it is one surface around the stones or in pieces; mortar drawn as blocks of its own stays.
+    """
+    by_name = {
+        i: LeftOut("annotation", layout.outlines[i], f"block '{layout.names[i]}' is on layer '{layout.groups[i]}'")
+        for i in range(layout.n_blocks)
+        if ANNOTATIONS.fullmatch(layout.groups[i].strip()) and not matches(labels_of(layout, i), only)
+    }
+    if len(by_name) < layout.n_blocks:
+        layout = layout.leaving_out(by_name)
+    mortar = tuple(
+        replace(item, kind="mortar", serious=False)
+        if item.closed and item.kind != "asked" and MORTAR.search(f"{item.layer} {item.name}") and layout.n_blocks
+        else item
+        for item in layout.left_out
+    )
+    layout = replace(layout, left_out=mortar)
+    reasons = _around_others(layout)
+    reasons = {i: item for i, item in reasons.items() if not matches(labels_of(layout, i), only)}
+    return layout.leaving_out(reasons)
+
+
+def drawn_mortar(layout: Layout) -> list[LeftOut]:
+    """Find the surfaces of mortar around stones among what was left out, by itself or as asked."""
+    return [item for item in layout.left_out if item.holes and MORTAR.search(f"{item.layer} {item.name}")]
+
+
+def _around_others(layout: Layout) -> dict[int, LeftOut]:
+    """Frames and backgrounds around other blocks, title blocks on a frame, inner lines of blocks."""
+    import shapely
+
+    n = layout.n_blocks
+    if n < 2:
+        return {}
+    shapes = np.array([shapely.Polygon(ring) for ring in layout.outlines])
+    shapes[~shapely.is_valid(shapes)] = shapely.Polygon()
+    areas = shapely.area(shapes)
+    inner, outer = shapely.STRtree(shapes).query(shapes, "covered_by")
+    # Of two outlines drawn twice neither lies within the other.
+    nested = (inner != outer) & (areas[inner] < (1.0 - 1e-6) * areas[outer]) & (areas[inner] > 0)
+    inner, outer = inner[nested], outer[nested]
+    if len(inner) == 0:
+        return {}
+    held = np.bincount(outer, minlength=n)
+    frames = [int(i) for i in np.flatnonzero((held >= 2) & (held >= BACKGROUND * (n - 1)))]
+    reasons = {}
+    for i in frames:
+        kind = "mortar" if MORTAR.search(" ".join(labels_of(layout, i))) else "background"
+        message = f"block '{layout.names[i]}' lies around {held[i]} others"
+        reasons[i] = LeftOut(kind, layout.outlines[i], message)
+    reasons |= _title_cells(layout, shapes, frames)
+    left = [k for k in range(len(inner)) if int(outer[k]) not in reasons and int(inner[k]) not in reasons]
+    lines = sorted({int(inner[k]) for k in left})
+    blocks = {int(outer[k]) for k in left} - set(lines)
+    if len(blocks) >= INNER and len(blocks) >= 0.25 * (n - len(reasons) - len(lines)):
+        for i in lines:
+            reasons[i] = LeftOut("inner", layout.outlines[i], f"block '{layout.names[i]}' lies within another")
+    return reasons
+
+
+def _title_cells(layout: Layout, shapes: Any, frames: list[int]) -> dict[int, LeftOut]:
+    """Upright rectangles that hang together, reach the frame of a sheet and are not the main part of the drawing."""
+    import shapely
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    others = np.array([i for i in range(len(shapes)) if i not in frames])
+    if not frames or len(others) == 0:
+        return {}
+    frame = shapes[min(frames, key=lambda i: shapes[i].area)].exterior
+    near = 2e-3 * frame.length / 4.0
+    apart = max(near, 0.5 * float(np.sqrt(np.median(shapely.area(shapes[others])))))
+    a, b = shapely.STRtree(shapes[others]).query(shapes[others], "dwithin", apart)
+    piece = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(len(others),) * 2), directed=False)[1]
+    area = np.bincount(piece, shapely.area(shapes[others]))
+    main = int(np.argmax(area))
+    if (piece == main).sum() < 0.5 * len(others):
+        # The blocks stand apart, as bricks on a background do: those at its border are no title block.
+        return {}
+    found = {}
+    for k in range(piece.max() + 1):
+        members = others[piece == k]
+        boxes = shapely.box(*shapely.bounds(shapes[members]).T)
+        upright = (shapely.area(shapes[members]) > 0.99 * shapely.area(boxes)).all()
+        if k != main and upright and shapely.dwithin(shapes[members], frame, near).any():
+            for i in members:
+                message = f"block '{layout.names[i]}' hangs on the frame of the sheet"
+                found[int(i)] = LeftOut("title", layout.outlines[i], message)
+    return found

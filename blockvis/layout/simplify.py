@@ -1,0 +1,170 @@
+"""Outlines finer than needed, simplified within a tolerance, neighbours along the same edges."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+import solver
+
+from .joints.trimming import with_corners_on_edges
+
+#: Outlines of more corners than this in the mean are finer than needed: every corner at a joint is a contact.
+FINE = 24
+
+#: Corners go within this fraction of the size of the median block (the root of its area).
+TOLERANCE = 0.01
+
+
+def default_tolerance(outlines: Sequence[np.ndarray]) -> float:
+    """Find the tolerance [m] within which outlines are simplified by default; 0 where they are not fine."""
+    if sum(map(len, outlines)) <= FINE * len(outlines):
+        return 0.0
+    import shapely
+
+    return TOLERANCE * float(np.sqrt(np.median(shapely.area(np.array([shapely.Polygon(ring) for ring in outlines])))))
+
+
+def simplified(outlines: Sequence[np.ndarray], tolerance: float) -> tuple[list[np.ndarray], str]:
+    """Drop corners of outlines; edges that blocks share stay shared.
+
+    Parameters
+    ----------
+    outlines : sequence of (n, 2) arrays [m]
+        Counter-clockwise.
+    tolerance : float [m]
+        Farthest that a dropped corner may lie from the outline that is left.
+
+    Returns
+    -------
+    outlines : list of (n, 2) arrays [m]
+    note : str
+        What was dropped; "" for nothing.
+
+    Notes
+    -----
+    Outlines are divided into the chains that two blocks share, and every chain is simplified once (Douglas and Peucker
+    1973, doi:10.3138/FM57-6770-U75U-7727). Blocks that this would fold, or push into another, keep their corners.
+    """
+    before = sum(map(len, outlines))
+    if tolerance <= 0.0:
+        return list(outlines), ""
+    points, around = _shared_corners(outlines)
+    chains = [_chains(ids, points, nodes) for nodes in [_nodes(around, len(points))] for ids in around]
+    kept: set[int] = set()
+    for _ in range(4):
+        whole = {_key(chain) for block in kept for chain in chains[block]}
+        short = {
+            key: key if key in whole else _simple(key, points, tolerance)
+            for key in {_key(chain) for parts in chains for chain in parts}
+        }
+        found = []
+        for parts in chains:
+            ids = [i for chain in parts for i in _turned(short[_key(chain)], chain)[:-1]]
+            found.append(points[ids])
+        bad = _spoilt(found, outlines, tolerance) - kept
+        if not bad:
+            break
+        kept |= bad
+    else:
+        return list(outlines), ""
+    after = sum(map(len, found))
+    if after >= before:
+        return list(outlines), ""
+    return found, (
+        f"outlines were finer than needed: {before} corners of {len(outlines)} blocks were simplified to {after} "
+        f"within {tolerance:.2g} m (outline_tolerance; 0 keeps every corner)"
+    )
+
+
+def _shared_corners(outlines: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
+    """(n, 2) array [m] of all corners, each once, and for each outline the numbers of its corners.
+
+    Neighbours share an edge only between corners that both have.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    every = np.concatenate(outlines)
+    same = 1e-9 * float(np.ptp(every, axis=0).max())
+    index = cKDTree(every)
+    rings = [with_corners_on_edges(ring, every, index, same) for ring in outlines]
+    corners = np.concatenate(rings)
+    a, b = cKDTree(corners).query_pairs(2.0 * same, output_type="ndarray").reshape(-1, 2).T
+    graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(corners),) * 2)
+    group = connected_components(graph, directed=False)[1]
+    first = np.unique(group, return_index=True)[1]
+    around = []
+    for ids in np.split(group, np.cumsum([len(ring) for ring in rings])[:-1]):
+        around.append(ids[ids != np.roll(ids, 1)])
+    return corners[first], around
+
+
+def _nodes(around: list[np.ndarray], n: int) -> np.ndarray:
+    """(n,) bool array: corners at which three or more edges meet."""
+    ends = np.concatenate([np.stack([ids, np.roll(ids, -1)], axis=1) for ids in around])
+    edges = np.unique(np.sort(ends, axis=1), axis=0)
+    count: np.ndarray = np.bincount(edges.ravel(), minlength=n)
+    return count > 2
+
+
+def _chains(ids: np.ndarray, points: np.ndarray, nodes: np.ndarray) -> list[tuple[int, ...]]:
+    """Divide an outline at its nodes, or at two corners far apart."""
+    cuts = np.flatnonzero(nodes[ids])
+    if len(cuts) < 2:
+        start = int(cuts[0]) if len(cuts) else int(np.argmin(ids))
+        far = int(np.argmax(np.hypot(*(points[ids] - points[ids[start]]).T)))
+        cuts = np.unique([start, far])
+    ids = np.roll(ids, -cuts[0])
+    ends = [*(cuts - cuts[0]), len(ids)]
+    closed = [*ids.tolist(), int(ids[0])]
+    return [tuple(closed[i : j + 1]) for i, j in itertools.pairwise(ends)]
+
+
+def _key(chain: tuple[int, ...]) -> tuple[int, ...]:
+    """Write a chain in the direction in which both its blocks simplify it."""
+    return min(chain, chain[::-1])
+
+
+def _turned(simple: tuple[int, ...], chain: tuple[int, ...]) -> tuple[int, ...]:
+    return simple if _key(chain) == chain else simple[::-1]
+
+
+def _simple(chain: tuple[int, ...], points: np.ndarray, tolerance: float) -> tuple[int, ...]:
+    """Drop the corners of a chain that lie within the tolerance [m] of what is left."""
+    places = points[list(chain)]
+    kept, open_parts = {0, len(chain) - 1}, [(0, len(chain) - 1)]
+    while open_parts:
+        i, j = open_parts.pop()
+        if j - i < 2:
+            continue
+        along, offset = places[j] - places[i], places[i + 1 : j] - places[i]
+        length = float(np.hypot(*along))
+        t = np.clip(offset @ along / max(length, 1e-300) ** 2, 0.0, 1.0)
+        apart = np.hypot(*(offset - t[:, None] * along).T)
+        k = int(np.argmax(apart))
+        if apart[k] > tolerance:
+            kept.add(i + 1 + k)
+            open_parts += [(i, i + 1 + k), (i + 1 + k, j)]
+    return tuple(chain[k] for k in sorted(kept))
+
+
+def _spoilt(found: list[np.ndarray], drawn: Sequence[np.ndarray], tolerance: float) -> set[int]:
+    """Find the blocks that simplifying folds, or pushes into another."""
+    import shapely
+
+    shapes = np.array([shapely.Polygon(ring) if len(ring) > 2 else shapely.Polygon() for ring in found])
+    before = shapely.area(np.array([shapely.Polygon(ring) for ring in drawn]))
+    bad = set(np.flatnonzero(~shapely.is_valid(shapes) | (shapely.area(shapes) < 0.8 * before)).tolist())
+    if bad:
+        return bad
+    offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in found])])
+    a, b, _ = solver.overlap_depths(np.concatenate(found), offsets, 1e-3 * tolerance)
+    offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in drawn])])
+    i, j, _ = solver.overlap_depths(np.concatenate(drawn), offsets, 1e-3 * tolerance)
+    already = set(zip(i.tolist(), j.tolist(), strict=True))
+    new = set(zip(a.tolist(), b.tolist(), strict=True)) - already
+    return {block for pair in new for block in pair}

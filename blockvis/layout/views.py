@@ -1,0 +1,35 @@
+"""Views: which two coordinates of a drawing in space become x and y of the layout."""
+
+from __future__ import annotations
+
+#: Coordinates kept by each view: from +z, from -y and from +x, which mirrors nothing.
+VIEWS = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+
+def checked_view(view: str | None) -> str | None:
+    """Return the view if it is one.
+
+    Raises
+    ------
+    ValueError
+        For any other word.
+    """
+    if view is not None and view not in VIEWS:
+        raise ValueError(f"view '{view}' is not known; the views are {', '.join(VIEWS)}")
+    return view
+
+
+def axis_across(view: str) -> int:
+    """Give the number of the coordinate along which a view looks.
+
+    Examples
+    --------
+    >>> axis_across("xz")
+    1
+    """
+    return 3 - sum(VIEWS[view])
+
+
+def view_along(axis: int) -> str:
+    """Name the view that looks along an axis: 0 for x, 1 for y, 2 for z."""
+    return next(view for view in VIEWS if axis_across(view) == axis)

@@ -1,0 +1,132 @@
+"""Outlines cut by joint lines, ends that miss by little, and what is said where nothing closes."""
+
+import ezdxf
+import numpy as np
+import pytest
+import shapely
+
+from blockvis.formats.read import read, read_layout
+
+
+def dxf(tmp_path, draw):
+    document = ezdxf.new("R2010")
+    document.header["$INSUNITS"] = 4
+    draw(document.modelspace())
+    document.saveas(tmp_path / "a.dxf")
+    return tmp_path / "a.dxf"
+
+
+def svg(tmp_path, body, box="0 0 1000 600"):
+    (tmp_path / "a.svg").write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{box.split()[2]}mm" viewBox="{box}">{body}</svg>'
+    )
+    return tmp_path / "a.svg"
+
+
+#: Bed joints, and head joints between them.
+LINES = [((0, 200), (1000, 200)), ((0, 400), (1000, 400))] + [
+    ((x, y), (x, y + 200)) for y, xs in ((0, (300, 700)), (200, (500,)), (400, (300, 700))) for x in xs
+]
+AREAS = [0.06, 0.06, 0.06, 0.06, 0.08, 0.08, 0.1, 0.1]
+
+
+def joints(space, miss=0.0):
+    space.add_lwpolyline([(0, 0), (1000, 0), (1000, 600), (0, 600)], close=True, dxfattribs={"layer": "wall"})
+    for (x, y), (u, v) in LINES:
+        # Head joints end short of the bed joints, or beyond them.
+        short = miss if x == u else 0.0
+        space.add_line((x, y + short), (u, v - short), dxfattribs={"layer": "joint"})
+
+
+@pytest.mark.parametrize("miss", [0.0, 0.05, -0.05])
+def test_joint_lines_cut_an_outline(tmp_path, miss):
+    drawing = read_layout(dxf(tmp_path, lambda space: joints(space, miss=miss)))
+    areas = sorted(shapely.Polygon(ring).area for ring in drawing.outlines)
+    assert areas == pytest.approx(AREAS, rel=1e-3)
+    assert set(drawing.groups) == {"wall"}
+    assert any(note.startswith("cut: 7 lines within an outline cut it into 8 blocks") for note in drawing.notes)
+    assert any(note.startswith("joined:") for note in drawing.notes) == (miss != 0.0)
+    # An end that reaches too far is one that misses. Neighbours meet: the wall has no gap and no overlap.
+    assert shapely.union_all([shapely.Polygon(r) for r in drawing.outlines]).area == pytest.approx(0.6, rel=1e-6)
+
+
+def test_strokes_cut_a_shape(tmp_path):
+    strokes = "".join(f'<path d="M{x} {y}L{u} {v}"/>' for (x, y), (u, v) in LINES)
+    path = svg(
+        tmp_path, f'<g id="wall"><rect id="w" x="0" y="0" width="1000" height="600"/></g><g id="j">{strokes}</g>'
+    )
+    drawing = read_layout(path)
+    assert sorted(shapely.Polygon(ring).area for ring in drawing.outlines) == pytest.approx(AREAS)
+    assert set(drawing.groups) == {"wall"}
+    assert len(read_layout(path, ignore="j").outlines) == 1
+
+
+def test_strokes_alone_enclose_blocks(tmp_path):
+    lines = [*LINES, ((0, 0), (1000, 0)), ((1000, 0), (1000, 600)), ((1000, 600), (0, 600)), ((0, 600), (0, 0))]
+    strokes = "".join(f'<line x1="{x}" y1="{y}" x2="{u}" y2="{v}"/>' for (x, y), (u, v) in lines)
+    drawing = read_layout(svg(tmp_path, f'<g id="wall">{strokes}</g>'))
+    assert sorted(shapely.Polygon(ring).area for ring in drawing.outlines) == pytest.approx(AREAS)
+
+
+def test_a_frame_around_loose_lines_is_not_cut(tmp_path):
+    lines = [*LINES, ((0, 0), (1000, 0)), ((1000, 0), (1000, 600)), ((1000, 600), (0, 600)), ((0, 600), (0, 0))]
+
+    def draw(space):
+        space.add_lwpolyline([(-500, -500), (2000, -500), (2000, 1500), (-500, 1500)], close=True)
+        for a, b in lines:
+            space.add_line(a, b, dxfattribs={"layer": "joint"})
+
+    drawing = read_layout(dxf(tmp_path, draw))
+    assert drawing.n_blocks == 8
+    assert any("1 frame or background around other blocks" in note for note in drawing.notes)
+
+
+def test_ends_that_miss_by_a_ten_thousandth_meet_and_by_a_hundredth_do_not(tmp_path):
+    def square(miss):
+        return lambda space: [
+            space.add_line(a, b)
+            for a, b in (
+                ((0, 0), (200, 0)),
+                ((200, miss), (200, 100)),
+                ((200, 100 + miss), (0, 100)),
+                ((miss, 100), (0, miss)),
+            )
+        ]
+
+    drawing = read_layout(dxf(tmp_path, square(0.015)))
+    assert drawing.n_blocks == 1
+    assert any(note.startswith("joined: ") and "up to 0.015" in note for note in drawing.notes)
+    with pytest.raises(
+        ValueError,
+        match=r"found: 4 lines close nothing \(4 on layer '0'\); their ends are 2 to 2(\.\d+)? from the nearest",
+    ):
+        read(dxf(tmp_path, square(2.0)))
+
+
+def test_an_outline_whose_ends_miss_by_little_is_closed_with_a_note(tmp_path):
+    ring = [(0, 0), (240, 0), (240, 65), (0, 65), (0, 0.01)]
+    drawing = read_layout(dxf(tmp_path, lambda space: space.add_lwpolyline(ring)))
+    assert drawing.n_blocks == 1
+    assert any("joined: the ends of 1 outlines, which missed each other by up to 0.01" in n for n in drawing.notes)
+
+
+def test_where_nothing_closes_the_message_says_what_there_is(tmp_path):
+    path = svg(tmp_path, '<g id="a"><path d="M0 0L100 0"/><path d="M103 0L200 50"/></g>')
+    with pytest.raises(
+        ValueError, match=r"no closed shape: 2 lines close nothing \(2 on layer 'a'\); their ends are 3 to"
+    ):
+        read(path)
+
+
+def test_thousands_of_lines_are_quick(tmp_path):
+    import time
+
+    from blockvis.formats.loose_lines import Line, faces_of_lines
+
+    n = 40
+    at = np.arange(n + 1.0)
+    lines = [Line(np.array([[x, y], [x + 1, y]]), "a", "", False) for x in at[:-1] for y in at]
+    lines += [Line(np.array([[x, y], [x, y + 1]]), "a", "", False) for x in at for y in at[:-1]]
+    start = time.perf_counter()
+    assert len(faces_of_lines(lines).rings) == n * n
+    assert time.perf_counter() - start < 10

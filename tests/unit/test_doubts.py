@@ -1,0 +1,90 @@
+"""Numbers that are probably in another unit, and what a run changes: one note each."""
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis.cases.build import case_assembly
+from blockvis.cases.case import parse_case
+from blockvis.formats.read import read_layout, write_layout
+from blockvis.layout.layout import Layout
+from blockvis.layout.units import doubt
+
+
+def bricks(path, factor, **more):
+    rings = tuple(
+        factor * np.array([[x, 0.0], [x + 0.24, 0.0], [x + 0.24, 0.071], [x, 0.071]]) for x in (0.0, 0.24, 0.48)
+    )
+    write_layout(Layout(rings, ("a", "b", "c"), **more), path)
+    return path
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1000.0, "mm"), (0.001, "km")])
+def test_metres_are_doubted_too(tmp_path, factor, unit):
+    notes = read_layout(bricks(tmp_path / "a.msh", factor)).notes
+    assert [note for note in notes if note.startswith("unit m in doubt") and f'unit = "{unit}"' in note]
+    # A unit that is given holds.
+    assert read_layout(tmp_path / "a.msh", unit=unit).outlines[0][:, 0].max() == pytest.approx(0.24)
+    assert not any("doubt" in note for note in read_layout(tmp_path / "a.msh", unit=unit).notes)
+
+
+def test_masonry_is_not_doubted():
+    assert all(doubt("m", size) == "" for size in (0.05, 0.3, 2.0, 9.0))
+    assert "cm would make it 0.35 m" in doubt("m", 35.0)
+
+
+def assembled(tmp_path, text):
+    moving = '[[supports]]\nrole = "moving"\noutline = [[-9, -9], [9, -9], [9, -8]]\n'
+    motion = "" if "[settlement]" in text else "[settlement]\ndirection = [0, -1]\nincrement = 1e-4\nlimit = 1e-3\n"
+    return case_assembly(parse_case(f"{text}\n{moving}{motion}", tmp_path / "case.toml"))
+
+
+COLUMN = '[geometry]\nlayout = "column"\n'
+
+
+@pytest.mark.parametrize(
+    ("keys", "note"),
+    [
+        (
+            "[material]\nfriction_coefficient = 35",
+            "friction_coefficient = 35 is a slope of 88.4 degrees; .* tangent, 0.7",
+        ),
+        ("[material]\ndensity = 2.0", "density 2 kg/m³ is lighter than masonry; if it is in t/m³, give 2000 kg/m³"),
+        ("[material]\ndensity = 20", "density 20 kg/m³ is lighter than masonry; if it is in kN/m³, give 2039 kg/m³"),
+        (
+            "[settlement]\ndirection = [0, -1]\nincrement = 50\nlimit = 100",
+            "increment = 50 m is",
+        ),
+    ],
+)
+def test_likely_unit_mistakes_are_named(tmp_path, keys, note):
+    with pytest.warns(UserWarning, match=note):
+        assembled(tmp_path, COLUMN + keys)
+
+
+def test_density_of_the_file_wins_with_a_note(tmp_path):
+    bricks(tmp_path / "a.json", 1.0, density=np.array([2400.0, 2500.0, np.nan]))
+    text = '[geometry]\nfile = "a.json"\n[material]\ndensity = 1800'
+    with pytest.warns(UserWarning, match=r"density = 1800 is that of 1 blocks; 2 of 3 keep .* 2400 to 2500 kg/m³"):
+        assembly = assembled(tmp_path, text)
+    assert assembly.density[:3].tolist() == [2400.0, 2500.0, 1800.0]
+
+
+def test_overlaps_cut_away_are_told(tmp_path):
+    rings = tuple(np.array([[x, 0.0], [x + 0.3, 0.0], [x + 0.3, 0.3], [x, 0.3]]) for x in (0.0, 0.298, 0.597))
+    write_layout(Layout(rings, ("left", "middle", "right")), tmp_path / "a.json")
+    with pytest.warns(UserWarning, match=r"2 overlaps of up to 0.002 m were cut away, the deepest between 'left' and"):
+        assembled(tmp_path, '[geometry]\nfile = "a.json"')
+
+
+def test_the_first_line_of_a_run_says_the_largest_block(capsys):
+    from pathlib import Path
+
+    from blockvis.cli import _in_words
+
+    rings = [np.array([[0, 0], [3, 0], [3, 1], [0, 1]]), np.array([[0, 1], [0.3, 1], [0.3, 1.4], [0, 1.4]])]
+    wall = solver.Assembly.from_outlines(rings, roles=["moving", "free"])
+    response = solver.settle(wall, solver.Settlement(direction=(0, -1), increment=0.01, limit=0.01))
+    assert _in_words(response, Path("out")).startswith(
+        "2 blocks (1 free), 0.3 m wide, 0.4 m high, weight 2354.4 N, largest block 0.5 m across\n"
+    )
