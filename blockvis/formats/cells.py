@@ -167,7 +167,7 @@ def merged(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path |
 
 def _own_names(names: Sequence[str], label: str) -> tuple[str, ...]:
     """Name the blocks of a part after it, unless they have names of their own."""
-    if not label or not all(name.startswith("block ") for name in names):
+    if not label or not all(f"{name} ".startswith("block ") for name in names):
         return tuple(names)
     return (label,) if len(names) == 1 else tuple(f"{label} {k + 1}" for k in range(len(names)))
 
