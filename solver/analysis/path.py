@@ -24,6 +24,7 @@ from solver.results.mechanism import mechanism_of
 from solver.results.response import Collapse
 from solver.tolerances import COMPUTED_GAP, DRAG, FARTHEST_FALL, GIVE, GIVE_ACROSS, IMPERFECTION, JUMP, USED_UP
 
+from .checkpoint import ProgramCheckpoint
 from .controls import Ending
 from .drivers import Driver
 
@@ -171,6 +172,8 @@ class Checkpoint:
         The phase has reached its limit.
     marks : tuple of Place
         The last two that are a notable way apart.
+    program : ProgramCheckpoint, optional
+        Of increments by linear program, to which nothing else here but phase and start belongs.
     """
 
     phase: int
@@ -182,6 +185,7 @@ class Checkpoint:
     careful_until: float = -np.inf
     ended: bool = False
     marks: tuple[Place, ...] = ()
+    program: ProgramCheckpoint | None = None
 
 
 @dataclass(frozen=True)
