@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
 import tomllib
@@ -126,6 +127,9 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
     _add_sweep(verbs)
+    schema = verbs.add_parser("schema", help="JSON schema of the case or study file, for editors of TOML")
+    schema.add_argument("file", nargs="?", choices=("case", "study"), default="case")
+    schema.set_defaults(verb=_schema)
     return parser
 
 
@@ -183,6 +187,13 @@ def _sweep(options: argparse.Namespace) -> int:
         return INTERRUPTED
     print(in_words(stored_summary(folder)))
     print(f"table and pictures in {folder}/")
+    return 0
+
+
+def _schema(options: argparse.Namespace) -> int:
+    from .reference.schema import SCHEMAS
+
+    print(json.dumps(SCHEMAS[options.file](), indent=2, ensure_ascii=False))
     return 0
 
 

@@ -19,13 +19,11 @@ from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import files_like
 from blockvis.video_suffixes import VIDEO_SUFFIXES
 
+from .case_keys import MOST_STEPS
 from .contents import Case
 from .imperfections import Imperfection, read_imperfection
 from .loads import LoadCase
 from .toml_table import Table, is_number, shortened
-
-#: More increments or frames than this are taken for a typing error.
-MOST_STEPS = 1_000_000
 
 
 def read_case(path: str | Path) -> Case:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -38,6 +39,25 @@ def parameters_of(name: str) -> dict[str, Any]:
     5
     """
     return {key: value.default for key, value in inspect.signature(_layout(name)).parameters.items()}
+
+
+def described(name: str) -> dict[str, tuple[str, str]]:
+    """List the kind of value and the meaning of the parameters of a layout, of its docstring.
+
+    Examples
+    --------
+    >>> described("segmental arch")["span"]
+    ('float [m]', 'Of the intrados; a rise of half the span gives a semicircle.')
+    """
+    text = inspect.cleandoc(_layout(name).__doc__ or "")
+    block = re.search(r"Parameters\n-+\n(.*?)(?=\n\n\w+\n-+\n|\Z)", text, re.DOTALL)
+    found: dict[str, tuple[str, str]] = {}
+    for names, kind, meaning in re.findall(
+        r"^(\w[\w, ]*?) : (.*)((?:\n +.*)*)", block[1] if block else "", re.MULTILINE
+    ):
+        for one in names.split(", "):
+            found[one] = (kind, " ".join(meaning.split()))
+    return found
 
 
 def build(name: str, parameters: Mapping[str, Any] | None = None) -> solver.Assembly:

@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[2]
 ORDER = (
     "blockvis.__main__",
     "blockvis.cli",
+    "blockvis.reference",
     "blockvis.studies",
     "blockvis.runs.run",
     "blockvis.report",
@@ -25,6 +26,7 @@ ORDER = (
     "blockvis.pictures",
     "blockvis.runs",
     "blockvis.cases.case",
+    "blockvis.cases.case_keys",
     "blockvis.runs.kinds",
     "blockvis.runs.pushover",
     "blockvis.runs.limit_load",
