@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import glob
 import json
 import os
 import sys
@@ -127,9 +128,8 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
     _add_sweep(verbs)
-    schema = verbs.add_parser("schema", help="JSON schema of the case or study file, for editors of TOML")
-    schema.add_argument("file", nargs="?", choices=("case", "study"), default="case")
-    schema.set_defaults(verb=_schema)
+    _add_new(verbs)
+    _add_schema(verbs)
     return parser
 
 
@@ -160,6 +160,23 @@ def _add_sweep(verbs: Any) -> None:
     sweep.set_defaults(verb=_sweep)
 
 
+def _add_new(verbs: Any) -> None:
+    new = verbs.add_parser("new", help="a case file for a drawing, with a comment on every key")
+    new.add_argument("drawing", metavar="DRAWING", help="or a folder or a pattern of files, one per stone")
+    new.add_argument("-o", "--output", metavar="CASE.toml", help="(default: <drawing>.toml)")
+    new.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    _add_view(new)
+    _add_choice(new)
+    new.add_argument("--force", action="store_true", help="replace CASE.toml if it is there already")
+    new.set_defaults(verb=_new)
+
+
+def _add_schema(verbs: Any) -> None:
+    schema = verbs.add_parser("schema", help="JSON schema of the case or study file, for editors of TOML")
+    schema.add_argument("file", nargs="?", choices=("case", "study"), default="case")
+    schema.set_defaults(verb=_schema)
+
+
 def _sweep(options: argparse.Namespace) -> int:
     from .studies.campaign import run_study
     from .studies.study_file import read_study
@@ -187,6 +204,29 @@ def _sweep(options: argparse.Namespace) -> int:
         return INTERRUPTED
     print(in_words(stored_summary(folder)))
     print(f"table and pictures in {folder}/")
+    return 0
+
+
+def _new(options: argparse.Namespace) -> int:
+    from .atomic_files import whole_file
+    from .cases.build import case_assembly
+    from .cases.case import parse_case
+    from .cases.new_case import case_text, relative_to
+    from .formats.read import inspect
+
+    drawing = Path(options.drawing)
+    stem = drawing.parent.name if glob.has_magic(drawing.name) else drawing.resolve().stem
+    target = _new_file(options.output or f"{stem}.toml", options.force)
+    choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
+    found = inspect(drawing, unit=options.unit, **choice)
+    text = case_text(found, relative_to(target.parent, drawing), **choice)
+    with whole_file(target) as partial:
+        partial.write_text(text, encoding="utf-8", newline="\n")
+    print(f"{target} written for {len(found.kept)} blocks; run it: blockvis run {target}")
+    try:
+        case_assembly(parse_case(text, target))
+    except ValueError as error:
+        print(f"blockvis: note: as it is, blockvis run refuses it: {error}", file=sys.stderr)
     return 0
 
 

@@ -26,6 +26,7 @@ ORDER = (
     "blockvis.pictures",
     "blockvis.runs",
     "blockvis.cases.case",
+    "blockvis.cases.new_case",
     "blockvis.cases.case_keys",
     "blockvis.runs.kinds",
     "blockvis.runs.pushover",
