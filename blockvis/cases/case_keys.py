@@ -66,6 +66,8 @@ _PLACES = ValueKind(
     {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
 )
 
+_NEEDED, _UNLIMITED = "required where the distribution has it", "; normal and lognormal have none"
+
 #: Numbers of the distributions; :data:`blockvis.cases.distributions.KINDS` says which of them each one takes.
 DISTRIBUTION_KEYS = (
     Key(
@@ -75,13 +77,19 @@ DISTRIBUTION_KEYS = (
         "normal",
         required=True,
     ),
-    Key("mean", NUMBER, "Mean of normal and lognormal, before they are cut off", 0.6),
-    Key("deviation", POSITIVE, "Standard deviation of normal and lognormal, before they are cut off", 0.1),
-    Key("lower", NUMBER, "Lower limit", 0.2),
-    Key("upper", NUMBER, "Upper limit", 1.0),
-    Key("mode", NUMBER, "Most probable value of triangular", 0.6),
-    Key("alpha", POSITIVE, "First shape parameter of beta", 2.0),
-    Key("beta", POSITIVE, "Second shape parameter of beta", 3.0),
+    Key("mean", NUMBER, "Mean of normal and lognormal, before they are cut off", 0.6, otherwise=_NEEDED),
+    Key(
+        "deviation",
+        POSITIVE,
+        "Standard deviation of normal and lognormal, before they are cut off",
+        0.1,
+        otherwise=_NEEDED,
+    ),
+    Key("lower", NUMBER, "Lower limit", 0.2, otherwise=_NEEDED + _UNLIMITED),
+    Key("upper", NUMBER, "Upper limit", 1.0, otherwise=_NEEDED + _UNLIMITED),
+    Key("mode", NUMBER, "Most probable value of triangular", 0.6, otherwise=_NEEDED),
+    Key("alpha", POSITIVE, "First shape parameter of beta", 2.0, otherwise=_NEEDED),
+    Key("beta", POSITIVE, "Second shape parameter of beta", 3.0, otherwise=_NEEDED),
 )
 
 

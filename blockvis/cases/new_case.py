@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 import os
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -16,6 +14,7 @@ import numpy as np
 import solver
 from blockvis.layout.inspect import Inspection
 from blockvis.numbers import rounded_length
+from blockvis.toml_text import toml_key, toml_value
 
 from . import case_keys
 from .build import DENSITY
@@ -233,12 +232,12 @@ def _roles(found: Inspection, ground: Ground) -> str:
     lines = [_comment(f"{section.meaning}. {ground.says}")]
     as_drawn = [i for i in found.kept if found.roles[i] != solver.FREE and found.layout.names[i] not in ground.roles]
     drawn = dict.fromkeys((found.layout.names[i], found.roles[i]) for i in as_drawn)
-    said = [f"{_toml(name)} = {_toml(role)}" for name, role in list(drawn)[:12]]
+    said = [f"{toml_key(name)} = {toml_value(role)}" for name, role in list(drawn)[:12]]
     if not said and not ground.roles:
         groups = sorted({word for word in found.layout.groups if word})
-        said = [f"{_toml(group)} = {_toml(solver.FIXED)}" for group in groups[:12]]
+        said = [f"{toml_key(group)} = {toml_value(solver.FIXED)}" for group in groups[:12]]
     lines += [section.header if ground.roles else f"# {section.header}"]
-    lines += [f"{_toml(name)} = {_toml(role)}" for name, role in ground.roles.items()]
+    lines += [f"{toml_key(name)} = {toml_value(role)}" for name, role in ground.roles.items()]
     return "\n".join([*lines, *(f"# {line}" for line in said), ""])
 
 
@@ -275,7 +274,7 @@ def _table(
         given = values.get(key.name)
         lines.append(_comment(_about(key, given=given is not None)))
         shown = _other(key, values) if given is None else given
-        lines.append(f"{'# ' if given is None else ''}{key.name} = {_toml(shown)}")
+        lines.append(f"{'# ' if given is None else ''}{key.name} = {toml_value(shown)}")
     return "\n".join([*lines, ""])
 
 
@@ -295,17 +294,3 @@ def _about(key: Key, *, given: bool) -> str:
 
 def _comment(text: str) -> str:
     return "\n".join(f"# {line}" for line in textwrap.wrap(text, WIDTH, break_long_words=False))
-
-
-def _toml(value: Any) -> str:
-    """Write a value as TOML has it."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_toml(key)} = {_toml(one)}" for key, one in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, float):
-        # Lengths of drawings come with the digits of their unit's conversion.
-        text = f"{value:.12g}"
-        return text if any(c in text for c in ".en") or not math.isfinite(value) else f"{text}.0"
-    # The strings of JSON are basic strings of TOML, but for one control character.
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

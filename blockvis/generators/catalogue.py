@@ -14,6 +14,9 @@ from .arches import arch, basket_handle_arch, pointed_arch, segmental_arch
 from .frames import arch_on_piers, buttressed_arch, column, portal
 from .walls import facade, panel, wall
 
+#: A link of a docstring, and the last part of what it names.
+_LINK = re.compile(r":\w+:`~?(?:\w+\.)*(\w+)`")
+
 #: Every layout by its name.
 LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
     "arch": arch,
@@ -52,11 +55,13 @@ def described(name: str) -> dict[str, tuple[str, str]]:
     text = inspect.cleandoc(_layout(name).__doc__ or "")
     block = re.search(r"Parameters\n-+\n(.*?)(?=\n\n\w+\n-+\n|\Z)", text, re.DOTALL)
     found: dict[str, tuple[str, str]] = {}
-    for names, kind, meaning in re.findall(
-        r"^(\w[\w, ]*?) : (.*)((?:\n +.*)*)", block[1] if block else "", re.MULTILINE
+    for names, kind, lines in re.findall(
+        r"^(\w[\w, ]*?)(?: : (.*))?((?:\n +.*)+|$)", block[1] if block else "", re.MULTILINE
     ):
+        meaning = " ".join(lines.split())
+        same = re.match(r"As in :func:`(\w+)`", meaning)
         for one in names.split(", "):
-            found[one] = (kind, " ".join(meaning.split()))
+            found[one] = described(same[1])[one] if same else (kind, _LINK.sub(r"\1", meaning).replace("``", "`"))
     return found
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from blockvis.cases.case_keys import DISTRIBUTION_KEYS, IMPERFECTION_KEYS
 from blockvis.cases.key import NUMBERS, POSITIVE, TEXT, TEXTS, Key, Section, ValueKind, one_of, whole
 
@@ -30,9 +32,10 @@ STUDY = Section(
 
 #: Keys of a parameter that chooses from a list of values.
 LIST_KEYS = (
-    Key("values", ValueKind("list", {"type": "array", "minItems": 1}), "Values to choose from", [0.3, 0.5, 0.7]),
+    Key("values", ValueKind("list", {"type": "array", "minItems": 1}), "Values to choose from", [0.3, 0.5, 0.7],
+        otherwise="a distribution is given"),
     Key("weights", NUMBERS, "Their probabilities, up to a common factor", [1, 2, 1], otherwise="all alike"),
-)
+)  # fmt: skip
 
 #: Keys of every parameter.
 COMMON_KEYS = (
@@ -48,7 +51,7 @@ PARAMETER = Section(
         *COMMON_KEYS,
         *LIST_KEYS,
         *(
-            Key(key.name, key.kind, key.meaning, key.example, otherwise="values is given" if key.required else "")
+            replace(key, required=False, otherwise="values is given" if key.required else key.otherwise)
             for key in DISTRIBUTION_KEYS
         ),
         Key("points", whole(0), "Number of values of the distribution that a grid takes", 5, default=0),

@@ -43,6 +43,7 @@ ORDER = (
     "blockvis.video_suffixes",
     "blockvis.extras",
     "blockvis.numbers",
+    "blockvis.toml_text",
     "blockvis.vtk_files",
     "blockvis.atomic_files",
     "solver",
