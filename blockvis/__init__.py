@@ -11,6 +11,7 @@ Lengths are in m, forces in N, angles in rad; see ``solver`` for the signs.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -66,8 +67,24 @@ def _plot(response: solver.Response, **options: Any) -> Any:
     return show(response, **options)
 
 
-# solver has no plotting; importing blockvis adds `Response.plot()`.
+def _shown_by(name: str) -> Callable[[Any], str]:
+    """Make a method for notebooks of a function of :mod:`blockvis.report.notebook`, loaded when first used."""
+
+    def _repr_html_(value: Any) -> str:
+        written: str = getattr(import_module(".report.notebook", __name__), name)(value)
+        return written
+
+    return _repr_html_
+
+
+# solver has no plotting; importing blockvis adds `Response.plot()` and what notebooks show of its values.
 setattr(solver.Response, "plot", _plot)  # noqa: B010
+for _kind, _name in (
+    (solver.Response, "response_html"),
+    (solver.Collapse, "collapse_html"),
+    (solver.Assembly, "assembly_html"),
+):
+    setattr(_kind, "_repr_html_", _shown_by(_name))  # noqa: B010
 
 
 def __getattr__(name: str) -> Any:

@@ -109,8 +109,8 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
         badge=html.escape(badge_of(response) if fall is None else FALL_BADGE),
         style=(page / "player.css").read_text(encoding="utf-8"),
         script=(page / "player.js").read_text(encoding="utf-8"),
-        summary=_rows(_summary(response)),
-        certificate=_rows(_certificate(response)),
+        summary=html_rows(summary_rows(response)),
+        certificate=html_rows(_certificate(response)),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
         case_open=" open" if case_text else "",
         model=model,
@@ -372,14 +372,15 @@ def _curve(response: solver.Response) -> dict[str, Any]:
     }
 
 
-def _summary(response: solver.Response) -> list[tuple[str, str]]:
+def summary_rows(response: solver.Response) -> list[tuple[str, str]]:
+    """Sum up a response in words and numbers with their units."""
     assembly, path = response.assembly, response.path
     rows = [("analysis", response.analysis), ("status", str(response.stop)), *KINDS[response.analysis].rows(response)]
     frames = "of pseudo-motion" if response.swings else "falling"
     rows += [
         ("weight W", force_text(response.total_weight)),
         ("blocks", f"{assembly.n_blocks} ({int(assembly.free.sum())} free)"),
-        ("contact points", str(len(response.increments[0].contacts.points))),
+        *([("contact points", str(len(response.increments[0].contacts.points)))] if response.increments else []),
         ("increments", f"{len(path)} in equilibrium, {len(response.increments) - len(path)} {frames}"),
         ("solver time", f"{sum(i.seconds for i in response.increments):.1f} s"),
     ]
@@ -401,5 +402,6 @@ def _certificate(response: solver.Response) -> list[tuple[str, str]]:
     ]
 
 
-def _rows(rows: list[tuple[str, str]]) -> str:
+def html_rows(rows: list[tuple[str, str]]) -> str:
+    """Write the rows of a table as HTML."""
     return "".join(f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>" for name, value in rows)
