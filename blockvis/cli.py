@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import glob
+import io
 import json
 import os
 import sys
@@ -17,6 +18,7 @@ import numpy as np
 
 import solver
 
+from .broken_pipes import is_broken_pipe
 from .extras import MissingExtra
 from .generators import LAYOUTS
 from .layout.views import VIEWS
@@ -44,9 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = _show_warning
     try:
         code: int = options.verb(options)
-    except BrokenPipeError:
-        raise
     except (ValueError, OSError, MissingExtra) as error:
+        if isinstance(error, OSError) and is_broken_pipe(error):
+            raise
         print(f"blockvis: {error}", file=sys.stderr)
         return BAD_INPUT
     except MemoryError:
@@ -63,10 +65,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def entry() -> None:
     """Console script."""
+    # Names of blocks may have characters that a console, or what the output goes to, cannot show.
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         code = main()
         sys.stdout.flush()
-    except BrokenPipeError:
+    except OSError as error:
+        if not is_broken_pipe(error):
+            raise
         # Whatever reads the output, such as head, has enough of it; Python would complain again as it ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
@@ -208,7 +215,7 @@ def _sweep(options: argparse.Namespace) -> int:
 
 
 def _new(options: argparse.Namespace) -> int:
-    from .atomic_files import whole_file
+    from .atomic_files import write_whole
     from .cases.build import case_assembly
     from .cases.case import parse_case
     from .cases.new_case import case_text, relative_to
@@ -220,8 +227,7 @@ def _new(options: argparse.Namespace) -> int:
     choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
     found = inspect(drawing, unit=options.unit, **choice)
     text = case_text(found, relative_to(target.parent, drawing), **choice)
-    with whole_file(target) as partial:
-        partial.write_text(text, encoding="utf-8", newline="\n")
+    write_whole(target, text)
     print(f"{target} written for {len(found.kept)} blocks; run it: blockvis run {target}")
     try:
         case_assembly(parse_case(text, target))
@@ -233,7 +239,8 @@ def _new(options: argparse.Namespace) -> int:
 def _schema(options: argparse.Namespace) -> int:
     from .reference.schema import SCHEMAS
 
-    print(json.dumps(SCHEMAS[options.file](), indent=2, ensure_ascii=False))
+    # ASCII, so that it is valid JSON in whatever encoding a shell writes it to a file.
+    print(json.dumps(SCHEMAS[options.file](), indent=2))
     return 0
 
 

@@ -54,9 +54,12 @@ def read_case(path: str | Path) -> Case:
             f'[geometry] file = "{path.name}" (see examples/); blockvis info shows what is in it'
         )
     try:
-        text = path.read_text(encoding="utf-8")
+        # Editors of Windows begin a file with a mark of its encoding.
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: is not a text file ({error.reason} at byte {error.start})") from None
+        raise ValueError(
+            f"{path}: is not a text file in UTF-8 ({error.reason} at byte {error.start}); save it in UTF-8"
+        ) from None
     return parse_case(text, path)
 
 
@@ -67,7 +70,8 @@ def parse_case(text: str, source: Path) -> Case:
     except RecursionError:
         raise ValueError(f"{source}: nests lists or tables without end; a case file has a handful of them") from None
     except ValueError as error:
-        raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"') from None
+        hint = "; write paths with / or in single quotes" if "\\" in text else ""
+        raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"{hint}') from None
     return case_of(values, source, text)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from blockvis.atomic_files import write_whole
 from blockvis.cases import case_keys
 from blockvis.cases.distributions import CUT_OFF, KINDS
 from blockvis.cases.key import Key, Section
@@ -66,13 +67,7 @@ def write_pages(folder: str | Path) -> list[Path]:
     list of Path
         The files.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, page in PAGES.items():
-        (folder / name).write_text(page(), encoding="utf-8", newline="\n")
-        written.append(folder / name)
-    return written
+    return [write_whole(Path(folder) / name, page()) for name, page in PAGES.items()]
 
 
 def _section(section: Section) -> list[str]:

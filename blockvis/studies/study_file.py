@@ -223,9 +223,11 @@ def read_study(source: str | Path | Mapping[str, Any]) -> Study:
     if not path.is_file():
         raise ValueError(f"there is no study file '{path}'")
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
+        values = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: is not a text file ({error.reason} at byte {error.start})") from None
+        raise ValueError(
+            f"{path}: is not a text file in UTF-8 ({error.reason} at byte {error.start}); save it in UTF-8"
+        ) from None
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path}: {error}; a study file is TOML") from None
     return _study(values, path)

@@ -45,6 +45,7 @@ ORDER = (
     "blockvis.numbers",
     "blockvis.toml_text",
     "blockvis.vtk_files",
+    "blockvis.broken_pipes",
     "blockvis.atomic_files",
     "solver",
     "solver.analysis",
