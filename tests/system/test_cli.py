@@ -74,10 +74,10 @@ def test_run_writes_the_results_folder(case, capsys, monkeypatch):
 def test_results_are_not_overwritten_without_force(case, capsys):
     out = case.parent / "out"
     out.mkdir()
-    (out / "summary.json").write_text("{}")
+    (out / "summary.json").write_text("{}", encoding="utf-8")
     assert main(["run", str(case), "-o", str(out)]) == 2
     assert "--force" in capsys.readouterr().err
-    assert (out / "summary.json").read_text() == "{}"
+    assert (out / "summary.json").read_text(encoding="utf-8") == "{}"
 
 
 def test_console_script_and_exit_code():

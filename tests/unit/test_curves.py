@@ -23,7 +23,7 @@ def test_png_has_a_curve_and_the_collapse(tmp_path):
 
 
 def test_svg_says_what_it_shows(tmp_path):
-    text = draw_curve(arch_response(), tmp_path / "curve.svg").read_text()
+    text = draw_curve(arch_response(), tmp_path / "curve.svg").read_text(encoding="utf-8")
     said = re.findall(r"<!-- (.*?) -->", text)
     assert "settlement [m]" in said
     assert "reaction [kN]" in said
