@@ -77,8 +77,24 @@ def _shown_by(name: str) -> Callable[[Any], str]:
     return _repr_html_
 
 
-# solver has no plotting; importing blockvis adds `Response.plot()` and what notebooks show of its values.
-setattr(solver.Response, "plot", _plot)  # noqa: B010
+def _mesh(response: solver.Response, k: int = -1, *, shape: str = "moved") -> Any:
+    """Make a pyvista dataset of the blocks of increment k; see :func:`blockvis.results.datasets.block_dataset`."""
+    from .results.datasets import block_dataset
+
+    return block_dataset(response.assembly, response.increments[k], shape=shape)
+
+
+def _joints(response: solver.Response, k: int = -1, *, shape: str = "moved") -> Any:
+    """Make a pyvista dataset of the joints of increment k; see :func:`blockvis.results.datasets.joint_dataset`."""
+    from .results.datasets import joint_dataset
+
+    return joint_dataset(response.assembly, response.increments[k], shape=shape)
+
+
+# solver draws nothing and knows no pyvista; importing blockvis adds `Response.plot()`, `mesh(k)` and `joints(k)`, and
+# what notebooks show of its values.
+for _name, _method in (("plot", _plot), ("mesh", _mesh), ("joints", _joints)):
+    setattr(solver.Response, _name, _method)
 for _kind, _name in (
     (solver.Response, "response_html"),
     (solver.Collapse, "collapse_html"),

@@ -2,38 +2,39 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Mapping
 from typing import Any
 
+import tomlkit
 
-def toml_value(value: Any) -> str:
-    r"""Write a value as TOML has it; lengths with twelve digits, which leaves out the rounding of their conversion.
+
+def as_toml(value: Any) -> str:
+    r"""Write a value as TOML has it; numbers with twelve digits, which leaves out the rounding of converted lengths.
 
     Examples
     --------
-    >>> toml_value({"x": 0.1 + 0.2, "names": ["a", 'b "c"'], "film": False})
-    '{ x = 0.3, names = ["a", "b \\"c\\""], film = false }'
+    >>> print(as_toml({"x": 0.1 + 0.2, "names": ["a", 'b "c"'], "film": False}))
+    {x = 0.3, names = ["a", "b \"c\""], film = false}
     """
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{toml_key(key)} = {toml_value(one)}" for key, one in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(toml_value, value))}]"
-    if isinstance(value, float):
-        text = f"{value:.12g}"
-        return text if any(c in text for c in ".en") or not math.isfinite(value) else f"{text}.0"
-    # The strings of JSON are basic strings of TOML, but for one control character.
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return tomlkit.item(_inline(value)).as_string()
 
 
-def toml_key(key: str) -> str:
+def as_key(key: str) -> str:
     """Write a key as TOML has it, in quotes where it needs them.
 
     Examples
     --------
-    >>> toml_key("limit"), toml_key("left springer")
+    >>> as_key("limit"), as_key("left springer")
     ('limit', '"left springer"')
     """
-    plain = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
-    return key if plain else toml_value(key)
+    return tomlkit.key(key).as_string()
+
+
+def _inline(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        table = tomlkit.inline_table()
+        table.update({key: _inline(one) for key, one in value.items()})
+        return table
+    if isinstance(value, list | tuple):
+        return [_inline(one) for one in value]
+    return float(f"{value:.12g}") if isinstance(value, float) else value

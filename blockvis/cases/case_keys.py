@@ -307,7 +307,9 @@ OUTPUT = Section(
     "output",
     "What is written beside the results",
     (Key("animation", _FILM, "Name of the film in the results folder; false for none", "collapse.gif",
-         default="collapse.mp4"),),
+         default="collapse.mp4"),
+     Key("vtu", one_of(("moved", "undeformed")), "Where the points of the VTU files are: where the blocks have moved "
+         "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved")),
 )  # fmt: skip
 
 #: Every table of the case file with its keys.

@@ -14,7 +14,7 @@ import numpy as np
 import solver
 from blockvis.layout.inspect import Inspection
 from blockvis.numbers import rounded_length
-from blockvis.toml_text import toml_key, toml_value
+from blockvis.toml_text import as_key, as_toml
 
 from . import case_keys
 from .build import DENSITY
@@ -232,12 +232,12 @@ def _roles(found: Inspection, ground: Ground) -> str:
     lines = [_comment(f"{section.meaning}. {ground.says}")]
     as_drawn = [i for i in found.kept if found.roles[i] != solver.FREE and found.layout.names[i] not in ground.roles]
     drawn = dict.fromkeys((found.layout.names[i], found.roles[i]) for i in as_drawn)
-    said = [f"{toml_key(name)} = {toml_value(role)}" for name, role in list(drawn)[:12]]
+    said = [f"{as_key(name)} = {as_toml(role)}" for name, role in list(drawn)[:12]]
     if not said and not ground.roles:
         groups = sorted({word for word in found.layout.groups if word})
-        said = [f"{toml_key(group)} = {toml_value(solver.FIXED)}" for group in groups[:12]]
+        said = [f"{as_key(group)} = {as_toml(solver.FIXED)}" for group in groups[:12]]
     lines += [section.header if ground.roles else f"# {section.header}"]
-    lines += [f"{toml_key(name)} = {toml_value(role)}" for name, role in ground.roles.items()]
+    lines += [f"{as_key(name)} = {as_toml(role)}" for name, role in ground.roles.items()]
     return "\n".join([*lines, *(f"# {line}" for line in said), ""])
 
 
@@ -274,7 +274,7 @@ def _table(
         given = values.get(key.name)
         lines.append(_comment(_about(key, given=given is not None)))
         shown = _other(key, values) if given is None else given
-        lines.append(f"{'# ' if given is None else ''}{key.name} = {toml_value(shown)}")
+        lines.append(f"{'# ' if given is None else ''}{key.name} = {as_toml(shown)}")
     return "\n".join([*lines, ""])
 
 

@@ -13,7 +13,7 @@ from blockvis.cases.key import Key, Section
 from blockvis.generators import LAYOUTS, parameters_of
 from blockvis.generators.catalogue import described
 from blockvis.studies import study_keys
-from blockvis.toml_text import toml_key, toml_value
+from blockvis.toml_text import as_key, as_toml
 
 _HEAD = "| key | value | unit | default | meaning | example |\n|---|---|---|---|---|---|"
 
@@ -74,7 +74,7 @@ def _section(section: Section) -> list[str]:
     shown = section.header.replace("*", "NAME")
     parts = [f"## `{shown}`", f"{section.meaning}."]
     if section.names is not None:
-        lines = [shown, *(f"{toml_key(key)} = {toml_value(value)}" for key, value in section.example.items())]
+        lines = [shown, *(f"{as_key(key)} = {as_toml(value)}" for key, value in section.example.items())]
         choices = ", ".join(f"`{word}`" for word in section.names.schema.get("enum", ()))
         return [*parts, f"Values: {choices or section.names.words}.", _code(lines)]
     rows = [_row(key) for key in section.keys]
@@ -82,11 +82,9 @@ def _section(section: Section) -> list[str]:
 
 
 def _row(key: Key) -> str:
-    default = "required" if key.required else key.otherwise if key.default is None else f"`{toml_value(key.default)}`"
+    default = "required" if key.required else key.otherwise if key.default is None else f"`{as_toml(key.default)}`"
     kind = ", ".join(f'`"{word}"`' for word in key.choices) or key.kind.words
-    return _cells(
-        f"`{key.name}`", kind, key.unit, default, f"{key.meaning}.", f"`{key.name} = {toml_value(key.example)}`"
-    )
+    return _cells(f"`{key.name}`", kind, key.unit, default, f"{key.meaning}.", f"`{key.name} = {as_toml(key.example)}`")
 
 
 def _cells(*cells: str) -> str:
@@ -108,7 +106,7 @@ def _layout(name: str) -> str:
 
 
 def _default(value: Any) -> str:
-    return "" if value is None else f"`{toml_value(value)}`"
+    return "" if value is None else f"`{as_toml(value)}`"
 
 
 def _distributions() -> str:

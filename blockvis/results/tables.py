@@ -12,6 +12,7 @@ import numpy as np
 
 import solver
 
+from .about import collapse_mechanism, loss_of, mechanism_text
 from .record import Record
 
 #: Columns of response.csv.
@@ -66,8 +67,9 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "settlement_unit": response.settlements[-1].unit if response.settlements else response.parameter.unit,
         "initial_reaction": path[0].reaction if path else None,
         "collapse_reaction": collapse.reaction if collapse else None,
-        "mechanism": collapse.words if collapse else None,
+        "mechanism": mechanism_text(response) if collapse else None,
         **_joint_counts(response),
+        **_loss(response),
         "analysis": response.analysis,
         "parameter": response.parameter.name,
         **own,
@@ -90,11 +92,22 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
 
 def _joint_counts(response: solver.Response) -> dict[str, int | None]:
     """How many hinges and sliding joints the collapse mechanism has, as the picture of it shows them."""
-    if response.collapse is None or not response.path:
+    mechanism = collapse_mechanism(response)
+    if mechanism is None:
         return {"hinges": None, "sliding_joints": None}
-    falling = solver.with_motion(response.path[-1], response.collapse.mechanism)
-    mechanism = solver.mechanism_of(response.assembly, falling)
     return {"hinges": len(mechanism.hinges), "sliding_joints": len(mechanism.sliding)}
+
+
+def _loss(response: solver.Response) -> dict[str, Any]:
+    """Weight that falls in the collapse, its share of the whole, and whether that is a local loss."""
+    loss = loss_of(response)
+    if loss is None:
+        return {"loss": None, "falling_weight": None, "falling_share": None}
+    return {
+        "loss": "local" if loss.local else "structure",
+        "falling_weight": loss.weight,
+        "falling_share": loss.share,
+    }
 
 
 def own_columns(parameter: solver.Quantity) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ import solver
 from blockvis.cases.contents import Case
 from blockvis.cases.key import PAIR, POSITIVE, TEXT, Key, Section
 from blockvis.cases.toml_table import Table
+from blockvis.results.about import mechanism_text
 from blockvis.suggestions import nearest
 
 from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, begun, needs_dry_joints, needs_live_load
@@ -125,7 +126,7 @@ class PushoverKind(AnalysisKind):
             low, high = response.collapse.bracket
             lines += [
                 f"zero capacity at     {response.collapse.displacement:12.6g} m   between {low:.6g} and {high:.6g}",
-                f"mechanism: {response.collapse.words}",
+                f"mechanism: {mechanism_text(response)}",
             ]
         return lines
 

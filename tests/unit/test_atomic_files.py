@@ -94,8 +94,9 @@ def test_all_of_an_increment_is_on_the_disk_before_the_checkpoint_that_counts_it
     del done[:]
     results.add(next(steps))
     placed = [path.name for what, path in done if what == "replace"]
-    lists = ["response.csv", "blocks.pvd", "contacts.pvd"]
-    assert placed == ["blocks_00000.vtu", "contacts_00000.vtu", "state_00000.npz", *lists, "checkpoint.npz"]
+    files = [f"{kind}_00000.vtu" for kind in ("blocks", "contacts", "joints")]
+    lists = ["response.csv", "blocks.pvd", "contacts.pvd", "joints.pvd"]
+    assert placed == [*files, "state_00000.npz", *lists, "checkpoint.npz"]
     flushed = [path.name for what, path in done if what == "flush"]
     for name in placed:
         stem, _, suffix = name.rpartition(".")
