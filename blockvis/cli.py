@@ -247,7 +247,11 @@ def _add_new(verbs: Any) -> None:
 
 
 def _add_schema(verbs: Any) -> None:
-    schema = verbs.add_parser("schema", help="JSON schema of the case or study file, for editors of TOML")
+    schema = verbs.add_parser(
+        "schema",
+        help="JSON schema of the case or study file, for editors of TOML",
+        epilog="blockvis schema > case.schema.json; then #:schema ./case.schema.json is the first line of a case",
+    )
     schema.add_argument("file", nargs="?", choices=("case", "study"), default="case")
     schema.set_defaults(verb=_schema)
 

@@ -163,7 +163,7 @@ def ground_of(found: Inspection) -> Ground:
         )
     names = found.layout.names
     right = max(fixed, key=lambda i: float(found.layout.outlines[i][:, 0].mean()))
-    if len(fixed) > 1 and names.count(names[right]) == 1:
+    if len(fixed) > 1 and names[right] and names.count(names[right]) == 1:
         return Ground(
             f"The drawing says which blocks are supports, but of none that it moves: here '{names[right]}' does.",
             roles={names[right]: solver.MOVING},
@@ -293,4 +293,6 @@ def _about(key: Key, *, given: bool) -> str:
 
 
 def _comment(text: str) -> str:
+    # Layers may have names that TOML refuses even in a comment.
+    text = "".join(c if c.isprintable() or c.isspace() else "\ufffd" for c in text)
     return "\n".join(f"# {line}" for line in textwrap.wrap(text, WIDTH, break_long_words=False))

@@ -20,13 +20,14 @@ _HEAD = "| key | value | unit | default | meaning | example |\n|---|---|---|---|
 _CASE_INTRODUCTION = """\
 A case file is TOML in UTF-8. Lengths are in m, forces in N, angles in rad; compression is positive, moments are
 counter-clockwise. Paths are relative to the case file. A key that is not in these tables is refused.
-`blockvis new DRAWING` writes a case with a comment on every key; `blockvis schema` prints the same tables as a JSON
-schema, with which editors complete and check them.
+`blockvis new DRAWING` writes a case with a comment on every key. `blockvis schema > case.schema.json` writes the same
+tables as a JSON schema; with `#:schema ./case.schema.json` as the first line of a case, editors such as Visual Studio
+Code with Even Better TOML complete and check its keys.
 """
 
 _STUDY_INTRODUCTION = """\
 A study file is TOML in UTF-8 and names a [case](case_keys.md), what varies in it, and how often. A key that is not in
-these tables is refused. `blockvis schema study` prints the same tables as a JSON schema.
+these tables is refused. `blockvis schema study` prints the same tables as a JSON schema for editors.
 """
 
 

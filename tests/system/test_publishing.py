@@ -1,6 +1,7 @@
 """Wheel and sdist are built, pass the checks of the package index, and hold what running needs."""
 
 import os
+import re
 import subprocess
 import sys
 import tarfile
@@ -28,6 +29,12 @@ def built(tmp_path_factory):
     _ran(sys.executable, "-m", "build", "--outdir", folder, ROOT)
     (wheel,), (sdist,) = folder.glob("*.whl"), folder.glob("*.tar.gz")
     return wheel, sdist
+
+
+def test_the_citation_has_the_version_that_is_built(built):
+    wheel, _ = built
+    cited = re.search(r"^version: (\S+)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.MULTILINE)
+    assert wheel.name.startswith(f"blockvis-{cited[1]}-")
 
 
 def test_the_package_index_would_take_them(built):

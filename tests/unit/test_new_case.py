@@ -157,6 +157,19 @@ def test_a_drawing_that_is_missing_is_refused(tmp_path, capsys):
     assert not (tmp_path / "case.toml").exists()
 
 
+def test_hostile_names_stay_in_their_quotes_and_comments(tmp_path):
+    names = ['q"\\', "new\nline = 1", "nul\x00", "[[loads]]", "support \x7f é", "support 2 \u2028"]
+    blocks = [
+        {"name": name, "role": "free", "outline": [[k, 0], [k + 0.9, 0], [k + 0.9, 1], [k, 1]]}
+        for k, name in enumerate(names)
+    ]
+    path = tmp_path / "hostile.json"
+    path.write_text(json.dumps({"format": "blockvis layout", "unit": "m", "blocks": blocks}), encoding="utf-8")
+    _, values = _written(path)
+    assert values["roles"] == {names[4]: "fixed", names[5]: "moving"}
+    assert set(values) == {"geometry", "roles", "material", "settlement", "output"}
+
+
 def test_every_commented_key_may_be_uncommented(tmp_path):
     """The values in the comments are of the right kind: the case stays a case with any one of them."""
     path = tmp_path / "portal.svg"
