@@ -92,7 +92,7 @@ def test_a_failed_run_says_so_first():
     page = report_html(failed(arch_response()))
     assert "solver failed" in re.search("<h1>(.*?)</h1>", page).group(1).lower()
     banner = re.search('<p class="failed">(.*?)</p>', page).group(1)
-    assert "The solver failed after settlement 0.1409 m: a point is off by 1e-7 m" in banner
+    assert "The solver failed after settlement 0.1410 m: a point is off by 1e-7 m" in banner
     assert 'class="failed"' not in report_html(arch_response())
 
 
