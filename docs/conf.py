@@ -1,0 +1,104 @@
+"""How the manual is built: ``python -m sphinx -W -b html docs docs/_build``, without a network."""
+
+import os
+import shutil
+import subprocess
+import sys
+import warnings
+from importlib.metadata import version as installed
+from pathlib import Path
+
+from sphinx_gallery.scrapers import figure_rst
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+sys.path.insert(0, str(ROOT))
+
+project = "blockvis"
+author = "The blockvis developers"
+version = release = installed("blockvis")
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "numpydoc",
+    "myst_parser",
+    "sphinx_gallery.gen_gallery",
+    # Formulas as pictures: a page that is opened from the disk has no network to fetch MathJax from.
+    "matplotlib.sphinxext.mathmpl",
+]
+exclude_patterns = ["_build", "README.md", "gallery", "tutorials"]
+myst_enable_extensions = ["colon_fence", "deflist"]
+myst_heading_anchors = 3
+autosummary_generate = True
+autodoc_typehints = "none"
+numpydoc_show_class_members = False
+mathmpl_fontsize = 11.0
+mathmpl_srcset = ["2x"]
+
+html_theme = "pydata_sphinx_theme"
+html_title = "blockvis"
+html_static_path = ["_static"]
+html_show_sourcelink = False
+html_theme_options = {"show_prev_next": False, "navigation_with_keys": False, "secondary_sidebar_items": ["page-toc"]}
+templates_path: list[str] = []
+
+
+class PicturesWritten:
+    """Shows the pictures that a part of a script has written, in the order in which it wrote them."""
+
+    def __repr__(self) -> str:
+        """Name of the class: an address in memory would have every script run again."""
+        return "PicturesWritten"
+
+    def __call__(self, block, block_vars, gallery_conf) -> str:
+        """Move new pictures to where sphinx-gallery wants them, and return the text that shows them."""
+        folder = Path(block_vars["src_file"]).parent
+        shown = []
+        for picture in sorted(folder.glob("*.png"), key=lambda path: path.stat().st_mtime_ns):
+            shown.append(next(block_vars["image_path_iterator"]))
+            shutil.move(picture, shown[-1])
+        return figure_rst(shown, gallery_conf["src_dir"])
+
+
+sphinx_gallery_conf = {
+    "examples_dirs": ["gallery", "tutorials"],
+    "gallery_dirs": ["auto_gallery", "auto_tutorials"],
+    "filename_pattern": r"\.py$",
+    "within_subsection_order": "FileNameSortKey",
+    "image_scrapers": (PicturesWritten(),),
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "show_memory": False,
+    "show_signature": False,
+    "min_reported_time": 10_000,
+    "remove_config_comments": True,
+}
+# Blocks that a drawing leaves out, cut light pieces and the like: the scripts print what they are about.
+warnings.filterwarnings("ignore", category=UserWarning, module="blockvis")
+
+#: Where the generated pages go; not in git.
+GENERATED = HERE / "generated"
+
+
+def write_generated(app) -> None:
+    """Write the pages that come from the code: the keys of case and study files, and the validation tables."""
+    GENERATED.mkdir(exist_ok=True)
+    shutil.copytree(ROOT / "assets", HERE / "_static" / "assets", dirs_exist_ok=True)
+    keys = ROOT / "tools" / "key_reference.py"
+    if keys.is_file():
+        subprocess.run([sys.executable, str(keys), str(GENERATED)], check=True, cwd=ROOT)
+    tables = GENERATED / "validation_tables.md"
+    # Single pages are looked at with -D plot_gallery=0, which leaves out whatever takes long.
+    quick = str(app.config.overrides.get("plot_gallery", 1)) in ("0", "False")
+    if quick:
+        if not tables.is_file():
+            tables.write_text("## Not computed in this build\n", encoding="utf-8")
+        return
+    tool = ROOT / "tools" / "validation_tables.py"
+    subprocess.run([sys.executable, str(tool), str(tables)], check=True, cwd=ROOT, env=dict(os.environ))
+
+
+def setup(app) -> None:
+    """Have the generated pages written before the sources are read."""
+    app.connect("builder-inited", write_generated, priority=100)
