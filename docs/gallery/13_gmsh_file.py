@@ -5,13 +5,12 @@ From a gmsh file
 A meshed surface is a block; physical groups name it. ``roles`` says which groups are supports.
 """
 
-import os
 from pathlib import Path
 
 import blockvis
 import solver
 
-mesh = Path(os.environ.get("BLOCKVIS_ROOT", Path.cwd().parents[1])) / "assets" / "semicircular_arch.msh"
+mesh = Path("../../assets/semicircular_arch.msh")
 found = blockvis.inspect(mesh)
 print(found)
 
