@@ -66,8 +66,23 @@ def _plot(response: solver.Response, **options: Any) -> Any:
     return show(response, **options)
 
 
-# solver has no plotting; importing blockvis adds `Response.plot()`.
-setattr(solver.Response, "plot", _plot)  # noqa: B010
+def _mesh(response: solver.Response, k: int = -1, *, shape: str = "moved") -> Any:
+    """Make a pyvista dataset of the blocks of increment k; see :func:`blockvis.results.datasets.block_dataset`."""
+    from .results.datasets import block_dataset
+
+    return block_dataset(response.assembly, response.increments[k], shape=shape)
+
+
+def _joints(response: solver.Response, k: int = -1, *, shape: str = "moved") -> Any:
+    """Make a pyvista dataset of the joints of increment k; see :func:`blockvis.results.datasets.joint_dataset`."""
+    from .results.datasets import joint_dataset
+
+    return joint_dataset(response.assembly, response.increments[k], shape=shape)
+
+
+# solver draws nothing and knows no pyvista; importing blockvis adds `Response.plot()`, `mesh(k)` and `joints(k)`.
+for _name, _method in (("plot", _plot), ("mesh", _mesh), ("joints", _joints)):
+    setattr(solver.Response, _name, _method)
 
 
 def __getattr__(name: str) -> Any:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import tomllib
 import warnings
 from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -16,18 +16,27 @@ import numpy as np
 import solver
 
 from .extras import MissingExtra
-from .generators import LAYOUTS
+from .generators import LAYOUTS, help_text
 from .layout.views import VIEWS
 
 #: Exit codes: bad input or a missing extra, a solver failure, everything written but the pictures, no equilibrium to
 #: start from, Ctrl-C.
 BAD_INPUT, SOLVER_FAILED, NO_PICTURES, NO_EQUILIBRIUM, INTERRUPTED = 2, 3, 4, 5, 130
 
-EXIT_CODES = (
-    f"exit codes: 0 done, also when the structure collapses; {BAD_INPUT} bad input or a missing package; "
-    f"{SOLVER_FAILED} the solver failed; {NO_PICTURES} everything is written but the pictures; {NO_EQUILIBRIUM} no "
-    f"initial equilibrium: the structure does not stand as drawn; {INTERRUPTED} interrupted"
-)
+#: What the exit codes mean, for ``--help``.
+EXIT_CODES = f"""exit codes:
+  0    done, also when the structure collapses
+  {BAD_INPUT}    bad input, or a package that is not installed
+  {SOLVER_FAILED}    the solver failed; what it had found is written
+  {NO_PICTURES}    everything is written but the pictures
+  {NO_EQUILIBRIUM}    no initial equilibrium: the structure does not stand as drawn
+  {INTERRUPTED}  interrupted by Ctrl-C; blockvis run --resume OUT goes on"""
+
+#: What ``blockvis completion`` writes for, and where it goes.
+SHELLS = {
+    "bash": "blockvis completion bash > ~/.local/share/bash-completion/completions/blockvis",
+    "zsh": "blockvis completion zsh > a folder of $fpath, as _blockvis",
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -76,12 +85,27 @@ def _parser() -> argparse.ArgumentParser:
         prog="blockvis",
         description="How dry-jointed masonry cracks on settling supports, and how far it can go.",
         epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--version", action="version", version=f"blockvis {_version()}")
     verbs = parser.add_subparsers(required=True, metavar="VERB")
-    run = verbs.add_parser("run", help="solve a case, write everything, draw", epilog=EXIT_CODES)
+    run = verbs.add_parser(
+        "run",
+        help="solve a case, write everything, draw",
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     run.add_argument("case", metavar="CASE.toml", nargs="?")
     run.add_argument("-o", "--output", metavar="OUT", help="results folder (default: <case>-results)")
     run.add_argument("--force", action="store_true", help="replace results that are there already")
+    run.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a value of the case for this run, as material.friction_coefficient=0.5 or "
+        "'settlement.direction=[1, 0]'; may be given again",
+    )
     run.add_argument(
         "--resume", metavar="OUT", help="go on with the run in this results folder, however it was stopped"
     )
@@ -108,7 +132,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     convert.add_argument("--force", action="store_true", help="replace OUT if it is there already")
     convert.set_defaults(verb=_convert)
-    layout = verbs.add_parser("layout", help="a parametric layout as a file", epilog=f"layouts: {', '.join(LAYOUTS)}")
+    layout = verbs.add_parser(
+        "layout",
+        help="a parametric layout as a file",
+        epilog=f"layouts: {', '.join(_layout_names())}; blockvis layout NAME --help lists the parameters of one",
+        add_help=False,
+    )
+    layout.add_argument("-h", "--help", action=_LayoutHelp, help="show this help, or the parameters of NAME")
     layout.add_argument("name", metavar="NAME")
     layout.add_argument(
         "parameters", nargs="*", metavar="key=value", help="parameters of the layout, values as in TOML"
@@ -126,7 +156,45 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
     _add_sweep(verbs)
+    completion = verbs.add_parser(
+        "completion",
+        help="a script that completes verbs and options in a shell",
+        epilog="; ".join(f"{shell}: {command}" for shell, command in SHELLS.items()),
+    )
+    completion.add_argument("shell", choices=tuple(SHELLS))
+    completion.set_defaults(verb=_completion)
     return parser
+
+
+class _LayoutHelp(argparse.Action):
+    """``blockvis layout NAME --help``: the parameters of that layout."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, help: str | None = None) -> None:
+        super().__init__(option_strings, dest, nargs=0, default=argparse.SUPPRESS, help=help)
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, *_: object) -> None:
+        """Print the help and end."""
+        name = getattr(namespace, "name", None)
+        if name is None:
+            parser.print_help()
+            parser.exit()
+        try:
+            text = help_text(name)
+        except ValueError as error:
+            parser.exit(BAD_INPUT, f"blockvis: {error}\n")
+        print(f"usage: blockvis layout {name} [key=value ...] -o FILE\n\n{text}")
+        parser.exit()
+
+
+def _layout_names() -> list[str]:
+    return [name.replace(" ", "-") for name in LAYOUTS]
+
+
+def _version() -> str:
+    try:
+        return version("blockvis")
+    except PackageNotFoundError:
+        return "(not installed)"
 
 
 def _add_view(verb: argparse.ArgumentParser) -> None:
@@ -154,6 +222,24 @@ def _add_sweep(verbs: Any) -> None:
     sweep.add_argument("--keep", metavar="RUNS", default="", help="runs whose results folder is wanted, as 0,17,42")
     sweep.add_argument("--force", action="store_true", help="throw away the runs of another study in OUT")
     sweep.set_defaults(verb=_sweep)
+
+
+def _completion(options: argparse.Namespace) -> int:
+    import shtab
+
+    parser = _parser()
+    # Choices here, not in the parser: a name that does not exist gets a better message than argparse has.
+    choices: dict[str, Any] = {"name": _layout_names()}
+    files = {"case", "output", "resume", "file", "source", "target", "results", "study", "picture"}
+    for action in parser._actions:
+        for verb in (action.choices or {}).values() if isinstance(action.choices, dict) else ():
+            for argument in verb._actions:
+                if argument.dest in choices:
+                    argument.choices = choices[argument.dest]
+                elif argument.dest in files:
+                    argument.complete = shtab.FILE
+    print(shtab.complete(parser, options.shell))
+    return 0
 
 
 def _sweep(options: argparse.Namespace) -> int:
@@ -195,11 +281,12 @@ def _run_numbers(text: str) -> tuple[int, ...]:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from .cases.case import read_case
     from .runs.run import resume_run, run_case
 
     drawn = {"film": not options.no_film, "pictures": not options.no_pictures}
     if options.resume is not None:
-        if options.case is not None or options.output is not None or options.force:
+        if options.case is not None or options.output is not None or options.force or options.set:
             raise ValueError("--resume takes the results folder alone; the case is stored in it")
         run = resume_run(options.resume, **drawn)
         if run.had_finished:
@@ -207,7 +294,7 @@ def _run(options: argparse.Namespace) -> int:
     elif options.case is None:
         raise ValueError("name a case file: blockvis run CASE.toml, or go on with a run: blockvis run --resume OUT")
     else:
-        run = run_case(options.case, options.output, overwrite=options.force, **drawn)
+        run = run_case(read_case(options.case, options.set), options.output, overwrite=options.force, **drawn)
     print(_in_words(run.response, run.folder))
     for problem in run.missing:
         print(f"blockvis: everything but the pictures is written: {problem}", file=sys.stderr)
@@ -319,13 +406,12 @@ def _number(text: str) -> float:
 
 def _parameter(given: str) -> tuple[str, Any]:
     """Read a parameter "key=value" of the command line; the value as TOML writes it, or a plain word."""
+    from .cases.toml_table import toml_value
+
     key, equals, value = given.partition("=")
     if not equals:
         raise ValueError(f"'{given}' is not a parameter; write key=value, for instance voussoirs=12")
-    try:
-        return key.strip(), tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return key.strip(), value
+    return key.strip(), toml_value(value)
 
 
 def _in_words(response: solver.Response, folder: Path) -> str:

@@ -11,11 +11,13 @@ Importing this module registers everything. Suffixes that PyVista reads or write
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyvista as pv
 
 import solver
@@ -26,6 +28,8 @@ from .formats.read import read_layout, write_layout
 from .layout.assemble import assemble
 from .layout.layout import Layout
 from .layout.selection import sorted_out
+from .pictures import palette
+from .results.datasets import block_dataset
 
 
 def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:
@@ -77,23 +81,56 @@ WRITES = _registered(pv.register_writer, (".dxf", ".json", ".msh", ".svg"), _wri
 
 
 class BlockvisAccessor:
-    """The blocks of a polygon mesh: ``mesh.blockvis``.
+    """The blocks of a polygon mesh, or of several in a MultiBlock: ``mesh.blockvis``.
 
     A cell array ``block_id`` says which cells form one block; without it every polygon is a block, and triangles that
-    share points form one. The cell arrays ``name``, ``role``, ``material``, ``density`` and ``thickness`` are optional.
+    share points form one. The cell arrays ``name``, ``role``, ``material``, ``density`` and ``thickness`` are optional;
+    a block of a MultiBlock that has no name takes that of its part.
     """
 
     def __init__(self, mesh: Any) -> None:
         self._mesh = mesh
+
+    def __repr__(self) -> str:
+        """One line: how many blocks there are, and what can be done with them."""
+        return f"<{self.layout().n_blocks} blocks: plot(), assembly(), settle(), limit_load(), save()>"
 
     def layout(self) -> Layout:
         """Read the blocks as a layout, lengths in m."""
         layout = layout_of_dataset(self._mesh)
         return sorted_out(replace(layout, unit=layout.unit or "m"))
 
-    def assembly(self, roles: Mapping[str, str] | None = None, **options: Any) -> solver.Assembly:
-        """Build an assembly of the blocks; the options are those of :func:`blockvis.layout.assemble.assemble`."""
-        return assemble(self.layout(), roles=roles, **options)
+    def save(self, path: str | Path) -> Path:
+        """Write the blocks to a layout file of any format that blockvis writes."""
+        write_layout(self.layout(), path)
+        return Path(path)
+
+    def assembly(
+        self,
+        roles: Mapping[str, str] | None = None,
+        *,
+        supports: Sequence[Mapping[str, Any]] = (),
+        density: float = 2000.0,
+        thickness: float = 1.0,
+        joint_thickness: float | str = 0.0,
+        overlap_tolerance: float | None = None,
+    ) -> solver.Assembly:
+        """Build an assembly of the blocks.
+
+        Parameters
+        ----------
+        roles, supports, density, thickness, joint_thickness, overlap_tolerance
+            As of :func:`blockvis.layout.assemble.assemble`.
+        """
+        return assemble(
+            self.layout(),
+            roles=roles,
+            supports=supports,
+            density=density,
+            thickness=thickness,
+            joint_thickness=joint_thickness,
+            overlap_tolerance=overlap_tolerance,
+        )
 
     def settle(
         self,
@@ -102,8 +139,17 @@ class BlockvisAccessor:
         direction: tuple[float, float] = (0.0, -1.0),
         increment: float = 0.01,
         limit: float = 0.5,
+        tolerance: float | None = None,
+        phases: Sequence[solver.Settlement] = (),
         friction_coefficient: float = solver.InterfaceLaw.friction_coefficient,
-        **options: Any,
+        interfaces: solver.Interfaces | None = None,
+        loads: solver.Loads | None = None,
+        controls: solver.Controls | None = None,
+        supports: Sequence[Mapping[str, Any]] = (),
+        density: float = 2000.0,
+        thickness: float = 1.0,
+        joint_thickness: float | str = 0.0,
+        overlap_tolerance: float | None = None,
     ) -> solver.Response:
         """Move the moving supports until the structure collapses.
 
@@ -114,16 +160,139 @@ class BlockvisAccessor:
             Of the settlement of the moving supports.
         increment, limit : float [m]
             Length of a step, and the settlement at which the analysis stops.
+        tolerance : float, optional [m]
+            Width of the collapse bracket; a hundredth of the increment by default.
+        phases : sequence of solver.Settlement
+            Settlements one after another, in place of ``direction``, ``increment``, ``limit`` and ``tolerance``.
         friction_coefficient : float
-        **options
-            Those of :func:`blockvis.layout.assemble.assemble`: supports, joint_thickness, density ...
+        interfaces, loads, controls : optional
+            As of :func:`solver.settle`.
+        supports, density, thickness, joint_thickness, overlap_tolerance
+            As of :func:`blockvis.layout.assemble.assemble`.
 
         Returns
         -------
         solver.Response
         """
-        motion = solver.Settlement(direction=direction, increment=increment, limit=limit)
-        return solver.settle(self.assembly(roles, **options), motion, friction_coefficient=friction_coefficient)
+        assembly = self.assembly(
+            roles,
+            supports=supports,
+            density=density,
+            thickness=thickness,
+            joint_thickness=joint_thickness,
+            overlap_tolerance=overlap_tolerance,
+        )
+        one = solver.Settlement(direction=direction, increment=increment, limit=limit, tolerance=tolerance)
+        return solver.settle(
+            assembly,
+            tuple(phases) or one,
+            friction_coefficient=friction_coefficient,
+            interfaces=interfaces,
+            loads=loads,
+            controls=controls,
+        )
+
+    def limit_load(
+        self,
+        roles: Mapping[str, str] | None = None,
+        *,
+        weight_fraction: tuple[float, float] = (1.0, 0.0),
+        loads: solver.Loads | None = None,
+        friction_coefficient: float = solver.InterfaceLaw.friction_coefficient,
+        interfaces: solver.Interfaces | None = None,
+        flow: str = "associative",
+        supports: Sequence[Mapping[str, Any]] = (),
+        density: float = 2000.0,
+        thickness: float = 1.0,
+        joint_thickness: float | str = 0.0,
+        overlap_tolerance: float | None = None,
+    ) -> solver.LimitLoad:
+        """Find the largest multiplier of live loads that the blocks carry as drawn; all supports stand still.
+
+        Parameters
+        ----------
+        roles : mapping of str to {"free", "fixed", "moving"}, optional
+        weight_fraction : (2,) tuple
+            Live load of each block as a fraction of its weight, along x and y.
+        loads : solver.Loads, optional
+            Dead and live loads, in place of the self-weight and ``weight_fraction``.
+        friction_coefficient : float
+        interfaces, flow : optional
+            As of :func:`solver.limit_load`.
+        supports, density, thickness, joint_thickness, overlap_tolerance
+            As of :func:`blockvis.layout.assemble.assemble`.
+
+        Returns
+        -------
+        solver.LimitLoad
+        """
+        assembly = self.assembly(
+            roles,
+            supports=supports,
+            density=density,
+            thickness=thickness,
+            joint_thickness=joint_thickness,
+            overlap_tolerance=overlap_tolerance,
+        )
+        if loads is None:
+            live = solver.weight_fraction(assembly, weight_fraction, assembly.free)
+            loads = replace(solver.self_weight(assembly), live=live)
+        return solver.limit_load(
+            assembly, loads=loads, friction_coefficient=friction_coefficient, interfaces=interfaces, flow=flow
+        )
+
+    def plot(
+        self,
+        roles: Mapping[str, str] | None = None,
+        *,
+        names: bool = True,
+        off_screen: bool | None = None,
+        screenshot: str | os.PathLike[str] | None = None,
+        window_size: tuple[int, int] = (1280, 720),
+    ) -> Any:
+        """Show the blocks as they will be analysed: fixed and moving supports by their colour, each with its name.
+
+        Parameters
+        ----------
+        roles : mapping of str to {"free", "fixed", "moving"}, optional
+        names : bool
+            Write the name of each block on it, and the role of supports.
+        off_screen : bool, optional
+            Draw without a window; as of :class:`pyvista.Plotter`.
+        screenshot : path, optional
+            Write the picture to this file.
+        window_size : (int, int)
+            Pixels.
+
+        Returns
+        -------
+        As :meth:`pyvista.Plotter.show`: in a notebook a view.
+        """
+        assembly = self.assembly(roles)
+        blocks = block_dataset(assembly)
+        colours = palette.block_colours(assembly.materials, assembly.free)
+        colours[assembly.moving] = np.asarray(palette.SETTLEMENT) // 2 + 127
+        blocks.cell_data["colour"] = colours
+        plotter = pv.Plotter(off_screen=off_screen, window_size=list(window_size))
+        plotter.background_color = "white"
+        # Triangulated first: VTK fills bent polygons wrongly.
+        plotter.add_mesh(blocks.triangulate(), scalars="colour", rgb=True, lighting=False)
+        plotter.add_mesh(blocks.extract_all_edges(), color=palette.OUTLINE, line_width=1.5, lighting=False)
+        if names:
+            places = np.column_stack([assembly.centroids, np.zeros(assembly.n_blocks)])
+            labels = [
+                name if free else f"{name} ({role})"
+                for name, role, free in zip(assembly.names, assembly.roles, assembly.free, strict=True)
+            ]
+            plotter.add_point_labels(
+                places, labels, shape=None, show_points=False, always_visible=True, font_size=14,
+                text_color=palette.INK, justification_horizontal="center", justification_vertical="center",
+            )  # fmt: skip
+        plotter.view_xy()
+        plotter.enable_parallel_projection()
+        width, height = np.ptp(assembly.vertices, axis=0)
+        plotter.camera.parallel_scale = 0.55 * max(height, width * window_size[1] / window_size[0])
+        return plotter.show(screenshot=False if screenshot is None else str(screenshot))
 
 
-pv.register_dataset_accessor("blockvis", pv.DataSet)(BlockvisAccessor)
+pv.register_dataset_accessor("blockvis", pv.DataObject)(BlockvisAccessor)

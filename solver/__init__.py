@@ -12,10 +12,10 @@ Conventions, written once:
 This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 """
 
-from .analysis.checkpoint import Checkpoint, PushoverCheckpoint
 from .analysis.controls import INCREMENTS, Controls, Ending
 from .analysis.drivers import ControlDisplacement
 from .analysis.limit_load import limit_load, limit_load_envelope
+from .analysis.path import Checkpoint
 from .analysis.pushover import pushover, pushover_increments
 from .analysis.settlement import check_settlement, settle, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly, find_contacts, measure_contacts
@@ -79,7 +79,6 @@ __all__ = [
     "Mechanism",
     "Polygons",
     "Pose",
-    "PushoverCheckpoint",
     "Quantity",
     "Response",
     "Settlement",

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomlkit
 
 import solver
 from blockvis import generators
@@ -22,18 +23,21 @@ from blockvis.video_suffixes import VIDEO_SUFFIXES
 from .contents import Case
 from .imperfections import Imperfection, read_imperfection
 from .loads import LoadCase
-from .toml_table import Table, is_number, shortened
+from .toml_table import Table, is_number, shortened, toml_value
+from .value_paths import parse_path, put
 
 #: More increments or frames than this are taken for a typing error.
 MOST_STEPS = 1_000_000
 
 
-def read_case(path: str | Path) -> Case:
+def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
     """Read and check a case file.
 
     Parameters
     ----------
     path : str or Path
+    changes : sequence of str
+        Changes for this time, as ``"material.friction_coefficient=0.5"``; see :func:`changed_text`.
 
     Returns
     -------
@@ -59,7 +63,37 @@ def read_case(path: str | Path) -> Case:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: is not a text file ({error.reason} at byte {error.start})") from None
-    return parse_case(text, path)
+    return parse_case(changed_text(text, path, changes) if changes else text, path)
+
+
+def changed_text(text: str, source: Path, changes: Sequence[str]) -> str:
+    """Change values in the text of a case file; what is not changed stays as it is, comments included.
+
+    Parameters
+    ----------
+    text : str
+    source : Path
+        The case file.
+    changes : sequence of str
+        ``key=value`` each: a dotted key, with ``[n]`` for entries of a list, from 0, and a value as TOML writes it, or
+        a plain word. Tables that the file does not have are made.
+
+    Raises
+    ------
+    ValueError
+        For broken TOML, a change without "=", and a key that leads nowhere; names the key.
+    """
+    parse_case(text, source)
+    document: Any = tomlkit.parse(text)
+    for change in changes:
+        key, equals, value = change.partition("=")
+        if not equals:
+            raise ValueError(f"'{change}' is no change of a case; write key=value, as in material.density=1800")
+        try:
+            put(document, parse_path(key.strip()), toml_value(value))
+        except ValueError as error:
+            raise ValueError(f"{source}: cannot set '{key.strip()}': {error}") from None
+    return tomlkit.dumps(document)
 
 
 def parse_case(text: str, source: Path) -> Case:
@@ -144,6 +178,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         settings=settings[kind.name],
         controls=_controls(analysis, geometry.number("overlap_tolerance", positive=True)),
         animation=animation or None,
+        vtu=output.text("vtu", "moved", among=("moved", "undeformed")),
     )
     for table in (geometry, material, analysis, output, top):
         table.finish()

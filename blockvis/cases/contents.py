@@ -28,6 +28,8 @@ class Case:
         Name of the kind of analysis.
     settings : optional
         What that kind has read from its own keys; see :meth:`blockvis.runs.kind.AnalysisKind.read`.
+    vtu : {"moved", "undeformed"}
+        Shape of the blocks in the VTU files.
     """
 
     source: Path
@@ -59,3 +61,4 @@ class Case:
     settings: Any = None
     controls: solver.Controls = field(default_factory=solver.Controls)
     animation: str | None = "collapse.mp4"
+    vtu: str = "moved"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -118,6 +119,20 @@ class Table:
         for key in self.values:
             if key not in self.known:
                 raise self.error(key, f"is not a key here{nearest(key, self.known)}; keys are {', '.join(self.known)}")
+
+
+def toml_value(text: str) -> Any:
+    """Read a value as TOML writes it, or a plain word.
+
+    Examples
+    --------
+    >>> toml_value("0.5"), toml_value("[1, 0]"), toml_value("auto")
+    (0.5, [1, 0], 'auto')
+    """
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text.strip()
 
 
 def is_number(value: object) -> bool:

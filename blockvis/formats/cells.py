@@ -99,6 +99,13 @@ def _enclosed(
         # A drawing that is meant to be flat: the error says how far it is not.
         flattened(points, f"'{path}'")
         raise
+    except ValueError:
+        # Bodies that touch: those that share no point can be told apart by their pieces, if all are closed.
+        owner = components(rings, len(points))
+        names = [f"block {k}" for k in range(int(owner.max()) + 1)]
+        if key or len(names) < 2 or len(rings) < 4 * len(names):
+            raise
+        bodies, owners = bodies_of_surfaces(points, rings, owner, names, path)
     first = np.unique(owner, return_index=True)[1]
     rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
     how = f"one per value of the cell array '{key}'" if key else "one per closed surface"
@@ -167,7 +174,7 @@ def merged(found: Sequence[Layout | Bodies], labels: Sequence[str], path: Path |
 
 def _own_names(names: Sequence[str], label: str) -> tuple[str, ...]:
     """Name the blocks of a part after it, unless they have names of their own."""
-    if not label or not all(name.startswith("block ") for name in names):
+    if not label or not all(f"{name} ".startswith("block ") for name in names):
         return tuple(names)
     return (label,) if len(names) == 1 else tuple(f"{label} {k + 1}" for k in range(len(names)))
 

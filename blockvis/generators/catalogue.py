@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import json
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -29,6 +31,10 @@ LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
 }
 
 
+#: Kinds of parameters without a unit, in plain words.
+_KINDS = {"float": "", "int": "whole number", "int, optional": "whole number, optional"}
+
+
 def parameters_of(name: str) -> dict[str, Any]:
     """List the parameters of a layout with their defaults.
 
@@ -38,6 +44,29 @@ def parameters_of(name: str) -> dict[str, Any]:
     5
     """
     return {key: value.default for key, value in inspect.signature(_layout(name)).parameters.items()}
+
+
+def help_text(name: str) -> str:
+    """Describe a layout and its parameters, with units and defaults, as its docstring has them.
+
+    Examples
+    --------
+    >>> print(help_text("column").splitlines()[4])
+      width = 0.5  [m]
+    """
+    layout = _layout(name)
+    purpose, _, rest = (inspect.getdoc(layout) or "").partition("\n\nParameters\n----------\n")
+    defaults, lines = parameters_of(name), [purpose, "", "parameters:"]
+    for line in rest.partition("\n\n")[0].splitlines():
+        if line.startswith(" "):
+            lines.append(f"      {line.strip()}")
+            continue
+        names, _, kind = line.partition(" : ")
+        kind = _KINDS.get(kind, kind[kind.index("[") :] if "[" in kind else kind)
+        for one in names.split(", "):
+            default = "" if defaults[one] is None else f" = {json.dumps(defaults[one], ensure_ascii=False)}"
+            lines.append(f"  {one}{default}  {kind}".rstrip())
+    return re.sub(r":\w+:`~?[\w.]*?(\w+)`|``", r"\1", "\n".join(lines))
 
 
 def build(name: str, parameters: Mapping[str, Any] | None = None) -> solver.Assembly:

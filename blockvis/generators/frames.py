@@ -171,8 +171,12 @@ def buttressed_arch(
 
     Parameters
     ----------
-    span, rise, thickness, voussoirs, pier_width, pier_height, pier_blocks
-        As in :func:`arch_on_piers`.
+    span, rise, thickness : float [m]
+        Of the arch, as in :func:`arch_on_piers`.
+    voussoirs : int
+    pier_width, pier_height : float [m]
+    pier_blocks : int
+        In each pier.
     buttress_width, buttress_top : float [m]
         Width of a buttress at the ground and at its top.
     buttress_height : float [m]

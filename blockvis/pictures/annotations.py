@@ -8,23 +8,18 @@ import numpy as np
 import shapely
 
 import solver
+from blockvis.results.joints import InitialJoints, faces_at
 
 #: A joint is shown open from this fraction of the block size on; on an ordinary brick it is a tenth of a millimetre.
 SMALLEST_OPENING = 1e-3
 
-#: What lies between faces is a crack up to this distance: on the path, in block sizes or lengths of the joint; in
-#: the fall, where blocks tumble apart, in lengths of the joint only, and up to this angle [rad].
-WIDEST_STANDING, WIDEST_FALLING, STEEPEST_FALLING = 1.5, 0.6, 1.0
+#: What lies between faces is a crack until they are apart by this many block sizes, or by their own length: then the
+#: blocks have parted, and it is air. Of faces that are turned against each other by more than this angle [rad] only the
+#: edges have the colour of a crack: the wedge between them is open to the room.
+WIDEST, STEEPEST = 0.5, 0.5
 
-#: What cracks and blocks enclose without covering it belongs to the cracks from this fraction of the block size squared
-#: (what is smaller is rounding) up to that: where several cracks meet.
-SMALLEST_POCKET, LARGEST_POCKET = 1e-5, 2.0
-
-#: Faces count as one initial joint when they are apart by at most this fraction of the block size.
-TOUCHING = 2e-3
-
-#: Faces count as parallel up to this sine.
-PARALLEL = 0.05
+#: A sliding joint is marked over this length at least, in block sizes.
+SHORTEST = 0.3
 
 #: Resultants below this fraction of the largest are not drawn.
 SMALLEST_RESULTANT = 2e-3
@@ -59,25 +54,6 @@ def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndar
 
 
 @dataclass(frozen=True)
-class InitialJoints:
-    """Pairs of faces that touch in the layout.
-
-    Attributes
-    ----------
-    block_a, block_b : (n_joints,) int arrays
-    ends : (n_joints, 2, 2) array [m]
-        Both ends of the common length, where the layout has them.
-    normals : (n_joints, 2) array
-        Unit normal in the layout, from ``block_b`` into ``block_a``.
-    """
-
-    block_a: np.ndarray
-    block_b: np.ndarray
-    ends: np.ndarray
-    normals: np.ndarray
-
-
-@dataclass(frozen=True)
 class Marks:
     """What is marked at one pose.
 
@@ -87,8 +63,8 @@ class Marks:
         Quadrilateral between the faces of each open joint: both ends on block a, then back along block b.
     openings : (n_cracks,) array [m]
         Largest distance of the two faces of each, unmagnified.
-    pockets : tuple of (n, 2) arrays [m]
-        Outlines of what is enclosed where cracks meet.
+    faces : (n_faces, 2, 2) array [m]
+        Ends of the faces of joints that gape too wide to be filled, two of each.
     sliding : (n_sliding, 2, 2) array [m]
         Ends of each sliding joint.
     hinges : (n_hinges, 2) array [m]
@@ -96,37 +72,9 @@ class Marks:
 
     cracks: np.ndarray
     openings: np.ndarray
-    pockets: tuple[np.ndarray, ...]
+    faces: np.ndarray
     sliding: np.ndarray
     hinges: np.ndarray
-
-
-def initial_joints(assembly: solver.Assembly) -> InitialJoints:
-    """Find the faces that touch in the layout; where they part later there is a crack."""
-    tolerance = TOUCHING * assembly.block_size
-    contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * tolerance)
-    touching = np.abs(contacts.gaps) <= tolerance
-    vertex, edge_b, _ = solver.corners_and_edges(contacts.features[touching])
-    # The corner belongs to two faces of block a; either may lie on the edge of block b.
-    edge_a = np.concatenate([vertex, assembly.previous_vertex[vertex]])
-    edge_b = np.concatenate([edge_b, edge_b])
-    pairs = np.unique(np.stack([np.minimum(edge_a, edge_b), np.maximum(edge_a, edge_b)], axis=1), axis=0)
-    a, b = pairs[:, 0], pairs[:, 1]
-    start, stop = assembly.vertices[b], assembly.vertices[assembly.next_vertex[b]]
-    length = assembly.edge_lengths[b]
-    tangent = (stop - start) / length[:, None]
-    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
-    ends_a = np.stack([assembly.vertices[a], assembly.vertices[assembly.next_vertex[a]]], axis=1) - start[:, None]
-    along = np.einsum("nij,nj->ni", ends_a, tangent)
-    across = np.abs(np.einsum("nij,nj->ni", ends_a, normal))
-    lean = np.abs(across[:, 1] - across[:, 0]) / assembly.edge_lengths[a]
-    low = np.maximum(0.0, along.min(axis=1))
-    high = np.minimum(length, along.max(axis=1))
-    keep = (high - low > 10.0 * tolerance) | (high - low > 0.5 * np.minimum(length, assembly.edge_lengths[a]))
-    keep &= (lean < PARALLEL) & (across.min(axis=1) <= 2.0 * tolerance) & (along[:, 0] > along[:, 1])
-    ends = np.stack([start + low[:, None] * tangent, start + high[:, None] * tangent], axis=1)
-    owner = assembly.block_of_vertex
-    return InitialJoints(owner[a][keep], owner[b][keep], ends[keep], normal[keep])
 
 
 def marks_of(
@@ -145,13 +93,12 @@ def marks_of(
     """
     contacts, mechanism = increment.contacts, solver.mechanism_of(assembly, increment)
     points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
-    falling = increment.status == solver.Status.FALLING
-    cracks, openings, cracked = _cracks(assembly, joints, increment.pose, shown, falling)
+    cracks, openings, faces = _cracks(assembly, joints, increment.pose, shown)
     return Marks(
         cracks=cracks,
         openings=openings,
-        pockets=() if falling else _pockets(assembly, cracks, cracked, shown),
-        sliding=_sliding(contacts, mechanism.sliding_points, points),
+        faces=faces,
+        sliding=_sliding(contacts, mechanism.sliding_points, points, assembly.block_size),
         hinges=points[mechanism.hinge_points],
     )
 
@@ -199,76 +146,72 @@ def length_per_force(sizes: np.ndarray, largest: float, usual_length: float, ext
 
 
 def _cracks(
-    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, shown: solver.Pose, falling: bool
+    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, shown: solver.Pose
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Quadrilaterals of the open joints, their openings [m], and the blocks beside them."""
-    initial = solver.Pose.initial(assembly)
-
-    def sides(at: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
-        on_a = np.stack([solver.carried(joints.ends[:, k], joints.block_a, initial, at) for k in (0, 1)], axis=1)
-        on_b = np.stack([solver.carried(joints.ends[:, k], joints.block_b, initial, at) for k in (0, 1)], axis=1)
-        return on_a, on_b
-
-    on_a, on_b = sides(pose)
-    normal = solver.turned(joints.normals, pose.rotations[joints.block_b])
+    """Quadrilaterals of the open joints, their openings [m], and the faces of those that gape too wide."""
+    on_a, on_b, normal = faces_at(assembly, joints, pose)
     length = np.hypot(*(joints.ends[:, 1] - joints.ends[:, 0]).T)
     opening = np.einsum("nij,nj->ni", on_a - on_b, normal).max(axis=1)
     apart = np.hypot(*np.moveaxis(on_a - on_b, 2, 0)).min(axis=1)
-    # Blocks that have parted altogether have no joint any more: what lies between them is air, not a crack.
-    if falling:
-        turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])[:, 0]
-        together = (apart < WIDEST_FALLING * length) & (turn < STEEPEST_FALLING)
-    else:
-        together = apart < np.maximum(length, WIDEST_STANDING * assembly.block_size)
-    is_open = (opening > SMALLEST_OPENING * assembly.block_size) & together
-    on_a, on_b = sides(shown)
-    beside = np.unique(np.concatenate([joints.block_a[is_open], joints.block_b[is_open]]))
-    return np.concatenate([on_a, on_b[:, ::-1]], axis=1)[is_open], opening[is_open], beside
+    turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])[:, 0]
+    is_open = opening > SMALLEST_OPENING * assembly.block_size
+    is_open &= apart < np.minimum(length, WIDEST * assembly.block_size)
+    narrow, wide = is_open & (turn <= STEEPEST), is_open & (turn > STEEPEST)
+    on_a, on_b, _ = faces_at(assembly, joints, shown)
+    filled = np.concatenate([on_a, on_b[:, ::-1]], axis=1)[narrow]
+    return filled, opening[narrow], np.concatenate([on_a[wide], on_b[wide]])
 
 
-def _pockets(
-    assembly: solver.Assembly, cracks: np.ndarray, cracked: np.ndarray, shown: solver.Pose
-) -> tuple[np.ndarray, ...]:
-    """Find what several cracks enclose that lies between no two faces: the corner that a brick has moved out of."""
-    if len(cracks) < 2:
-        return ()
-    size = assembly.block_size
-    corners = solver.moved_vertices(assembly, shown)
-    blocks = [corners[assembly.offsets[b] : assembly.offsets[b + 1]] for b in range(assembly.n_blocks)]
-    # A crack crosses itself where one end has closed up: its hull is taken. It is widened by the smallest opening, or a
-    # joint that is not quite open would leave the pocket without a wall on that side.
-    filled = shapely.buffer(
-        shapely.convex_hull(shapely.multipoints(cracks)), SMALLEST_OPENING * size, join_style="mitre", quad_segs=1
-    )
-    near = [shapely.Polygon(blocks[b]) for b in cracked]
-    covered = shapely.union_all([*shapely.buffer(near, 0.0), *filled])
-    holes = [
-        shapely.Polygon(ring)
-        for part in shapely.get_parts(covered)
-        for ring in part.interiors
-        if SMALLEST_POCKET * size**2 < shapely.Polygon(ring).area < LARGEST_POCKET * size**2
-    ]
-    if not holes:
-        return ()
-    # Openings of the layout are no pockets, nor are places where blocks without a crack stand.
-    tree = shapely.STRtree([shapely.Polygon(outline) for outline in blocks])
-    laid_out = shapely.STRtree([shapely.Polygon(assembly.outline(b)) for b in range(assembly.n_blocks)])
-    pockets = []
-    for hole in holes:
-        inside = hole.representative_point()
-        if len(tree.query(inside, predicate="intersects")) == 0 and len(laid_out.query(inside, predicate="intersects")):
-            pockets.append(shapely.get_coordinates(hole)[:-1])
-    return tuple(pockets)
-
-
-def joint_places(assembly: solver.Assembly, increment: solver.Increment) -> tuple[np.ndarray, np.ndarray]:
-    """Where the hinges are, and the middles of the sliding joints: (n, 2) arrays [m], at the increment's pose."""
+def joint_marks(assembly: solver.Assembly, increment: solver.Increment) -> tuple[np.ndarray, np.ndarray]:
+    """Where the hinges are, (n, 2) [m], and the ends of the sliding joints, (n, 2, 2) [m], at the increment's pose."""
     mechanism, contacts = solver.mechanism_of(assembly, increment), increment.contacts
-    stretches = _sliding(contacts, mechanism.sliding_points, contacts.points)
-    return contacts.points[mechanism.hinge_points], stretches.mean(axis=1)
+    return contacts.points[mechanism.hinge_points], _sliding(
+        contacts, mechanism.sliding_points, contacts.points, assembly.block_size
+    )
 
 
-def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray) -> np.ndarray:
+def settlement_arrows(
+    assembly: solver.Assembly, settlement: solver.Settlement, pose: solver.Pose, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find where arrows show how supports move in a settlement.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    settlement : solver.Settlement
+    pose : solver.Pose
+    low, high : (2,) arrays [m]
+        Corners of what the picture shows.
+
+    Returns
+    -------
+    blocks : (n,) int array
+        The supports; of more than four, the one in the middle stands for all.
+    places : (n, 2) array [m]
+        Inside the part of each that the picture shows.
+    directions : (n, 2) array
+        Unit vectors; zero where a support turns about that place.
+    """
+    part = np.flatnonzero(settlement.taking_part(assembly))
+    rate = settlement.rate(assembly, solver.Pose.initial(assembly), 0.0)
+    corners = solver.moved_vertices(assembly, pose)
+    outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in part]
+    shown = shapely.intersection(outlines, shapely.box(*low, *high))
+    seen = [k for k, outline in enumerate(shown) if not outline.is_empty]
+    if len(seen) > 4:
+        seen = [seen[len(seen) // 2]]
+    places = np.zeros((len(seen), 2))
+    for row, k in enumerate(seen):
+        # A bent support may have its centroid outside.
+        inside = shown[k].centroid if shown[k].contains(shown[k].centroid) else shown[k].point_on_surface()
+        places[row] = inside.coords[0]
+    blocks = part[seen]
+    speeds = solver.point_velocities(places, blocks, pose, rate)
+    sizes = np.hypot(*speeds.T)[:, None]
+    return blocks, places, np.divide(speeds, sizes, out=np.zeros_like(speeds), where=sizes > 0.0)
+
+
+def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray, size: float) -> np.ndarray:
     """(n, 2, 2) array [m]: ends of the part of each sliding joint that slides.
 
     Parameters
@@ -278,6 +221,8 @@ def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray) -> np
         Numbers of the contact points that slide.
     points : (n_contacts, 2) array [m]
         Where the contact points are drawn.
+    size : float [m]
+        Of a block.
     """
     if len(k) == 0:
         return np.zeros((0, 2, 2))
@@ -290,8 +235,29 @@ def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray) -> np
     lowest, highest = np.zeros(n), np.zeros(n)
     np.minimum.at(lowest, which, place)
     np.maximum.at(highest, which, place)
-    # A joint that slides on one point only still needs a length to be seen.
-    short = 0.15 * np.median(highest - lowest) if (highest > lowest).any() else 0.0
-    lowest, highest = lowest - short, highest + short
+    # A joint that slides on one point only still needs a length to be seen, towards the others that it touches at.
+    short = np.maximum(SHORTEST * size - (highest - lowest), 0.0)
+    face_low, face_high = _extents(contacts, points, pairs, points[first], tangent)
+    alone = face_high - face_low < short
+    lowest = np.where(alone, lowest - short / 2.0, np.maximum(lowest - short, np.minimum(face_low, lowest)))
+    highest = np.where(alone, highest + short / 2.0, np.minimum(highest + short, np.maximum(face_high, highest)))
     base = points[first]
     return np.stack([base + lowest[:, None] * tangent, base + highest[:, None] * tangent], axis=1)
+
+
+def _extents(
+    contacts: solver.Contacts, points: np.ndarray, pairs: np.ndarray, base: np.ndarray, tangent: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest place, (n,) [m], of all contact points of pairs of blocks along their tangents."""
+    every, which = contacts.joints()
+    count = int(every.max(initial=0)) + 1
+    row = np.searchsorted(every[:, 0] * count + every[:, 1], pairs[:, 0] * count + pairs[:, 1])
+    number = np.full(len(every), -1)
+    number[row] = np.arange(len(pairs))
+    k = number[which]
+    here = k >= 0
+    place = ((points[here] - base[k[here]]) * tangent[k[here]]).sum(axis=1)
+    low, high = np.full(len(pairs), np.inf), np.full(len(pairs), -np.inf)
+    np.minimum.at(low, k[here], place)
+    np.maximum.at(high, k[here], place)
+    return low, high

@@ -6,9 +6,13 @@ import numpy as np
 
 import solver
 from blockvis.numbers import force_text
+from blockvis.results.about import loss_of
 
 #: Warning on frames of a fall in real time.
 FALL_BADGE = "FALLING · real time"
+
+#: Warning on pictures of runs that the solver could not follow to their end.
+FAILED_BADGE = "SOLVER FAILED"
 
 #: Multipliers above this many times the lowest of an envelope are not shown: over a support a load may grow nearly
 #: without limit.
@@ -100,17 +104,15 @@ def matters(increment: solver.Increment, response: solver.Response) -> bool:
     return increment.measured <= MOST_OVER_LOWEST * lowest.measured
 
 
-def state_text(increment: solver.Increment, response: solver.Response, at: float | None = None) -> str:
+def state_text(increment: solver.Increment, response: solver.Response) -> str:
     """Write the first line of a caption: the parameter and what is measured there.
 
     Parameters
     ----------
     increment : solver.Increment
     response : solver.Response
-    at : float, optional [m or rad]
-        The parameter, of frames in between increments.
     """
-    place = parameter_text(increment.parameter if at is None else at, response)
+    place = parameter_text(increment.parameter, response)
     if response.parameter.is_path:
         text = f"{response.parameter.name.capitalize()} {place}"
     else:
@@ -139,3 +141,21 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
 def badge_of(response: solver.Response) -> str:
     """Warning on frames that are no equilibrium."""
     return "MECHANISM · pseudo-motion" if response.swings else "FALLING · pseudo-time"
+
+
+def lost_text(response: solver.Response) -> str:
+    """Name what a collapse is: of the structure, of a few blocks, or of its capacity for live loads."""
+    if response.collapse is not None and response.collapse.lost == "capacity":
+        return "capacity is lost"
+    loss = loss_of(response)
+    return "a local loss" if loss is not None and loss.local else "collapse"
+
+
+def failure_text(response: solver.Response) -> str:
+    """Say where the solver failed and why; empty where it did not."""
+    if response.stop is not solver.Status.SOLVER_FAILED:
+        return ""
+    where = ""
+    if response.path and response.parameter.is_path:
+        where = f" after {response.parameter.name} {parameter_text(response.path[-1].parameter, response)}"
+    return f"The solver failed{where}: {response.message}" if response.message else f"The solver failed{where}"

@@ -16,15 +16,28 @@ from PIL import Image, ImageDraw
 
 import solver
 from blockvis.atomic_files import whole_file
+from blockvis.results.about import about, collapse_mechanism
 
 from . import palette
-from .captions import collapse_places, force_unit, parameter_label, parameter_unit, shown_range, value_label
+from .captions import (
+    collapse_places,
+    force_unit,
+    lost_text,
+    parameter_label,
+    parameter_text,
+    parameter_unit,
+    shown_range,
+    value_label,
+)
 
 #: Suffixes of the files that draw_curve writes.
 CURVE_SUFFIXES = (".png", ".svg", ".pdf")
 
 #: More changes of hinges than this are not numbered one by one.
 MOST_EVENTS = 12
+
+#: Height of the text of the file [points].
+TEXT = 11.0
 
 
 @dataclass(frozen=True)
@@ -71,6 +84,7 @@ def draw_curve(
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.add_subplot()
     _draw(axes, response, events=True)
+    axes.set_title(about(response).name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK))
     with whole_file(path) as partial:
         figure.savefig(partial, dpi=200)
     return path
@@ -146,7 +160,7 @@ class CurvePanel:
         return picture
 
 
-def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 11.0) -> None:
+def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = TEXT) -> None:
     path = response.path
     factor, _ = force_unit(response)
     moment = any(s.unit == "rad" for s in response.settlements) or response.measured.unit == "N·m"
@@ -156,6 +170,8 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
     known = values[np.isfinite(values)]
     axes.set_ylabel(value_label(response), fontsize=text)
     axes.tick_params(labelsize=0.9 * text)
+    # Numbers as they are, without a power of ten or an offset in the corner.
+    axes.ticklabel_format(useOffset=False, style="plain")
     axes.grid(color="#e4e4e4", linewidth=0.8)
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.02, y=0.12)
@@ -180,10 +196,32 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
         over_weight.tick_params(labelsize=0.9 * text)
     if not response.parameter.is_path:
         _mark_lowest(axes, response, text, events)
+        for place in total[~np.isfinite(values)] if events else ():
+            axes.annotate(
+                "unbounded", (place, 0.88), xycoords=("data", "axes fraction"), ha="center", va="top", rotation=90,
+                fontsize=0.8 * text, color=palette.hexadecimal(palette.FAINT),
+            )  # fmt: skip
     elif events:
         _mark_events(axes, response, factor, text)
     if response.collapse is not None and len(path):
         _mark_collapse(axes, response, total, values, text, events)
+    if response.stop is solver.Status.SOLVER_FAILED:
+        _mark_failure(axes, response, total, values, text, events)
+
+
+def _mark_failure(
+    axes: Axes, response: solver.Response, total: np.ndarray, values: np.ndarray, text: float, words: bool
+) -> None:
+    """Mark where the solver gave up: the curve ends there, the structure need not."""
+    red = palette.hexadecimal(palette.WARNING)
+    axes.plot(total[-1:], values[-1:], "X", color=red, markersize=9 if words else 6, zorder=5)
+    what = (
+        f"solver failed at {parameter_text(response.path[-1].parameter, response)}" if len(total) else "solver failed"
+    )
+    axes.annotate(
+        f"{what}: the curve is not complete" if words else "solver failed",
+        (0.98, 0.03), xycoords="axes fraction", ha="right", va="bottom", fontsize=0.9 * text, color=red,
+    )  # fmt: skip
 
 
 def _draw_single(axes: Axes, known: np.ndarray, text: float) -> None:
@@ -233,7 +271,8 @@ def _mark_collapse(
     red = palette.hexadecimal(palette.WARNING)
     # A capacity that is lost ends at the foot of the diagram.
     above = collapse.lost == "capacity"
-    what = "no capacity" if above else "collapse"
+    lost = lost_text(response)
+    what = "no capacity" if above else lost.removeprefix("a ")
     places = collapse_places(response)
     assert places is not None
     low, middle, high = places.tolist()
@@ -243,7 +282,7 @@ def _mark_collapse(
     if words:
         axes.annotate(
             f"{what} at {collapse.displacement:.5g} {collapse.unit}\n"
-            f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]",
+            f"[{collapse.bracket[0]:.6g}, {collapse.bracket[1]:.6g}]{_counts(response)}",
             (middle, 0.96 if above else 0.04),
             xycoords=("data", "axes fraction"),
             xytext=(-6, 0),
@@ -255,6 +294,17 @@ def _mark_collapse(
         )
 
 
+def _counts(response: solver.Response) -> str:
+    """Count the hinges and sliding joints of the collapse mechanism, on a line of their own."""
+    mechanism = collapse_mechanism(response)
+    if mechanism is None or response.collapse is None or response.collapse.lost != "equilibrium":
+        return ""
+    hinges, sliding = map(len, _joints(mechanism))
+    found = [(hinges, "hinge"), (sliding, "sliding joint")]
+    words = ", ".join(f"{n} {word}{'' if n == 1 else 's'}" for n, word in found if n)
+    return f"\n{words}" if words else ""
+
+
 def _mark_events(axes: Axes, response: solver.Response, factor: float, text: float) -> None:
     found = events_of(response)
     if not found:
@@ -262,25 +312,30 @@ def _mark_events(axes: Axes, response: solver.Response, factor: float, text: flo
     ink = palette.hexadecimal(palette.INK)
     per_length, _ = parameter_unit(response)
     x, y = [e.parameter * per_length for e in found], [e.value / factor for e in found]
-    axes.plot(x, y, "o", color="white", markeredgecolor=ink, markersize=7, zorder=4, label="hinges or sliding change")
-    if len(found) <= MOST_EVENTS:
-        low, high = axes.get_xlim()
-        above = True
-        for number in range(1, len(found) + 1):
-            # Under the curve where it would run into the number before.
-            close = number > 1 and abs(x[number - 1] - x[number - 2]) < 0.03 * (high - low)
-            above = not (close and above)
-            axes.annotate(
-                str(number), (x[number - 1], y[number - 1]), xytext=(0, 8 if above else -8),
-                textcoords="offset points", ha="center", va="bottom" if above else "top", fontsize=0.8 * text,
-            )  # fmt: skip
-        lines = [f"{n}  {e.text}" for n, e in enumerate(found, 1)]
-        axes.text(
-            0.02, 0.04, "\n".join(lines), transform=axes.transAxes, va="bottom", fontsize=0.8 * text, linespacing=1.4,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+    if len(found) > MOST_EVENTS:
+        # Circles on nearly every point would hide the curve: ticks at the foot say where.
+        axes.plot(
+            x, [0.012] * len(x), "|", transform=axes.get_xaxis_transform(), color=ink, markersize=7,
+            markeredgewidth=0.8, zorder=4, label=f"{len(found)} times hinges or sliding joints change",
         )  # fmt: skip
-    else:
         axes.legend(loc="upper left", fontsize=0.8 * text, frameon=False)
+        return
+    axes.plot(x, y, "o", color="white", markeredgecolor=ink, markersize=7, zorder=4)
+    low, high = axes.get_xlim()
+    above = True
+    for number in range(1, len(found) + 1):
+        # Under the curve where it would run into the number before.
+        close = number > 1 and abs(x[number - 1] - x[number - 2]) < 0.03 * (high - low)
+        above = not (close and above)
+        axes.annotate(
+            str(number), (x[number - 1], y[number - 1]), xytext=(0, 8 if above else -8),
+            textcoords="offset points", ha="center", va="bottom" if above else "top", fontsize=0.8 * text,
+        )  # fmt: skip
+    lines = [f"{n}  {e.text}" for n, e in enumerate(found, 1)]
+    axes.text(
+        0.02, 0.04, "\n".join(lines), transform=axes.transAxes, va="bottom", fontsize=0.8 * text, linespacing=1.4,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+    )  # fmt: skip
 
 
 def _joints(mechanism: solver.Mechanism) -> list[set[tuple[int, int]]]:

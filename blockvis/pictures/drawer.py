@@ -7,30 +7,28 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 
 import numpy as np
-import shapely
 from PIL import Image
 
 import solver
 from blockvis.fall import CAPTION, Fall, falling_increment
 from blockvis.numbers import force_text, rounded_length
+from blockvis.results.joints import initial_joints
 
 from . import palette
 from .annotations import (
     SMALLEST_RESULTANT,
-    Marks,
-    initial_joints,
     length_per_force,
     marks_of,
     part_outlines,
     resultants,
+    settlement_arrows,
 )
-from .captions import FALL_BADGE, badge_of, matters, state_text
+from .captions import FAILED_BADGE, FALL_BADGE, badge_of, lost_text, matters, state_text
 from .curves import CurvePanel
 from .flat_scene import Scene, magnified
 from .frame import ColourBar, Key, Sheet, framed
-from .hatching import cut_into_triangles
 from .live_load import LiveLoads
-from .swing import Swing, swing_of
+from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
@@ -40,9 +38,6 @@ FINE_CRACK = 0.01
 
 #: Joints open by more than this fraction need no line: the middle of a wide crack may lie on a third block.
 WIDE_CRACK = 0.2
-
-#: Up to this many parts of a mechanism are tinted one by one.
-MOST_PARTS = 16
 
 #: Layers that a fall in time has not.
 OF_STATICS = (
@@ -99,7 +94,7 @@ class _Seen:
     largest : float [m]
         Displacement of any free block.
     cracks, sliding, hinges : bool
-        Whether any is marked anywhere.
+        Whether there are any anywhere.
     largest_force : float [N]
     forces : list of arrays [N]
         Sizes, of the increments sampled.
@@ -144,12 +139,15 @@ class Drawer:
         extra: tuple[solver.Pose, ...] = (),
         fall: Fall | None = None,
     ) -> None:
-        if look.forces == "auto":
+        automatic = look.forces == "auto"
+        if automatic:
             few = response.assembly.n_blocks <= FEW_BLOCKS
             look = replace(look, forces="thrust" if few else "none")
+        self._forces_hidden = automatic and look.forces == "none"
         self.response, self.look, self.increments, self.fall = response, look, increments, fall
         assembly = self.assembly = response.assembly
         self.joints = initial_joints(assembly)
+        self._swing = swing_of(response) if look.colour_by == "mechanism" else None
         self._seen = _Seen(sampled=_sampled([k for k, i in enumerate(increments) if matters(i, response)]))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = framed(assembly, chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
@@ -168,9 +166,8 @@ class Drawer:
         self._show_start()
         if fall is not None:
             self._show_ground(fall.ground)
-        self._swing = swing_of(response) if look.colour_by == "mechanism" else None
         if self._swing is not None and self._swing.moves:
-            self.tints = self._tints(self._swing)
+            self.tints = mechanism_colours(self.assembly, self.fill, self._swing)
         self._keys: list[Key] | None = None
 
     def _surveyed(self) -> Iterator[solver.Pose]:
@@ -182,10 +179,10 @@ class Drawer:
         for number, increment in enumerate(self.increments):
             seen.largest = max(seen.largest, _largest_displacement(self.assembly, increment))
             if look.joints:
-                found = marks_of(self.assembly, self.joints, increment, increment.pose)
-                seen.cracks |= len(found.cracks) > 0
+                found = marks_of(self.assembly, self.joints, self._shown(increment), increment.pose)
+                seen.cracks |= len(found.cracks) + len(found.faces) > 0
                 seen.sliding |= len(found.sliding) > 0
-                seen.hinges |= len(self._hinges(found)) > 0
+                seen.hinges |= len(found.hinges) > 0
             if look.forces != "none" and matters(increment, self.response):
                 sizes = np.hypot(*_joint_forces(increment, look.forces)[1].T)
                 seen.largest_force = max(seen.largest_force, float(sizes.max(initial=0.0)))
@@ -218,8 +215,7 @@ class Drawer:
         blocks_only : bool
             Leave out what statics knows: joints, forces, what stands on what, and where supports go.
         """
-        if self._swing is not None and pose is None and increment is self.response.governing:
-            increment = self._swing.increment
+        increment = increment if pose is not None else self._shown(increment)
         true = increment.pose if pose is None else pose
         shown = magnified(self.assembly, true, self.look.magnification)
         at = increment.with_arrays(pose=true, contacts=_contacts_at(increment, true)) if pose is not None else increment
@@ -233,12 +229,13 @@ class Drawer:
             self._draw_settlement_arrow(at, shown)
             self._draw_live_load(increment, shown)
         falling = increment.status == solver.Status.FALLING
-        head, detail = _caption(self.response, at, self.look, s)
+        failed = self.response.stop == solver.Status.SOLVER_FAILED
+        head, detail = _caption(self.response, increment, self.look)
         return self.sheet.composed(
             self.scene.image(),
             title=title or head,
             detail=note or detail,
-            badge=badge or (badge_of(self.response) if falling else ""),
+            badge=badge or (badge_of(self.response) if falling else FAILED_BADGE if failed else ""),
             keys=self.keys(),
             pixel=self.scene.pixel,
             beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, parameter=s)),
@@ -277,7 +274,7 @@ class Drawer:
             moves = np.flatnonzero(parts >= 0)
             _, first = np.unique(cell[moves], axis=0, return_index=True)
             chosen = [moves[[k]] for k in first]
-        self.tints = self._tints(swing)
+        self.tints = mechanism_colours(self.assembly, self.fill, swing)
         scene.pose(pose, self.tints)
         tails, tips = np.zeros((len(chosen), 2)), np.zeros((len(chosen), 2))
         for k, blocks in enumerate(chosen):
@@ -285,14 +282,6 @@ class Drawer:
             tails[k] = weight @ pose.positions[blocks]
             tips[k] = solver.carried(tails[[k]], blocks[:1], pose, displaced)[0]
         self._arrows("motion", tails, tips, 0.6)
-
-    def _tints(self, swing: Swing) -> np.ndarray:
-        """(n_blocks, 3) uint8 array: fills with the parts of a mechanism tinted, or darker where they are faster."""
-        if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
-            return palette.part_colours(self.fill, swing.parts)
-        travel = np.hypot(*(swing.displaced.positions - swing.increment.pose.positions).T)
-        tints = palette.displacement_colours(0.75 * travel / travel[self.assembly.free].max())
-        return np.where(self.assembly.free[:, None], tints, self.fill)
 
     def keys(self) -> list[Key]:
         """Return the legend: what is marked in any of the increments, so that it is the same in all pictures."""
@@ -306,14 +295,21 @@ class Drawer:
             if self.look.joints:
                 seen = self._seen
                 keys += [Key("area", "open joint", palette.OPEN)] if seen.cracks else []
-                keys += [Key("line", "sliding joint", palette.SLIDING)] if seen.sliding else []
-                keys += [Key("dot", "hinge", palette.HINGE)] if seen.hinges else []
+                marked = [
+                    *([Key("line", "sliding joint", palette.SLIDING)] if seen.sliding else []),
+                    *([Key("dot", "hinge", palette.HINGE)] if seen.hinges else []),
+                ]
+                # They would hide the cracks: in a wall of many blocks nearly every brick turns or slides a little.
+                hidden = " and ".join(f"{key.text}s" for key in marked[::-1])
+                keys += marked if not self.many else [Key("", f"{hidden} not shown", palette.FAINT)] if hidden else []
             if self.force_shown > 0:
                 text = ("compression " if self.look.forces == "thrust" else "contact force ") + force_text(
                     self.force_shown
                 )
                 length = self.force_shown * self.force_scale / self.scene.pixel
                 keys.append(Key("bar", text, palette.FORCE, length))
+            if self._forces_hidden:
+                keys.append(Key("", "forces not shown", palette.FAINT))
             if self.live.largest > 0.0:
                 keys.append(Key("line", self.live.words, palette.LIVE))
             if any(layer.startswith("motion") for layer in self.scene.layers):
@@ -321,9 +317,15 @@ class Drawer:
             self._keys = keys
         return self._keys
 
-    def _hinges(self, found: Marks) -> np.ndarray:
-        """Hinges that get a dot: in a wall of many blocks nearly every brick turns a little about some corner."""
-        return found.hinges if self.assembly.n_blocks <= FEW_BLOCKS else found.hinges[:0]
+    @property
+    def many(self) -> bool:
+        """Whether dots and arrows at every joint would hide the blocks."""
+        return self.assembly.n_blocks > FEW_BLOCKS
+
+    def _shown(self, increment: solver.Increment) -> solver.Increment:
+        """Give the state that governs the motion of the mechanism that follows it."""
+        governs = self._swing is not None and increment is self.response.governing
+        return self._swing.increment if self._swing is not None and governs else increment
 
     def _block_colours(self, pose: solver.Pose) -> np.ndarray | None:
         if self.look.colour_by != "displacement":
@@ -338,16 +340,18 @@ class Drawer:
         scene, thin = self.scene, self.scene.size[1] / 1080.0
         found = marks_of(self.assembly, self.joints, increment, shown)
         scene.polygons("crack", found.cracks, palette.OPEN)
-        scene.polygons("crack/pocket", cut_into_triangles(found.pockets), palette.OPEN)
         middle = (found.cracks[:, [0, 1]] + found.cracks[:, [3, 2]]) / 2.0 if len(found.cracks) else found.cracks
         width = found.openings / self.assembly.block_size
         fine, wide = width < FINE_CRACK, width * self.look.magnification > WIDE_CRACK
         scene.lines("crack edge", middle[~fine & ~wide], palette.OPEN, self._line(2.2 * thin))
+        scene.lines("crack edge/faces", found.faces, palette.OPEN, self._line(3.0 * thin))
         scene.lines("crack edge/fine", middle[fine], palette.OPEN, self._line(1.1 * thin))
+        if self.many:
+            return
         scene.lines("sliding", found.sliding, palette.SLIDING, self._line(5.0 * thin))
         radius = float(np.clip(0.09 * self.assembly.block_size / scene.pixel, 3.0 * thin, 11.0 * thin))
-        scene.discs("hinge/rim", self._hinges(found), radius * 1.35, palette.PAPER)
-        scene.discs("hinge top", self._hinges(found), radius, palette.HINGE)
+        scene.discs("hinge/rim", found.hinges, radius * 1.35, palette.PAPER)
+        scene.discs("hinge top", found.hinges, radius, palette.HINGE)
 
     def _line(self, pixels: float) -> float:
         return max(pixels, 1.2)
@@ -425,26 +429,10 @@ class Drawer:
         if not self.response.settlements:
             return
         phase = self.response.settlements[min(increment.phase, len(self.response.settlements) - 1)]
-        part = np.flatnonzero(phase.taking_part(assembly))
-        rate = phase.rate(assembly, solver.Pose.initial(assembly), 0.0)
-        corners = solver.moved_vertices(assembly, shown)
-        window = shapely.box(*scene.frame.low, *scene.frame.high)
-        outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in part]
-        seen = [(b, o) for b, o in zip(part, shapely.intersection(outlines, window), strict=True) if not o.is_empty]
-        if len(seen) > 4:
-            seen = [seen[len(seen) // 2]]
-        length = 0.055 * float(scene.frame.size.max())
-        tails, tips = [], []
-        for block, outline in seen:
-            # A bent support may have its centroid outside.
-            inside = outline.centroid if outline.contains(outline.centroid) else outline.point_on_surface()
-            place = np.array(inside.coords[0])
-            speed = solver.point_velocities(place[None], np.array([block]), shown, rate)[0]
-            if np.hypot(*speed) > 0:
-                along = speed / np.hypot(*speed) * length
-                tails.append(place - along / 2.0)
-                tips.append(place + along / 2.0)
-        self._arrows("arrow", np.array(tails).reshape(-1, 2), np.array(tips).reshape(-1, 2), 1.0)
+        _, places, directions = settlement_arrows(assembly, phase, shown, scene.frame.low, scene.frame.high)
+        half = 0.0275 * float(scene.frame.size.max()) * directions[directions.any(axis=1)]
+        places = places[directions.any(axis=1)]
+        self._arrows("arrow", places - half, places + half, 1.0)
 
     def _arrows(
         self,
@@ -517,13 +505,16 @@ def _contacts_at(increment: solver.Increment, pose: solver.Pose) -> solver.Conta
     return replace(contacts, points=points)
 
 
-def _caption(response: solver.Response, increment: solver.Increment, look: Look, s: float | None) -> tuple[str, str]:
-    title = state_text(increment, response, s)
-    detail = _state(response, increment)
+def _caption(response: solver.Response, increment: solver.Increment, look: Look) -> tuple[str, str]:
+    """First and second line of the caption: what is true of the increment, in frames between two of the one before."""
+    parts = [_state(response, increment)]
     if len(response.settlements) > 1:
-        detail += f"   ·   phase {increment.phase + 1} of {len(response.settlements)}"
-    scale = "true scale" if look.magnification == 1.0 else f"displacements × {look.magnification:g}"
-    return title, f"{detail}   ·   {scale}   ·   W = {force_text(response.total_weight)}"
+        parts.append(f"phase {increment.phase + 1} of {len(response.settlements)}")
+    # A mechanism that swings out of a limit state has no scale.
+    if not (response.swings and increment.status == solver.Status.FALLING):
+        parts.append("true scale" if look.magnification == 1.0 else f"displacements × {look.magnification:g}")
+    parts.append(f"W = {force_text(response.total_weight)}")
+    return state_text(increment, response), "   ·   ".join(parts)
 
 
 def _state(response: solver.Response, increment: solver.Increment) -> str:
@@ -535,9 +526,12 @@ def _state(response: solver.Response, increment: solver.Increment) -> str:
         lowest = len(response.path) > 1 and not response.parameter.is_path and _decides(response, increment)
         words = f"limit state, {response.limits[0].flow} friction"
         return words + (f"   ·   the lowest of {len(response.path)} positions" if lowest else "")
-    if response.stop == solver.Status.COLLAPSED and increment.parameter == response.path[-1].parameter:
-        capacity = response.collapse is not None and response.collapse.lost == "capacity"
-        return "last equilibrium before " + ("capacity is lost" if capacity else "collapse")
+    last = response.path[-1]
+    if (increment.phase, increment.parameter) == (last.phase, last.parameter):
+        if response.stop == solver.Status.COLLAPSED:
+            return f"last equilibrium before {lost_text(response)}"
+        if response.stop == solver.Status.SOLVER_FAILED:
+            return "last equilibrium found before the solver failed"
     return "equilibrium"
 
 

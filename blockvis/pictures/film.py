@@ -59,7 +59,7 @@ def film_of(
     holds[-1] += round(END * fps)
 
     def pictures() -> Iterator[Image.Image]:
-        along: Iterator[Draw] = (partial(drawer.picture, *place) for place in _even_motion(path, distinct))
+        along: Iterator[Draw] = (partial(drawer.picture, *place) for place in _places(drawer.response, path, distinct))
         for number, draw in enumerate(chain(along, (draw for draw, _ in falling)), start=1):
             picture = draw()
             if progress is not None:
@@ -109,6 +109,15 @@ def _falling(drawer: Drawer, fps: float) -> list[tuple[Draw, int]]:
         # Rest at the end is held as long as any end.
         shown[-1] = shown[-1][0], 1
     return shown
+
+
+def _places(
+    response: solver.Response, path: list[solver.Increment], n: int
+) -> Iterator[tuple[solver.Increment, solver.Pose | None, float | None]]:
+    """``n`` frames along the path; of states that stand by themselves, some of them: between two there is nothing."""
+    if response.parameter.is_path:
+        return _even_motion(path, n)
+    return ((path[k], None, None) for k in np.linspace(0, len(path) - 1, n).round().astype(int))
 
 
 def _even_motion(

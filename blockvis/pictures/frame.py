@@ -25,7 +25,8 @@ class Key:
 
     Attributes
     ----------
-    kind : {"area", "line", "dot", "bar"}
+    kind : {"area", "line", "dot", "bar", ""}
+        What stands before the text; nothing before a note.
     text : str
     colour : (int, int, int)
     length : float
@@ -166,9 +167,8 @@ class Sheet:
         swatch, space, gap = 1.5 * self.text, 0.45 * self.text, 1.4 * self.text
 
         def width(font: ImageFont.FreeTypeFont) -> float:
-            return sum(max(swatch, k.length) + space + draw.textlength(k.text, font) for k in keys) + gap * (
-                len(keys) - 1
-            )
+            each = (draw.textlength(k.text, font) + (max(swatch, k.length) + space) * bool(k.kind) for k in keys)
+            return sum(each) + gap * (len(keys) - 1)
 
         room = self.size[0] - self.pad - left
         font = _font(size)
@@ -178,9 +178,10 @@ class Sheet:
             font = _font(size)
         x, y = self.size[0] - self.pad - width(font), self.size[1] - self.pad - 0.35 * self.text
         for key in keys:
-            wide = max(swatch, key.length)
-            _swatch(draw, key, x, y, wide, self.text)
-            x += wide + space
+            if key.kind:
+                wide = max(swatch, key.length)
+                _swatch(draw, key, x, y, wide, self.text)
+                x += wide + space
             draw.text((x, y), key.text, palette.INK, font, anchor="lm")
             x += draw.textlength(key.text, font) + gap
 

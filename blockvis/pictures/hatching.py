@@ -1,20 +1,11 @@
-"""What fills the outlines: triangles of pockets, hatch lines of the supports."""
+"""What fills the outlines of supports: hatch lines."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 import shapely
 
 import solver
-from blockvis.layout.triangulation import triangles_of_ring
-
-
-def cut_into_triangles(outlines: Sequence[np.ndarray]) -> np.ndarray:
-    """(n, 3, 2) array [m]: triangles that fill outlines, (k, 2) arrays [m] counter-clockwise, bent ones included."""
-    cut = [outline[triangles_of_ring(outline)] for outline in outlines]
-    return np.concatenate([np.zeros((0, 3, 2)), *cut])
 
 
 def hatch_lines(

@@ -13,8 +13,9 @@ from . import palette
 _SCRIPT = Template('''\
 """Opens these results in ParaView: View > Python Shell > Run Script, or paraview --script=paraview_colours.py
 
-Blocks are coloured by displacement [m], with their outlines; hinges and sliding points by state, with arrows
-of the contact forces [N]. Cells are triangulated first: ParaView fills bent polygons wrongly otherwise.
+Blocks are coloured by displacement [m], with their outlines, open joints by their opening [m]; hinges and sliding
+points by state, with arrows of the contact forces [N]. Cells are triangulated first: ParaView fills bent polygons
+wrongly otherwise.
 """
 
 import os
@@ -30,7 +31,9 @@ view.InteractionMode = "2D"
 
 blocks = OpenDataFile(os.path.join(here, "blocks.pvd"))
 contacts = OpenDataFile(os.path.join(here, "contacts.pvd"))
+joints = OpenDataFile(os.path.join(here, "joints.pvd"))
 RenameSource("blocks", blocks)
+RenameSource("joints", joints)
 RenameSource("contact points", contacts)
 scene = GetAnimationScene()
 scene.UpdateAnimationUsingDataTimeSteps()
@@ -39,6 +42,7 @@ last = times[-1] if times else 0.0
 scene.AnimationTime = last
 UpdatePipeline(last, blocks)
 UpdatePipeline(last, contacts)
+UpdatePipeline(last, joints)
 
 surface = ExtractSurface(Input=blocks)
 RenameSource("blocks, surface", surface)
@@ -67,6 +71,25 @@ outlines = Show(edges, view)
 ColorBy(outlines, None)
 outlines.AmbientColor = outlines.DiffuseColor = [$outline]
 outlines.LineWidth = 1.0
+
+widest = joints.CellData["opening"].GetRange()[1] if joints.CellData.GetNumberOfArrays() else 0.0
+cracks = Threshold(Input=joints, Scalars=["CELLS", "opening"])
+cracks.LowerThreshold, cracks.UpperThreshold = max(0.01 * widest, 1e-9), max(widest, 1e-9)
+RenameSource("open joints", cracks)
+lines = Show(cracks, view)
+lines.LineWidth = 4.0
+ColorBy(lines, ("CELLS", "opening"))
+openings = GetColorTransferFunction("opening")
+openings.RGBPoints = [0.0, $pale, 1.0, $open]
+openings.ColorSpace = "RGB"
+openings.RescaleTransferFunction(0.0, max(widest, 1e-9))
+lines.SetScalarBarVisibility(view, True)
+crack_bar = GetScalarBar(openings, view)
+crack_bar.Title, crack_bar.ComponentTitle = "opening [m]", ""
+crack_bar.TitleColor = crack_bar.LabelColor = [0.1, 0.1, 0.1]
+crack_bar.TitleFontSize = crack_bar.LabelFontSize = 12
+crack_bar.AutomaticLabelFormat, crack_bar.LabelFormat, crack_bar.RangeLabelFormat = 0, "%.3g", "%.3g"
+crack_bar.WindowLocation, crack_bar.ScalarBarLength = "Lower Left Corner", 0.35
 
 carrying = Threshold(Input=contacts, Scalars=["POINTS", "state"])
 carrying.LowerThreshold, carrying.UpperThreshold = 1.0, 3.0
@@ -108,7 +131,7 @@ Render(view)
 
 
 def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
-    """Write ``paraview_colours.py`` beside ``blocks.pvd`` and ``contacts.pvd``.
+    """Write ``paraview_colours.py`` beside ``blocks.pvd``, ``joints.pvd`` and ``contacts.pvd``.
 
     Parameters
     ----------
@@ -127,6 +150,7 @@ def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
         ramp=", ".join(f"{v:.4f}" for v in ramp),
         outline=_fractions(palette.OUTLINE),
         open=_fractions(palette.OPEN),
+        pale=_fractions((250, 220, 205)),
         sticking=_fractions(palette.FAINT),
         sliding=_fractions(palette.SLIDING),
         hinge=_fractions(palette.HINGE),

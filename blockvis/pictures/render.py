@@ -12,10 +12,11 @@ from PIL import Image
 import solver
 from blockvis.atomic_files import whole_file
 from blockvis.fall import Fall, fall_of
+from blockvis.results.about import loss_of
 
-from .drawer import MOST_PARTS, Drawer, Look
+from .drawer import Drawer, Look
 from .film import film_of
-from .swing import swing_of
+from .swing import MOST_PARTS, swing_of
 from .video import write_film
 
 STILL_SIZE = (1920, 1080)
@@ -161,7 +162,10 @@ def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:
         return f"{response.stop}: the motion that would follow   ·   {bodies}"
     collapse = response.collapse
     low, high = (f"{end:.5g} {collapse.unit}" for end in collapse.bracket)
-    return f"collapse mechanism   ·   {collapse.lost} at {low}, none at {high}   ·   {bodies}"
+    loss = loss_of(response)
+    what = "collapse mechanism" if loss is None or not loss.local else "local loss"
+    falls = "" if loss is None else f"   ·   {100.0 * loss.share:.3g} % of W fall"
+    return f"{what}   ·   {collapse.lost} at {low}, none at {high}   ·   {bodies}{falls}"
 
 
 def _check_response(response: solver.Response) -> None:

@@ -8,7 +8,11 @@ import numpy as np
 
 import solver
 
+from . import palette
 from .frame import framed
+
+#: Up to this many parts of a mechanism are tinted one by one.
+MOST_PARTS = 16
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,23 @@ def swing_of(response: solver.Response) -> Swing:
     reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
     displaced = solver.swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
     return Swing(last, displaced, solver.rigid_parts(assembly, last), fastest > 0.0)
+
+
+def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing) -> np.ndarray:
+    """(n_blocks, 3) uint8 array: fills with the parts of a mechanism tinted, or darker where they are faster.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    fill : (n_blocks, 3) uint8 array
+        As :func:`blockvis.pictures.palette.block_colours` gives it.
+    swing : Swing
+    """
+    if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
+        return palette.part_colours(fill, swing.parts)
+    travel = np.hypot(*(swing.displaced.positions - swing.increment.pose.positions).T)
+    tints = palette.displacement_colours(0.75 * travel / travel[assembly.free].max())
+    return np.where(assembly.free[:, None], tints, fill)
 
 
 def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:

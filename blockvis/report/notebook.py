@@ -29,7 +29,7 @@ class Player:
         # A frame of its own keeps the page's names and styles apart from the notebook's.
         page = html.escape(report_html(self.response, fall=fall_of(self.response)), quote=True)
         style = f"width:100%;height:{self.height}px;border:0"
-        return f'<iframe srcdoc="{page}" style="{style}" sandbox="allow-scripts"></iframe>'
+        return f'<iframe srcdoc="{page}" style="{style}" sandbox="allow-scripts allow-downloads"></iframe>'
 
 
 def show(response: solver.Response, *, height: int = 760) -> Player:

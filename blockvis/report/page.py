@@ -8,10 +8,11 @@ import json
 import os
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
@@ -24,18 +25,18 @@ from blockvis.pictures import palette
 from blockvis.pictures.annotations import (
     SMALLEST_OPENING,
     SMALLEST_RESULTANT,
-    STEEPEST_FALLING,
-    WIDEST_FALLING,
-    WIDEST_STANDING,
-    initial_joints,
-    joint_places,
+    STEEPEST,
+    WIDEST,
+    joint_marks,
     length_per_force,
     resultants,
+    settlement_arrows,
 )
 from blockvis.pictures.captions import (
     FALL_BADGE,
     badge_of,
     collapse_places,
+    failure_text,
     force_unit,
     parameter_label,
     parameter_unit,
@@ -45,6 +46,9 @@ from blockvis.pictures.captions import (
 )
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
+from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, swing_of
+from blockvis.results.about import about, loss_of
+from blockvis.results.joints import initial_joints
 from blockvis.runs.kinds import KINDS
 
 #: Increments beyond this many are thinned out evenly; the page stays below 2 MB for a thousand blocks. Of more than
@@ -57,10 +61,27 @@ FINENESS, TURN_UNIT = 1e-6, 1e-6
 #: Forces are stored in this fraction of the largest.
 FORCE_FINENESS = 1e-3
 
-#: Seconds the path takes at even settlement, and each frame of the fall.
-PATH_SECONDS, FALL_SECONDS = 6.0, 0.06
+#: Seconds the path takes at even settlement, each frame of a fall without time, and the pause before a fall.
+PATH_SECONDS, FALL_SECONDS, PAUSE = 6.0, 0.06, 0.6
 
-T = TypeVar("T")
+#: Above this many blocks dots of hinges and lines of sliding joints hide the cracks: they are off until asked for.
+FEW_BLOCKS = 300
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """A frame of the page: an increment, or a moment of the fall with the time since the last equilibrium [s].
+
+    On the curve it stands at this number of the path.
+    """
+
+    increment: solver.Increment
+    curve: int
+    time: float | None = None
+
+    @property
+    def falling(self) -> bool:
+        return self.increment.status == solver.Status.FALLING
 
 
 def write_report(
@@ -80,9 +101,9 @@ def write_report(
     case_text : str
         The case file, shown as it is.
     title : str
-        Of the page; says what happened by default.
+        Of the page; the name of the case and what happened by default.
     fall : Fall, optional
-        After the last equilibrium, played in real time.
+        What comes after the last equilibrium, in time, instead of the frames without it.
 
     Returns
     -------
@@ -103,23 +124,66 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
         raise ValueError(f"there is no increment to show: {response.message or response.stop}")
     page = files("blockvis") / "report"
     # No "<" may survive in the data: a name with "</script>" in it would end the script.
-    model = json.dumps(_model(response, fall), ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
+    origin = about(response)
+    model = _model(response, fall) | {"name": origin.name}
+    data = json.dumps(model, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
+    failed = response.stop is solver.Status.SOLVER_FAILED
     return Template((page / "player.html").read_text(encoding="utf-8")).substitute(
-        title=html.escape(title or KINDS[response.analysis].title(response)),
-        badge=html.escape(badge_of(response) if fall is None else FALL_BADGE),
+        title=html.escape(title or " · ".join(filter(None, (origin.name, headline_of(response))))),
+        about=" · ".join(html.escape(part) for part in (origin.file, origin.finished, origin.version) if part),
+        failed=f'<p class="failed">{html.escape(failure_text(response))}</p>' if failed else "",
+        badge=html.escape(FALL_BADGE if fall is not None else badge_of(response)),
+        notes=_notes(response),
         style=(page / "player.css").read_text(encoding="utf-8"),
         script=(page / "player.js").read_text(encoding="utf-8"),
-        summary=_rows(_summary(response)),
+        summary=_rows(_summary(response, fall)),
         certificate=_rows(_certificate(response)),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
         case_open=" open" if case_text else "",
-        model=model,
+        model=data,
     )
+
+
+def headline_of(response: solver.Response) -> str:
+    """Say what happened, in a few words; that the solver failed comes first."""
+    words = KINDS[response.analysis].title(response)
+    failed = response.stop is solver.Status.SOLVER_FAILED and "failed" not in words
+    return f"Solver failed: {words} so far" if failed else words
+
+
+def _notes(response: solver.Response) -> str:
+    """List the notes of the run."""
+    items = "".join(f"<li>{html.escape(note)}</li>" for note in dict.fromkeys(response.notes))
+    return f'<h2>Notes</h2><ul id="notes">{items}</ul>' if items else ""
+
+
+def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> list[_Frame]:
+    """Choose what the page shows: the path, thinned where it is long, and the fall.
+
+    The state that governs has the hinges and sliding joints of the mechanism that follows it, as pictures and films do.
+    """
+    most = max(FEWEST_FRAMES, min(MOST_FRAMES, MOST_POSES // response.assembly.n_blocks))
+    path, governing = response.path, response.governing
+    place = {id(increment): k for k, increment in enumerate(path)}
+
+    def framed_at(increment: solver.Increment) -> _Frame:
+        return _Frame(swing.increment if increment is governing else increment, place.get(id(increment), len(path)))
+
+    if fall is None or not path:
+        return [framed_at(increment) for increment in _thinned(response.increments, most)]
+    n = min(len(fall) - 1, most // 2)
+    chosen = np.linspace(len(fall) - 1, 1, n).round().astype(int)[::-1]
+    falling = [
+        _Frame(falling_increment(response, fall.pose(k)), len(path), float(fall.times[k])) for k in chosen.tolist()
+    ]
+    return [*map(framed_at, _thinned(path, most - n)), *falling]
 
 
 def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
     assembly = response.assembly
-    shown, seconds = _shown(response, fall)
+    swing = swing_of(response)
+    frames = _frames_of(response, swing, fall)
+    shown = [frame.increment for frame in frames]
     frame, largest = _surveyed(assembly, shown)
     live = LiveLoads(response, shown, float(frame.size.max()))
     frame = frame.holding(live.tails)
@@ -130,7 +194,6 @@ def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
     force_length = tables.force_length(assembly.block_size, float(frame.size.max()))
     shown_force = rounded_length(largest)
     packed = _packed_geometry(assembly, origin, unit) | tables.packed() | _packed_live(live, shown, origin, unit)
-    arrows = [["area", live.words, palette.hexadecimal(palette.LIVE)]] if live.largest > 0.0 else []
     materials = list(assembly.materials)
     roles = {role: number for number, role in enumerate(solver.ROLES)}
     fills = palette.block_colours(assembly.materials, assembly.free)
@@ -141,11 +204,21 @@ def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
         "bounds": [*(frame.low - origin).tolist(), *(frame.high - origin).tolist()],
         "block_size": assembly.block_size,
         "smallest_opening": SMALLEST_OPENING * assembly.block_size,
-        "widest": [WIDEST_STANDING * assembly.block_size, WIDEST_FALLING, STEEPEST_FALLING],
+        "widest": [WIDEST * assembly.block_size, STEEPEST],
         "names": list(assembly.names),
         "materials": materials,
         "roles": [roles[str(role)] for role in assembly.roles],
-        "fills": [palette.hexadecimal((int(r), int(g), int(b))) for r, g, b in fills],
+        "fills": _hexadecimal(fills),
+        "tints": _hexadecimal(mechanism_colours(assembly, fills, swing)) if swing.moves else [],
+        "tints_words": _tints_text(response, swing),
+        "moving": int(np.argmax(swing.parts >= 0)),
+        "ramp": _hexadecimal(palette.RAMP.astype(int)),
+        "largest_displacement": tables.largest_displacement,
+        "arrows": _arrows(response, frame, origin),
+        "has_forces": any(map(len, tables.sizes)),
+        "live_words": live.words if live.largest > 0.0 else "",
+        "ground": None if fall is None else float(fall.ground - origin[1]),
+        "many": assembly.n_blocks > FEW_BLOCKS,
         "colours": {
             name: palette.hexadecimal(getattr(palette, name.upper()))
             for name in (
@@ -153,44 +226,51 @@ def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
                 "live",
             )
         },
-        "frames": _frames(response, shown, seconds),
-        "times": _times(shown, seconds),
+        "frames": _frames(response, frames),
+        "times": _times(frames),
+        # In a fall in time blocks part and meet anew: what lay between two of them is no joint any more.
         "joints_of_fall": fall is None,
         "curve": _curve(response),
         "force_unit": FORCE_FINENESS * largest,
         "force_length": force_length,
         "force_scale": [shown_force, force_text(shown_force)],
-        "legend": [
-            ["area", "open joint", palette.hexadecimal(palette.OPEN)],
-            ["dot", "hinge", palette.hexadecimal(palette.HINGE)],
-            ["dot", "sliding", palette.hexadecimal(palette.SLIDING)],
-            ["area", "resultant of a joint", palette.hexadecimal(palette.FORCE)],
-            *arrows,
-        ],
         "packed": packed,
     }  # fmt: skip
 
 
-def _shown(response: solver.Response, fall: Fall | None) -> tuple[list[solver.Increment], np.ndarray]:
-    """Choose the increments shown, and the seconds of those that are a fall in time, which come last."""
-    n = response.assembly.n_blocks
-    if fall is None:
-        return _thinned(response.increments, n), np.zeros(0)
-    poses = _thinned(tuple(range(1, len(fall))), 2 * n)
-    return [
-        *_thinned(response.path, 2 * n),
-        *(falling_increment(response, fall.pose(k)) for k in poses),
-    ], fall.times[poses]
+def _hexadecimal(colours: np.ndarray) -> list[str]:
+    return [palette.hexadecimal((int(r), int(g), int(b))) for r, g, b in colours]
 
 
-def _thinned(increments: tuple[T, ...], n_blocks: int) -> list[T]:
-    """All increments, or an even choice of them with the last equilibrium kept; or of other things."""
-    most = max(FEWEST_FRAMES, min(MOST_FRAMES, MOST_POSES // n_blocks))
+def _tints_text(response: solver.Response, swing: Swing) -> str:
+    """Say what the colours of the mechanism mean."""
+    whose = "" if response.parameter.is_path else " of the lowest state"
+    if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
+        return f"parts of the mechanism{whose}"
+    return f"mechanism{whose}, darker where faster"
+
+
+def _arrows(response: solver.Response, frame: Frame, origin: np.ndarray) -> list[list[list[float]]]:
+    """Arrows of each phase of the settlement: support, place [m] and direction."""
+    initial = solver.Pose.initial(response.assembly)
+    phases = []
+    for settlement in response.settlements:
+        found = settlement_arrows(response.assembly, settlement, initial, frame.low, frame.high)
+        phases.append(
+            [
+                [int(block), *np.round(place - origin, 5).tolist(), *np.round(direction, 5).tolist()]
+                for block, place, direction in zip(*found, strict=True)
+                if direction.any()
+            ]
+        )
+    return phases
+
+
+def _thinned(increments: tuple[solver.Increment, ...], most: int) -> list[solver.Increment]:
+    """All increments, or an even choice of at most so many, with the last equilibrium kept."""
     if len(increments) <= most:
         return list(increments)
-    last = max(
-        (k for k, i in enumerate(increments) if getattr(i, "status", "") == solver.Status.EQUILIBRIUM), default=0
-    )
+    last = max((k for k, i in enumerate(increments) if i.status == solver.Status.EQUILIBRIUM), default=0)
     chosen = np.unique([*np.linspace(0, len(increments) - 1, most - 1).round().astype(int), last])
     return [increments[k] for k in chosen]
 
@@ -239,6 +319,8 @@ def _packed_geometry(assembly: solver.Assembly, origin: np.ndarray, unit: float)
 class _Tables:
     """What changes from frame to frame, as integers: motion, resultants of the joints, hinges (1), sliding joints (2).
 
+    A hinge has its place twice, a sliding joint both its ends. Each resultant names its two blocks.
+
     Parameters
     ----------
     assembly : solver.Assembly
@@ -257,20 +339,26 @@ class _Tables:
         coarse = round(FORCE_FINENESS / FINENESS / 4.0)
         self.n, self.largest = len(shown), largest
         self.travel, self.turn = [], []
-        self.places, self.vectors, self.sizes = _empty(2), _empty(2), [np.zeros(0)]
-        self.mark_places, self.mark_kinds = _empty(2), [np.zeros(0, dtype=np.int32)]
+        self.places, self.vectors, self.sizes, self.pairs = _empty(2), _empty(2), [np.zeros(0)], _empty(2)
+        self.mark_places, self.mark_kinds = _empty(4), [np.zeros(0, dtype=np.int32)]
+        self.largest_displacement = 0.0
         for increment in shown:
             moved = increment.pose.displacements(assembly)
+            if increment.status != solver.Status.FALLING:
+                far = float(np.hypot(*moved[assembly.free, :2].T).max(initial=0.0))
+                self.largest_displacement = max(self.largest_displacement, far)
             self.travel.append(_rounded(moved[:, :2], unit))
             self.turn.append(_rounded(moved[:, 2], TURN_UNIT))
-            points, forces, _ = resultants(increment)
+            points, forces, pairs = resultants(increment)
             size = np.hypot(*forces.T) * (increment.status != solver.Status.FALLING)
             kept = size > SMALLEST_RESULTANT * largest
             self.places.append(_rounded(points[kept] - origin, unit * coarse) * coarse)
             self.vectors.append(_rounded(forces[kept], FORCE_FINENESS * largest))
             self.sizes.append(size[kept])
-            hinges, sliding = joint_places(assembly, increment)
-            self.mark_places.append(_rounded(np.concatenate([hinges, sliding]) - origin, unit))
+            self.pairs.append(pairs[kept].astype(np.int32))
+            hinges, sliding = joint_marks(assembly, increment)
+            ends = np.concatenate([np.repeat(hinges[:, None], 2, axis=1), sliding])
+            self.mark_places.append(_rounded(ends - origin, unit).reshape(-1, 4))
             self.mark_kinds.append(np.repeat([1, 2], [len(hinges), len(sliding)]))
 
     def force_length(self, block_size: float, extent: float) -> float:
@@ -286,6 +374,7 @@ class _Tables:
             "force_first": _deflated(forces, len(forces)),
             "force_place": _deflated(np.concatenate(self.places), forces[-1]),
             "force_vector": _deflated(np.concatenate(self.vectors), forces[-1]),
+            "force_blocks": _deflated(np.concatenate(self.pairs), forces[-1]),
             "mark_first": _deflated(found, len(found)),
             "mark_place": _deflated(np.concatenate(self.mark_places), found[-1]),
             "mark_kind": _deflated(np.concatenate(self.mark_kinds), found[-1]),
@@ -310,35 +399,35 @@ def _empty(columns: int) -> list[np.ndarray]:
     return [np.zeros((0, columns), dtype=np.int32)]
 
 
-def _frames(response: solver.Response, shown: list[solver.Increment], seconds: np.ndarray) -> list[dict[str, Any]]:
-    place = {id(increment): k for k, increment in enumerate(response.path)}
+def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, Any]]:
     frames = []
-    for increment in shown:
-        falling = increment.status == solver.Status.FALLING
-        caption = state_text(increment, response).replace("   ·   ", "  ·  ")
-        if len(response.settlements) > 1:
-            caption += f"  ·  phase {increment.phase + 1}"
-        frames.append({"caption": caption, "falling": falling, "curve": place.get(id(increment), len(response.path))})
-    for frame, time in zip(frames[len(frames) - len(seconds) :], seconds, strict=True):
-        frame["caption"] = f"{CAPTION}  ·  {time:.2f} s"
+    for frame in shown:
+        increment = frame.increment
+        if frame.time is not None:
+            caption = f"{CAPTION}  ·  {frame.time:.2f} s"
+        else:
+            caption = state_text(increment, response).replace("   ·   ", "  ·  ")
+            if len(response.settlements) > 1:
+                caption += f"  ·  phase {increment.phase + 1}"
+        phase = min(increment.phase, max(len(response.settlements) - 1, 0))
+        frames.append({"caption": caption, "falling": frame.falling, "curve": frame.curve, "phase": phase})
     return frames
 
 
-def _times(shown: list[solver.Increment], seconds: np.ndarray) -> list[float]:
-    """Seconds at which each frame plays: even settlement, then the fall, in real time where it has one."""
-    path = solver.path_parameters([i for i in shown if i.status != solver.Status.FALLING])
+def _times(shown: list[_Frame]) -> list[float]:
+    """Seconds at which each frame plays: even settlement, a pause, the fall in its own time where it has one."""
+    path = solver.path_parameters([frame.increment for frame in shown if not frame.falling])
     path = path - path[:1]
     total = float(path[-1]) if len(path) and path[-1] > 0 else 1.0
     times: list[float] = []
-    for k in range(len(shown)):
+    for k, frame in enumerate(shown):
         if k < len(path):
             times.append(max(PATH_SECONDS * float(path[k]) / total, times[-1] + 0.02 if times else 0.0))
+        elif frame.time is not None:
+            times.append(times[len(path) - 1] + PAUSE + frame.time)
         else:
-            pause = 0.6 if k == len(path) and times else FALL_SECONDS
-            times.append((times[-1] + pause) if times else 0.0)
-    if len(seconds):
-        start = len(shown) - len(seconds)
-        times[start:] = [(times[start - 1] if start else 0.0) + 0.6 + float(t) for t in seconds]
+            step = PAUSE if k == len(path) and times else FALL_SECONDS
+            times.append((times[-1] + step) if times else 0.0)
     return [round(t, 4) for t in times]
 
 
@@ -369,18 +458,28 @@ def _curve(response: solver.Response) -> dict[str, Any]:
         "y_ticks": ticks(low, high, 5),
         "x_label": parameter_label(response),
         "y_label": value_label(response),
+        # One limit load has no path: it is drawn as a rigid-plastic diagram.
+        "single": not response.parameter.is_path and len(response.path) == 1,
     }
 
 
-def _summary(response: solver.Response) -> list[tuple[str, str]]:
+def _summary(response: solver.Response, fall: Fall | None) -> list[tuple[str, str]]:
     assembly, path = response.assembly, response.path
-    rows = [("analysis", response.analysis), ("status", str(response.stop)), *KINDS[response.analysis].rows(response)]
-    frames = "of pseudo-motion" if response.swings else "falling"
+    # That a limit load is found is no collapse that has happened.
+    status = "limit load found" if response.swings and response.limits else str(response.stop)
+    rows = [("analysis", response.analysis), ("status", status), *KINDS[response.analysis].rows(response)]
+    apart = len(response.increments) - len(path)
+    loss = loss_of(response)
+    if loss is not None:
+        rows.append(
+            ("falls", f"{force_text(loss.weight)} = {loss.share:.4f} W{', a local loss' if loss.local else ''}")
+        )
+    follows = f", {apart} {'of pseudo-motion' if response.swings else 'falling'}" if apart and fall is None else ""
     rows += [
         ("weight W", force_text(response.total_weight)),
         ("blocks", f"{assembly.n_blocks} ({int(assembly.free.sum())} free)"),
         ("contact points", str(len(response.increments[0].contacts.points))),
-        ("increments", f"{len(path)} in equilibrium, {len(response.increments) - len(path)} {frames}"),
+        ("increments", f"{len(path)} in equilibrium{follows}"),
         ("solver time", f"{sum(i.seconds for i in response.increments):.1f} s"),
     ]
     if response.message and response.collapse is None:

@@ -1,21 +1,36 @@
-"""Assemblies and increments as pyvista datasets: one polygon cell per block, one vertex cell per contact point."""
+"""Assemblies and increments as pyvista datasets: blocks as polygons, joints as lines, contact points as vertices."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pyvista as pv
 from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonCore import vtkStringArray
+from vtkmodules.vtkCommonCore import vtkDataArray, vtkStringArray
 
 import solver
+
+from .joints import InitialJoints, initial_joints, joint_states
 
 #: Numbers of the roles in the cell array ``role``; their names are in the field array ``role_names``.
 ROLE_NUMBERS = {role: number for number, role in enumerate(solver.ROLES)}
 
 
-def block_dataset(assembly: solver.Assembly, increment: solver.Increment | None = None) -> pv.UnstructuredGrid:
+#: What the points of a dataset of blocks show: where the blocks are, or where the layout has them.
+SHAPES = ("moved", "undeformed")
+
+#: Units of the arrays; those that are not here are names, numbers of blocks or states, or have no unit.
+UNITS = {
+    "displacement": "m", "reference": "m", "to_reference": "m", "rotation": "rad", "force": "N", "normal_force": "N",
+    "shear_force": "N", "gap": "m", "opening": "m", "slip": "m", "length": "m",
+}  # fmt: skip
+
+
+def block_dataset(
+    assembly: solver.Assembly, increment: solver.Increment | None = None, *, shape: str = "moved"
+) -> pv.UnstructuredGrid:
     """Make a dataset of the blocks of one increment, one polygon cell per block, non-convex outlines too.
 
     Parameters
@@ -23,14 +38,18 @@ def block_dataset(assembly: solver.Assembly, increment: solver.Increment | None 
     assembly : solver.Assembly
     increment : solver.Increment, optional
         The blocks as laid out by default.
+    shape : {"moved", "undeformed"}
+        Whether the points are where the blocks are at the increment, or where the layout has them. Warped by its active
+        vectors, the one gives the other.
 
     Returns
     -------
     pyvista.UnstructuredGrid
         Cell arrays ``block_id``, ``name``, ``role`` (number), ``role_name``, ``material_id``, ``material``,
-        ``displacement`` (n_blocks, 3) of the centroids [m] and ``rotation`` [rad]; point array ``displacement``
-        (n_vertices, 3) [m]; field arrays ``settlement`` (the parameter: of a pushover the control displacement, of a
-        load that moves its position), ``phase``, ``load_multiplier``,
+        ``displacement`` (n_blocks, 3) of the centroids [m] and ``rotation`` [rad]; point arrays ``displacement``
+        (n_vertices, 3) [m], ``reference``, the coordinates in the layout [m], and of moved shapes ``to_reference``, the
+        vector back to them [m]; field arrays ``units`` as "displacement [m]", ``settlement`` (the parameter: of a
+        pushover the control displacement, of a load that moves its position), ``phase``, ``load_multiplier``,
         ``reaction`` [N or N·m], ``status``, ``role_names`` and ``material_names``.
 
     Examples
@@ -57,55 +76,117 @@ def block_dataset(assembly: solver.Assembly, increment: solver.Increment | None 
         grid.cell_data[name] = array
     for name, words in (("name", assembly.names), ("role_name", assembly.roles), ("material", assembly.materials)):
         grid.GetCellData().AddArray(_strings(name, words))
-    grid.point_data["displacement"] = _in_space(corners - assembly.vertices)
+    _give_shape(grid, assembly.vertices, shape)
     grid.GetFieldData().AddArray(_strings("role_names", solver.ROLES))
     grid.GetFieldData().AddArray(_strings("material_names", materials))
     if increment is not None:
         _describe(grid, increment)
+    _state_units(grid)
     return grid
 
 
-def contact_dataset(assembly: solver.Assembly, increment: solver.Increment) -> pv.UnstructuredGrid:
+def joint_dataset(
+    assembly: solver.Assembly,
+    increment: solver.Increment,
+    *,
+    shape: str = "moved",
+    joints: InitialJoints | None = None,
+) -> pv.UnstructuredGrid:
+    """Make a dataset of the joints of one increment: a line cell for each, midway between its two faces.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    increment : solver.Increment
+    shape : {"moved", "undeformed"}
+        As of :func:`block_dataset`.
+    joints : InitialJoints, optional
+        Of the assembly, where they are at hand.
+
+    Returns
+    -------
+    pyvista.UnstructuredGrid
+        Cell arrays ``opening`` and ``slip`` [m], ``normal_force`` (compression positive) and ``shear_force`` [N] on
+        ``block_a``, ``length`` of the faces in common [m], ``block_a``, ``block_b``, ``joint`` (their names) and
+        ``initial``: 1 for joints of the layout, 0 for blocks that have come to touch since, whose opening and slip are
+        0. In frames of a fall there are no forces. Point and field arrays as those of :func:`block_dataset`.
+    """
+    states = joint_states(assembly, initial_joints(assembly) if joints is None else joints, increment)
+    n = len(states.ends)
+    points = states.ends.reshape(-1, 2)
+    cells = np.column_stack([np.full(n, 2), np.arange(2 * n).reshape(n, 2)]).ravel()
+    grid = pv.UnstructuredGrid(cells, np.full(n, int(pv.CellType.LINE), np.uint8), _in_space(points))
+    blocks = (np.repeat(states.block_a, 2), np.repeat(states.block_b, 2))
+    initial = solver.Pose.initial(assembly)
+    _give_shape(grid, solver.carried_between(points, *blocks, increment.pose, initial), shape)
+    _add(
+        grid.GetCellData(),
+        {
+            "opening": states.opening,
+            "slip": states.slip,
+            "normal_force": states.normal_force,
+            "shear_force": states.shear_force,
+            "length": np.hypot(*(states.ends[:, 1] - states.ends[:, 0]).T),
+            "block_a": states.block_a.astype(np.int32),
+            "block_b": states.block_b.astype(np.int32),
+            "initial": states.initial.astype(np.int32),
+        },
+    )
+    names = assembly.names
+    words = (f"{names[a]} | {names[b]}" for a, b in zip(states.block_a, states.block_b, strict=True))
+    grid.GetCellData().AddArray(_strings("joint", words))
+    _describe(grid, increment)
+    _state_units(grid)
+    return grid
+
+
+def contact_dataset(
+    assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
+) -> pv.UnstructuredGrid:
     """Make a dataset of the contact points of one increment, one vertex cell each.
 
     Parameters
     ----------
     assembly : solver.Assembly
     increment : solver.Increment
+    shape : {"moved", "undeformed"}
+        As of :func:`block_dataset`.
 
     Returns
     -------
     pyvista.UnstructuredGrid
         Point arrays ``normal`` and ``tangent`` (n_contacts, 3), ``force`` (n_contacts, 3) on ``block_a`` [N],
         ``normal_force`` (compression positive) and ``shear_force`` [N], ``gap`` [m], ``friction``, ``state``
-        (number of :class:`solver.ContactState`), ``block_a`` and ``block_b``; field arrays as those of
-        :func:`block_dataset`, and ``state_names``.
+        (number of :class:`solver.ContactState`), ``block_a`` and ``block_b``, ``displacement`` and ``reference`` as of
+        :func:`block_dataset`; its field arrays, and ``state_names``. In frames of a fall, which are no
+        equilibrium, forces are 0.
     """
     contacts = increment.contacts
     n = len(contacts.points)
     vertices = np.column_stack([np.ones(n, dtype=np.int64), np.arange(n)]).ravel()
     grid = pv.UnstructuredGrid(vertices, np.full(n, int(pv.CellType.VERTEX), np.uint8), _in_space(contacts.points))
+    initial = solver.Pose.initial(assembly)
+    drawn = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, initial)
+    _give_shape(grid, drawn, shape)
     normal, tangent = contacts.frames[:, 0], contacts.frames[:, 1]
-    force = increment.forces[:, :1] * normal + increment.forces[:, 1:] * tangent
+    balanced = increment.forces * (increment.status != solver.Status.FALLING)
+    force = balanced[:, :1] * normal + balanced[:, 1:] * tangent
     points = {
         "normal": _in_space(normal),
         "tangent": _in_space(tangent),
         "force": _in_space(force),
-        "normal_force": increment.forces[:, 0].copy(),
-        "shear_force": increment.forces[:, 1].copy(),
+        "normal_force": balanced[:, 0],
+        "shear_force": balanced[:, 1],
         "gap": np.asarray(contacts.gaps, dtype=float),
         "friction": np.asarray(increment.friction, dtype=float),
         "state": increment.states.astype(np.int32),
         "block_a": contacts.block_a.astype(np.int32),
         "block_b": contacts.block_b.astype(np.int32),
     }
-    for name, array in points.items():
-        # Blocks in the air have no contact point; pyvista refuses empty arrays, VTK and ParaView do not.
-        values = numpy_to_vtk(np.ascontiguousarray(array), deep=True)
-        values.SetName(name)
-        grid.GetPointData().AddArray(values)
+    _add(grid.GetPointData(), points)
     grid.GetFieldData().AddArray(_strings("state_names", [state.name.lower() for state in solver.ContactState]))
     _describe(grid, increment)
+    _state_units(grid)
     return grid
 
 
@@ -142,6 +223,42 @@ def _describe(grid: pv.UnstructuredGrid, increment: solver.Increment) -> None:
     grid.field_data["load_multiplier"] = np.array([increment.load_multiplier])
     grid.field_data["reaction"] = np.array([increment.reaction])
     grid.GetFieldData().AddArray(_strings("status", [str(increment.status)]))
+
+
+def _add(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
+    """Add arrays that may be empty: blocks in the air have no contact point, and pyvista refuses empty arrays."""
+    for name, array in arrays.items():
+        values = numpy_to_vtk(np.ascontiguousarray(array), deep=True)
+        values.SetName(name)
+        attributes.AddArray(values)
+
+
+def _give_shape(grid: pv.UnstructuredGrid, reference: np.ndarray, shape: str) -> None:
+    """Let the points of a moved grid stay or go where the layout has them, (n, 2) [m], and say how far they move.
+
+    The active vectors are what Warp By Vector takes first: of moved shapes those that do not move them a second time.
+    """
+    if shape not in SHAPES:
+        raise ValueError(f"shape is '{shape}'; choose from {', '.join(SHAPES)}")
+    drawn = _in_space(reference)
+    moved = np.asarray(grid.points).reshape(-1, 3) - drawn
+    vectors = {"to_reference": -moved} if shape == "moved" else {}
+    _add(grid.GetPointData(), vectors | {"displacement": moved, "reference": drawn})
+    grid.GetPointData().SetActiveVectors("to_reference" if shape == "moved" else "displacement")
+    if shape == "undeformed":
+        grid.points = drawn
+
+
+def _state_units(grid: pv.UnstructuredGrid) -> None:
+    """Write the unit of each array into its metadata and into the field array ``units``."""
+    listed = []
+    for attributes in (grid.GetPointData(), grid.GetCellData()):
+        for k in range(attributes.GetNumberOfArrays()):
+            array = attributes.GetAbstractArray(k)
+            if array.GetName() in UNITS:
+                array.GetInformation().Set(vtkDataArray.UNITS_LABEL(), UNITS[array.GetName()])
+                listed.append(f"{array.GetName()} [{UNITS[array.GetName()]}]")
+    grid.GetFieldData().AddArray(_strings("units", dict.fromkeys(listed)))
 
 
 def _strings(name: str, words: Iterable[str]) -> vtkStringArray:

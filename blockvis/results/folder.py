@@ -19,6 +19,7 @@ from blockvis.atomic_files import PARTIAL, make_folder, write_whole
 from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .increments import StoredIncrements, packed_increment
+from .joints import LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
@@ -27,7 +28,7 @@ from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summar
 CHECKPOINT = "checkpoint.npz"
 
 #: Files that list or sum up others; what a run starts with; pictures of the results.
-_LISTS = ("summary.json", "response.csv", "blocks.pvd", "contacts.pvd", *LIMIT_TABLES)
+_LISTS = ("summary.json", "response.csv", "joints.csv", "blocks.pvd", "contacts.pvd", "joints.pvd", *LIMIT_TABLES)
 _STARTED = (RECORD, CHECKPOINT, "assembly.npz")
 _PICTURES = (
     *("report.html", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
@@ -69,6 +70,8 @@ class ResultsFolder:
         Whether results that are there already may be replaced.
     parameter : solver.Quantity
         What the increments run over.
+    shape : {"moved", "undeformed"}
+        Of the blocks in the VTU files; see :func:`blockvis.results.datasets.block_dataset`.
 
     Raises
     ------
@@ -89,8 +92,9 @@ class ResultsFolder:
         record: Record | None = None,
         overwrite: bool = False,
         parameter: solver.Quantity = solver.SETTLEMENT,
+        shape: str = "moved",
     ) -> None:
-        self.parameter = parameter
+        self.parameter, self.shape = parameter, shape
         self.path, self.assembly, self.record = Path(path), assembly, record or Record(versions=versions())
         self.increments: list[solver.Increment] = []
         self._files = StoredIncrements(self.path)
@@ -106,7 +110,9 @@ class ResultsFolder:
         self._start_table()
 
     @classmethod
-    def reopened(cls, path: str | Path, parameter: solver.Quantity, kind: type[C]) -> tuple[ResultsFolder, C | None]:
+    def reopened(
+        cls, path: str | Path, parameter: solver.Quantity, kind: type[C], shape: str = "moved"
+    ) -> tuple[ResultsFolder, C | None]:
         """Reopen the folder of a run that was stopped, as it was after its last checkpoint.
 
         Parameters
@@ -116,6 +122,8 @@ class ResultsFolder:
             As of the folder.
         kind : type
             Of the checkpoint.
+        shape : {"moved", "undeformed"}
+            As of the folder.
 
         Returns
         -------
@@ -129,7 +137,7 @@ class ResultsFolder:
             If the folder holds no run.
         """
         results = cls.__new__(cls)
-        results.path, results.parameter = Path(path), parameter
+        results.path, results.parameter, results.shape = Path(path), parameter, shape
         results.record = read_record(results.path)
         results.assembly = _stored_assembly(results.path)
         results._release = _held(results, results.path)
@@ -159,12 +167,16 @@ class ResultsFolder:
         """
         from blockvis.vtk_files import write_vtu
 
-        from .datasets import block_dataset, contact_dataset
+        from .datasets import block_dataset, contact_dataset, joint_dataset
 
         number = len(self.increments)
         folder = self.path / "increments"
-        write_vtu(block_dataset(self.assembly, increment), folder / f"blocks_{number:05d}.vtu", last=False)
-        write_vtu(contact_dataset(self.assembly, increment), folder / f"contacts_{number:05d}.vtu", last=False)
+        for part, dataset in (
+            ("blocks", block_dataset(self.assembly, increment, shape=self.shape)),
+            ("contacts", contact_dataset(self.assembly, increment, shape=self.shape)),
+            ("joints", joint_dataset(self.assembly, increment, shape=self.shape, joints=self._movements.joints)),
+        ):
+            write_vtu(dataset, folder / f"{part}_{number:05d}.vtu", last=False)
         write_whole(self._files.file(number), packed_increment(increment))
         self.increments.append(self._files.without_arrays(number, increment))
         self._add_row(number, increment)
@@ -193,6 +205,7 @@ class ResultsFolder:
             Tables of the kind of analysis.
         """
         self._write_lists()
+        write_whole(self.path / "joints.csv", self._movements.table())
         for name, text in (tables or {}).items():
             write_whole(self.path / name, text)
         summary = summary_of(response, seconds=seconds, record=self.record, own=own or {})
@@ -204,10 +217,12 @@ class ResultsFolder:
         self._rows = io.StringIO()
         self._table = csv.writer(self._rows, lineterminator="\n")
         self._table.writerow((*COLUMNS, *own_columns(self.parameter)))
+        self._movements = LargestMovements(self.assembly, self.parameter)
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
             self._table.writerow(row_of_increment(number, increment, self.assembly, self.parameter))
+            self._movements.add(increment)
 
     def _write_lists(self) -> None:
         """Write the table and the lists of files, of everything so far."""
@@ -217,7 +232,7 @@ class ResultsFolder:
 
         write_whole(self.path / "response.csv", self._rows.getvalue(), last=False)
         times = output_times(self.increments)
-        for kind in ("blocks", "contacts"):
+        for kind in ("blocks", "contacts", "joints"):
             entries = [(t, f"increments/{kind}_{i:05d}.vtu") for i, t in enumerate(times)]
             write_pvd(self.path / f"{kind}.pvd", entries, last=False)
 

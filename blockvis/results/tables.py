@@ -12,6 +12,7 @@ import numpy as np
 
 import solver
 
+from .about import collapse_mechanism, loss_of, mechanism_text
 from .record import Record
 
 #: Columns of response.csv.
@@ -22,11 +23,14 @@ COLUMNS = (
     "reaction",
     "reaction_over_weight",
     "load_multiplier",
+    "least_admissible",
+    "largest_admissible",
     "equilibrium_residual",
     "largest_penetration",
     "duality_gap",
     "complementarity",
     "kinematic_violation",
+    "energy_residual",
     "contacts_open",
     "contacts_sticking",
     "contacts_sliding",
@@ -65,9 +69,12 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "collapse_bracket": list(collapse.bracket) if collapse else None,
         "settlement_unit": response.settlements[-1].unit if response.settlements else response.parameter.unit,
         "initial_reaction": path[0].reaction if path else None,
+        "reaction_at_rest": _known(path[0].at_rest) if path else None,
+        "onset_reaction": _known(path[0].onset) if path else None,
         "collapse_reaction": collapse.reaction if collapse else None,
-        "mechanism": collapse.words if collapse else None,
+        "mechanism": mechanism_text(response) if collapse else None,
         **_joint_counts(response),
+        **_loss(response),
         "analysis": response.analysis,
         "parameter": response.parameter.name,
         **own,
@@ -88,13 +95,29 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
     }
 
 
+def _known(value: float) -> float | None:
+    """Give a number, or None where it was not worked out."""
+    return float(value) if np.isfinite(value) else None
+
+
 def _joint_counts(response: solver.Response) -> dict[str, int | None]:
     """How many hinges and sliding joints the collapse mechanism has, as the picture of it shows them."""
-    if response.collapse is None or not response.path:
+    mechanism = collapse_mechanism(response)
+    if mechanism is None:
         return {"hinges": None, "sliding_joints": None}
-    falling = solver.with_motion(response.path[-1], response.collapse.mechanism)
-    mechanism = solver.mechanism_of(response.assembly, falling)
     return {"hinges": len(mechanism.hinges), "sliding_joints": len(mechanism.sliding)}
+
+
+def _loss(response: solver.Response) -> dict[str, Any]:
+    """Weight that falls in the collapse, its share of the whole, and whether that is a local loss."""
+    loss = loss_of(response)
+    if loss is None:
+        return {"loss": None, "falling_weight": None, "falling_share": None}
+    return {
+        "loss": "local" if loss.local else "structure",
+        "falling_weight": loss.weight,
+        "falling_share": loss.share,
+    }
 
 
 def own_columns(parameter: solver.Quantity) -> tuple[str, ...]:
@@ -129,11 +152,14 @@ def row_of_increment(
         repr(float(increment.reaction)),
         repr(float(increment.reaction) / solver.total_weight(assembly)),
         repr(float(increment.load_multiplier)),
+        repr(float(increment.least)),
+        repr(float(increment.largest)),
         f"{certificate.equilibrium_residual:.3e}",
         f"{certificate.largest_penetration:.3e}",
         f"{certificate.duality_gap:.3e}",
         f"{certificate.complementarity:.3e}",
         f"{certificate.kinematic_violation:.3e}",
+        f"{certificate.energy_residual:.3e}",
         *(int(counts[state]) for state in (0, 1, 2, 3)),
         len(mechanism.hinges),
         len(mechanism.sliding),

@@ -15,6 +15,7 @@ from typing import Any
 import solver
 from blockvis.cases.contents import Case
 from blockvis.cases.toml_table import Table
+from blockvis.results.about import loss_of, mechanism_text
 
 Steps = Generator[solver.Increment, None, solver.Ending]
 
@@ -216,7 +217,9 @@ class AnalysisKind(ABC):
             low, high = response.collapse.bracket
             place = f"{response.collapse.displacement:12.6g} {response.collapse.unit}"
             lines.append(f"{'collapse at':<21}{place}   between {low:.6g} and {high:.6g}")
-            lines.append(f"mechanism: {response.collapse.words}")
+            lines.append(f"mechanism: {mechanism_text(response)}")
+            loss = loss_of(response)
+            lines += [] if loss is None else [str(loss)]
         return lines
 
     def title(self, response: solver.Response) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 import solver
 from blockvis.cases.contents import Case
 from blockvis.cases.toml_table import Table
+from blockvis.results.about import mechanism_text
 from blockvis.suggestions import nearest
 
 from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, begun, needs_dry_joints, needs_live_load
@@ -24,7 +25,7 @@ class PushoverKind(AnalysisKind):
     name = "pushover"
     parameter = solver.CONTROL_DISPLACEMENT
     measured = solver.LOAD_MULTIPLIER
-    checkpoint = solver.PushoverCheckpoint
+    checkpoint = solver.Checkpoint
     lost = "capacity"
 
     def read(self, top: Table, analysis: Table) -> solver.ControlDisplacement | None:
@@ -108,7 +109,7 @@ class PushoverKind(AnalysisKind):
             low, high = response.collapse.bracket
             lines += [
                 f"zero capacity at     {response.collapse.displacement:12.6g} m   between {low:.6g} and {high:.6g}",
-                f"mechanism: {response.collapse.words}",
+                f"mechanism: {mechanism_text(response)}",
             ]
         return lines
 
@@ -143,7 +144,7 @@ def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDis
     return control
 
 
-def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.PushoverCheckpoint | None) -> Steps:
+def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.Checkpoint | None) -> Steps:
     case = given.case
     pose, steps = None, settlement_steps(given)
     # A pushover that has begun has its settlement behind it.

@@ -147,7 +147,12 @@ def run_case(
         run = planned(case, assembly)
     try:
         results = ResultsFolder(
-            folder, assembly, record=record_of(case), overwrite=overwrite, parameter=run.course.parameter
+            folder,
+            assembly,
+            record=record_of(case),
+            overwrite=overwrite,
+            parameter=run.course.parameter,
+            shape=case.vtu,
         )
     except OSError as error:
         raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
@@ -196,7 +201,7 @@ def resume_run(folder: str | Path, *, film: bool = True, pictures: bool = True) 
     for note in record.changes(checksum_of_files):
         warnings.warn(note, stacklevel=2)
     kind = KINDS[case.analysis]
-    results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint)
+    results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint, case.vtu)
     remove_fall(folder)
     run = planned(case, results.assembly, checkpoint, tuple(results.increments))
     return _followed(case, results, run, drawing, Clock())

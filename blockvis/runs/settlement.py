@@ -10,8 +10,12 @@ from typing import Any
 import solver
 from blockvis.cases.contents import Case
 from blockvis.numbers import force_text
+from blockvis.results.about import loss_of, mechanism_text
 
 from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, needs_dry_joints
+
+#: Difference of two reactions, in weights, that is worth a line.
+NOTABLE = 1e-3
 
 
 class SettlementKind(AnalysisKind):
@@ -62,14 +66,22 @@ class SettlementKind(AnalysisKind):
         lines = []
         if path:
             lines.append(f"first reaction       {path[0].reaction:12.6g} N   {path[0].reaction / weight:.6f} W")
+            onset = path[0].onset
+            if abs(onset - path[0].reaction) > NOTABLE * weight:
+                lines[-1] += "   the least that equilibrium allows"
+                lines.append(
+                    f"reaction at onset    {onset:12.6g} N   {onset / weight:.6f} W   where friction leaves it"
+                )
         if response.collapse is not None:
             low, high = response.collapse.bracket
             last, at = response.collapse.reaction, response.collapse.displacement
             lines += [
                 f"last reaction        {last:12.6g} N   {last / weight:.6f} W",
                 f"collapse displacement{at:12.6g} {unit}   between {low:.6g} and {high:.6g}",
-                f"mechanism: {response.collapse.words}",
+                f"mechanism: {mechanism_text(response)}",
             ]
+            loss = loss_of(response)
+            lines += [] if loss is None else [str(loss)]
         elif len(path) > 1:
             lines.append(f"last reaction        {path[-1].reaction:12.6g} N   {path[-1].reaction / weight:.6f} W")
             lines.append(f"last settlement      {path[-1].parameter:12.6g} {unit}")
@@ -78,7 +90,9 @@ class SettlementKind(AnalysisKind):
     def title(self, response: solver.Response) -> str:
         """Say how it ended."""
         if response.collapse is not None:
-            return f"Collapse at a settlement of {response.collapse.displacement:.5g} {response.collapse.unit}"
+            loss = loss_of(response)
+            what = "Local loss" if loss is not None and loss.local else "Collapse"
+            return f"{what} at a settlement of {response.collapse.displacement:.5g} {response.collapse.unit}"
         return {
             solver.Status.LIMIT_REACHED: "Standing at the end of the settlement",
             solver.Status.NO_INITIAL_EQUILIBRIUM: "No equilibrium before any settlement",

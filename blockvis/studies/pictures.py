@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
+import solver
 from blockvis.atomic_files import whole_file
 from blockvis.pictures import palette
+from blockvis.results.about import LOCAL
 
 from .fragility import Fragility, fragility_of
 from .sensitivity import first_order, outcome, swings
@@ -25,6 +29,9 @@ if TYPE_CHECKING:
 
 #: Classes of mechanisms with their own colour in the scatter, and classes that are drawn.
 COLOURED, DRAWN = 6, 12
+
+#: Empty border of a tile, and how far beyond the blocks it shows supports, in sizes of the structure.
+MARGIN, SUPPORTS = 0.05, 0.25
 
 #: Panels of the scatter, for the parameters with the largest swings.
 PANELS = 3
@@ -73,7 +80,8 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     path : path
         Of a PNG, SVG or PDF.
     """
-    curve = fragility_of(independent_rows(study, table))
+    rows = independent_rows(study, table)
+    curve = fragility_of(rows)
     factor, unit = _length(table)
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     axes = figure.add_subplot()
@@ -103,7 +111,7 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
     axes.set_ylabel(curve_name(study), fontsize=TEXT)
     _plain_frame(axes)
     axes.legend(loc="upper left", frameon=False, fontsize=0.9 * TEXT)
-    axes.set_title(_counts(curve, table, factor, unit), **HEADING)
+    axes.set_title(counted(curve, rows, factor, unit), **HEADING)
     return _saved(figure, path)
 
 
@@ -225,16 +233,22 @@ def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path)
     for one in shown:
         with np.load(records.shape_file(one)) as stored:
             shapes.append({name: stored[name] for name in stored.files})
-    tall = _aspect(shapes[0]) if shapes else 0.6
+    low, high = _frame(shapes) if shapes else (np.zeros(2), np.array([1.0, 0.6]))
+    tall = float((high[1] - low[1]) / (high[0] - low[0]))
     figure = Figure(figsize=(4.0 * columns, (4.0 * min(max(tall, 0.35), 1.6) + 1.0) * rows + 0.3), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for place, (one, shape) in enumerate(zip(shown, shapes, strict=True)):
         axes = panels[place]
-        _draw_shape(axes, shape)
+        _draw_shape(axes, shape, low, high)
         median = factor * float(table.loc[table["mechanism_class"] == one, "collapse_displacement"].median())
-        number, share = classes[one], 100 * classes[one] / sum(classes.values())
-        runs = f"{number} run{'' if number == 1 else 's'}, {share:.2g} %"
-        axes.set_title(f"{place + 1}: {runs}; median {median:.3g} {unit}", fontsize=0.95 * TEXT, loc="left")
+        number, part = classes[one], 100 * classes[one] / sum(classes.values())
+        runs = f"{number} run{'' if number == 1 else 's'}, {part:.2g} %"
+        share = float(table.loc[table["mechanism_class"] == one, "falling_share"].median())
+        title = f"{place + 1}: {runs}; median {median:.3g} {unit}"
+        if not np.isnan(share):
+            percent = f"{100 * share:.2g}" if share < 0.095 else f"{100 * share:.0f}"
+            title += f"; {percent} % of W fall" + ", a local loss" * (share < LOCAL)
+        axes.set_title(textwrap.fill(title, 48), fontsize=0.95 * TEXT, loc="left")
         words = textwrap.wrap(one, 54)[:3]
         axes.text(
             0.0, -0.02, "\n".join(words), transform=axes.transAxes, va="top", fontsize=0.72 * TEXT, color="#4a4a4a"
@@ -247,39 +261,58 @@ def draw_mechanisms(records: StudyFolder, table: pd.DataFrame, path: str | Path)
     return _saved(figure, path)
 
 
-def _draw_shape(axes: Axes, shape: dict[str, np.ndarray]) -> None:
+def _draw_shape(axes: Axes, shape: dict[str, np.ndarray], low: np.ndarray, high: np.ndarray) -> None:
     fills = np.tile(np.array(palette.STONES[0]), (len(shape["free"]), 1))
     fills = np.where(shape["free"][:, None], fills, palette.SUPPORT).astype(np.uint8)
     fills = palette.part_colours(fills, shape["parts"].astype(int))
     cuts = shape["offsets"][1:-1]
     ghost = [ring for ring, free in zip(np.split(shape["at_rest"], cuts), shape["free"], strict=True) if free]
     axes.add_collection(PolyCollection(ghost, facecolor="none", edgecolor="#cfcfcf", linewidth=0.5, zorder=1))
-    rings = np.split(shape["vertices"], cuts)
+    # Ground that goes on beyond the picture ends before its edge, with an outline.
+    inside = shapely.box(*(low + 0.25 * MARGIN * (high - low)), *(high - 0.25 * MARGIN * (high - low)))
+    rings, colours = [], []
+    for ring, colour, free in zip(np.split(shape["vertices"], cuts), fills, shape["free"], strict=True):
+        for part in [ring] if free else _parts_inside(ring, inside):
+            rings.append(part)
+            colours.append(colour / 255.0)
     width = 0.7 if len(rings) < 300 else 0.25
     axes.add_collection(
         PolyCollection(
-            rings, facecolor=fills / 255.0, edgecolor=palette.hexadecimal(palette.OUTLINE), linewidth=width, zorder=2
+            rings, facecolor=colours, edgecolor=palette.hexadecimal(palette.OUTLINE), linewidth=width, zorder=2
         )
     )
-    low, high = _frame(shape)
+    length = 0.09 * float((high - low).max())
+    for place, direction in shape.get("arrows", ()):
+        axes.annotate(
+            "", place + 0.5 * length * direction, place - 0.5 * length * direction, zorder=4,
+            arrowprops={"arrowstyle": "-|>", "color": palette.hexadecimal(palette.SETTLEMENT), "linewidth": 2.0,
+                        "mutation_scale": 12, "shrinkA": 0, "shrinkB": 0},
+        )  # fmt: skip
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     axes.axis("off")
 
 
-def _frame(shape: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of the visible area [m]: the free blocks with a margin."""
-    free = np.repeat(shape["free"], np.diff(shape["offsets"]))
-    points = np.concatenate([shape["vertices"][free], shape["at_rest"][free]])
+def _parts_inside(ring: np.ndarray, box: shapely.Polygon) -> list[np.ndarray]:
+    found = shapely.get_parts(shapely.intersection(shapely.Polygon(ring), box))
+    return [shapely.get_coordinates(part.exterior) for part in found if isinstance(part, shapely.Polygon)]
+
+
+def _frame(shapes: Sequence[dict[str, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of what all tiles show [m]: the free blocks, the supports as far as ``SUPPORTS`` beyond, and a margin."""
+    inner, outer = [], []
+    for shape in shapes:
+        free = np.repeat(shape["free"], np.diff(shape["offsets"]))
+        inner += [shape["vertices"][free], shape["at_rest"][free]]
+        outer += [shape["vertices"][~free]]
+    points, ground = np.concatenate(inner), np.concatenate(outer)
     low, high = points.min(axis=0), points.max(axis=0)
-    margin = 0.08 * float((high - low).max())
-    return low - margin, high + margin
-
-
-def _aspect(shape: dict[str, np.ndarray]) -> float:
-    low, high = _frame(shape)
-    return float((high[1] - low[1]) / (high[0] - low[0]))
+    size = float((high - low).max())
+    if len(ground):
+        low = np.minimum(low, np.maximum(ground.min(axis=0), low - SUPPORTS * size))
+        high = np.maximum(high, np.minimum(ground.max(axis=0), high + SUPPORTS * size))
+    return low - MARGIN * size, high + MARGIN * size
 
 
 def _interesting(curve: Fragility) -> float:
@@ -289,8 +322,28 @@ def _interesting(curve: Fragility) -> float:
     return curve.furthest
 
 
-def _counts(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> str:
-    words = [f"{curve.n_runs} runs", f"{curve.n_collapsed} collapsed"]
+def counted(curve: Fragility, table: pd.DataFrame, factor: float, unit: str) -> str:
+    """Count the runs by how they ended: the title of the fragility curve.
+
+    Parameters
+    ----------
+    curve : Fragility
+    table : pandas.DataFrame
+        The rows that the curve is made of.
+    factor : float
+    unit : str
+        Of the settlements.
+    """
+    status = table["status"]
+    collapsed = status == str(solver.Status.COLLAPSED)
+    local = int((collapsed & (table["falling_share"] < LOCAL)).sum())
+    words = [
+        f"{curve.n_runs} runs",
+        f"{int(collapsed.sum())} collapsed" + f" ({local} of a few blocks only)" * (local > 0),
+    ]
+    never = int((status == str(solver.Status.NO_INITIAL_EQUILIBRIUM)).sum())
+    if never:
+        words.append(f"{never} never stood")
     if curve.n_stood:
         words.append(f"{curve.n_stood} stood (up to {factor * curve.furthest:.3g} {unit})")
     failed = int(table["status"].isin(NO_RESULT).sum())

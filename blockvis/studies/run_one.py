@@ -15,6 +15,8 @@ import numpy as np
 import solver
 from blockvis.cases.build import case_assembly, case_interfaces, case_loads
 from blockvis.cases.case import Case, case_of
+from blockvis.pictures.annotations import settlement_arrows
+from blockvis.results.about import loss_in
 
 from .study_file import run_values
 
@@ -142,13 +144,14 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
         return found, b""
     mechanism = solver.mechanism_of(assembly, falling)
     found |= {
+        "falling_share": loss_in(assembly, falling).share,
         "mechanism": str(mechanism),
         "mechanism_class": mechanism_class(mechanism),
         "macro_blocks": len(mechanism.motions),
         "hinges": len(mechanism.hinges),
         "sliding_joints": len(mechanism.sliding),
     }
-    return found, _shape(assembly, falling, mechanism)
+    return found, _shape(assembly, falling, mechanism, case.settlements[falling.phase])
 
 
 def mechanism_class(mechanism: solver.Mechanism) -> str:
@@ -190,14 +193,21 @@ def _joints(names: Sequence[str], pairs: Sequence[Sequence[int]]) -> str:
     return ", ".join(words)
 
 
-def _shape(assembly: solver.Assembly, falling: solver.Increment, mechanism: solver.Mechanism) -> bytes:
-    """Pack the blocks as the mechanism displaces them, in single precision, for a small picture."""
+def _shape(
+    assembly: solver.Assembly, falling: solver.Increment, mechanism: solver.Mechanism, settlement: solver.Settlement
+) -> bytes:
+    """Pack the blocks as the mechanism displaces them, in single precision, for a small picture.
+
+    The arrows are where supports settle, and which way.
+    """
     free = assembly.free[assembly.block_of_vertex]
     at_rest = solver.moved_vertices(assembly, falling.pose)
     size = float(np.ptp(at_rest[free], axis=0).max())
     step = solver.moved_vertices(assembly, solver.swung(falling.pose, falling.velocity * 1e-6)) - at_rest
     fastest = float(np.hypot(*step[free].T).max()) / 1e-6
     moved = solver.swung(falling.pose, falling.velocity * (SWING * size / fastest if fastest > 0.0 else 0.0))
+    low, high = at_rest[free].min(axis=0), at_rest[free].max(axis=0)
+    _, places, directions = settlement_arrows(assembly, settlement, falling.pose, low - 0.15 * size, high + 0.15 * size)
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
@@ -206,5 +216,6 @@ def _shape(assembly: solver.Assembly, falling: solver.Increment, mechanism: solv
         offsets=assembly.offsets.astype(np.int32),
         parts=mechanism.parts.astype(np.int16),
         free=assembly.free,
+        arrows=np.stack([places, directions], axis=1).astype(np.float32),
     )
     return buffer.getvalue()

@@ -18,18 +18,18 @@ from blockvis.cases.case import case_of, read_case
 from blockvis.cases.distributions import Distribution, read_distribution
 from blockvis.cases.imperfections import read_imperfection
 from blockvis.cases.toml_table import is_number
+from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats.files import checksum_of_files
 from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import nearest, refuse_unknown
 
 from .sampling import METHODS, Design, designed
-from .value_paths import parse_path, put
 
 #: Columns of the table besides the parameters.
 RESERVED = (
     "run", "status", "collapse_displacement", "bracket_low", "bracket_high", "last_settlement", "unit",
     "mechanism_class", "mechanism", "macro_blocks", "hinges", "sliding_joints", "initial_reaction",
-    "collapse_reaction", "total_weight", "increments", "programs", "seconds", "seed", "message",
+    "collapse_reaction", "total_weight", "falling_share", "increments", "programs", "seconds", "seed", "message",
 )  # fmt: skip
 
 #: Most runs of one study: their table is made in memory.

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import solver
+from blockvis.results.about import LOCAL
+
 from .fragility import fragility_of
 from .sensitivity import first_order, swings
 from .study_file import Study
@@ -57,7 +60,9 @@ def summary_of(study: Study, table: pd.DataFrame) -> dict[str, Any]:
     return {
         "n_runs": study.n_runs,
         "n_finished": len(table),
-        "n_collapsed": curve.n_collapsed,
+        "n_collapsed": int((table["status"] == str(solver.Status.COLLAPSED)).sum()),
+        "n_local": int((table["falling_share"] < LOCAL).sum()),
+        "n_never_stood": int((table["status"] == str(solver.Status.NO_INITIAL_EQUILIBRIUM)).sum()),
         "n_stood": curve.n_stood,
         "n_without_result": len(failed),
         "reasons": _reasons(failed["message"].tolist()),
@@ -99,7 +104,11 @@ def in_words(summary: dict[str, Any]) -> str:
     ]
     for reason, n in summary["reasons"].items():
         lines.append(f"without result, {n} time{'' if n == 1 else 's'}: {reason}")
-    if summary["n_collapsed"]:
+    if summary["n_local"]:
+        number = summary["n_local"]
+        words = "is a local loss" if number == 1 else "are local losses"
+        lines.append(f"{number} of the collapses {words}: a few blocks fall, the structure stands")
+    if summary["n_collapsed"] or summary["n_never_stood"]:
         quantiles = [
             f"{100 * float(p):g} % at {value:.4g} {unit}" if value is not None else f"{100 * float(p):g} % not reached"
             for p, value in summary["quantiles"].items()

@@ -9,7 +9,7 @@ from solver.results.response import Collapse
 
 #: How increments are found: along the path that Coulomb friction leaves, or by the paper's linear program.
 COULOMB, LINEAR_PROGRAM = "coulomb", "linear program"
-INCREMENTS = (LINEAR_PROGRAM, COULOMB)
+INCREMENTS = (COULOMB, LINEAR_PROGRAM)
 
 
 @dataclass(frozen=True)
@@ -18,9 +18,9 @@ class Controls:
 
     Attributes
     ----------
-    increments : {"linear program", "coulomb"}
-        The method of Portioli & Cascini (2017), a linear program per increment, or the path that Coulomb friction
-        leaves, which depends on neither description nor rounding where many joints slide. A path is not resumed.
+    increments : {"coulomb", "linear program"}
+        The path of Coulomb friction, or the method of Portioli & Cascini (2017) with a linear program per increment,
+        for comparison and teaching: of settlements only, and dependent on rounding where many joints slide.
     overlap_tolerance : float, optional [m]
         Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
     falling_frames : int
@@ -39,7 +39,7 @@ class Controls:
         For an unknown way to find increments.
     """
 
-    increments: str = LINEAR_PROGRAM
+    increments: str = COULOMB
     overlap_tolerance: float | None = None
     falling_frames: int = 40
     trust_region: float | None = None
@@ -49,7 +49,7 @@ class Controls:
     def __post_init__(self) -> None:
         """Refuse an unknown way to find increments."""
         if self.increments not in INCREMENTS:
-            raise ValueError(f"increments is '{self.increments}'; it is 'linear program' or 'coulomb'")
+            raise ValueError(f"increments is '{self.increments}'; it is 'coulomb' or 'linear program'")
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
+from itertools import count, islice
 
 import numpy as np
 
@@ -11,8 +12,11 @@ from solver.assembly import find_contacts, measure_contacts
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts, matched_contacts
 from solver.kinematics import Pose, moved, moved_vertices, relative_velocities, unit_lengths
+from solver.lp.problem import SolveError
 from solver.program.admissible import Admissible, admissible
 from solver.program.coulomb import NotSolved, Step, solve_step
+from solver.program.increment import Locked, solve_program
+from solver.program.light_blocks import light_blocks
 from solver.program.model import Model
 from solver.results.certificate import Certificate
 from solver.results.increment import Increment, State, Status
@@ -27,6 +31,10 @@ from .drivers import Driver
 #: the analysis where no step is solved.
 LARGEST_STEP, SMALLEST_STEP = 0.05, 1e-9
 
+#: Change of the velocities, as a part of them, from which on a step is taken again in shorter ones, down to this part
+#: of the largest.
+EVENT_CHANGE, EVENT_REFINEMENT = 0.03, 8.0
+
 #: First step, and movement by which a structure has begun to move, in elastic gives.
 FIRST_STEP, ONSET = 0.1, 100.0
 
@@ -38,15 +46,22 @@ LINEARISATIONS, EXACT, ACCEPTED = 6, 1e-6, 1e-4
 #: its weight.
 FALLING_FORCE = 1.0
 
-#: Part of the drag that is left where a collapse is being enclosed.
-CARE = 1e-3
+#: Part of the drag that is left where a collapse is being enclosed: within so many tolerances of it.
+CARE, ENCLOSED = 1e-3, 8.0
 
-#: Where a block moves so many times as fast as the supports, the place is proved before the path goes on.
-FAST = 10.0
+#: Part of the give of the joints that is left there, where forces grow without limit before a snap.
+STIFF = 1e-2
+
+#: Where a block moves so many times as fast as the supports, the place is proved before the path goes on; and after so
+#: many steps.
+FAST, STEPS_UNPROVED = 10.0, 16
+
+#: Growth of the steps after one that was not solved.
+SLOW_GROWTH = 1.25
 
 #: A fall is followed in steps of this movement of a block, in block sizes.
-FALL_STEP = 0.05
-FALL_STEPS, CREEPS = 60, 16
+FALL_STEP = 0.1
+FALL_STEPS, CREEPS, FALL_FAILURES = 60, 16, 30
 
 #: Unbalanced force, in block weights, under which what creeps may have come to rest.
 CREEPING = 1e-2
@@ -58,11 +73,23 @@ MECHANISM = 1e-3
 #: At rest: movement of a block in a step of a fall whose drag is that of a step of a block size.
 AT_REST = 1e-7
 
+#: Penetration that a step may leave, in block sizes, where forces grow fast.
+PRESSED = 1e-5
+
 #: Force, in total loads, beyond which blocks wedged between supports count as locked.
 LOCKED_FORCE = 1e3
 
 #: Blocks that a message names.
 NAMED = 4
+
+
+#: A corner that carries this force, in block weights, may slip past the end of its edge, or come into another block
+#: from the side, in steps of the supports, and of blocks, no larger than this, in block sizes; what falls, in steps
+#: whose drag is that of the second.
+SLIPPED_OFF_FORCE, SLIP_OFF, SHORTEST_FALL = 1e-3, 1e-4, 1e-6
+
+#: Contact points of two blocks no farther apart than this, in block sizes, are one, by whichever corner and edge.
+SAME_PLACE = 1e-2
 
 
 class Falls(Exception):
@@ -75,6 +102,10 @@ class Wedged(Exception):
     def __init__(self, place: Place) -> None:
         super().__init__("wedged")
         self.place = place
+
+
+class Pressed(NotSolved):
+    """Blocks were pressed into each other in a step, by more than what the joints give."""
 
 
 class NoStep(Exception):
@@ -96,6 +127,8 @@ class Place:
         Their normal and shear forces, in units of the program.
     multiplier : float
         Of the live load.
+    velocity : (n_blocks, 3) array, optional
+        In the step that led here, per unit of the parameter; None where nothing moved with it.
     """
 
     s: float
@@ -103,6 +136,7 @@ class Place:
     contacts: Contacts | None
     forces: np.ndarray
     multiplier: float = 0.0
+    velocity: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -120,7 +154,7 @@ class Checkpoint:
     Attributes
     ----------
     phase : int
-        Number of the settlement, from 0; behind the last increment of a phase that of the next, which may not exist.
+        Number of the settlement, from 0.
     start : Pose
         Where the phase began.
     place : Place
@@ -131,6 +165,10 @@ class Checkpoint:
         Smallest parameter known to have no equilibrium; infinite where none is known.
     works : tuple of float
         Of loads, on supports and of friction since the start of the phase, in units of the program.
+    careful_until : float [m or rad]
+        Parameter up to which a collapse is being enclosed.
+    ended : bool
+        The phase has reached its limit.
     """
 
     phase: int
@@ -139,6 +177,8 @@ class Checkpoint:
     step: float
     first_without: float
     works: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    careful_until: float = -np.inf
+    ended: bool = False
 
 
 @dataclass(frozen=True)
@@ -186,8 +226,13 @@ class Path:
         self.drag = drag_of(model)
         self.lever = driver.lever()
         self.longest = min(driver.increment, LARGEST_STEP * model.length / self.lever)
+        self.finest = LARGEST_STEP / EVENT_REFINEMENT * model.length / self.lever
         self.programs, self.works, self.care = 0, (0.0, 0.0, 0.0), 1.0
+        self.barrier, self.careful_until = np.inf, -np.inf
         self.notes: list[Note] = []
+        self.around: tuple[Pose, Contacts] | None = None
+        self.sunk: tuple[Place, list[tuple[Place, np.ndarray, float]], Iterator[tuple[Place, np.ndarray, float]]] | None
+        self.sunk = None
         rate = driver.rate(0.0)
         sideways = rate[model.assembly.moving, :2].sum(axis=0) if model.assembly.moving.any() else np.zeros(2)
         size = float(np.hypot(*sideways))
@@ -250,18 +295,22 @@ class Path:
         free, scales = assembly.free, model.lengths
         s = place.s if still else place.s + length
         supports, size = driver.supports(s), length * self.lever / model.length
-        start = find_contacts(assembly, moved_vertices(assembly, place.pose), model.reach)
+        start = self._around(place.pose)
         memory = self._remembered(place, start)
         normal, shear = memory.T
         friction = model.interfaces.friction(assembly, start.block_a, start.block_b)
         rows = np.repeat(free, 3)
         load = (model.scaled_load + self.imperfection)[free].ravel()
-        drag = DRAG * (1.0 if still else self.care) / size * self.drag[free].ravel()
+        drag = DRAG * self.care / size * self.drag[free].ravel()
+        if place.velocity is not None and not still:
+            # The drag resists changes of the velocity: what moves on as before is not held back.
+            load = load + drag * (place.velocity / scales * length)[free].ravel()
         live, live_size = model.scaled_live
         gone = np.zeros(len(load))
         multiplier = place.multiplier * live_size
         pose = self._with_supports(place.pose, supports)
-        way, near = 0.0, None
+        way, pressed, near = 0.0, 0.0, None
+        stiff = 1.0 if self.care == 1.0 else STIFF
         for _ in range(LINEARISATIONS):
             contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
             control = driver.control(pose) if model.live is not None else None
@@ -275,7 +324,7 @@ class Path:
                 normal=normal,
                 shear=shear,
                 friction=friction,
-                give=(GIVE_ACROSS, GIVE),
+                give=(GIVE_ACROSS * stiff, GIVE * stiff),
                 size=size,
                 live=live[free].ravel() if control is not None else None,
                 control=None if control is None else (control * scales / model.length)[free].ravel(),
@@ -283,7 +332,7 @@ class Path:
             )
             self.programs += 1
             found = solve_step(linear, gone, multiplier, near)
-            near = found
+            near, pressed = found, float((found.normal - normal).max(initial=0.0)) * linear.give[0]
             # The give is taken back: the next linearisation starts from the forces it has reached.
             normal, shear, multiplier = found.normal, found.shear, found.multiplier
             gone = gone + found.motion
@@ -297,14 +346,51 @@ class Path:
                 break
         if way > ACCEPTED:
             raise NotSolved(f"the geometry still moves by {way:.1e} block sizes")
+        if pressed > PRESSED:
+            raise Pressed(f"blocks are pressed into each other by {pressed:.1e} block sizes")
         motion = full + np.where(free[:, None], 0.0, 1.0) * self._between(place.pose, pose)
-        if not still and np.abs(gone).max(initial=0.0) > max(FALLING_FORCE / DRAG * size, 1e3 * GIVE):
+        if not still and np.abs(gone).max(initial=0.0) > max(FALLING_FORCE / (DRAG * self.care) * size, 1e3 * GIVE):
             raise Falls
+        if size > (SHORTEST_FALL if still else SLIP_OFF) and np.abs(gone).max(initial=0.0) > SLIP_OFF:
+            self._refuse_beyond(contacts, normal, pose)
         forces = np.stack([normal, shear], axis=1)
         return (
-            Place(s, pose, contacts, forces, multiplier / (live_size or 1.0)),
+            Place(s, pose, contacts, forces, multiplier / (live_size or 1.0), None if still else motion / length),
             motion / scales,
         )
+
+    def _around(self, pose: Pose) -> Contacts:
+        """The contact points at a pose; those at the last one asked for are remembered."""
+        if self.around is None or self.around[0] is not pose:
+            model = self.model
+            self.around = pose, find_contacts(model.assembly, moved_vertices(model.assembly, pose), model.reach)
+        return self.around[1]
+
+    def _refuse_beyond(self, contacts: Contacts, normal: np.ndarray, pose: Pose) -> None:
+        """Refuse a step at whose end a corner stands on no edge any more, or in a block that it did not see before.
+
+        Raises
+        ------
+        NotSolved
+        """
+        length, end = self.model.length, self._around(pose)
+        _, there = matched_contacts(contacts, end) if len(end) else (None, np.zeros(len(contacts), dtype=bool))
+        off = np.flatnonzero(~there & (normal > SLIPPED_OFF_FORCE))
+        if (~self._near(contacts, off, end, np.flatnonzero(end.gaps < SLIP_OFF * length))).any():
+            raise NotSolved("a corner slips off its edge")
+        _, seen = matched_contacts(end, contacts) if len(contacts) else (None, np.zeros(len(end), dtype=bool))
+        inside = np.flatnonzero(~seen & (end.gaps < -SLIP_OFF * length))
+        if (~self._near(end, inside, contacts, np.arange(len(contacts)))).any():
+            raise NotSolved("a corner meets a block from the side")
+
+    def _near(self, some: Contacts, which: np.ndarray, others: Contacts, those: np.ndarray) -> np.ndarray:
+        """(len(which),) bool array: whether another contact point joins the same two blocks at the same place."""
+        pair, other = (
+            np.sort(np.stack([c.block_a[k], c.block_b[k]], axis=1), axis=1) for c, k in ((some, which), (others, those))
+        )
+        same = (pair[:, None] == other[None]).all(axis=2)
+        apart = np.linalg.norm(some.points[which][:, None] - others.points[those][None], axis=2)
+        return np.asarray((same & (apart < SAME_PLACE * self.model.length)).any(axis=1))
 
     def _with_supports(self, pose: Pose, supports: Pose) -> Pose:
         free = self.model.assembly.free
@@ -317,7 +403,10 @@ class Path:
         return np.column_stack([after.positions - before.positions, after.rotations - before.rotations])
 
     def advanced(self, place: Place, target: float, step: float) -> tuple[Place, float]:
-        """Goes towards a parameter in steps that suit the path, and stops early where blocks are fast.
+        """Goes towards a parameter in steps that suit the path, and stops early where a place is worth a proof.
+
+        Where blocks fall in a step, shorter ones look for the place from which they do; where they are short, with less
+        drag. What has been gone is kept; ``self.barrier`` is then the nearest parameter that was not reached.
 
         Returns
         -------
@@ -327,34 +416,91 @@ class Path:
 
         Raises
         ------
-        Falls
         NoStep
+        Wedged
         """
         smallest = SMALLEST_STEP * self.model.length / self.lever
-        failed = False
-        while target - place.s > 1e-12 * max(abs(target), smallest):
+        tolerance, started = self.driver.tolerance, place.s
+        grow = 2.0
+        for _ in range(STEPS_UNPROVED):
             ahead = target - place.s
-            # Two equal steps rather than a long one and a sliver.
-            length = ahead if ahead <= step * 1.000001 else min(step, ahead / 2.0)
+            if ahead <= 1e-12 * max(abs(target), smallest):
+                break
+            careful = place.s < self.careful_until
+            length = min(step, ahead)
+            if np.isfinite(self.barrier):
+                # Nearer than half-way only in the end, where it is tried once more.
+                rest = self.barrier - place.s
+                length = min(length, rest if rest <= tolerance / 4.0 else rest / 2.0)
+            elif ahead > step * 1.000001:
+                # Two equal steps rather than a long one and a sliver.
+                length = min(step, ahead / 2.0)
             try:
-                new, motion = self.step(place, length)
-            except (NotSolved, Falls) as error:
-                step, failed = length / 2.0, True
-                if isinstance(error, Falls) and step < self.driver.tolerance / 4.0:
-                    raise
+                new, motion = self._careful_step(place, length) if careful else self.step(place, length)
+            except NotSolved as error:
+                if isinstance(error, Pressed) and self._locks(place, length):
+                    raise Wedged(place) from None
+                step, grow = length / 2.0, SLOW_GROWTH
                 if step < smallest:
                     raise NoStep(f"at {place.s:.6g} {self.driver.unit}: {error}") from None
                 continue
+            except Falls:
+                # The drag may lose its hold early.
+                if self._falls_within(place, length):
+                    step = length / 2.0
+                    if careful and length <= tolerance / 4.0:
+                        break
+                grow = SLOW_GROWTH
+                continue
             if float(new.forces[:, 0].max(initial=0.0)) > LOCKED_FORCE * self.model.total_load:
                 raise Wedged(new)
+            if length > self.finest * 1.000001 and self._turns(place, new):
+                step = max(length / 2.0, self.finest)
+                continue
             self.works = self._works(place, new, motion)
             place = replace(new, s=target) if length == ahead else new
-            step = length if failed else max(step, min(self.longest, 2.0 * length))
-            failed = False
+            if place.s >= self.barrier:
+                self.barrier = np.inf
+            step = min(self.longest, max(step, grow * length)) if length >= 0.99 * step else step
             moved_by = float(np.abs(motion[self.model.assembly.free]).max(initial=0.0))
-            if moved_by > max(FAST * length * self.lever / self.model.length, 1e2 * GIVE):
-                break
+            if moved_by > FAST * length * self.lever / self.model.length:
+                # What jumps does not go on like that.
+                place = replace(place, velocity=None)
+                if moved_by > 1e2 * GIVE and place.s > started:
+                    break
         return place, step
+
+    def _locks(self, place: Place, length: float) -> bool:
+        """Whether no movement whatever lets the supports go on: proved by a linear program without end."""
+        if self.model.live is not None:
+            return False
+        self.programs += 1
+        try:
+            solve_program(self.model, place.pose, self.driver.rate(place.s) * length)
+        except Locked:
+            return True
+        except SolveError:
+            pass
+        return False
+
+    def _careful_step(self, place: Place, length: float) -> tuple[Place, np.ndarray]:
+        """Take a step with less drag and stiffer joints, or an ordinary one where that is not solved."""
+        self.care = CARE
+        try:
+            return self.step(place, length)
+        except NotSolved:
+            self.care = 1.0
+            return self.step(place, length)
+        finally:
+            self.care = 1.0
+
+    def _turns(self, before: Place, after: Place) -> bool:
+        """Whether blocks move otherwise than in the step before: a hinge has jumped, a joint slides or has closed."""
+        if before.velocity is None or after.velocity is None:
+            return False
+        size = np.sqrt(self.drag) / self.model.lengths
+        change = np.linalg.norm((after.velocity - before.velocity) * size)
+        return bool(change > EVENT_CHANGE * np.linalg.norm(before.velocity * size))
 
     def _works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float]:
         """Works of loads, on supports and of friction so far, with the forces at the end of the step."""
@@ -378,15 +524,15 @@ class Path:
     def proved(self, place: Place) -> Proved:
         """What equilibrium within friction says of a place, and balanced forces near those of the path."""
         model, assembly = self.model, self.model.assembly
-        contacts = find_contacts(assembly, moved_vertices(assembly, place.pose), model.reach)
+        contacts = self._around(place.pose)
         friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         rate = None if model.live is not None else self.driver.rate(place.s)
-        bounds = admissible(model, place.pose, contacts, friction, rate)
+        bounds = admissible(model, place.pose, contacts, friction, rate, vertex=place.s == 0.0)
         self.programs += bounds.programs
         remembered = self._remembered(place, contacts)
         if not bounds.exists:
             return Proved(place, contacts, friction, bounds, remembered, place.multiplier)
-        if place.s == 0.0:
+        if place.s == 0.0 and np.isfinite(bounds.low if model.live is None else bounds.high):
             # Nothing has moved: what the first movement has to overcome, least reaction or largest multiplier.
             forces, multiplier = bounds.forces, bounds.high
         else:
@@ -449,13 +595,17 @@ class Path:
         """Yields the increments of the phase, returns how it ended and leaves the last place in ``self.last``."""
         driver, tolerance = self.driver, self.driver.tolerance
         self.last, self.start = start, start.pose
-        step, first_without = FIRST_STEP * GIVE * self.model.length / self.lever, np.inf
+        step = FIRST_STEP * GIVE * self.model.length / self.lever
         if resume is not None:
-            start, step, first_without = resume.place, resume.step, resume.first_without
-            self.start, self.works = resume.start, resume.works
+            start, step, self.barrier = resume.place, resume.step, resume.first_without
+            self.start, self.works, self.careful_until = resume.start, resume.works, resume.careful_until
         proved = self.proved(start)
-        if resume is None and not proved.bounds.exists:
-            motion = next((motion for _, motion, _ in self._sinking(start, 1)), self.drag)
+        if resume is not None:
+            self.programs = 0
+            if resume.ended:
+                return self._reached()
+        if resume is None and not (proved.bounds.exists and self._light_blocks_stand(start.pose)):
+            motion = next((motion for _, motion, _ in self._sinking(start)), self.drag)
             yield self._falling(start, motion * self.model.lengths, start.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, self._no_equilibrium(motion))
         if resume is None and self.model.live is not None and not 0.0 < proved.measured < np.inf:
@@ -465,60 +615,83 @@ class Path:
                 )
             yield self._falling(start, np.zeros((self.model.assembly.n_blocks, 3)), start.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
+        if resume is None and self.model.live is None and np.isinf(proved.bounds.low):
+            length = GIVE * self.model.length / self.lever
+            if self._locks(start, length):
+                return Ending(Status.LOCKED, self._locked(replace(start, contacts=proved.contacts, forces=proved.forces)))
+        if resume is None and self.model.live is not None:
+            _, onset = self._at_first(proved)
+            if onset <= 0.0:
+                raise ValueError(self.driver.misdirected())
         reported, without, spent = resume is not None, None, None
+        self.reported = start.s
         while True:
             place = proved.place
             self.last = place
             if not reported:
                 at_limit = place.s >= driver.limit * (1.0 - 1e-12)
                 motion = self._next_motion(place)
-                number = self.number + 1 if at_limit else self.number
-                checkpoint = Checkpoint(number, self.start, place, step, first_without, self.works)
-                found = replace(self._increment(proved, motion), checkpoint=checkpoint)
-                if place.s == 0.0 and self.model.live is None:
-                    at_rest, onset = self._at_first(proved)
-                    found = replace(found, at_rest=at_rest, onset=onset)
-                yield found
-                reported = True
+                checkpoint = Checkpoint(
+                    self.number, self.start, place, step, self.barrier, self.works, self.careful_until, at_limit
+                )
+                first = place.s == 0.0 and self.model.live is None
+                at_rest, onset = self._at_first(proved) if first else (np.nan, np.nan)
+                found = self._increment(proved, motion)
+                yield replace(found, checkpoint=checkpoint, at_rest=at_rest, onset=onset)
+                reported, self.reported = True, place.s
                 if at_limit:
                     return self._reached()
-            if first_without - place.s <= tolerance * (1.0 + 1e-9):
+            if self.barrier - place.s <= tolerance * (1.0 + 1e-9):
                 # A hair beyond the last equilibrium: what loses its hold may come to rest nearby.
                 without = without or self._beyond(place)
                 settled = self._settles(without)
                 if settled is not None:
-                    proved, reported, first_without, without, spent = settled, False, np.inf, None, None
+                    proved, reported, self.barrier, without, spent = settled, False, np.inf, None, None
                     continue
-                if not self._is_stop(place.s) and place.s > 0.0:
+                if place.s > self.reported:
                     yield self._increment(proved, self._next_motion(place))
-                return (yield from self._collapse(proved, without, first_without, spent))
-            ahead = min(self._next_stop(place.s), 0.5 * (place.s + first_without))
-            # Where equilibrium is about to be lost, the drag would lose it early.
-            self.care = CARE if np.isfinite(first_without) else 1.0
+                return (yield from self._collapse(proved, without, self.barrier, spent))
             try:
-                new, step = self.advanced(place, ahead, step)
-            except Falls:
-                first_without, without, spent, step = min(first_without, ahead), None, None, 0.5 * (ahead - place.s)
-                continue
+                new, step = self.advanced(place, min(self._next_stop(place.s), 0.5 * (place.s + self.barrier)), step)
             except Wedged as wedged:
                 return Ending(Status.LOCKED, self._locked(wedged.place))
             except NoStep as reason:
-                if not self._is_stop(place.s) and place.s > 0.0:
+                if place.s > self.reported:
                     yield self._increment(proved, self._next_motion(place))
                 return Ending(Status.SOLVER_FAILED, self._no_step(str(reason)))
+            if new is place:
+                without, spent = None, None
+                continue
             reached = self.proved(new)
             crept: Proved | None = reached
-            if place.s == 0.0 and self.model.live is not None and reached.measured <= 0.0:
-                raise ValueError(self.driver.misdirected())
             lost = reached.measured if reached.bounds.exists else None
-            if not self._holds(reached) and lost is None:
+            if not self._holds(reached) and lost is None and new.s > self.careful_until:
                 # What the drag holds back may only have to creep on.
                 crept = self._settles(new, CREEPS, JUMP)
             if self._holds(crept):
                 assert crept is not None
-                proved, reported = crept, not self._is_stop(new.s)
+                proved, reported, without, spent = crept, not self._is_stop(new.s), None, None
             else:
-                first_without, without, spent, step = new.s, new, lost, min(step, 0.5 * (new.s - place.s))
+                length = new.s - place.s
+                step = min(step, 0.5 * length)
+                if self._falls_within(place, length):
+                    without, spent = new, lost
+
+    def _falls_within(self, place: Place, length: float) -> bool:
+        """Notes that no equilibrium was reached so far beyond a place; False where less drag is to be tried first."""
+        near = ENCLOSED * self.driver.tolerance
+        if place.s >= self.careful_until and length <= near:
+            self.careful_until, self.barrier = place.s + 2.0 * near, np.inf
+            return False
+        self.barrier = place.s + length
+        return True
+
+    def _light_blocks_stand(self, pose: Pose) -> bool:
+        """Whether blocks too light for the others' programs stand where the others do."""
+        if self.model.live is not None or not light_blocks(self.model).any():
+            return True
+        self.programs += 1
+        return not solve_program(self.model, pose).falling
 
     def _beyond(self, place: Place) -> Place:
         """A place just beyond one from which the structure falls: reached by the longest step that is solved."""
@@ -532,7 +705,7 @@ class Path:
 
     def _at_first(self, proved: Proved) -> tuple[float, float]:
         """The reaction at rest, and once the structure has begun to move: far beyond the give of the joints."""
-        place, works = proved.place, self.works
+        place, works, barrier, careful_until = proved.place, self.works, self.barrier, self.careful_until
         rate = self.driver.rate(0.0)
         remembered = self._remembered(place, proved.contacts)
         at_rest = float((self._on_supports(proved.contacts, place.pose, remembered) * rate).sum())
@@ -542,9 +715,9 @@ class Path:
             begun, _ = self.advanced(place, ONSET * give, FIRST_STEP * give)
             begun_there = self.proved(begun)
             onset = begun_there.measured if begun_there.bounds.exists else np.nan
-        except (Falls, NoStep, Wedged):
+        except (NoStep, Wedged):
             pass
-        self.works = works
+        self.works, self.barrier, self.careful_until = works, barrier, careful_until
         return at_rest, onset
 
     def _is_stop(self, s: float) -> bool:
@@ -564,53 +737,69 @@ class Path:
         return proved is not None and proved.bounds.exists and (self.model.live is None or proved.measured > 0.0)
 
     def _next_motion(self, place: Place) -> np.ndarray:
-        """(n_blocks, 3) array: velocity in the movement that follows, per unit of the parameter."""
+        """(n_blocks, 3) array: velocity in the movement that follows, per unit of the parameter.
+
+        Where no step is solved, as near a collapse, that in the movement that led here.
+        """
         length = MECHANISM * self.model.length / self.lever
-        for _ in range(4):
-            try:
-                _, motion = self.step(place, length)
-            except (NotSolved, Falls):
-                length /= 3.0
-            else:
-                return motion * self.model.lengths / length
-        return self.driver.rate(place.s)
+        try:
+            _, motion = self.step(place, length)
+        except (NotSolved, Falls):
+            return self.driver.rate(place.s) if place.velocity is None else place.velocity
+        return motion * self.model.lengths / length
 
     def _settles(self, place: Place, steps: int = FALL_STEPS, farthest: float = FARTHEST_FALL) -> Proved | None:
         """The equilibrium in which a structure that falls comes to rest, where it does so soon and near."""
         model, start = self.model, place.pose
-        for sunk, motion, length in self._sinking(place, steps):
-            place = sunk
-            if float(np.abs(self._between(start, place.pose)[:, :2]).max()) > farthest * model.length:
+        for number, (sunk, motion, length) in enumerate(islice(self._sinking(place), steps), start=1):
+            way = float(np.abs(self._between(start, sunk.pose)[:, :2]).max())
+            if way > farthest * model.length:
                 return None
-            # As slow as what creeps under a millionth of its weight.
-            speed = float(np.abs(motion[model.assembly.free]).max(initial=0.0)) * model.length / (length * self.lever)
-            if speed * DRAG > CREEPING:
+            # As slow as what creeps under a small part of its weight.
+            fastest = float(np.abs(motion[model.assembly.free]).max(initial=0.0))
+            speed = fastest * model.length / (length * self.lever)
+            often = number & (number - 1) == 0 or number == steps or fastest < AT_REST
+            if speed * DRAG > CREEPING or not often:
                 continue
-            found = self.proved(place)
+            found = self.proved(sunk)
             if self._holds(found):
-                way = float(np.abs(self._between(start, place.pose)[:, :2]).max())
                 if way > JUMP * model.length:
-                    self.notes.append(Note(place.s, self._jump(start, place.pose)))
+                    self.notes.append(Note(sunk.s, self._jump(start, sunk.pose)))
                 return found
+            if fastest < AT_REST:
+                return None
         return None
 
-    def _sinking(self, place: Place, steps: int) -> Generator[tuple[Place, np.ndarray, float], None, None]:
-        """Steps in which what falls sinks against the drag, the driver at rest; each moves blocks by a little."""
-        length = self.model.length / self.lever * MECHANISM * DRAG
-        failures = 0
-        while steps > 0 and failures < 30:
+    def _sinking(self, place: Place) -> Iterator[tuple[Place, np.ndarray, float]]:
+        """Steps in which what falls sinks against the drag, the driver at rest; remembered for who asks once more."""
+        if self.sunk is None or self.sunk[0] is not place:
+            self.sunk = (place, [], self._sink(place))
+        _, steps, more = self.sunk
+        for number in count():
+            if number == len(steps):
+                try:
+                    steps.append(next(more))
+                except StopIteration:
+                    return
+            yield steps[number]
+
+    def _sink(self, place: Place) -> Iterator[tuple[Place, np.ndarray, float]]:
+        """Work out the steps of :meth:`_sinking`; each moves blocks by a little."""
+        length, largest = (part * self.model.length / self.lever for part in (MECHANISM * DRAG, 10.0))
+        failures, grow = 0, 2.5
+        while failures < FALL_FAILURES:
             try:
                 new, motion = self.step(place, length, still=True)
             except (NotSolved, Falls):
-                length, failures = length / 3.0, failures + 1
+                length, failures, grow = length / 3.0, failures + 1, SLOW_GROWTH
                 continue
             moved_by = float(np.abs(motion[self.model.assembly.free]).max(initial=0.0))
             if moved_by > 2.0 * FALL_STEP:
-                length, failures = length / 3.0, failures + 1
+                length, failures = length * FALL_STEP / moved_by, failures + 1
                 continue
-            place, steps = new, steps - 1
+            place = new
             yield place, motion, length
-            length = min(length * (1.5 if moved_by > 0.5 * FALL_STEP else 2.5), 10.0 * self.model.length / self.lever)
+            length = min(length * min(grow, max(FALL_STEP / max(moved_by, 1e-300), 0.5)), largest)
 
     def _collapse(
         self, last: Proved, without: Place, first_without: float, spent: float | None
@@ -626,7 +815,19 @@ class Path:
         # The first movement that is large against the give of the joints, and small enough to be one of velocities.
         sizes = [float(np.abs(frame.velocity * unit_lengths(3, model.length)).max()) for frame in frames]
         chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))
-        velocity, first, largest = frames[chosen].velocity, frames[chosen], max(sizes[chosen], 1e-300)
+        velocity, largest = frames[chosen].velocity, max(sizes[chosen], 1e-300)
+        standing = self._reported(
+            last.place,
+            last.contacts,
+            last.forces,
+            last.friction,
+            velocity / largest,
+            last.measured,
+            np.zeros((model.assembly.n_blocks, 3)),
+            frames[chosen].certificate,
+            Status.EQUILIBRIUM,
+            (),
+        )
         # Where a multiplier reaches zero, it does so in between; an equilibrium that is lost, somewhere.
         part = 0.5 if spent is None else last.measured / (last.measured - spent)
         reaction = last.measured
@@ -638,11 +839,12 @@ class Path:
             reaction=reaction,
             mechanism=velocity / largest,
             unit=driver.unit,
-            words=str(mechanism_of(model.assembly, first)),
+            words=str(mechanism_of(model.assembly, standing)),
             lost="equilibrium" if spent is None else "capacity",
         )
-        if self.falling_frames:
-            yield from frames[: self.falling_frames]
+        del standing, last, frames[self.falling_frames :]
+        while frames:
+            yield frames.pop(0)
         if model.live is None:
             return Ending(Status.COLLAPSED, str(collapse), collapse)
         what = "equilibrium is lost" if spent is None else "no capacity is left"
@@ -651,14 +853,14 @@ class Path:
     def _fall(self, place: Place) -> Generator[Increment, None, None]:
         """Pseudo-time frames: what falls sinks against the drag until it rests."""
         frames, start, total = 0, place, np.zeros((self.model.assembly.n_blocks, 3))
-        for new, motion, length in self._sinking(place, 4 * max(self.falling_frames, 4)):
+        for new, motion, length in islice(self._sinking(place), 4 * max(self.falling_frames, 4)):
             total = total + motion
             moved_by = float(np.abs(total).max())
             at_rest = length >= self.model.length and float(np.abs(motion).max()) < AT_REST
-            if (frames == 0 and moved_by > MECHANISM) or moved_by > 2.0 * FALL_STEP or at_rest:
+            if (frames == 0 and moved_by > MECHANISM) or moved_by > FALL_STEP or at_rest:
                 yield self._falling(start, total * self.model.lengths, start.s)
                 frames, start, total = frames + 1, new, np.zeros_like(total)
-            if at_rest or frames == self.falling_frames:
+            if at_rest or frames >= max(self.falling_frames, 1):
                 return
 
     # What is reported -----------------------------------------------------------------------------------------------
@@ -700,7 +902,7 @@ class Path:
 
     def _falling(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
         model, assembly = self.model, self.model.assembly
-        contacts = find_contacts(assembly, moved_vertices(assembly, place.pose), model.reach)
+        contacts = self._around(place.pose)
         friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         none = Certificate(0.0, float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)), 0.0, 0.0, 0.0)
         return self._reported(

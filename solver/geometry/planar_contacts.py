@@ -18,8 +18,10 @@ LARGEST_LEAN = 0.5
 #: this multiple of its overlap.
 STEEPEST_LANDING = 0.25
 
-#: Cosine up to which two faces that leave a corner count as perpendicular, as those of diagonal neighbours are.
-PERPENDICULAR = 1e-6
+#: Cosine of the angle between two faces that leave a corner from which on they face each other: up to 78 degrees, as a
+#: hinge of an arch that falls may open. Those of diagonal neighbours, which touch at a corner alone, open by a right
+#: angle, and by a little less once one of them has turned.
+FACING = 0.2
 
 #: Difference of cosines up to which two pairs of faces at a corner are open alike.
 SAME_OPENING = 1e-9
@@ -263,7 +265,7 @@ def _classified_ends(
     facing = _facing_edge(shapes, vertex, edge, other)
     along_edge = sense * tangent
     along_facing = -sense * _unit(vertices[following[facing]] - vertices[facing])
-    same_way = _dot(along_edge, along_facing) > PERPENDICULAR
+    same_way = _dot(along_edge, along_facing) > FACING
     # At a re-entrant corner the edge ends at a wall: a corner that gets there is simply on the edge.
     near_end = (overlap <= end) & shapes.convex_vertex[other]
     # Faces that overlap on a bit at an angle touch at the corner below alone: the one above slides past the end

@@ -11,7 +11,7 @@ from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.lp.problem import LinearProgram, Unbounded
-from solver.lp.solve import solve_lp
+from solver.lp.solve import INTERIOR_ROUTES, SIMPLEX_ROWS, solve_lp
 from solver.tolerances import BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
 
 from .increment import along_structure
@@ -53,7 +53,13 @@ class Admissible:
 
 
 def admissible(
-    model: Model, pose: Pose, contacts: Contacts, friction: np.ndarray, rate: np.ndarray | None = None
+    model: Model,
+    pose: Pose,
+    contacts: Contacts,
+    friction: np.ndarray,
+    rate: np.ndarray | None = None,
+    *,
+    vertex: bool = True,
 ) -> Admissible:
     """Whether an equilibrium within friction exists at a pose, and what it leaves free.
 
@@ -67,6 +73,8 @@ def admissible(
     friction : (n_contacts,) array
     rate : (n_blocks, 3) array, optional
         Movement of the supports along which the reaction is bounded.
+    vertex : bool
+        Forces at a vertex of the program, as few as there are; otherwise, in larger models, those found fastest.
 
     Raises
     ------
@@ -109,7 +117,7 @@ def admissible(
             along=along_structure(free_blocks(model.assembly), pose),
         )
         try:
-            solution = solve_lp(program)
+            solution = solve_lp(program, None if vertex or rows <= SIMPLEX_ROWS else INTERIOR_ROUTES)
         except Unbounded:
             values.append(-sign * np.inf)
             continue

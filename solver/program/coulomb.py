@@ -21,7 +21,6 @@ https://doi.org/10.1023/A:1008292328909, here for quasi-static steps.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -43,6 +42,10 @@ FIRST_DISTANCE, FIRST_FORCE = 0.1, 0.05
 
 #: Start near a known solution: least forces, and least distances in parts of a step and an elastic give.
 NEAR = 1e-3
+
+#: Newton's method on the points' states: part of a force that counts as none, and changes of states after which it is
+#: given up.
+STATES, STATE_CHANGES = 1e-9, 12
 
 #: Up to so many freedoms a dense factorisation is the faster.
 DENSE = 150
@@ -119,6 +122,7 @@ class Moved:
     iterations: int
     forces: np.ndarray
     distances: np.ndarray
+    pattern: _Pattern | None = None
 
 
 def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Moved | None = None) -> Moved:
@@ -142,9 +146,12 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
         # Nothing touches anything: the drag alone holds.
         none = np.zeros((3, 0))
         return Moved(step.load / step.drag - gone, none[0], none[0], multiplier, 0, none, none)
-    pattern = _Pattern(step)
+    pattern = _Pattern(step) if near is None or near.pattern is None else near.pattern.fill(step)
     scale = step.size + step.give[1]
     if near is not None:
+        found = _in_states(step, pattern, gone, multiplier, near)
+        if found is not None:
+            return found
         rays = np.maximum(near.forces[1:], NEAR)
         distances = np.maximum(near.distances, NEAR * scale)
         try:
@@ -159,7 +166,17 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
     try:
         return _followed(step, pattern, gone, multiplier, forces, distances)
     except NotSolved:
+        pass
+    try:
         return _followed(step, pattern, gone, multiplier, forces, distances, careful=True)
+    except NotSolved:
+        # In steps so short that nothing moves all is as it was.
+        remembered = np.stack([step.normal, *rays]), np.maximum(np.stack([step.gap, step.slip, -step.slip]), 0.0)
+        before = Moved(np.zeros(len(gone)), step.normal, step.shear, multiplier, 0, *remembered)
+        found = _in_states(step, pattern, gone, multiplier, before)
+        if found is None:
+            raise
+        return found
 
 
 class _Pattern:
@@ -170,7 +187,6 @@ class _Pattern:
         number = np.full(len(step.free), -1)
         number[step.free] = np.arange(n_dof)
         # A column holds the rows of the two blocks, the same for a point's normal and shear force.
-        self.blocks = step.matrix.data.reshape(n, 2, -1)
         dof = number[step.matrix.indices.reshape(n, 2, -1)[:, 0]]
         self.both = (dof[:, :, None] >= 0) & (dof[:, None, :] >= 0)
         row, column = (
@@ -185,8 +201,15 @@ class _Pattern:
         self.indices, counts = filled % n_dof, np.bincount(filled // n_dof, minlength=n_dof)
         self.pointers = np.concatenate([[0], np.cumsum(counts)])
         self.drag = step.drag
-        self.to_blocks = sp.csr_array(sp.csr_array(step.matrix)[step.free])
-        self.to_contacts = sp.csr_array(self.to_blocks.T)
+        self.fill(step)
+
+    def fill(self, step: Step) -> _Pattern:
+        """Take the numbers of a step with the same contact points; gives itself."""
+        self.blocks = step.matrix.data.reshape(len(step.gap), 2, -1)
+        to_blocks = sp.csr_array(sp.csr_array(step.matrix)[step.free])
+        self.to_blocks = to_blocks.toarray() if self.dense else to_blocks
+        self.to_contacts = np.ascontiguousarray(self.to_blocks.T) if self.dense else sp.csr_array(to_blocks.T)
+        return self
 
     def stiffness(self, local: np.ndarray) -> np.ndarray | sp.csc_array:
         """The matrix with the drag, for (n_contacts, 2, 2) answers of the contact points."""
@@ -196,6 +219,51 @@ class _Pattern:
             return np.bincount(self.raw, np.concatenate([each[self.both], self.drag]), n * n).reshape(n, n).T
         data = np.bincount(self.place, np.concatenate([each[self.both], self.drag]), len(self.indices))
         return sp.csc_array((data, self.indices, self.pointers), shape=(n, n))
+
+
+def _in_states(step: Step, pattern: _Pattern, gone: np.ndarray, multiplier: float, near: Moved) -> Moved | None:
+    """Newton's method on which points are open, stick or slide, from a solution near; None where that goes round."""
+    mu, (across, along) = step.friction, step.give
+    steep = (1.0 - STATES) * mu * near.normal
+    # Open, or the direction in which friction acts on what slides; 0 for what sticks.
+    is_open = near.forces[0] * along <= near.distances[0]
+    way = np.where(np.abs(near.shear) >= steep, np.sign(near.shear), 0.0)
+    no_force, no_way = STATES * max(float(near.normal.max(initial=0.0)), 1.0), EQUATIONS * (step.size + along)
+    for iteration in range(STATE_CHANGES):
+        closed, sticks = ~is_open, ~is_open & (way == 0.0)
+        local = np.zeros((len(mu), 2, 2))
+        local[:, 0, 0] = closed / across
+        local[:, 1, 0] = closed * way * mu / across
+        local[:, 1, 1] = sticks / along
+        first = np.where(closed, step.normal - step.gap / across, 0.0)
+        second = np.where(sticks, step.shear - step.slip / along, way * mu * first)
+        solve = _factorised(pattern.stiffness(local))
+        motion = solve(step.load + pattern.to_blocks @ _paired(first, second) - step.drag * gone)
+        found_multiplier = multiplier
+        if step.live is not None and step.control is not None:
+            by_live = solve(step.live)
+            moved = float(step.control @ by_live)
+            if moved == 0.0:
+                return None
+            found_multiplier = (step.wanted - float(step.control @ motion)) / moved
+            motion = motion + found_multiplier * by_live
+        gap, slip = (pattern.to_contacts @ motion).reshape(-1, 2).T
+        normal = first - local[:, 0, 0] * gap
+        shear = second - local[:, 1, 0] * gap - local[:, 1, 1] * slip
+        distance = step.gap + gap + across * (normal - step.normal)
+        slipped = step.slip + slip + along * (shear - step.shear)
+        opens, closes = closed & (normal < -no_force), is_open & (distance < -no_way)
+        starts = sticks & (np.abs(shear) > mu * normal + no_force) & ~opens
+        stops = closed & (way * slipped > no_way)
+        if not (opens | closes | starts | stops).any():
+            normal = np.maximum(normal, 0.0)
+            lean = np.divide(shear, mu, out=np.zeros_like(shear), where=mu > 0.0)
+            forces = np.maximum(np.stack([normal, 0.5 * (normal + lean), 0.5 * (normal - lean)]), 0.0)
+            distances = np.maximum(np.stack([distance, slipped, -slipped]), 0.0)
+            return Moved(motion, normal, shear, found_multiplier, iteration, forces, distances, pattern)
+        is_open = (is_open | opens) & ~closes
+        way = np.where(starts, np.sign(shear), np.where(stops | closes, 0.0, way))
+    return None
 
 
 def _followed(
@@ -215,17 +283,17 @@ def _followed(
         normal, shear = forces[0], mu * (forces[1] - forces[2])
         gap_error = distances[0] - (gap + across * (normal - step.normal))
         slip_error = distances[1] - distances[2] - (slip + along * (shear - step.shear))
-        unbalanced = step.load + pattern.to_blocks @ np.stack([normal, shear], 1).ravel() - step.drag * (gone + motion)
+        unbalanced = step.load + pattern.to_blocks @ _paired(normal, shear) - step.drag * (gone + motion)
         behind = 0.0
         if step.live is not None and step.control is not None:
             unbalanced = unbalanced + multiplier * step.live
             behind = step.wanted - float(step.control @ motion)
         products = forces * distances
         mean = float(products.mean())
-        out = float(np.abs(unbalanced).max(initial=0.0))
-        wrong = max(float(np.abs(e).max(initial=0.0)) for e in (gap_error, slip_error, np.array([behind])))
+        out = float(np.abs(unbalanced).max())
+        wrong = max(float(np.abs(gap_error).max()), float(np.abs(slip_error).max()), abs(behind))
         if out < BALANCE and wrong < EQUATIONS * scale and float(products.max(initial=0.0)) < PRODUCT * across:
-            return Moved(motion, normal, shear, multiplier, iteration, forces, distances)
+            return Moved(motion, normal, shear, multiplier, iteration, forces, distances, pattern)
         if sum(part < SHORT for part in recent[-LOOK_BACK:]) >= LOST:
             lost, recent = lost + 1, [1.0] * LOOK_BACK
             if lost > 1:
@@ -236,7 +304,8 @@ def _followed(
         part = _longest(forces, distances, found)
         after = float(((forces + part * found.forces) * (distances + part * found.distances)).mean())
         centring = min(max((after / mean) ** 3, 1e-3), 0.8)
-        second = np.clip(found.forces * found.distances, -CORRECTION * mean, CORRECTION * mean)
+        most = CORRECTION * mean
+        second = np.minimum(np.maximum(found.forces * found.distances, -most), most)
         if careful or short:
             centring, second = 1.0 if short else max(centring, CAREFUL), 0.0
         found = newton.direction(centring * mean - products - second, *errors)
@@ -252,19 +321,22 @@ def _followed(
 
 def _longest(forces: np.ndarray, distances: np.ndarray, change: _Direction) -> float:
     """Largest part of a change that keeps all forces and distances positive, at most 1."""
-    steepest = max(
-        float((-change.forces / forces).max(initial=0.0)), float((-change.distances / distances).max(initial=0.0))
-    )
+    steepest = max(-float((change.forces / forces).min()), -float((change.distances / distances).min()))
     return 1.0 / max(steepest, 1.0)
+
+
+def _paired(normal: np.ndarray, shear: np.ndarray) -> np.ndarray:
+    """(2 n_contacts,) array: normal and shear force of each contact point, one behind the other."""
+    both = np.empty((len(normal), 2))
+    both[:, 0], both[:, 1] = normal, shear
+    return both.ravel()
 
 
 def _factorised(matrix: np.ndarray | sp.csc_array) -> Callable[[np.ndarray], np.ndarray]:
     """What solves with a matrix; a sparse one's pattern is symmetric, its values are not."""
     if isinstance(matrix, np.ndarray):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", sla.LinAlgWarning)
-            factors = sla.lu_factor(matrix, overwrite_a=True, check_finite=False)
-        return lambda right: sla.lu_solve(factors, right, check_finite=False)
+        factors, pivots, _ = sla.lapack.dgetrf(matrix, overwrite_a=True)
+        return lambda right: np.asarray(sla.lapack.dgetrs(factors, pivots, right)[0])
     try:
         # Minimum degree of the pattern, pivots near the diagonal.
         solve: Callable[[np.ndarray], np.ndarray] = spl.splu(
@@ -311,14 +383,18 @@ class _Newton:
         for_shear = aims[1] / plus - aims[2] / minus + slip_error
         at_once = for_normal / self.k_normal
         shear = step.friction * ((self.k_minus - self.k_plus) * at_once + 2.0 * for_shear) / self.k_shear
-        motion = self.solve(unbalanced + self.pattern.to_blocks @ np.stack([at_once, shear], 1).ravel())
+        motion = self.solve(unbalanced + self.pattern.to_blocks @ _paired(at_once, shear))
         multiplier = 0.0
         if self.by_live is not None and step.control is not None:
-            multiplier = (behind - float(step.control @ motion)) / float(step.control @ self.by_live)
+            moved = float(step.control @ self.by_live)
+            if moved == 0.0:
+                raise NotSolved("the live load does not move the control point")
+            multiplier = (behind - float(step.control @ motion)) / moved
             motion = motion + multiplier * self.by_live
         relative = (self.pattern.to_contacts @ motion).reshape(-1, 2)
         d_normal = (for_normal - relative[:, 0]) / self.k_normal
         rest = for_shear - relative[:, 1]
-        d_rays = np.stack([self.k_minus * d_normal + rest, self.k_plus * d_normal - rest]) / self.k_shear
-        forces = np.stack([d_normal, *d_rays])
+        forces = np.empty_like(self.forces)
+        forces[0], forces[1], forces[2] = d_normal, self.k_minus * d_normal + rest, self.k_plus * d_normal - rest
+        forces[1:] /= self.k_shear
         return _Direction(motion, relative, multiplier, forces, (aims - self.distances * forces) / self.forces)

@@ -3,14 +3,19 @@
 import csv
 import json
 import math
+import re
 import shutil
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
+from blockvis import cli
+from blockvis.cases.case import read_case
 from blockvis.cli import main
+from blockvis.generators import LAYOUTS, parameters_of
 from blockvis.runs import progress
 
 ROOT = Path(__file__).parents[2]
@@ -148,6 +153,113 @@ def test_overlapping_support_names_both_blocks_and_the_depth(case, capsys):
     with open(case, "a", encoding="utf-8") as file:
         file.write('\n[[supports]]\nname = "prop"\noutline = [[-0.2, 0.9], [0.2, 0.9], [0.2, 1.0], [-0.2, 1.0]]\n')
     _refused(case, capsys, "prop", "overlaps", "voussoir")
+
+
+def _printed(capsys, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main(list(arguments))
+    return ended.value.code, capsys.readouterr()
+
+
+def test_version_names_the_program_and_its_version(capsys):
+    code, printed = _printed(capsys, "--version")
+    assert (code, printed.out) == (0, f"blockvis {version('blockvis')}\n")
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"]])
+def test_help_says_what_every_exit_code_means(arguments, capsys):
+    code, printed = _printed(capsys, *arguments)
+    assert code == 0
+    listed = dict(re.findall(r"(?m)^  (\d+) +(\S.*)$", printed.out.partition("exit codes:")[2]))
+    codes = {cli.BAD_INPUT, cli.SOLVER_FAILED, cli.NO_PICTURES, cli.NO_EQUILIBRIUM, cli.INTERRUPTED}
+    assert set(map(int, listed)) == {0} | codes
+    assert "interrupted" in listed["130"]
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_help_of_a_layout_lists_its_parameters_with_units_and_defaults(name, capsys):
+    code, printed = _printed(capsys, "layout", name.replace(" ", "-"), "--help")
+    assert code == 0
+    for key, default in parameters_of(name).items():
+        line = next(line for line in printed.out.splitlines() if re.match(rf"  {key}\b", line))
+        if default is not None:
+            assert f"{key} = {json.dumps(default)}" in line
+        if isinstance(default, float) and not key.endswith(("_ratio", "_bricks", "_courses")):
+            assert re.search(r"\[(m|kg/m³|degrees)\]", line), line
+    assert "density = " in printed.out
+
+
+def test_help_of_a_layout_that_does_not_exist_names_the_nearest(capsys):
+    code, printed = _printed(capsys, "layout", "archh", "--help")
+    assert code == 2
+    assert "did you mean 'arch'" in printed.err
+    code, printed = _printed(capsys, "layout", "--help")
+    assert code == 0
+    assert "segmental-arch" in printed.out
+
+
+def test_bash_completes_verbs_options_and_layouts(tmp_path, capsys):
+    assert main(["completion", "bash"]) == 0
+    script = tmp_path / "blockvis.bash"
+    script.write_text(capsys.readouterr().out)
+    ask = (
+        f"source {script}; function said {{ COMP_WORDS=(blockvis $1 $2); COMP_CWORD=$(($# > 1 ? 2 : 1)); "
+        '_shtab_blockvis; echo "${COMPREPLY[@]}"; }; said comp; said layout segm; said run --res'
+    )
+    done = subprocess.run(["bash", "--norc", "-c", ask], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["completion", "segmental-arch", "--resume"]
+
+
+def test_zsh_gets_a_script_of_its_own(tmp_path, capsys):
+    assert main(["completion", "zsh"]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("#compdef blockvis")
+    assert "segmental-arch" in text
+    if shutil.which("zsh"):
+        (tmp_path / "_blockvis").write_text(text)
+        subprocess.run(["zsh", "-n", tmp_path / "_blockvis"], check=True)
+
+
+def test_set_changes_the_case_for_one_run(case, capsys):
+    out = case.parent / "out"
+    before = case.read_text(encoding="utf-8")
+    changes = ["--set", "settlement.limit=0.02", "--set", "settlement.increment=0.02", "--set", "material.density=1000"]
+    assert main(["run", str(case), "-o", str(out), *changes]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["last_settlement"] == pytest.approx(0.02)
+    assert summary["total_weight"] == pytest.approx(9140.45 / 2, rel=1e-5)
+    stored = summary["case"]
+    assert "density = 1000" in stored
+    assert "# no sliding: the arch hinges only" in stored, "comments stay"
+    assert case.read_text(encoding="utf-8") == before
+    assert main(["run", "--resume", str(out)]) == 0, "the results folder has the changed case"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("material.friction_coeficient=0.5", ["friction_coeficient", "did you mean 'friction_coefficient'"]),
+        ("material.friction_coefficient=-1", ["[material] friction_coefficient is -1"]),
+        ("settlement.direction.x=1", ["cannot set 'settlement.direction.x'"]),
+        ("supports[3].role=fixed", ["cannot set 'supports[3].role'"]),
+        ("material.density", ["'material.density' is no change of a case"]),
+    ],
+)
+def test_set_names_the_key_it_cannot_change(case, capsys, change, words):
+    assert main(["run", str(case), "-o", str(case.parent / "out"), "--set", change]) == 2
+    said = capsys.readouterr().err
+    for word in words:
+        assert word in said
+    assert not (case.parent / "out").exists()
+
+
+def test_set_makes_tables_and_takes_plain_words_and_lists(case):
+    found = read_case(
+        case, ["geometry.joint_thickness=auto", "settlement.direction=[0, -1]", "analysis.falling_frames=7"]
+    )
+    assert found.joint_thickness == "auto"
+    assert found.settlements[0].direction == (0.0, -1.0)
+    assert found.controls.falling_frames == 7
 
 
 def test_no_initial_equilibrium_has_its_own_exit_code(case, capsys):

@@ -5,11 +5,12 @@ import os
 import shutil
 import subprocess
 
+import numpy as np
 import pytest
 from structures import arch_response
 
 from blockvis.pictures.paraview import write_paraview_macro
-from blockvis.results.datasets import block_dataset, contact_dataset, output_times
+from blockvis.results.datasets import block_dataset, contact_dataset, joint_dataset, output_times
 from blockvis.vtk_files import write_pvd, write_vtu
 
 PVPYTHON, XVFB = shutil.which("pvpython"), shutil.which("xvfb-run")
@@ -19,7 +20,7 @@ import json, sys
 from paraview.simple import OpenDataFile, UpdatePipeline
 from paraview import servermanager
 told = {}
-for part in ("blocks", "contacts"):
+for part in ("blocks", "contacts", "joints"):
     reader = OpenDataFile(f"{sys.argv[1]}/{part}.pvd")
     told[part] = []
     for time in reader.TimestepValues:
@@ -35,11 +36,27 @@ print("TOLD" + json.dumps(told))
 """
 
 
+DATASETS = {"blocks": block_dataset, "contacts": contact_dataset, "joints": joint_dataset}
+
+WARP = """
+import json, sys
+from paraview.simple import OpenDataFile, WarpByVector, UpdatePipeline
+from paraview import servermanager
+reader = OpenDataFile(f"{sys.argv[1]}/blocks.pvd")
+time = reader.TimestepValues[12]
+UpdatePipeline(time, reader)
+warped = WarpByVector(Input=reader)
+UpdatePipeline(time, warped)
+data = servermanager.Fetch(warped)
+print("TOLD" + json.dumps([list(warped.Vectors), [data.GetPoint(i)[:2] for i in range(data.GetNumberOfPoints())]]))
+"""
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     response, path = arch_response(), tmp_path_factory.mktemp("results")
     times = output_times(response.increments)
-    for part, dataset in (("blocks", block_dataset), ("contacts", contact_dataset)):
+    for part, dataset in DATASETS.items():
         files = [f"increments/{part}_{k}.vtu" for k in range(len(times))]
         for file, increment in zip(files, response.increments, strict=True):
             write_vtu(dataset(response.assembly, increment), path / file)
@@ -57,7 +74,7 @@ def test_paraview_reads_every_increment_and_every_array(folder, tmp_path):
     assert done.returncode == 0, done.stderr[-2000:]
     told = json.loads(done.stdout.split("TOLD")[1])
     response = arch_response()
-    for part, dataset in (("blocks", block_dataset), ("contacts", contact_dataset)):
+    for part, dataset in DATASETS.items():
         assert len(told[part]) == len(response.increments)
         for (_, cells, names), increment in zip(told[part], response.increments, strict=True):
             ours = dataset(response.assembly, increment)
@@ -66,6 +83,18 @@ def test_paraview_reads_every_increment_and_every_array(folder, tmp_path):
                 assert set(names[kind]) == set(arrays.keys())
             assert names["Field"]["status"] == str(increment.status)
     assert told["blocks"][0][2]["Cell"]["name"] == response.assembly.names[-1]
+
+
+@pytest.mark.paraview
+@pytest.mark.skipif(PVPYTHON is None, reason="pvpython is not installed (Debian: python3-paraview)")
+def test_warp_by_vector_as_it_comes_does_not_move_the_blocks_twice(folder, tmp_path):
+    script = tmp_path / "warp.py"
+    script.write_text(WARP)
+    done = subprocess.run([PVPYTHON, script, folder], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    (_, vector), points = json.loads(done.stdout.split("TOLD")[1])
+    assert vector == "to_reference"
+    np.testing.assert_allclose(points, arch_response().assembly.vertices, atol=1e-6)
 
 
 @pytest.mark.paraview

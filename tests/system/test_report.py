@@ -111,7 +111,7 @@ def test_live_load_stands_where_it_acts_at_each_position(tmp_path):
     assert min(map(len, columns)) > 80
     assert columns[1].mean() - columns[0].mean() > 100
     assert max(map(np.ptp, columns)) < 20
-    told = '["area","live load '
+    told = '"live_words":"live load '
     assert told in page.read_text(encoding="utf-8")
     assert told not in report_html(arch_response())
 

@@ -122,7 +122,7 @@ def test_hostile_names_are_shown_and_none_runs(tmp_path):
     [
         ("<h1>plain</h1>", f"<h1>{HOSTILE[3]}</h1>"),
         ('"block 7"', f'"{HOSTILE[1]}"'),
-        ("tip.textContent = `${model.names[b]}", "tip.innerHTML = `<b>x</b>${model.names[b]}"),
+        ("tip.textContent = blockText(b)", "tip.innerHTML = `<b>x</b>${blockText(b)}`"),
     ],
 )
 def test_the_probe_notices_what_does_run(tmp_path, there, put):

@@ -191,7 +191,7 @@ def test_run_killed_by_the_signal_goes_on(whole, tmp_path):
     _same_result(whole / "out", out)
 
 
-@pytest.mark.parametrize("moments", [(2,), (30, 40), (75,), (200,)])
+@pytest.mark.parametrize("moments", [(2,), (30, 40), (75,), (100,)])
 def test_killed_run_goes_on(whole, tmp_path, moments):
     out = tmp_path / "out"
     arguments = ["run", whole / "case.toml", "-o", out]
@@ -320,7 +320,7 @@ def test_damaged_checkpoint_is_refused(whole, tmp_path, capsys):
     shutil.copytree(whole / "out", out)
     (out / "summary.json").unlink()
     data = (out / "checkpoint.npz").read_bytes()
-    for damaged in (b"", data[:200], data[: len(data) // 2], b"PK" + bytes(500)):
+    for damaged in (b"", data[:120], data[: len(data) // 2], b"PK" + bytes(500)):
         (out / "checkpoint.npz").write_bytes(damaged)
         assert main(["run", "--resume", str(out)]) == 2
         assert "cannot go on" in capsys.readouterr().err
@@ -389,7 +389,7 @@ def test_every_checkpoint_leads_to_the_same_end():
 def test_every_checkpoint_of_a_pushover_leads_to_the_same_end():
     arch = generators.arch(voussoirs=13)
     live = solver.weight_fraction(arch, (1.0, 0.0), np.flatnonzero(arch.free))
-    control = solver.ControlDisplacement("voussoir 4", increment=0.03, limit=0.6)
+    control = solver.ControlDisplacement("voussoir 4", increment=0.003, limit=0.6)
     setting = {
         "interfaces": solver.Interfaces(solver.InterfaceLaw(0.45)),
         "loads": solver.Loads(solver.self_weight(arch).dead, live),
@@ -399,7 +399,7 @@ def test_every_checkpoint_of_a_pushover_leads_to_the_same_end():
     kept = [k for k, increment in enumerate(told) if increment.checkpoint is not None]
     assert len(kept) > 5
     for k in kept:
-        checkpoint, _ = unpacked(packed(told[k].checkpoint), solver.PushoverCheckpoint)
+        checkpoint, _ = unpacked(packed(told[k].checkpoint), solver.Checkpoint)
         assert _equal(checkpoint, told[k].checkpoint)
         again = list(solver.pushover_increments(arch, control, resume=checkpoint, **setting))
         assert len(again) == len(told) - k - 1
@@ -417,8 +417,8 @@ def test_checkpoint_behind_the_last_increment_has_nothing_left_to_do():
     phases = [solver.Settlement(direction=(1, 0), increment=0.01, limit=limit) for limit in (0.02, 0.01)]
     setting = {"interfaces": solver.Interfaces(), "loads": solver.self_weight(arch)}
     told = list(solver.settlement_increments(arch, phases, **setting))
-    ends = [k for k, i in enumerate(told) if i.checkpoint.told == -np.inf]
-    assert [(told[k].phase, told[k].checkpoint.phase) for k in ends] == [(0, 1), (1, 2)]
+    ends = [k for k, i in enumerate(told) if i.checkpoint.ended]
+    assert [(told[k].phase, told[k].checkpoint.phase) for k in ends] == [(0, 0), (1, 1)]
     assert ends[-1] == len(told) - 1
     steps = solver.settlement_increments(arch, phases, resume=told[-1].checkpoint, **setting)
     with pytest.raises(StopIteration) as end:

@@ -76,7 +76,8 @@ def programs_of(monkeypatch, assembly, **settlement):
 
     for module in (increment, light_blocks):
         monkeypatch.setattr(module, "solve_lp", keeping)
-    solver.settle(assembly, solver.Settlement(**settlement), friction_coefficient=0.6)
+    controls = solver.Controls(increments="linear program")
+    solver.settle(assembly, solver.Settlement(**settlement), friction_coefficient=0.6, controls=controls)
     return kept
 
 

@@ -8,9 +8,11 @@ import pytest
 from PIL import Image
 from structures import arch_response, parted, wall
 
-from blockvis.pictures import palette
+import blockvis
+import solver
+from blockvis.pictures import curves, palette
 from blockvis.pictures.captions import parameter_text
-from blockvis.pictures.curves import CurvePanel, draw_curve, events_of
+from blockvis.pictures.curves import CurvePanel, Event, draw_curve, events_of
 
 
 def test_png_has_a_curve_and_the_collapse(tmp_path):
@@ -41,6 +43,43 @@ def test_a_structure_without_any_equilibrium_has_an_empty_curve(tmp_path):
     falling = tuple(i for i in response.increments if i not in response.path)
     nothing = replace(response, increments=falling, collapse=None)
     assert draw_curve(nothing, tmp_path / "curve.png").stat().st_size > 1000
+
+
+def said(response, path):
+    return re.findall(r"<!-- (.*?) -->", draw_curve(response, path).read_text())
+
+
+def test_a_failed_run_says_so_in_the_curve(tmp_path):
+    response = arch_response()
+    failed = replace(response, stop=solver.Status.SOLVER_FAILED, collapse=None, increments=response.path[:4])
+    told = said(failed, tmp_path / "failed.svg")
+    place = parameter_text(response.path[3].parameter, failed)
+    assert f"solver failed at {place}: the curve is not complete" in told
+    assert not any("failed" in line for line in said(response, tmp_path / "whole.svg"))
+
+
+def test_the_collapse_has_the_count_of_its_mechanism_and_the_case_its_name(tmp_path):
+    assert "5 hinges" in said(arch_response(), tmp_path / "curve.svg")
+    (tmp_path / "garden.toml").write_text(
+        '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.05\nlimit = 0.05\n'
+        "[analysis]\nfalling_frames = 0\n[output]\nanimation = false\n"
+    )
+    run = blockvis.run_case(tmp_path / "garden.toml", tmp_path / "out")
+    assert "garden" in said(run.response, tmp_path / "named.svg")
+
+
+def test_ticks_are_plain_numbers(tmp_path):
+    response = parted(wall(4, 3), 4, 0, settlement=2e-7)
+    large = tuple(replace(i, measured=3.1e9 + k, reaction=3.1e9 + k) for k, i in enumerate(response.increments))
+    told = said(replace(response, increments=large, collapse=None), tmp_path / "curve.svg")
+    assert not [line for line in told if re.search(r"\de[+−-]?\d|10\^|×|mathdefault", line)], told
+
+
+def test_where_many_joints_change_the_curve_stays_free_of_circles(tmp_path, monkeypatch):
+    response = parted(wall(4, 3), 30, 0)
+    events = [Event(i.parameter, i.measured, "1 hinge") for i in response.path]
+    monkeypatch.setattr(curves, "events_of", lambda _: events)
+    assert "30 times hinges or sliding joints change" in said(response, tmp_path / "curve.svg")
 
 
 def test_hinges_of_the_arch_stay_the_same_on_its_path():

@@ -29,7 +29,7 @@ CASE = """
 layout = "arch"
 [settlement]
 direction = [1, 0]
-increment = 0.1
+increment = 0.03
 limit = 0.1
 """
 

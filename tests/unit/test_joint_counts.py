@@ -5,6 +5,7 @@ import csv
 import json
 import re
 import zlib
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -16,7 +17,10 @@ import solver
 from blockvis import generators
 from blockvis.pictures import annotations
 from blockvis.pictures.curves import events_of
+from blockvis.pictures.swing import swing_of
 from blockvis.report.page import report_html
+from blockvis.results.joints import initial_joints
+from blockvis.runs.kinds import KINDS
 
 SINKS = (0.0, -1.0)
 
@@ -67,7 +71,7 @@ def test_every_increment_has_one_count(name, tmp_path):
     response = RESPONSES[name]()
     expected = [counted(response, increment) for increment in response.increments]
     assert max(hinges for hinges, _ in expected) > 0
-    joints = annotations.initial_joints(response.assembly)
+    joints = initial_joints(response.assembly)
     for increment, (hinges, sliding) in zip(response.increments, expected, strict=True):
         words = str(solver.mechanism_of(response.assembly, increment))
         assert in_words(words) == (hinges, sliding)
@@ -84,7 +88,10 @@ def test_every_increment_has_one_count(name, tmp_path):
     packed = model["packed"]
     ends, kinds = unpacked(packed["mark_first"]).ravel(), unpacked(packed["mark_kind"]).ravel()
     frames = np.split(kinds, ends[1:-1])
-    assert [((k == 1).sum(), (k == 2).sum()) for k in frames] == expected
+    # The last equilibrium shows the mechanism that follows it, as the picture of it and the film do.
+    shown = [*path, *expected[len(path) :]]
+    shown[len(path) - 1] = counted(response, swing_of(response).increment)
+    assert [((k == 1).sum(), (k == 2).sum()) for k in frames] == shown
 
 
 @EACH
@@ -109,6 +116,18 @@ def test_collapse_has_one_count(name, tmp_path):
     assert counted(response, response.increments[len(response.path)]) == expected
     summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
     assert (summary["hinges"], summary["sliding_joints"]) == expected
+
+
+def test_console_and_summary_count_what_the_picture_shows(tmp_path):
+    """Not the first frame of the fall, whose contact points and forces are others."""
+    response = portal()
+    shown = swing_of(response).increment
+    collapse = replace(response.collapse, words="9 macro-blocks; hinge at a | b")
+    response = replace(response, collapse=collapse)
+    said = next(line for line in KINDS["settlement"].lines(response) if line.startswith("mechanism: "))
+    assert said == f"mechanism: {solver.mechanism_of(response.assembly, shown)}"
+    summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
+    assert f"mechanism: {summary['mechanism']}" == said
 
 
 def test_creeping_counts_for_nothing():

@@ -73,9 +73,10 @@ def test_free_blocks_move_for_themselves(wall):
 def test_a_large_wall_closes_up_like_a_small_one(wall, monkeypatch):
     """The reaction hangs on gaps being closed: left as they are it is 20 % off."""
     sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.004, limit=0.016)
-    exact = solver.settle(wall, sinks, friction_coefficient=0.6)
+    controls = solver.Controls(increments="linear program")
+    exact = solver.settle(wall, sinks, friction_coefficient=0.6, controls=controls)
     monkeypatch.setattr("solver.program.model.CROSSOVER_ROWS", 10)
-    large = solver.settle(wall, sinks, friction_coefficient=0.6)
+    large = solver.settle(wall, sinks, friction_coefficient=0.6, controls=controls)
     assert large.stop is solver.Status.LIMIT_REACHED
     here = np.interp(exact.settlement, large.settlement, large.reaction)
     np.testing.assert_allclose(here, exact.reaction, rtol=0.025)

@@ -8,6 +8,7 @@ import solver
 from blockvis import generators
 from solver.analysis.limit_load import limit_load
 from solver.analysis.pushover import ControlDisplacement, pushover
+from solver.tolerances import GIVE
 
 pytestmark = pytest.mark.path
 
@@ -69,8 +70,9 @@ def test_the_live_load_does_what_the_weight_gains_and_a_jump_takes():
             jumps += 1
             assert work > 1.05 * gained
         else:
-            # The trapezium rule is what is left.
-            assert work == pytest.approx(gained, rel=5e-4, abs=2e-4)
+            # The trapezium rule is what is left, and at the start what the joints give.
+            held = GIVE * response.assembly.block_size * response.total_weight if one.settlement == 0.0 else 0.0
+            assert work == pytest.approx(gained, rel=5e-4, abs=2e-4 + held)
     assert jumps == 1
 
 

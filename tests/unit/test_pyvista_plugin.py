@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+import solver
 from blockvis import pyvista_plugin
 from blockvis.formats.read import read
 
@@ -37,6 +38,74 @@ def test_three_lines_from_a_polygon_mesh_to_a_solved_collapse():
     response = mesh.blockvis.settle(direction=(1, 0), increment=0.005, limit=0.2, friction_coefficient=2.0)
     assert response.collapse.displacement == pytest.approx(2 * (np.hypot(a, h) - a), rel=5e-3)
     assert mesh.blockvis.assembly({"block 0": "fixed"}).roles[0] == "fixed"
+
+
+def flat_arch():
+    """Two blocks between abutments as a MultiBlock, one part each, that falls at 2 (sqrt(a² + h²) - a)."""
+    box = np.array([[0, 0], [1.0, 0], [1.0, 0.25], [0, 0.25]])
+    places = {"left block": 0.0, "right block": 1.0, "left abutment": -1.0, "right abutment": 2.0}
+    return pv.MultiBlock({name: polygons([box + np.array([x, 0.0])]) for name, x in places.items()})
+
+
+ROLES = {"left abutment": "fixed", "right abutment": "moving"}
+
+
+def test_a_multiblock_settles_and_its_parts_name_the_blocks():
+    accessor = flat_arch().blockvis
+    response = accessor.settle(
+        ROLES, direction=(1, 0), increment=0.02, limit=0.2, tolerance=1e-3, friction_coefficient=2.0
+    )
+    assert response.assembly.names == ("left block", "right block", "left abutment", "right abutment")
+    assert response.collapse.displacement == pytest.approx(2 * (np.hypot(1.0, 0.25) - 1.0), rel=2e-2)
+    low, high = response.collapse.bracket
+    assert 2e-4 < high - low <= 1e-3, "the tolerance is that of the caller"
+    assert repr(accessor).startswith("<4 blocks")
+
+
+def test_phases_follow_one_another():
+    phases = [solver.Settlement(direction=(1, 0), limit=0.02), solver.Settlement(direction=(0, -1), limit=0.01)]
+    response = flat_arch().blockvis.settle(ROLES, phases=phases, friction_coefficient=2.0)
+    assert {increment.phase for increment in response.path} == {0, 1}
+    assert response.parameters[-1] == pytest.approx(0.03)
+
+
+def test_limit_load_of_a_mesh():
+    # A block as wide as half its height tips under half its weight from the side.
+    box = np.array([[0, 0], [0.5, 0], [0.5, 1.0], [0, 1.0]])
+    base = np.array([[-1, -1], [2, -1], [2, 0], [-1, 0.0]])
+    mesh = polygons([box, base])
+    mesh.cell_data["role"] = ["free", "fixed"]
+    found = mesh.blockvis.limit_load(friction_coefficient=2.0)
+    assert found.multiplier == pytest.approx(0.5, rel=1e-6)
+    assert mesh.blockvis.limit_load(friction_coefficient=0.3).multiplier == pytest.approx(0.3, rel=1e-6)
+
+
+def test_cubes_are_blocks_alone_and_together():
+    cubes = pv.MultiBlock({name: pv.Cube(center=(0, 0, z)) for name, z in (("base", 0.0), ("top", 1.0))})
+    for layout in (cubes.blockvis.layout(), cubes.combine().blockvis.layout()):
+        assert layout.n_blocks == 2
+        heights = sorted(ring[:, 1].mean() for ring in layout.outlines)
+        assert heights[1] - heights[0] == pytest.approx(1.0)
+    assert cubes.blockvis.layout().names == ("base", "top")
+    assert cubes.blockvis.assembly({"base": "fixed"}).roles.tolist() == ["fixed", "free"]
+
+
+def test_an_open_shell_is_no_body():
+    shell = pv.Cube().extract_cells(range(5)).extract_surface(algorithm="dataset_surface")
+    with pytest.raises(ValueError, match="not flat"):
+        shell.blockvis.layout()
+
+
+def test_the_blocks_are_drawn_with_their_supports_apart(tmp_path):
+    file = tmp_path / "blocks.png"
+    flat_arch().blockvis.plot(ROLES, off_screen=True, screenshot=file, names=False, window_size=(400, 200))
+    picture = np.asarray(pv.read(file).point_data.active_scalars).reshape(200, 400, -1)[..., :3].astype(int)
+    row = picture[100, [60, 150, 250, 340]]
+    assert np.ptp(row[0]) < 12, "a fixed support is grey"
+    assert row[3][1] - row[3][0] > 40, "a moving support has the colour of the settlement"
+    assert row[1][0] - row[1][2] > 15, "free blocks have that of stone"
+    flat_arch().blockvis.save(tmp_path / "blocks.dxf")
+    assert read(tmp_path / "blocks.dxf").n_blocks == 4
 
 
 def test_meshes_without_flat_blocks_stay_with_pyvista(tmp_path):

@@ -454,7 +454,7 @@ def test_solver_failure_is_not_collapse(monkeypatch):
 
     def breaks(program, route):
         calls.append(route)
-        return run(program, route) if len(calls) <= 4 else (None, "kSolveError")
+        return run(program, route) if len(calls) <= 8 else (None, "kSolveError")
 
     monkeypatch.setattr(solve, "run_highs", breaks)
     spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)

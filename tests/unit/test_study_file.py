@@ -8,11 +8,11 @@ import pytest
 
 import blockvis
 from blockvis.cases.case import case_of
+from blockvis.cases.value_paths import parse_path, put
 from blockvis.cli import main
 from blockvis.studies import campaign
 from blockvis.studies.sampling import METHODS, designed
 from blockvis.studies.study_file import read_study
-from blockvis.studies.value_paths import parse_path, put
 
 CASE = """
 [geometry]

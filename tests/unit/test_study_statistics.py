@@ -6,6 +6,7 @@ import pytest
 import scipy.stats as st
 
 from blockvis.studies.fragility import fragility, fragility_of, wilson
+from blockvis.studies.pictures import counted
 from blockvis.studies.sensitivity import IMPERFECTIONS, first_order, swings
 from blockvis.studies.study_file import read_study
 from blockvis.studies.summary import in_words, summary_of
@@ -40,6 +41,7 @@ def _table(study, outcome, status=None):
             "last_settlement": np.nan_to_num(outcome),
             "unit": "m",
             "mechanism_class": "1 part",
+            "falling_share": 1.0,
             "message": "",
             "seconds": 0.1,
         }
@@ -127,6 +129,19 @@ def test_reasons_that_differ_in_numbers_only_are_counted_together():
     table = _table(study, np.full(8, np.nan), ["failed"] * 8)
     table["message"] = [f"off by {k}.5e-0{k} m" for k in range(1, 8)] + ["out of memory"]
     assert summary_of(study, table)["reasons"] == {"off by 1.5e-01 m": 7, "out of memory": 1}
+
+
+def test_title_and_words_count_what_collapsed_and_what_never_stood_apart():
+    study = _study(runs=8)
+    status = ["collapsed"] * 4 + ["no initial equilibrium"] * 2 + ["limit reached", "solver failed"]
+    table = _table(study, [0.1, 0.2, 0.3, 0.4, 0.0, 0.0, np.nan, np.nan], status)
+    table.loc[1, "falling_share"] = 0.02
+    summary = summary_of(study, table)
+    assert (summary["n_collapsed"], summary["n_never_stood"], summary["n_local"]) == (4, 2, 1)
+    assert "4 collapsed, 2 no initial equilibrium" in in_words(summary)
+    assert "1 of the collapses is a local loss: a few blocks fall, the structure stands" in in_words(summary)
+    title = counted(fragility_of(table), table, 1e3, "mm")
+    assert title.startswith("7 runs, 4 collapsed (1 of a few blocks only), 2 never stood, 1 stood")
 
 
 def test_first_order_indices_of_a_linear_function():

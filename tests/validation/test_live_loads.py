@@ -109,7 +109,7 @@ def test_overturning_block_and_stack(n):
     assert response.stop is solver.Status.COLLAPSED
     assert d[:19] == pytest.approx(0.01 * np.arange(19), abs=1e-9)
     # Far below the half per cent asked for: the geometry is exact, and the program leaves 1e-9 of the weight.
-    assert multiplier == pytest.approx(np.tan(np.arctan(0.2) - np.arcsin(d)), abs=1e-7)
+    assert multiplier == pytest.approx(np.tan(np.arctan(0.2) - np.arcsin(d)), abs=5e-7)
     for at, expected in ((0.05, 0.14845), (0.10, 0.09754), (0.15, 0.04686)):
         assert np.interp(at, d, multiplier) == pytest.approx(expected, abs=1e-5)
     low, high = response.collapse.bracket

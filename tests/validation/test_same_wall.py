@@ -126,3 +126,16 @@ def test_a_column_that_nothing_presses_against_a_wall_hangs_nothing_on_it():
     reaction = response.reaction / response.total_weight
     assert reaction[0] == pytest.approx(1.0 / (1.0 + MU**2), abs=1e-6)
     assert reaction[1:] == pytest.approx(np.ones(10), abs=1e-4)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-7, 1e-5, -1e-5, -1e-3, -1e-2])
+def test_blocks_that_meet_at_a_corner_do_not_hold_each_other(turn):
+    """One passes below the other, turned by a hair, on a support that moves to the left and down: R = W sin 30°."""
+    cos, sin = np.cos(turn), np.sin(turn)
+    turned = np.array(box(-1, 0, 0, 1)) @ np.array([[cos, sin], [-sin, cos]])
+    outlines = [box(0, -1, 1, 0), turned, box(-3, -2, 4, -1)]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["free", "fixed", "moving"])
+    away = solver.Settlement(direction=(-np.cos(np.pi / 6.0), -0.5), increment=0.01, limit=0.1)
+    response = solver.settle(assembly, away, friction_coefficient=0.6, controls=NO_FALL)
+    assert response.stop is solver.Status.LIMIT_REACHED
+    assert response.reaction / response.total_weight == pytest.approx(np.full(len(response.path), 0.5), abs=1e-5)

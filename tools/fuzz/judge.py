@@ -182,8 +182,12 @@ def _judge_increment(
         finding.counted("later increment whose closed contacts alone hold nothing: not judged")
         return
     finding.counted("reaction, other form of the program")
-    if not min(values) - same <= increment.reaction <= max(values) + same:
-        finding.wrong.append(f"increment {k}: reaction {increment.reaction!r}, by the oracle {values}, W {total!r}")
+    if not min(values) - same <= increment.least <= max(values) + same:
+        finding.wrong.append(f"increment {k}: least reaction {increment.least!r}, by the oracle {values}, W {total!r}")
+    if not increment.least - same <= increment.reaction <= increment.largest + same:
+        finding.wrong.append(
+            f"increment {k}: reaction {increment.reaction!r}, not within {increment.least!r} to {increment.largest!r}"
+        )
     bounds = [
         judged(
             rings, assembly.free, weights, touching(rings, assembly.free, near, generous=g), given.friction, velocity

@@ -1,0 +1,140 @@
+"""What pictures and pages say about a response beside its numbers: where it comes from, and how much of it falls."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import solver
+from blockvis.numbers import force_text
+
+from .increments import folder_of
+from .record import Record, read_record, versions
+
+#: A mechanism that takes less than this share of the weight with it is the loss of a few blocks: the structure stands.
+LOCAL = 0.05
+
+
+@dataclass(frozen=True)
+class About:
+    """Where a response comes from.
+
+    Attributes
+    ----------
+    name, file : str
+        Name of the case, empty for one made in Python, and of its file.
+    finished : str
+        When it was found.
+    version : str
+        Of this program, when the run began.
+    """
+
+    name: str
+    file: str
+    finished: str
+    version: str
+
+
+def about(response: solver.Response) -> About:
+    """Find where a response comes from, by the results folder that its increments are in.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    folder = folder_of(response.increments[0]) if response.increments else None
+    record, finished = Record(versions=versions()), ""
+    if folder is not None:
+        with contextlib.suppress(ValueError):
+            record = read_record(folder)
+        with contextlib.suppress(OSError, ValueError, KeyError):
+            finished = str(json.loads((folder / "summary.json").read_text(encoding="utf-8"))["finished"])
+    stamp = finished or time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    file = Path(record.case_file)
+    return About(
+        name=file.stem,
+        file=file.name or "no case file",
+        finished=stamp.replace("T", " ").replace("Z", " UTC"),
+        version=f"blockvis {record.versions.get('blockvis', '')}".strip(),
+    )
+
+
+def collapse_mechanism(response: solver.Response) -> solver.Mechanism | None:
+    """Find the collapse mechanism at the last equilibrium: what words, tables, curves, pictures and pages count.
+
+    Parameters
+    ----------
+    response : solver.Response
+
+    Returns
+    -------
+    solver.Mechanism or None
+        None where nothing collapses.
+    """
+    collapse, path = response.collapse, response.path
+    if collapse is None or not path or not collapse.mechanism.any():
+        return None
+    return solver.mechanism_of(response.assembly, solver.with_motion(path[-1], collapse.mechanism))
+
+
+def mechanism_text(response: solver.Response) -> str:
+    """Say in words how a structure collapses; empty where it does not."""
+    mechanism = collapse_mechanism(response)
+    if mechanism is not None:
+        return str(mechanism)
+    return "" if response.collapse is None else response.collapse.words
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What a collapse mechanism takes with it.
+
+    Attributes
+    ----------
+    weight : float [N]
+        Of the free blocks that move in the mechanism.
+    share : float
+        Of the weight of all free blocks.
+    """
+
+    weight: float
+    share: float
+
+    @property
+    def local(self) -> bool:
+        """Whether a few blocks are lost and the structure stands."""
+        return self.share < LOCAL
+
+    def __str__(self) -> str:
+        """Say what is lost, and how much."""
+        what = "local loss, the structure stands" if self.local else "collapse of the structure"
+        return f"{what}: {force_text(self.weight)} fall, {100.0 * self.share:.3g} % of the weight"
+
+
+def loss_in(assembly: solver.Assembly, falling: solver.Increment) -> Loss:
+    """Weigh what moves in the motion that follows an increment.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    falling : solver.Increment
+    """
+    moves = solver.rigid_parts(assembly, falling) >= 0
+    weight = float(assembly.masses[moves & assembly.free].sum() * solver.GRAVITY)
+    return Loss(weight, weight / solver.total_weight(assembly))
+
+
+def loss_of(response: solver.Response) -> Loss | None:
+    """Weigh what the collapse mechanism of a response takes with it; None where nothing collapses.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    collapse, path = response.collapse, response.path
+    if collapse is None or collapse.lost != "equilibrium" or not path or not collapse.mechanism.any():
+        return None
+    return loss_in(response.assembly, solver.with_motion(path[-1], collapse.mechanism))

@@ -1,0 +1,154 @@
+"""What pictures and films say: captions, legends and warnings that agree with what is drawn and with each other."""
+
+import io
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from structures import arch_response, parted, wall
+
+import solver
+from blockvis import generators
+from blockvis.pictures.captions import FAILED_BADGE
+from blockvis.pictures.drawer import Drawer, Look
+from blockvis.pictures.film import film_of
+from blockvis.pictures.frame import Sheet
+from blockvis.studies import pictures
+from blockvis.studies.run_one import _shape
+
+SMALL = (320, 180)
+
+
+@pytest.fixture
+def words(monkeypatch):
+    """What the sheets say, one dictionary per picture."""
+    told = []
+    composed = Sheet.composed
+
+    def noted(self, picture, **said):
+        told.append(said)
+        return composed(self, picture, **said)
+
+    monkeypatch.setattr(Sheet, "composed", noted)
+    return told
+
+
+def filmed(response, fps=4.0, seconds=4.0):
+    drawer = Drawer(response, Look(colour_by="mechanism"), SMALL, response.increments)
+    _, pictures_of = film_of(drawer, fps, seconds)
+    return list(pictures_of)
+
+
+@cache
+def swinging():
+    """A moving load on an arch: three positions, and the mechanism of the lowest."""
+    arch = generators.arch()
+    loads = [solver.self_weight(arch)] * 3
+    path = []
+    for k, x in enumerate((-0.5, 0.0, 0.5)):
+        live = solver.point_load(arch, 3 + 2 * k, force=(0.0, -1.0))
+        limit = solver.limit_load(arch, loads=replace(loads[k], live=live))
+        path.append((limit, replace(limit.increment, parameter=x)))
+    limits, states = zip(*path, strict=True)
+    falling = replace(states[0], status=solver.Status.FALLING)
+    return solver.Response(
+        assembly=arch, settlements=(), interfaces=solver.Interfaces(), loads=loads[0],
+        increments=(*states, falling), stop=solver.Status.COLLAPSED, analysis="limit load", limits=limits,
+        parameter=solver.LOAD_POSITION, measured=solver.LOAD_MULTIPLIER,
+    )  # fmt: skip
+
+
+def test_what_is_out_of_scale_is_not_at_true_scale(words):
+    filmed(swinging())
+    details = [said["detail"] for said in words]
+    assert any("out of scale" in detail for detail in details)
+    assert not [detail for detail in details if "out of scale" in detail and "true scale" in detail]
+    assert any("true scale" in detail for detail in details)
+
+
+def test_a_load_is_shown_at_its_positions_and_nowhere_between(words):
+    filmed(swinging(), fps=10.0)
+    shown = {said["title"] for said in words if "FALL" not in said["badge"]}
+    alpha = {f"{state.parameter:.4f}": f"{state.measured:.5g}" for state in swinging().path}
+    for title in shown:
+        place = title.partition("x = ")[2].partition(" m")[0]
+        assert f"α = {alpha[place]}" in title
+
+
+def test_a_frame_between_two_results_names_one_of_them(words):
+    response = replace(arch_response(), collapse=None, increments=arch_response().path[::4])
+    filmed(response, fps=12.0)
+    pairs = {(f"{i.parameter:.4f}", f"{i.reaction / response.total_weight:.4f} W") for i in response.path}
+    told = [said["title"] for said in words if "Reaction" in said["title"]]
+    assert len(told) > len(response.path)
+    for title in told:
+        place = title.partition("Settlement ")[2].partition(" m")[0]
+        assert (place, title.rpartition("= ")[2]) in pairs
+
+
+def test_every_picture_of_a_failed_run_says_so(words):
+    response = arch_response()
+    failed = replace(response, stop=solver.Status.SOLVER_FAILED, collapse=None, increments=response.path)
+    filmed(failed, fps=1.0)
+    assert {said["badge"] for said in words} == {FAILED_BADGE}
+    assert "before the solver failed" in words[-1]["detail"]
+    words.clear()
+    filmed(response, fps=1.0)
+    assert FAILED_BADGE not in {said["badge"] for said in words}
+
+
+def keys_of(response, **look):
+    drawer = Drawer(response, Look(**look), SMALL, response.increments)
+    return {key.text: key.kind for key in Drawer.keys(drawer)}
+
+
+def test_the_legend_lists_what_is_drawn_and_what_is_too_much():
+    few = keys_of(parted(wall(8, 6), 3, 0))
+    assert {"open joint", "sliding joint"} <= set(few)
+    assert not any("not shown" in text for text in few)
+    many = keys_of(parted(wall(20, 18), 3, 0))
+    assert "sliding joint" not in many
+    assert many["sliding joints not shown"] == ""
+    assert many["forces not shown"] == ""
+    assert "hinge" not in keys_of(parted(wall(8, 6), 3, 0))
+    # Who asks for none gets none, and no excuse.
+    assert not any("forces" in text for text in keys_of(parted(wall(20, 18), 3, 0), forces="none"))
+
+
+def test_picture_film_and_page_count_the_last_equilibrium_alike(monkeypatch):
+    from blockvis.pictures import drawer as drawing
+
+    marked = []
+    found = drawing.marks_of
+
+    def noted(assembly, joints, increment, shown):
+        marks = found(assembly, joints, increment, shown)
+        marked.append((increment.parameter, len(marks.hinges), len(marks.sliding)))
+        return marks
+
+    monkeypatch.setattr(drawing, "marks_of", noted)
+    response = arch_response()
+    filmed(response, fps=1.0)
+    last = response.path[-1]
+    counts = {(hinges, sliding) for at, hinges, sliding in marked if at == last.parameter}
+    falling = solver.mechanism_of(response.assembly, solver.with_motion(last, response.collapse.mechanism))
+    assert (len(falling.hinges), len(falling.sliding)) in counts
+    assert (3, 0) not in counts, "three hinges are those of the settlement, not of the collapse"
+
+
+def test_tiles_of_studies_hold_supports_and_their_arrow():
+    response = arch_response()
+    last = solver.with_motion(response.path[-1], response.collapse.mechanism)
+    mechanism = solver.mechanism_of(response.assembly, last)
+    with np.load(io.BytesIO(_shape(response.assembly, last, mechanism, response.settlements[0]))) as stored:
+        shape = {name: stored[name] for name in stored.files}
+    np.testing.assert_allclose(shape["arrows"][:, 1], [[1.0, 0.0]])
+    moving = int(np.flatnonzero(response.assembly.moving)[0])
+    support = solver.moved_vertices(response.assembly, last.pose)[response.assembly.block_of_vertex == moving]
+    place = shape["arrows"][0, 0]
+    assert (support.min(axis=0) < place).all()
+    assert (place < support.max(axis=0)).all()
+    low, high = pictures._frame([shape])
+    assert (low < shape["vertices"].min(axis=0)).all()
+    assert (shape["vertices"].max(axis=0) < high).all()

@@ -1,0 +1,75 @@
+"""What falls: a brick that drops is not the collapse of a wall, and every output says which of the two it was."""
+
+import json
+import re
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from structures import arch_response
+
+import blockvis
+import solver
+from blockvis.pictures.captions import lost_text
+from blockvis.pictures.curves import draw_curve
+from blockvis.report.page import report_html
+from blockvis.results.about import LOCAL, loss_of
+from blockvis.runs.kinds import KINDS
+
+
+@cache
+def dropped_brick():
+    """A heavy block that stands, and beside it a brick over a gap that opens under it."""
+    outlines = [
+        [[0, 0], [4, 0], [4, 2], [0, 2]],
+        [[4.9, 0], [5.4, 0], [5.4, 0.2], [4.9, 0.2]],
+        [[-1, -1], [5, -1], [5, 0], [-1, 0]],
+        [[5.2, -1], [6, -1], [6, 0], [5.2, 0]],
+    ]
+    assembly = solver.Assembly.from_outlines(
+        outlines, names=["pier", "brick", "ground", "footing"], roles=["free", "free", "fixed", "moving"]
+    )
+    away = solver.Settlement(direction=(1, 0), increment=0.05, limit=1.0)
+    return solver.settle(assembly, away, friction_coefficient=0.6)
+
+
+def test_a_brick_that_drops_is_a_local_loss():
+    response = dropped_brick()
+    assert response.stop is solver.Status.COLLAPSED
+    loss = loss_of(response)
+    brick, pier = 0.5 * 0.2, 4.0 * 2.0
+    assert loss.share == pytest.approx(brick / (brick + pier))
+    assert loss.weight == pytest.approx(brick * 2000.0 * solver.GRAVITY)
+    assert loss.local
+    assert str(loss) == "local loss, the structure stands: 1.962 kN fall, 1.23 % of the weight"
+    whole = loss_of(arch_response())
+    assert whole.share == pytest.approx(1.0)
+    assert str(whole).startswith("collapse of the structure: 9.14 kN fall, 100 %")
+    assert loss_of(replace(response, collapse=None)) is None
+
+
+def test_the_limit_is_a_share_of_the_weight():
+    assert blockvis.results.about.Loss(1.0, LOCAL).local is False
+    assert blockvis.results.about.Loss(1.0, LOCAL - 1e-9).local is True
+
+
+def test_summary_console_report_and_curve_tell_them_apart(tmp_path):
+    response = dropped_brick()
+    summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
+    assert summary["status"] == "collapsed"
+    assert summary["loss"] == "local"
+    assert summary["falling_weight"] == pytest.approx(1962, abs=1)
+    assert summary["falling_share"] == pytest.approx(0.01235, abs=1e-5)
+    assert any("local loss" in line for line in KINDS["settlement"].lines(response))
+    assert not any("local loss" in line for line in KINDS["settlement"].lines(arch_response()))
+    page = report_html(response)
+    assert "<h1>Local loss at a settlement of" in page
+    assert "1.962 kN = 0.0123 W, a local loss" in page
+    said = re.findall(r"<!-- (.*?) -->", draw_curve(response, tmp_path / "curve.svg").read_text())
+    assert any(line.startswith("local loss at ") for line in said)
+    assert lost_text(response) == "a local loss"
+    assert lost_text(arch_response()) == "collapse"
+    other = json.loads(
+        (blockvis.write(arch_response(), tmp_path / "arch") / "summary.json").read_text(encoding="utf-8")
+    )
+    assert (other["loss"], other["falling_share"]) == ("structure", pytest.approx(1.0))
