@@ -1,6 +1,7 @@
 """How the manual is built: ``python -m sphinx -W -b html docs docs/_build``, without a network."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -8,11 +9,9 @@ import warnings
 from importlib.metadata import version as installed
 from pathlib import Path
 
-from sphinx_gallery.scrapers import figure_rst
-
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(HERE)]
 
 project = "blockvis"
 author = "The blockvis developers"
@@ -27,7 +26,7 @@ extensions = [
     # Formulas as pictures: a page that is opened from the disk has no network to fetch MathJax from.
     "matplotlib.sphinxext.mathmpl",
 ]
-exclude_patterns = ["_build", "README.md", "gallery", "tutorials"]
+exclude_patterns = ["_build", "gallery", "tutorials", "generated/validation_tables.md"]
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
 autosummary_generate = True
@@ -41,24 +40,7 @@ html_title = "blockvis"
 html_static_path = ["_static"]
 html_show_sourcelink = False
 html_theme_options = {"show_prev_next": False, "navigation_with_keys": False, "secondary_sidebar_items": ["page-toc"]}
-templates_path: list[str] = []
-
-
-class PicturesWritten:
-    """Shows the pictures that a part of a script has written, in the order in which it wrote them."""
-
-    def __repr__(self) -> str:
-        """Name of the class: an address in memory would have every script run again."""
-        return "PicturesWritten"
-
-    def __call__(self, block, block_vars, gallery_conf) -> str:
-        """Move new pictures to where sphinx-gallery wants them, and return the text that shows them."""
-        folder = Path(block_vars["src_file"]).parent
-        shown = []
-        for picture in sorted(folder.glob("*.png"), key=lambda path: path.stat().st_mtime_ns):
-            shown.append(next(block_vars["image_path_iterator"]))
-            shutil.move(picture, shown[-1])
-        return figure_rst(shown, gallery_conf["src_dir"])
+templates_path = ["_templates"]
 
 
 sphinx_gallery_conf = {
@@ -66,7 +48,7 @@ sphinx_gallery_conf = {
     "gallery_dirs": ["auto_gallery", "auto_tutorials"],
     "filename_pattern": r"\.py$",
     "within_subsection_order": "FileNameSortKey",
-    "image_scrapers": (PicturesWritten(),),
+    "image_scrapers": ("pictures_written.show_pictures",),
     "abort_on_example_error": True,
     "download_all_examples": False,
     "show_memory": False,
@@ -99,6 +81,12 @@ def write_generated(app) -> None:
     subprocess.run([sys.executable, str(tool), str(tables)], check=True, cwd=ROOT, env=dict(os.environ))
 
 
+def bars_of_absolute_values(app, what, name, obj, options, lines) -> None:
+    """Replace the bars of |T|, which reStructuredText takes for a substitution, by others that look alike."""
+    lines[:] = [re.sub(r"\|([^\s|][^|]*)\|", "\N{DIVIDES}\\1\N{DIVIDES}", line) for line in lines]
+
+
 def setup(app) -> None:
     """Have the generated pages written before the sources are read."""
     app.connect("builder-inited", write_generated, priority=100)
+    app.connect("autodoc-process-docstring", bars_of_absolute_values, priority=900)

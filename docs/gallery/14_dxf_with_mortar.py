@@ -26,9 +26,11 @@ def stone(x, y, width, height, layer):
 
 for course in range(6):
     y, shift = course * 210, 200 * (course % 2)
-    for x, width in [(0, 190)] * (course % 2) + [(k * 400 + shift, 390) for k in range(4 - course % 2)] + [
-        (1400, 190)
-    ] * (course % 2):
+    for x, width in (
+        [(0, 190)] * (course % 2)
+        + [(k * 400 + shift, 390) for k in range(4 - course % 2)]
+        + [(1400, 190)] * (course % 2)
+    ):
         stone(x, y, width, 200, "stones")
 stone(0, -210, 790, 200, "fixed")
 stone(800, -210, 790, 200, "moving")
