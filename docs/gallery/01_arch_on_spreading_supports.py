@@ -2,8 +2,8 @@
 Arch on spreading supports
 ==========================
 
-A semicircular arch of twelve voussoirs hinges at five joints as its right springer moves out, and falls at 0.14105 radii:
-exact three-hinge kinematics give 0.14104982.
+A semicircular arch of twelve voussoirs hinges at five joints as its right springer moves out, and falls at 0.14105
+radii: exact three-hinge kinematics give 0.14104982.
 """
 
 import blockvis

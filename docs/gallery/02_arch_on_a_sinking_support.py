@@ -2,8 +2,8 @@
 Arch on a sinking support
 =========================
 
-The right springer of a segmental arch sinks. Supports may go along any direction; a mechanism of four macro-blocks ends it
-at 0.35255 radii.
+The right springer of a segmental arch sinks. Supports may go along any direction; a mechanism of four macro-blocks
+ends it at 0.35255 radii.
 """
 
 import blockvis

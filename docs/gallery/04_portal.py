@@ -2,8 +2,8 @@
 Portal with a settling foot
 ===========================
 
-A lintel on two columns of blocks; the right foot sinks. By statics each column carries half of the lintel at first, and
-the lintel tilts about its bearings until it slides off.
+A lintel on two columns of blocks; the right foot sinks. By statics each column carries half of the lintel at first,
+and the lintel tilts about its bearings until it slides off.
 """
 
 import blockvis

@@ -2,8 +2,8 @@
 Panel in running bond
 =====================
 
-How much of a brick panel hangs on the ground that begins to settle? The kinematics of the cracked wedge give
-25/218 of its weight for this one, friction 0.3.
+How much of a brick panel hangs on the ground that begins to settle? The kinematics of the cracked wedge give 25/218
+of its weight for this one, friction 0.3.
 """
 
 import blockvis

@@ -2,8 +2,8 @@
 Wall under a horizontal acceleration
 ====================================
 
-The acceleration, as a fraction α of gravity, at which a wall with a window fails. Associative friction, in which sliding joints lift,
-gives both bounds; without lift the wall carries less.
+The acceleration, as a fraction α of gravity, at which a wall with a window fails. Associative friction, in which
+sliding joints lift, gives both bounds; without lift the wall carries less.
 """
 
 from dataclasses import replace

@@ -2,8 +2,8 @@
 What a settlement leaves
 ========================
 
-The same horizontal capacity before and after the right support of a block has sunk: a settlement first, then the limit load of
-the pose that it leaves.
+The same horizontal capacity before and after the right support of a block has sunk: a settlement first, then the
+limit load of the pose that it leaves.
 """
 
 from dataclasses import replace

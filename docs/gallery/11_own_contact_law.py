@@ -2,8 +2,8 @@
 Your own contact law
 ====================
 
-Joints may resist differently by pair of materials, and in limit loads have cohesion and a compressive strength. A block on the ground, pushed
-sideways: it slides at α = μ + cA/W, unless it overturns before.
+Joints may resist differently by pair of materials, and in limit loads have cohesion and a compressive strength. A
+block on the ground, pushed sideways: it slides at α = μ + cA/W, unless it overturns before.
 """
 
 import math

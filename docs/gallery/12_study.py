@@ -2,8 +2,8 @@
 Study: friction that nobody knows
 =================================
 
-Six runs of an arch whose friction coefficient is drawn from a normal distribution. ``blockvis sweep STUDY.toml`` makes
-them on all cores and writes a table, a summary and pictures.
+Six runs of an arch whose friction coefficient is drawn from a normal distribution. ``blockvis sweep STUDY.toml``
+makes them on all cores and writes a table, a summary and pictures.
 """
 
 import shutil

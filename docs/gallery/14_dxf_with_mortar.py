@@ -2,8 +2,8 @@
 From a DXF drawing with mortar
 ==============================
 
-Stones that were drawn with 10 mm of mortar between them. Dry joints have no thickness: ``joint_thickness="auto"`` measures the gaps
-and moves the faces to their midline.
+Stones that were drawn with 10 mm of mortar between them. Dry joints have no thickness: ``joint_thickness="auto"``
+measures the gaps and moves the faces to their midline.
 """
 
 import shutil

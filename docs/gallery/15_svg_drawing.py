@@ -2,8 +2,8 @@
 From an SVG drawing
 ===================
 
-Closed paths are blocks; a layer named ``fixed`` or ``moving`` makes its blocks supports. Width against viewBox
-gives the unit: this sheet is 300 cm for 300 units.
+Closed paths are blocks; a layer named ``fixed`` or ``moving`` makes its blocks supports. Width against viewBox gives
+the unit: this sheet is 300 cm for 300 units.
 """
 
 import shutil

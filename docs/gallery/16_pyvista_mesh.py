@@ -2,8 +2,8 @@
 From a PyVista mesh
 ===================
 
-Anything that PyVista builds or reads can be a wall: a cell array ``block_id`` says which cells are one block, ``role_name`` which
-blocks are supports.
+Anything that PyVista builds or reads can be a wall: a cell array ``block_id`` says which cells are one block,
+``role_name`` which blocks are supports.
 """
 
 import shutil

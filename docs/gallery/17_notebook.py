@@ -2,8 +2,8 @@
 In a notebook
 =============
 
-``response.plot()`` as the last line of a cell is the player of ``report.html``: drag the bar, or play. The page of each needs no
-network.
+``response.plot()`` as the last line of a cell is the player of ``report.html``: drag the bar, or play. The page of
+each needs no network.
 """
 
 import blockvis

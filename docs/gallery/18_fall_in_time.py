@@ -2,8 +2,8 @@
 The fall in time
 ================
 
-Behind the last equilibrium statics has nothing to say; where pymunk is installed, rigid-body dynamics without restitution
-goes on from there. The film plays it in real time. Here are the rubble and the way to it.
+Behind the last equilibrium statics has nothing to say; where pymunk is installed, rigid-body dynamics without
+restitution goes on from there. The film plays it in real time. Here are the rubble and the way to it.
 """
 
 import blockvis

@@ -2,8 +2,8 @@
 1. From a gmsh file to a collapse
 =================================
 
-The mesh in ``assets/semicircular_arch.msh`` has a physical group for its voussoirs and one for each springer. Every meshed
-surface becomes one block, however many triangles it has.
+The mesh in ``assets/semicircular_arch.msh`` has a physical group for its voussoirs and one for each springer. Every
+meshed surface becomes one block, however many triangles it has.
 """
 
 import shutil
@@ -24,8 +24,8 @@ mesh = Path("../../assets/semicircular_arch.msh").resolve()
 print(blockvis.inspect(mesh))
 
 # %%
-# The file says neither its unit nor which groups are supports. The case says the latter by ``[roles]``; the unit, where it is not m, by
-# ``unit = "mm"`` under ``[geometry]``.
+# The file says neither its unit nor which groups are supports. The case says the latter by ``[roles]``; the unit,
+# where it is not m, by ``unit = "mm"`` under ``[geometry]``.
 #
 # The case
 # --------
@@ -71,9 +71,9 @@ blockvis.draw_mechanism(response, "mechanism.png")
 # ParaView
 # --------
 #
-# Open ``blocks.pvd`` and ``contacts.pvd``; time is the settlement. *Warp By Vector* is not needed: the blocks stand where
-# they are. Colour the blocks by ``rotation`` to see the macro-blocks, and draw *Glyphs* of ``force`` at the contact points.
-# ``paraview_colours.py``, which a run with pictures leaves, does both. The same files in PyVista:
+# Open ``blocks.pvd`` and ``contacts.pvd``; time is the settlement. *Warp By Vector* is not needed: the blocks stand
+# where they are. Colour the blocks by ``rotation`` to see the macro-blocks, and draw *Glyphs* of ``force`` at the
+# contact points. ``paraview_colours.py``, which a run with pictures leaves, does both. The same files in PyVista:
 last = pv.read(sorted((folder / "out" / "increments").glob("*blocks*.vtu"))[len(response.path) - 1])
 print(sorted(last.cell_data))
 assert {"rotation", "displacement", "role_name"} <= set(last.cell_data)

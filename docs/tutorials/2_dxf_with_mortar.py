@@ -2,8 +2,8 @@
 2. From a DXF drawing with mortar to a collapse
 ===============================================
 
-A survey draws stones, not joints: between them is mortar. This one is made here by ezdxf, in mm: two piers and a lintel of
-three stones, 10 mm apart, with an axis and a note that are no stones.
+A survey draws stones, not joints: between them is mortar. This one is made here by ezdxf, in mm: two piers and a
+lintel of three stones, 10 mm apart, with an axis and a note that are no stones.
 """
 
 import shutil
@@ -40,16 +40,17 @@ drawing.saveas(file)
 # What the drawing holds
 # ----------------------
 #
-# The unit is the drawing's own; layers named ``fixed`` and ``moving`` are the supports; lines that close nothing are left out, and counted. The
-# mortar is measured.
+# The unit is the drawing's own; layers named ``fixed`` and ``moving`` are the supports; lines that close nothing are
+# left out, and counted. The mortar is measured.
 print(blockvis.inspect(file, ignore=["axes"]))
 
 # %%
 # Closing the joints
 # ------------------
 #
-# A dry joint has no thickness: with ``joint_thickness="auto"`` both faces move to the midline of the gap. In a case file this is
-# ``joint_thickness = "auto"`` under ``[geometry]``; a number in m is a limit up to which gaps are joints.
+# A dry joint has no thickness: with ``joint_thickness="auto"`` both faces move to the midline of the gap. In a case
+# file this is ``joint_thickness = "auto"`` under ``[geometry]``; a number in m is a limit up to which gaps are
+# joints.
 portal = blockvis.read(file, joint_thickness="auto", ignore=["axes", "notes"])
 print(portal)
 assert portal.n_blocks == 11
@@ -72,8 +73,8 @@ blockvis.draw_mechanism(response, "mechanism.png")
 # ParaView
 # --------
 #
-# ``blockvis.write`` makes the results folder; ``blocks.pvd`` in it is what ParaView opens. Blocks carry the names of their
-# layers as ``material``.
+# ``blockvis.write`` makes the results folder; ``blocks.pvd`` in it is what ParaView opens. Blocks carry the names of
+# their layers as ``material``.
 results = blockvis.write(response, folder / "out")
 print((results / "blocks.pvd").read_text().splitlines()[3].strip())
 shutil.rmtree(folder)

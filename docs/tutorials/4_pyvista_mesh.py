@@ -2,8 +2,8 @@
 4. From a PyVista mesh to a collapse
 ====================================
 
-A mesh that was made in Python, by PyVista or any of the many programs that write VTK files: here an arch of quadrangles, four per voussoir, on
-two springers.
+A mesh that was made in Python, by PyVista or any of the many programs that write VTK files: here an arch of
+quadrangles, four per voussoir, on two springers.
 """
 
 import shutil
@@ -41,8 +41,8 @@ mesh = pv.PolyData(points, faces)
 # Blocks and roles
 # ----------------
 #
-# The cell array ``block_id`` says which cells are one block, ``role_name`` which blocks are supports; without them connected
-# cells are a block, and ``roles`` says what is fixed and what moves.
+# The cell array ``block_id`` says which cells are one block, ``role_name`` which blocks are supports; without them
+# connected cells are a block, and ``roles`` says what is fixed and what moves.
 mesh.cell_data["block_id"] = number
 mesh.cell_data["role_name"] = ["moving" if n == voussoirs else "fixed" if n > voussoirs else "free" for n in number]
 folder = Path(tempfile.mkdtemp())
