@@ -59,6 +59,9 @@ sphinx_gallery_conf = {
 # Blocks that a drawing leaves out, cut light pieces and the like: the scripts print what they are about.
 warnings.filterwarnings("ignore", category=UserWarning, module="blockvis")
 
+# A formula that cannot be drawn would be left out with a warning that Sphinx does not count.
+warnings.filterwarnings("error", message="Could not render math expression")
+
 #: Where the generated pages go; not in git.
 GENERATED = HERE / "generated"
 
@@ -72,10 +75,13 @@ def write_generated(app) -> None:
         subprocess.run([sys.executable, str(keys), str(GENERATED)], check=True, cwd=ROOT)
     tables = GENERATED / "validation_tables.md"
     # Single pages are looked at with -D plot_gallery=0, which leaves out whatever takes long.
-    quick = str(app.config.overrides.get("plot_gallery", 1)) in ("0", "False")
-    if quick:
+    if str(app.config.overrides.get("plot_gallery", 1)) in ("0", "False"):
         if not tables.is_file():
-            tables.write_text("## Not computed in this build\n", encoding="utf-8")
+            tables.write_text("Not computed in this build.\n", encoding="utf-8")
+        return
+    # Two minutes of tests: not again while neither they nor the mechanics have changed.
+    sources = [*(ROOT / "solver").rglob("*.py"), *(ROOT / "tests" / "validation").glob("*.py")]
+    if tables.is_file() and tables.stat().st_mtime > max(path.stat().st_mtime for path in sources):
         return
     tool = ROOT / "tools" / "validation_tables.py"
     subprocess.run([sys.executable, str(tool), str(tables)], check=True, cwd=ROOT, env=dict(os.environ))

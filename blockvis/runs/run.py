@@ -279,7 +279,9 @@ def _solved(
             with clock.counting("write"):
                 results.add(increment)
             run.recorded(results.increments)
-            if len(results.increments) == 1:
+            # What stands after a settlement that is not reported has moved with it.
+            as_drawn = bool(case.settlements) == bool(run.course.settlements)
+            if len(results.increments) == 1 and as_drawn:
                 _note_settled(results.assembly, increment)
             for note in increment.notes:
                 warnings.warn(note, stacklevel=2)

@@ -7,12 +7,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
+import numpy as np
+
 import solver
 from blockvis.cases.contents import Case
 from blockvis.numbers import force_text
 from blockvis.results.about import loss_of, mechanism_text
 
 from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, needs_dry_joints
+
+#: The methods in words, as ``[analysis] increments`` has them.
+COULOMB, LINEAR_PROGRAM = solver.INCREMENTS
 
 #: Difference of two reactions, in weights, that is worth a line.
 NOTABLE = 1e-3
@@ -51,8 +56,11 @@ class SettlementKind(AnalysisKind):
         return AnalysisRun(self.name, given, self.course(given.case), settlement_steps(given, resume))
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
-        """List the settlements."""
-        return {"settlements": [asdict(settlement) for settlement in response.settlements]}
+        """List the settlements, and by which method their increments were found."""
+        return {
+            "settlements": [asdict(settlement) for settlement in response.settlements],
+            "increments_by": _method(response),
+        }
 
     def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:
         """Complete the response by the settlements of the summary."""
@@ -64,6 +72,8 @@ class SettlementKind(AnalysisKind):
         """Give the first and last reaction, and the settlement at collapse."""
         path, weight, unit = response.path, response.total_weight, response.settlements[-1].unit
         lines = []
+        if _method(response) == LINEAR_PROGRAM:
+            lines.append("increments by linear program: reactions are the least that equilibrium allows")
         if path:
             lines.append(f"first reaction       {path[0].reaction:12.6g} N   {path[0].reaction / weight:.6f} W")
             onset = path[0].onset
@@ -130,6 +140,13 @@ def stored_settlements(summary: Mapping[str, Any]) -> tuple[solver.Settlement, .
     for motion in motions:
         motion["blocks"] = None if motion["blocks"] is None else tuple(motion["blocks"])
     return tuple(solver.Settlement(**motion) for motion in motions)
+
+
+def _method(response: solver.Response) -> str | None:
+    """Name the method of the increments: only the path of Coulomb friction bounds its reactions."""
+    if not response.path:
+        return None
+    return LINEAR_PROGRAM if np.isnan(response.path[0].least) else COULOMB
 
 
 def settlement_steps(given: RunInput, resume: solver.Checkpoint | None = None) -> Steps:

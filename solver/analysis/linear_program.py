@@ -7,7 +7,7 @@ every digit where structures hinge; where many joints slide its path depends on 
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from solver.results.mechanism import mechanism_of
 from solver.results.response import Collapse
 from solver.tolerances import FARTHEST_FALL, JUMP, OVERLAP
 
+from .checkpoint import Note, Place, ProgramCheckpoint
 from .controls import Controls, Ending
 from .local_fall import jump_words, snapped
 
@@ -55,37 +56,6 @@ SNAPS = 100
 PROBE = 1e-6
 
 
-@dataclass(frozen=True)
-class Place:
-    """An equilibrium on the path, and how it was reached.
-
-    Attributes
-    ----------
-    s : float [m or rad]
-    pose : Pose
-    step : float [m or rad]
-        That led here; 0 at the start.
-    velocity : (n_blocks, 3) array, optional
-        Of the blocks in that step, per unit of s.
-    proved : bool
-        Whether a program with the supports nudged has confirmed the equilibrium.
-    """
-
-    s: float
-    pose: Pose
-    step: float = 0.0
-    velocity: np.ndarray | None = None
-    proved: bool = False
-
-
-@dataclass(frozen=True)
-class Note:
-    """What happened at a place of the path: settlement s [m or rad], and words."""
-
-    s: float
-    words: str
-
-
 class _NotHere(Falls):
     """The place itself, reached without proof, has no equilibrium."""
 
@@ -96,21 +66,23 @@ def linear_program_increments(
     interfaces: Interfaces,
     loads: Loads,
     controls: Controls,
+    resume: ProgramCheckpoint | None = None,
 ) -> Generator[Increment, None, Ending]:
     """The increments of :func:`solver.settle` by the paper's method; returns how they ended."""
     model = _model(assembly, phases, interfaces, loads, controls)
     pose = Pose.initial(assembly)
     try:
         # Gaps and overlaps within the accuracy of the drawing are closed before anything moves.
-        pose = at_rest(model, pose, controls.correctors)
+        pose = at_rest(model, pose, controls.correctors) if resume is None else resume.start
     except Falls as fall:
         yield _falling_frame(model, fall.solved, 0.0, 0)
         return Ending(Status.NO_INITIAL_EQUILIBRIUM, _no_equilibrium_message(assembly, fall.solved))
     except (Locked, SolveError, NotConverged) as error:
         return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
     ending = _reached(phases[-1])
-    for number, phase in enumerate(phases):
-        path = _Path(model, phase, number, pose, controls)
+    first = 0 if resume is None else resume.phase
+    for number, phase in enumerate(phases[first:], start=first):
+        path = _Path(model, phase, number, pose, controls, resume if number == first else None)
         try:
             ending = yield from path.follow()
         except (Locked, SolveError) as error:
@@ -140,6 +112,7 @@ class _Path:
         number: int,
         start: Pose,
         controls: Controls,
+        resume: ProgramCheckpoint | None = None,
     ) -> None:
         self.model, self.phase, self.number, self.controls, self.start = model, phase, number, controls, start
         self.here = Place(0.0, start)
@@ -152,6 +125,29 @@ class _Path:
         self.step = phase.increment
         self.fallen, self.snaps = np.zeros(model.assembly.n_blocks), 0
         self.notes: tuple[Note, ...] = ()
+        if resume is not None:
+            self.here, self.left, self.step = resume.here, list(resume.left), min(resume.step, phase.increment)
+            self.first_without, self.told = resume.first_without, resume.told
+            self.snaps, self.notes = resume.snaps, resume.notes
+            self.fallen = self.fallen if resume.fallen is None else resume.fallen
+
+    def _checkpoint(self) -> ProgramCheckpoint:
+        return ProgramCheckpoint(
+            phase=self.number,
+            start=self.start,
+            here=self.here,
+            left=tuple(self.left),
+            step=self.step,
+            first_without=self.first_without,
+            told=self.told,
+            fallen=self.fallen,
+            snaps=self.snaps,
+            notes=self.notes,
+        )
+
+    def _next_phase(self) -> ProgramCheckpoint:
+        pose = self.here.pose
+        return ProgramCheckpoint(self.number + 1, pose, Place(0.0, pose), (), np.inf, np.inf, -np.inf)
 
     def follow(self) -> Generator[Increment, None, Ending]:
         """Yields the increments of the phase, each when it is left behind; returns how the phase ended."""
@@ -177,7 +173,7 @@ class _Path:
                     if here.s > self.told and not predictor.falling:
                         last = self._left(predictor, step)
                         self.told = here.s
-                        yield self._noted(last)
+                        yield replace(self._noted(last), checkpoint=self._next_phase())
                     break
                 if predictor.falling:
                     if step <= self.tolerance:
@@ -239,7 +235,7 @@ class _Path:
             self.here = Place(here.s + step, pose, step, predictor.motion / step, proved)
             self.step = step = min(2.0 * step, phase.increment)
             if found is not None:
-                yield found
+                yield replace(found, checkpoint=self._checkpoint())
         yield from self._tell_last()
         return _reached(phase)
 
@@ -370,7 +366,7 @@ class _Path:
                 reading = self._read(self.here.s, self.here.pose)
                 if not reading.falling:
                     self.told = self.here.s
-                    yield self._noted(self._increment(reading, self.probe))
+                    yield replace(self._noted(self._increment(reading, self.probe)), checkpoint=self._checkpoint())
             self.here, self.left = Place(at, snap.pose, proved=True), before[-PLACES:]
             self._forget_beyond()
             self.first_without, self.step = np.inf, self.finest

@@ -24,6 +24,7 @@ from solver.results.mechanism import mechanism_of
 from solver.results.response import Collapse
 from solver.tolerances import COMPUTED_GAP, DRAG, FARTHEST_FALL, GIVE, GIVE_ACROSS, IMPERFECTION, JUMP, USED_UP
 
+from .checkpoint import ProgramCheckpoint
 from .controls import Ending
 from .drivers import Driver
 
@@ -169,6 +170,10 @@ class Checkpoint:
         Parameter up to which a collapse is being enclosed.
     ended : bool
         The phase has reached its limit.
+    marks : tuple of Place
+        The last two that are a notable way apart.
+    program : ProgramCheckpoint, optional
+        Of increments by linear program, to which nothing else here but phase and start belongs.
     """
 
     phase: int
@@ -179,6 +184,8 @@ class Checkpoint:
     works: tuple[float, float, float] = (0.0, 0.0, 0.0)
     careful_until: float = -np.inf
     ended: bool = False
+    marks: tuple[Place, ...] = ()
+    program: ProgramCheckpoint | None = None
 
 
 @dataclass(frozen=True)
@@ -229,6 +236,7 @@ class Path:
         self.finest = LARGEST_STEP / EVENT_REFINEMENT * model.length / self.lever
         self.programs, self.works, self.care = 0, (0.0, 0.0, 0.0), 1.0
         self.barrier, self.careful_until = np.inf, -np.inf
+        self.marks: tuple[Place, ...] = ()
         self.notes: list[Note] = []
         self.around: tuple[Pose, Contacts] | None = None
         self.sunk: tuple[Place, list[tuple[Place, np.ndarray, float]], Iterator[tuple[Place, np.ndarray, float]]] | None
@@ -461,6 +469,8 @@ class Path:
             place = replace(new, s=target) if length == ahead else new
             if place.s >= self.barrier:
                 self.barrier = np.inf
+            if not self.marks or place.s - self.marks[0].s > MECHANISM * self.model.length / self.lever:
+                self.marks = (place, *self.marks[:1])
             step = min(self.longest, max(step, grow * length)) if length >= 0.99 * step else step
             moved_by = float(np.abs(motion[self.model.assembly.free]).max(initial=0.0))
             if moved_by > FAST * length * self.lever / self.model.length:
@@ -599,6 +609,7 @@ class Path:
         if resume is not None:
             start, step, self.barrier = resume.place, resume.step, resume.first_without
             self.start, self.works, self.careful_until = resume.start, resume.works, resume.careful_until
+            self.marks = resume.marks
         proved = self.proved(start)
         if resume is not None:
             self.programs = 0
@@ -608,8 +619,8 @@ class Path:
             motion = next((motion for _, motion, _ in self._sinking(start)), self.drag)
             yield self._falling(start, motion * self.model.lengths, start.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, self._no_equilibrium(motion))
-        if resume is None and self.model.live is not None and not 0.0 < proved.measured < np.inf:
-            if proved.measured > 0.0:
+        if resume is None and self.model.live is not None and not 0.0 < proved.bounds.high < np.inf:
+            if proved.bounds.high > 0.0:
                 return Ending(
                     Status.LOCKED, "at a control displacement of 0 m no live load of this pattern moves the structure"
                 )
@@ -618,7 +629,9 @@ class Path:
         if resume is None and self.model.live is None and np.isinf(proved.bounds.low):
             length = GIVE * self.model.length / self.lever
             if self._locks(start, length):
-                return Ending(Status.LOCKED, self._locked(replace(start, contacts=proved.contacts, forces=proved.forces)))
+                yield self._increment(proved, self.driver.rate(start.s))
+                held = replace(start, contacts=proved.contacts, forces=proved.forces)
+                return Ending(Status.LOCKED, self._locked(held))
         if resume is None and self.model.live is not None:
             _, onset = self._at_first(proved)
             if onset <= 0.0:
@@ -632,7 +645,15 @@ class Path:
                 at_limit = place.s >= driver.limit * (1.0 - 1e-12)
                 motion = self._next_motion(place)
                 checkpoint = Checkpoint(
-                    self.number, self.start, place, step, self.barrier, self.works, self.careful_until, at_limit
+                    self.number,
+                    self.start,
+                    place,
+                    step,
+                    self.barrier,
+                    self.works,
+                    self.careful_until,
+                    at_limit,
+                    self.marks,
                 )
                 first = place.s == 0.0 and self.model.live is None
                 at_rest, onset = self._at_first(proved) if first else (np.nan, np.nan)
@@ -649,7 +670,7 @@ class Path:
                     proved, reported, self.barrier, without, spent = settled, False, np.inf, None, None
                     continue
                 if place.s > self.reported:
-                    yield self._increment(proved, self._next_motion(place))
+                    yield self._increment(proved, self._motion_at_last(place))
                 return (yield from self._collapse(proved, without, self.barrier, spent))
             try:
                 new, step = self.advanced(place, min(self._next_stop(place.s), 0.5 * (place.s + self.barrier)), step)
@@ -657,7 +678,7 @@ class Path:
                 return Ending(Status.LOCKED, self._locked(wedged.place))
             except NoStep as reason:
                 if place.s > self.reported:
-                    yield self._increment(proved, self._next_motion(place))
+                    yield self._increment(proved, self._motion_at_last(place))
                 return Ending(Status.SOLVER_FAILED, self._no_step(str(reason)))
             if new is place:
                 without, spent = None, None
@@ -706,6 +727,7 @@ class Path:
     def _at_first(self, proved: Proved) -> tuple[float, float]:
         """The reaction at rest, and once the structure has begun to move: far beyond the give of the joints."""
         place, works, barrier, careful_until = proved.place, self.works, self.barrier, self.careful_until
+        marks = self.marks
         rate = self.driver.rate(0.0)
         remembered = self._remembered(place, proved.contacts)
         at_rest = float((self._on_supports(proved.contacts, place.pose, remembered) * rate).sum())
@@ -717,7 +739,7 @@ class Path:
             onset = begun_there.measured if begun_there.bounds.exists else np.nan
         except (NoStep, Wedged):
             pass
-        self.works, self.barrier, self.careful_until = works, barrier, careful_until
+        self.works, self.barrier, self.careful_until, self.marks = works, barrier, careful_until, marks
         return at_rest, onset
 
     def _is_stop(self, s: float) -> bool:
@@ -737,16 +759,31 @@ class Path:
         return proved is not None and proved.bounds.exists and (self.model.live is None or proved.measured > 0.0)
 
     def _next_motion(self, place: Place) -> np.ndarray:
-        """(n_blocks, 3) array: velocity in the movement that follows, per unit of the parameter.
-
-        Where no step is solved, as near a collapse, that in the movement that led here.
-        """
+        """(n_blocks, 3) array: velocity in the movement that follows, per unit of the parameter."""
         length = MECHANISM * self.model.length / self.lever
         try:
             _, motion = self.step(place, length)
         except (NotSolved, Falls):
-            return self.driver.rate(place.s) if place.velocity is None else place.velocity
+            return self._motion_at_last(place)
         return motion * self.model.lengths / length
+
+    def _motion_at_last(self, place: Place) -> np.ndarray:
+        """(n_blocks, 3) array: velocity at the last equilibrium, beyond which a step would be one of the fall.
+
+        The motion of the paper's linear program there; under a live load that a little before.
+        """
+        length = MECHANISM * self.model.length / self.lever
+        before = next((one for one in self.marks if place.s - one.s >= length), None)
+        try:
+            if self.model.live is None:
+                found = solve_program(self.model, place.pose, self.driver.rate(place.s) * length)
+                if not found.falling:
+                    return found.motion / length
+            if before is not None:
+                return self.step(before, length)[1] * self.model.lengths / length
+        except (NotSolved, Falls, Locked, SolveError):
+            pass
+        return self.driver.rate(place.s)
 
     def _settles(self, place: Place, steps: int = FALL_STEPS, farthest: float = FARTHEST_FALL) -> Proved | None:
         """The equilibrium in which a structure that falls comes to rest, where it does so soon and near."""

@@ -19,7 +19,7 @@ from solver.results.increment import Increment, Status
 from solver.results.quantities import reaction_to, settlement_in
 from solver.results.response import Response
 
-from .controls import LINEAR_PROGRAM, Controls, Ending
+from .controls import LARGEST_FOLLOWED, LINEAR_PROGRAM, Controls, Ending
 from .drivers import SupportMotion
 from .linear_program import linear_program_increments
 from .local_origin import at_origin, told_from, without_origin
@@ -127,20 +127,49 @@ def settlement_increments(
     controls = controls or Controls()
     check_settlement(assembly, phases, controls)
     interfaces.refuse_strength("a settlement")
-    if resume is not None and controls.increments == LINEAR_PROGRAM:
-        raise ValueError("increments by linear program cannot go on from a checkpoint; start them again")
-    if resume is not None and (resume.phase >= len(phases) or len(resume.start.rotations) != assembly.n_blocks):
+    by_program = controls.increments == LINEAR_PROGRAM or (
+        controls.increments is None and int(assembly.free.sum()) > LARGEST_FOLLOWED
+    )
+    if resume is not None and (
+        resume.phase > len(phases) - (resume.program is None) or len(resume.start.rotations) != assembly.n_blocks
+    ):
         raise ValueError(
             f"the checkpoint is of phase {resume.phase + 1} with {len(resume.start.rotations)} blocks; there are "
             f"{len(phases)} phases and {assembly.n_blocks} blocks: it belongs to another run"
         )
     origin = at_origin(assembly)
     near, local = (assembly, phases) if not origin.any() else without_origin(origin, assembly, phases)
-    if controls.increments == LINEAR_PROGRAM:
-        steps = timed(linear_program_increments(near, local, interfaces, loads, controls))
+    if resume is not None and by_program != (resume.program is not None):
+        raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
+    if by_program:
+        steps = timed(_by_program(near, local, interfaces, loads, controls, resume))
     else:
         steps = timed(_increments(near, local, interfaces, loads, controls, resume))
     return (yield from (steps if not origin.any() else told_from(steps, origin)))
+
+
+def _by_program(
+    assembly: Assembly,
+    phases: Sequence[Settlement],
+    interfaces: Interfaces,
+    loads: Loads,
+    controls: Controls,
+    resume: Checkpoint | None,
+) -> Generator[Increment, None, Ending]:
+    """Yield the increments by linear program, their checkpoints in those of every settlement."""
+    from_there = None if resume is None else resume.program
+    steps = linear_program_increments(assembly, phases, interfaces, loads, controls, from_there)
+    while True:
+        try:
+            increment = next(steps)
+        except StopIteration as stop:
+            ending: Ending = stop.value
+            return ending
+        found = increment.checkpoint
+        if found is not None:
+            place = Place(found.here.s, found.here.pose, None, np.zeros((0, 2)))
+            found = Checkpoint(found.phase, found.start, place, found.step, found.first_without, program=found)
+        yield replace(increment, checkpoint=found)
 
 
 def _increments(

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.lp.problem import LinearProgram, Unbounded
+from solver.lp.problem import LinearProgram, LPSolution, Unbounded
 from solver.lp.solve import INTERIOR_ROUTES, SIMPLEX_ROWS, solve_lp
 from solver.tolerances import BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
 
@@ -104,30 +104,42 @@ def admissible(
         along = np.zeros(3 * model.assembly.n_blocks) if rate is None else (rate / model.lengths).ravel()
         objective = np.concatenate([rays.T @ (matrix.T @ np.where(free, 0.0, along)), np.zeros(2 * rows)])
         unit = model.force * model.length
-    values, gaps, unbalanced = [], [0.0], np.inf
-    forces = np.zeros(2 * len(contacts))
-    for sign in (1.0, -1.0):
+    lower, upper = -load - tolerance, -load + tolerance
+    along_rows = along_structure(free_blocks(model.assembly), pose)
+    routes = None if vertex or rows <= SIMPLEX_ROWS else INTERIOR_ROUTES
+
+    def extreme(sign: float, *, slack: bool) -> LPSolution | None:
+        """Least or, by sign, largest value, with or without unbalanced forces; None where it has no bound."""
         cost = sign * objective
         cost[n : n + 2 * rows] = UNBALANCED_COST
-        program = LinearProgram(
-            cost=cost,
-            matrix=with_slack(*columns),
-            lower=-load - tolerance,
-            upper=-load + tolerance,
-            along=along_structure(free_blocks(model.assembly), pose),
-        )
+        matrix = with_slack(*columns)
+        if not slack:
+            kept = np.concatenate([np.arange(n), np.arange(n + 2 * rows, matrix.shape[1])])
+            cost, matrix = cost[kept], matrix[:, kept]
         try:
-            solution = solve_lp(program, None if vertex or rows <= SIMPLEX_ROWS else INTERIOR_ROUTES)
+            return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, along=along_rows), routes)
         except Unbounded:
+            return None
+
+    found = {sign: extreme(sign, slack=True) for sign in (1.0, -1.0)}
+    out = {k: float(s.x[n : n + 2 * rows].sum()) / model.total_load for k, s in found.items() if s is not None}
+    unbalanced = min(out.values(), default=np.inf)
+    programs, values, gaps = 2, [], [0.0]
+    forces = np.zeros(2 * len(contacts))
+    for sign, solution in found.items():
+        balanced = objective
+        if solution is not None and out[sign] > FALLING_FRACTION >= unbalanced:
+            # Cheaper out of balance, though forces in balance exist: blocks would move ten thousand times as fast.
+            solution, programs = extreme(sign, slack=False), programs + 1
+            balanced = np.delete(objective, np.arange(n, n + 2 * rows))
+        if solution is None:
             values.append(-sign * np.inf)
             continue
-        slack = solution.x[n : n + 2 * rows]
-        unbalanced = min(unbalanced, float(slack.sum()) / model.total_load)
-        values.append(float(objective @ solution.x) * unit)
+        values.append(float(balanced @ solution.x) * unit)
         gaps.append(solution.gap)
         if sign == (1.0 if live_size == 0.0 else -1.0):
             forces = rays @ solution.x[:n]
     # Where both run away, forces without limit balance everything.
     return Admissible(
-        0.0 if np.isinf(unbalanced) else unbalanced, values[0], values[1], max(gaps), 2, forces.reshape(-1, 2)
+        0.0 if np.isinf(unbalanced) else unbalanced, values[0], values[1], max(gaps), programs, forces.reshape(-1, 2)
     )

@@ -69,7 +69,7 @@ animation = false
 SIDEWAYS = '[[loads]]\nkind = "live"\nweight_fraction = [1.0, 0.0]\n'
 OTHERS = {
     "pushover": SIDEWAYS + '[analysis]\nkind = "pushover"\nfalling_frames = 2\n'
-    '[control]\nblock = "voussoir 4"\nincrement = 0.03\n',
+    '[control]\nblock = "voussoir 4"\nincrement = 0.003\n',
     "limit load": SIDEWAYS + '[analysis]\nkind = "limit load"\ncapacity_at = [0.0, 0.015, 0.03]\n',
     "load that moves": '[analysis]\nkind = "limit load"\n[[loads]]\nkind = "live"\nforce = [0.0, -1000.0]\n'
     "positions = [-0.8, 0.8, 5]\n",

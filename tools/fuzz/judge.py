@@ -182,7 +182,7 @@ def _judge_increment(
         finding.counted("later increment whose closed contacts alone hold nothing: not judged")
         return
     finding.counted("reaction, other form of the program")
-    if not min(values) - same <= increment.least <= max(values) + same:
+    if np.isfinite(increment.least) and not min(values) - same <= increment.least <= max(values) + same:
         finding.wrong.append(f"increment {k}: least reaction {increment.least!r}, by the oracle {values}, W {total!r}")
     if not increment.least - same <= increment.reaction <= increment.largest + same:
         finding.wrong.append(
