@@ -32,12 +32,15 @@ myst_heading_anchors = 3
 autosummary_generate = True
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
-mathmpl_fontsize = 11.0
+mathmpl_fontsize = 12.0
 mathmpl_srcset = ["2x"]
 
 html_theme = "pydata_sphinx_theme"
 html_title = "blockvis"
 html_static_path = ["_static"]
+html_css_files = ["manual.css"]
+# Pages at the top have no section to navigate in.
+html_sidebars: dict[str, list[str]] = {"*": []}
 html_show_sourcelink = False
 html_theme_options = {"show_prev_next": False, "navigation_with_keys": False, "secondary_sidebar_items": ["page-toc"]}
 templates_path = ["_templates"]
@@ -50,6 +53,8 @@ sphinx_gallery_conf = {
     "within_subsection_order": "FileNameSortKey",
     "image_scrapers": ("pictures_written.show_pictures",),
     "abort_on_example_error": True,
+    # Figures of responses and the player; paths that functions return are no news.
+    "capture_repr": ("_repr_html_",),
     "download_all_examples": False,
     "show_memory": False,
     "show_signature": False,
