@@ -30,7 +30,7 @@ method = "latin hypercube"
 runs = 6
 seed = 1
 [parameters]
-"material.friction_coefficient" = { distribution = "normal", mean = 0.6, deviation = 0.1, lower = 0.3 }
+"material.friction_coefficient" = { distribution = "normal", mean = 0.5, deviation = 0.1, lower = 0.38 }
 """)
 command = [sys.executable, "-m", "blockvis", "sweep", str(folder / "study.toml"), "-o", str(folder / "study")]
 said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
