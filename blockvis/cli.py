@@ -430,7 +430,7 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         f"{response.assembly.n_blocks} blocks ({int(response.assembly.free.sum())} free), "
         f"{width:.4g} m wide, {height:.4g} m high, weight {weight:.6g} N, "
         f"largest block {across:.3g} m across",
-        f"{kind.headline(response)}, {sum(i.programs for i in response.increments)} linear "
+        f"{kind.headline(response)}, {sum(i.programs for i in response.increments)} "
         f"programs, {sum(i.seconds for i in response.increments):.2f} s of solver time",
     ]
     if response.message and not kind.tells_message(response):
