@@ -91,7 +91,7 @@ def sinking(
 
 def example(name: str, at: Sequence[float]) -> Wall:
     """A wall of ``examples/``."""
-    case = tomllib.loads((EXAMPLES / f"{name}.toml").read_text())
+    case = tomllib.loads((EXAMPLES / f"{name}.toml").read_text(encoding="utf-8"))
     assembly = catalogue.build(case["geometry"]["layout"], case["geometry"]["parameters"])
     settlement = case["settlement"]
     return sinking(
@@ -291,7 +291,7 @@ def run(out: Path, kernel: str, chosen: Iterable[tuple[str, int, str]], limit: f
 
 
 def lines(out: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
+    return [json.loads(line) for line in out.read_text(encoding="utf-8").splitlines()] if out.exists() else []
 
 
 def run_all(out: Path, chosen: argparse.Namespace) -> None:

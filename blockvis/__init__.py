@@ -11,6 +11,7 @@ Lengths are in m, forces in N, angles in rad; see ``solver`` for the signs.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -66,6 +67,16 @@ def _plot(response: solver.Response, **options: Any) -> Any:
     return show(response, **options)
 
 
+def _shown_by(name: str) -> Callable[[Any], str]:
+    """Make a method for notebooks of a function of :mod:`blockvis.report.notebook`, loaded when first used."""
+
+    def _repr_html_(value: Any) -> str:
+        written: str = getattr(import_module(".report.notebook", __name__), name)(value)
+        return written
+
+    return _repr_html_
+
+
 def _mesh(response: solver.Response, k: int = -1, *, shape: str = "moved") -> Any:
     """Make a pyvista dataset of the blocks of increment k; see :func:`blockvis.results.datasets.block_dataset`."""
     from .results.datasets import block_dataset
@@ -80,9 +91,16 @@ def _joints(response: solver.Response, k: int = -1, *, shape: str = "moved") -> 
     return joint_dataset(response.assembly, response.increments[k], shape=shape)
 
 
-# solver draws nothing and knows no pyvista; importing blockvis adds `Response.plot()`, `mesh(k)` and `joints(k)`.
+# solver draws nothing and knows no pyvista; importing blockvis adds `Response.plot()`, `mesh(k)` and `joints(k)`, and
+# what notebooks show of its values.
 for _name, _method in (("plot", _plot), ("mesh", _mesh), ("joints", _joints)):
     setattr(solver.Response, _name, _method)
+for _kind, _name in (
+    (solver.Response, "response_html"),
+    (solver.Collapse, "collapse_html"),
+    (solver.Assembly, "assembly_html"),
+):
+    setattr(_kind, "_repr_html_", _shown_by(_name))  # noqa: B010
 
 
 def __getattr__(name: str) -> Any:

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 #: Pattern of the temporary names under which files are written; those of a process that was killed may be removed.
 PARTIAL = ".*.part*"
+
+#: Windows flushes only what is open for writing, and moves nothing to a name that another program has open.
+WINDOWS = os.name == "nt"
+
+#: Seconds between attempts to move a file into its place on Windows: scanners for viruses open new files for a moment.
+ATTEMPTS = (0.02, 0.05, 0.1, 0.2, 0.5)
+
+#: What file systems answer that cannot flush a folder, such as those of a network.
+CANNOT_FLUSH = (errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.ENOTTY)
 
 
 @contextmanager
@@ -40,14 +52,14 @@ def whole_file(path: str | os.PathLike[str], *, last: bool = True, durable: bool
         return
     path = path.resolve() if path.is_symlink() else path
     make_folder(path.parent)
-    partial = path.with_name(f".{path.stem}.part{path.suffix}")
+    partial = partial_of(path)
     try:
         yield partial
         if durable:
             flush(partial)
-        os.replace(partial, path)
+        _move(partial, path)
     except BaseException:
-        partial.unlink(missing_ok=True)
+        remove(partial)
         raise
     if last and durable:
         flush(path.parent)
@@ -71,6 +83,38 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, last: boo
     return Path(path)
 
 
+def partial_of(path: Path) -> Path:
+    """Name under which a file is written before it is whole."""
+    return path.with_name(f".{path.stem}.part{path.suffix}")
+
+
+def remove(partial: Path) -> None:
+    """Remove a half-written file if it is there; one that another program has open on Windows stays."""
+    try:
+        partial.unlink(missing_ok=True)
+    except PermissionError:
+        if not WINDOWS:
+            raise
+
+
+def _move(partial: Path, path: Path) -> None:
+    """Put a file in its place; on Windows wait a moment for a program that has one of the two open."""
+    for wait in ATTEMPTS if WINDOWS else ():
+        try:
+            os.replace(partial, path)
+            return
+        except PermissionError:
+            time.sleep(wait)
+    try:
+        os.replace(partial, path)
+    except PermissionError as error:
+        if not WINDOWS:
+            raise
+        raise PermissionError(
+            error.errno, "another program has the file open, or it may not be replaced; close it there", str(path)
+        ) from None
+
+
 def make_folder(path: Path) -> None:
     """Make a folder and its missing parents, and flush them to the disk.
 
@@ -91,12 +135,32 @@ def flush(path: Path) -> None:
     ----------
     path : Path
     """
-    try:
-        handle = os.open(path, os.O_RDONLY)
-    except PermissionError:
-        # Windows opens no folder.
+    folder = path.is_dir()
+    if folder and WINDOWS:
+        # Windows opens no folder, and keeps its list of names in a journal.
         return
     try:
-        os.fsync(handle)
+        handle = os.open(path, os.O_RDWR if WINDOWS else os.O_RDONLY)
+    except PermissionError:
+        return
+    try:
+        _synchronise(handle)
+    except OSError as error:
+        if not (folder and error.errno in CANNOT_FLUSH):
+            raise
     finally:
         os.close(handle)
+
+
+def _synchronise(handle: int) -> None:
+    """Flush to the disk itself: fsync of macOS leaves what is in the disk's own memory."""
+    if sys.platform == "darwin":
+        import fcntl
+
+        try:
+            fcntl.fcntl(handle, fcntl.F_FULLFSYNC)
+            return
+        except OSError as error:
+            if error.errno not in CANNOT_FLUSH:
+                raise
+    os.fsync(handle)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import glob
+import io
+import json
 import os
 import sys
 import warnings
@@ -15,6 +18,7 @@ import numpy as np
 
 import solver
 
+from .broken_pipes import is_broken_pipe
 from .extras import MissingExtra
 from .generators import LAYOUTS, help_text
 from .layout.views import VIEWS
@@ -51,9 +55,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = _show_warning
     try:
         code: int = options.verb(options)
-    except BrokenPipeError:
-        raise
     except (ValueError, OSError, MissingExtra) as error:
+        if isinstance(error, OSError) and is_broken_pipe(error):
+            raise
         print(f"blockvis: {error}", file=sys.stderr)
         return BAD_INPUT
     except MemoryError:
@@ -70,10 +74,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def entry() -> None:
     """Console script."""
+    # Names of blocks may have characters that a console, or what the output goes to, cannot show.
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         code = main()
         sys.stdout.flush()
-    except BrokenPipeError:
+    except OSError as error:
+        if not is_broken_pipe(error):
+            raise
         # Whatever reads the output, such as head, has enough of it; Python would complain again as it ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
@@ -156,6 +165,8 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
     _add_sweep(verbs)
+    _add_new(verbs)
+    _add_schema(verbs)
     completion = verbs.add_parser(
         "completion",
         help="a script that completes verbs and options in a shell",
@@ -224,6 +235,27 @@ def _add_sweep(verbs: Any) -> None:
     sweep.set_defaults(verb=_sweep)
 
 
+def _add_new(verbs: Any) -> None:
+    new = verbs.add_parser("new", help="a case file for a drawing, with a comment on every key")
+    new.add_argument("drawing", metavar="DRAWING", help="or a folder or a pattern of files, one per stone")
+    new.add_argument("-o", "--output", metavar="CASE.toml", help="(default: <drawing>.toml)")
+    new.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    _add_view(new)
+    _add_choice(new)
+    new.add_argument("--force", action="store_true", help="replace CASE.toml if it is there already")
+    new.set_defaults(verb=_new)
+
+
+def _add_schema(verbs: Any) -> None:
+    schema = verbs.add_parser(
+        "schema",
+        help="JSON schema of the case or study file, for editors of TOML",
+        epilog="blockvis schema > case.schema.json; then #:schema ./case.schema.json is the first line of a case",
+    )
+    schema.add_argument("file", nargs="?", choices=("case", "study"), default="case")
+    schema.set_defaults(verb=_schema)
+
+
 def _completion(options: argparse.Namespace) -> int:
     import shtab
 
@@ -269,6 +301,36 @@ def _sweep(options: argparse.Namespace) -> int:
         return INTERRUPTED
     print(in_words(stored_summary(folder)))
     print(f"table and pictures in {folder}/")
+    return 0
+
+
+def _new(options: argparse.Namespace) -> int:
+    from .atomic_files import write_whole
+    from .cases.build import case_assembly
+    from .cases.case import parse_case
+    from .cases.new_case import case_text, relative_to
+    from .formats.read import inspect
+
+    drawing = Path(options.drawing)
+    stem = drawing.parent.name if glob.has_magic(drawing.name) else drawing.resolve().stem
+    target = _new_file(options.output or f"{stem}.toml", options.force)
+    choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
+    found = inspect(drawing, unit=options.unit, **choice)
+    text = case_text(found, relative_to(target.parent, drawing), **choice)
+    write_whole(target, text)
+    print(f"{target} written for {len(found.kept)} blocks; run it: blockvis run {target}")
+    try:
+        case_assembly(parse_case(text, target))
+    except ValueError as error:
+        print(f"blockvis: note: as it is, blockvis run refuses it: {error}", file=sys.stderr)
+    return 0
+
+
+def _schema(options: argparse.Namespace) -> int:
+    from .reference.schema import SCHEMAS
+
+    # ASCII, so that it is valid JSON in whatever encoding a shell writes it to a file.
+    print(json.dumps(SCHEMAS[options.file](), indent=2))
     return 0
 
 

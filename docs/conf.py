@@ -76,8 +76,7 @@ def write_generated(app) -> None:
     GENERATED.mkdir(exist_ok=True)
     shutil.copytree(ROOT / "assets", HERE / "_static" / "assets", dirs_exist_ok=True)
     keys = ROOT / "tools" / "key_reference.py"
-    if keys.is_file():
-        subprocess.run([sys.executable, str(keys), str(GENERATED)], check=True, cwd=ROOT)
+    subprocess.run([sys.executable, str(keys), str(GENERATED)], check=True, cwd=ROOT)
     tables = GENERATED / "validation_tables.md"
     # Single pages are looked at with -D plot_gallery=0, which leaves out whatever takes long.
     if str(app.config.overrides.get("plot_gallery", 1)) in ("0", "False"):

@@ -20,14 +20,12 @@ from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import files_like
 from blockvis.video_suffixes import VIDEO_SUFFIXES
 
+from .case_keys import MOST_STEPS
 from .contents import Case
 from .imperfections import Imperfection, read_imperfection
 from .loads import LoadCase
 from .toml_table import Table, is_number, shortened, toml_value
 from .value_paths import parse_path, put
-
-#: More increments or frames than this are taken for a typing error.
-MOST_STEPS = 1_000_000
 
 
 def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
@@ -60,9 +58,12 @@ def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
             f'[geometry] file = "{path.name}" (see examples/); blockvis info shows what is in it'
         )
     try:
-        text = path.read_text(encoding="utf-8")
+        # Editors of Windows begin a file with a mark of its encoding.
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: is not a text file ({error.reason} at byte {error.start})") from None
+        raise ValueError(
+            f"{path}: is not a text file in UTF-8 ({error.reason} at byte {error.start}); save it in UTF-8"
+        ) from None
     return parse_case(changed_text(text, path, changes) if changes else text, path)
 
 
@@ -103,7 +104,8 @@ def parse_case(text: str, source: Path) -> Case:
     except RecursionError:
         raise ValueError(f"{source}: nests lists or tables without end; a case file has a handful of them") from None
     except ValueError as error:
-        raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"') from None
+        hint = "; write paths with / or in single quotes" if "\\" in text else ""
+        raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"{hint}') from None
     return case_of(values, source, text)
 
 

@@ -24,7 +24,8 @@ KINDS: dict[str, tuple[str, ...]] = {
     "beta": ("alpha", "beta", "lower", "upper"),
 }
 
-_TRUNCATED = ("normal", "lognormal")
+#: Distributions that may be cut off by lower and upper.
+CUT_OFF = ("normal", "lognormal")
 
 #: Least probability that a truncated distribution must have between its limits; less is taken for a mistake.
 LEAST_INSIDE = 1e-6
@@ -54,7 +55,7 @@ class Distribution:
         array([2.5, 3. ])
         """
         p, n = np.asarray(probability, dtype=float), self.numbers
-        if self.kind in _TRUNCATED:
+        if self.kind in CUT_OFF:
             below, inside = self._inside()
             # Rounding may carry a value beyond a limit that has a physical meaning.
             value = self._untruncated(special.ndtri(below + p * inside))
@@ -142,7 +143,7 @@ def read_distribution(
         raise ValueError(f"{where}: {problem}; choose from {', '.join(KINDS)}")
     needed = KINDS[kind]
     refuse_unknown(
-        values, [*needed, *(("lower", "upper") if kind in _TRUNCATED else ())], f"{where}: distribution '{kind}'"
+        values, [*needed, *(("lower", "upper") if kind in CUT_OFF else ())], f"{where}: distribution '{kind}'"
     )
     numbers = {key: float(value) for key, value in (defaults or {}).items() if key in needed}
     for key, value in values.items():
@@ -162,7 +163,7 @@ def read_distribution(
     if kind == "triangular" and not low <= numbers["mode"] <= high:
         raise ValueError(f"{where}: mode is {numbers['mode']:g}; it must lie between {low:g} and {high:g}")
     found = Distribution(kind, numbers)
-    if kind in _TRUNCATED and found._inside()[1] < LEAST_INSIDE:
+    if kind in CUT_OFF and found._inside()[1] < LEAST_INSIDE:
         raise ValueError(
             f"{where}: of a {kind} variable with mean {numbers['mean']:g} and deviation {numbers['deviation']:g} "
             f"nothing lies between {low:g} and {high:g}; move the limits"

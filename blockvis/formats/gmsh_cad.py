@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import subprocess
 import sys
@@ -58,7 +59,15 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         command = [sys.executable, "-m", "blockvis.formats.gmsh_process", str(path.resolve()), str(target)]
         command += [str(chords), str(MOST_MEMORY)]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_SECONDS, check=False)
+            done = subprocess.run(
+                command,
+                capture_output=True,
+                encoding="utf-8",
+                errors="replace",
+                env={**os.environ, "PYTHONIOENCODING": "utf-8:backslashreplace"},
+                timeout=LONGEST_SECONDS,
+                check=False,
+            )
         except subprocess.TimeoutExpired:
             raise ValueError(f"'{path}': gmsh did not finish within {LONGEST_SECONDS} s; give it as .msh") from None
         if done.returncode == NO_LIBRARY:

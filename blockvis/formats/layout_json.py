@@ -26,7 +26,7 @@ FORMAT = "blockvis layout"
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a .json layout, or the blocks of a file of COMPAS."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise ValueError(f"'{path}' is not a JSON file: {error}; export it again") from None
     if not _is_own(content):

@@ -15,6 +15,9 @@ from .arches import arch, basket_handle_arch, pointed_arch, segmental_arch
 from .frames import arch_on_piers, buttressed_arch, column, portal
 from .walls import facade, panel, wall
 
+#: A link of a docstring, and the last part of what it names.
+_LINK = re.compile(r":\w+:`~?(?:\w+\.)*(\w+)`")
+
 #: Every layout by its name.
 LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
     "arch": arch,
@@ -44,6 +47,27 @@ def parameters_of(name: str) -> dict[str, Any]:
     5
     """
     return {key: value.default for key, value in inspect.signature(_layout(name)).parameters.items()}
+
+
+def described(name: str) -> dict[str, tuple[str, str]]:
+    """List the kind of value and the meaning of the parameters of a layout, of its docstring.
+
+    Examples
+    --------
+    >>> described("segmental arch")["span"]
+    ('float [m]', 'Of the intrados; a rise of half the span gives a semicircle.')
+    """
+    text = inspect.cleandoc(_layout(name).__doc__ or "")
+    block = re.search(r"Parameters\n-+\n(.*?)(?=\n\n\w+\n-+\n|\Z)", text, re.DOTALL)
+    found: dict[str, tuple[str, str]] = {}
+    for names, kind, lines in re.findall(
+        r"^(\w[\w, ]*?)(?: : (.*))?((?:\n +.*)+|$)", block[1] if block else "", re.MULTILINE
+    ):
+        meaning = " ".join(lines.split())
+        same = re.match(r"As in :func:`(\w+)`", meaning)
+        for one in names.split(", "):
+            found[one] = described(same[1])[one] if same else (kind, _LINK.sub(r"\1", meaning).replace("``", "`"))
+    return found
 
 
 def help_text(name: str) -> str:

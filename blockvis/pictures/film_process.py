@@ -8,11 +8,13 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import solver
+from blockvis.atomic_files import partial_of, remove
+from blockvis.broken_pipes import is_broken_pipe
 from blockvis.fall import Fall
 
 #: Seconds that a process has to remove its half-written film.
@@ -34,6 +36,7 @@ class FilmProcess:
 
     def __init__(self) -> None:
         start = f"import sys; sys.path[:] = {sys.path!r}; from blockvis.pictures.film_process import main; main()"
+        self._path: Path | None = None
         self._process = subprocess.Popen([sys.executable, "-c", start], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def draw(self, response: solver.Response, path: Path, fall: Fall | None) -> None:
@@ -47,7 +50,8 @@ class FilmProcess:
         """
         assert self._process.stdin is not None
         # A process that has ended says why in :meth:`wait`.
-        with contextlib.suppress(BrokenPipeError):
+        self._path = path
+        with _unread():
             pickle.dump((response, path, fall), self._process.stdin)
             self._process.stdin.flush()
 
@@ -93,10 +97,23 @@ class FilmProcess:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
+            if self._path is not None:
+                # Windows ends a process without asking it; it then leaves its half-written film.
+                remove(partial_of(self._path))
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
-                with contextlib.suppress(BrokenPipeError):
+                with _unread():
                     pipe.close()
+
+
+@contextlib.contextmanager
+def _unread() -> Iterator[None]:
+    """Go on where the other process reads no more."""
+    try:
+        yield
+    except OSError as error:
+        if not is_broken_pipe(error):
+            raise
 
 
 def main() -> None:
@@ -119,9 +136,9 @@ def main() -> None:
     # Nobody listens where the first process has ended: the next word ends this one, and no half film stays.
     try:
         render.animate(response, path, fall=fall, progress=lambda done, total: say((done, total)))
-    except BrokenPipeError:
-        return
     except Exception as error:  # noqa: BLE001 - it is the caller's, who raises it again
+        if isinstance(error, OSError) and is_broken_pipe(error):
+            return
         say(error)
         return
     say(None)

@@ -1,14 +1,30 @@
-"""The player inside a notebook."""
+"""What notebooks show: a player, and pictures with a few numbers in place of arrays."""
 
 from __future__ import annotations
 
+import base64
 import html
+import tempfile
+from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
 
 import solver
 from blockvis.fall import fall_of
+from blockvis.numbers import force_text
+from blockvis.pictures import palette
+from blockvis.pictures.curves import draw_curve
+from blockvis.pictures.render import draw_mechanism
 
-from .page import report_html
+from .page import html_rows, report_html, summary_rows
+
+#: Pixels of the picture of a response, and inches of its curve; both are shown at half their width.
+PICTURE, CURVE = (1280, 720), (6.4, 3.6)
+
+#: Pixels of the width and largest height of the picture of an assembly.
+WIDE, HIGH = 560, 420
 
 
 @dataclass(frozen=True)
@@ -46,3 +62,74 @@ def show(response: solver.Response, *, height: int = 760) -> Player:
     Player
     """
     return Player(response, height)
+
+
+def response_html(response: solver.Response) -> str:
+    """Show a response: its mechanism or last increment, its curve and its numbers."""
+    pictures = []
+    with tempfile.TemporaryDirectory() as folder:
+        if response.increments:
+            pictures.append(draw_mechanism(response, Path(folder) / "mechanism.png", size=PICTURE))
+        if response.path:
+            pictures.append(draw_curve(response, Path(folder) / "curve.png", size=CURVE))
+        images = [
+            f'<img alt="{path.stem}" width="{PICTURE[0] // 2}" '
+            f'src="data:image/png;base64,{base64.b64encode(path.read_bytes()).decode("ascii")}">'
+            for path in pictures
+        ]
+    return f"<div>{''.join(images)}{_table(summary_rows(response))}</div>"
+
+
+def collapse_html(collapse: solver.Collapse) -> str:
+    """Show a collapse by its numbers and its mechanism in words."""
+    low, high = collapse.bracket
+    unit = collapse.unit
+    return _table(
+        [
+            ("collapse at", f"{collapse.displacement:.6g} {unit}"),
+            (f"{collapse.lost} at", f"{low:.6g} {unit}"),
+            (f"no {collapse.lost} at", f"{high:.6g} {unit}"),
+            ("reaction at the last", force_text(collapse.reaction, moment=unit == "rad")),
+            ("mechanism", collapse.words),
+        ]
+    )
+
+
+def assembly_html(assembly: solver.Assembly) -> str:
+    """Show an assembly: its blocks by material, supports grey, those that move outlined, and its numbers."""
+    width, height = np.ptp(assembly.vertices, axis=0)
+    counts = Counter(map(str, assembly.roles))
+    weight = float((assembly.masses * solver.GRAVITY)[assembly.free].sum())
+    materials = [f"{name} {n}" for name, n in sorted(Counter(assembly.materials).items()) if name]
+    rows = [
+        ("blocks", f"{assembly.n_blocks}: " + ", ".join(f"{counts[r]} {r}" for r in solver.ROLES if counts[r])),
+        ("size", f"{width:.4g} m × {height:.4g} m"),
+        ("weight", force_text(weight)),
+        *([("materials", ", ".join(materials))] if materials else []),
+    ]
+    return f"<div>{_drawn(assembly)}{_table(rows)}</div>"
+
+
+def _drawn(assembly: solver.Assembly) -> str:
+    """Draw an assembly as SVG; in whole pixels' hundredths, which keeps it small."""
+    low, high = assembly.vertices.min(axis=0), assembly.vertices.max(axis=0)
+    scale = min(WIDE / (high[0] - low[0]), HIGH / (high[1] - low[1]))
+    points = (assembly.vertices - (low[0], high[1])) * (scale, -scale)
+    size = (high - low) * scale
+    fills = palette.block_colours(assembly.materials, assembly.free)
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{size[0] + 4:.0f}" height="{size[1] + 4:.0f}" '
+        f'viewBox="-2 -2 {size[0] + 4:.2f} {size[1] + 4:.2f}" stroke="{palette.hexadecimal(palette.OUTLINE)}" '
+        f'stroke-width="0.5">'
+    ]
+    for i, ring in enumerate(np.split(points, assembly.offsets[1:-1])):
+        corners = " ".join(f"{x:.2f},{y:.2f}" for x, y in ring.tolist())
+        edge = f' stroke="{palette.hexadecimal(palette.SETTLEMENT)}" stroke-width="2"' if assembly.moving[i] else ""
+        name = html.escape(assembly.names[i])
+        fill = palette.hexadecimal(tuple(fills[i].tolist()))
+        lines.append(f'<polygon points="{corners}" fill="{fill}"{edge}><title>{name}</title></polygon>')
+    return "\n".join([*lines, "</svg>"])
+
+
+def _table(rows: list[tuple[str, str]]) -> str:
+    return f"<table>{html_rows(rows)}</table>"

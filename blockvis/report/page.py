@@ -136,8 +136,8 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
         notes=_notes(response),
         style=(page / "player.css").read_text(encoding="utf-8"),
         script=(page / "player.js").read_text(encoding="utf-8"),
-        summary=_rows(_summary(response, fall)),
-        certificate=_rows(_certificate(response)),
+        summary=html_rows(summary_rows(response, fall)),
+        certificate=html_rows(_certificate(response)),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
         case_open=" open" if case_text else "",
         model=data,
@@ -463,7 +463,8 @@ def _curve(response: solver.Response) -> dict[str, Any]:
     }
 
 
-def _summary(response: solver.Response, fall: Fall | None) -> list[tuple[str, str]]:
+def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tuple[str, str]]:
+    """Sum up a response in words and numbers with their units."""
     assembly, path = response.assembly, response.path
     # That a limit load is found is no collapse that has happened.
     status = "limit load found" if response.swings and response.limits else str(response.stop)
@@ -478,7 +479,7 @@ def _summary(response: solver.Response, fall: Fall | None) -> list[tuple[str, st
     rows += [
         ("weight W", force_text(response.total_weight)),
         ("blocks", f"{assembly.n_blocks} ({int(assembly.free.sum())} free)"),
-        ("contact points", str(len(response.increments[0].contacts.points))),
+        *([("contact points", str(len(response.increments[0].contacts.points)))] if response.increments else []),
         ("increments", f"{len(path)} in equilibrium{follows}"),
         ("solver time", f"{sum(i.seconds for i in response.increments):.1f} s"),
     ]
@@ -500,5 +501,6 @@ def _certificate(response: solver.Response) -> list[tuple[str, str]]:
     ]
 
 
-def _rows(rows: list[tuple[str, str]]) -> str:
+def html_rows(rows: list[tuple[str, str]]) -> str:
+    """Write the rows of a table as HTML."""
     return "".join(f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>" for name, value in rows)

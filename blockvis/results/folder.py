@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib
 import io
 import json
 import os
@@ -15,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 import solver
-from blockvis.atomic_files import PARTIAL, make_folder, write_whole
+from blockvis.atomic_files import PARTIAL, WINDOWS, make_folder, remove, write_whole
 from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .increments import StoredIncrements, packed_increment
@@ -26,6 +27,9 @@ from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summar
 
 #: Where a run can go on from, beside the increments it belongs to.
 CHECKPOINT = "checkpoint.npz"
+
+#: What a run holds locked on Windows.
+LOCK = ".lock"
 
 #: Files that list or sum up others; what a run starts with; pictures of the results.
 _LISTS = ("summary.json", "response.csv", "joints.csv", "blocks.pvd", "contacts.pvd", "joints.pvd", *LIMIT_TABLES)
@@ -244,27 +248,44 @@ class ResultsFolder:
             if not old.name.startswith(".") and number.isdigit() and int(number) >= count:
                 old.unlink()
         for half in (*self.path.glob(PARTIAL), *folder.glob(PARTIAL)):
-            half.unlink()
+            remove(half)
 
 
 def _held(owner: ResultsFolder, folder: Path) -> Callable[[], None]:
     """Lock the folder for one run, until the returned function is called or the process ends, however it ends."""
+    handle = None
     try:
-        import fcntl
-    except ImportError:
-        return lambda: None
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(handle)
+        handle = _opened_lock(folder)
+        _lock(handle)
+    except (BlockingIOError, PermissionError):
+        if handle is not None:
+            os.close(handle)
         raise ResultsExist(
             f"another run is writing to '{folder}'; wait for it, end it, or choose another folder with -o"
         ) from None
     except OSError:
         # A file system without locks: two runs into one folder are not noticed.
-        pass
+        if handle is None:
+            return lambda: None
     return weakref.finalize(owner, os.close, handle)
+
+
+def _opened_lock(folder: Path) -> int:
+    """Open what is locked: the folder itself, or on Windows, which opens no folder, a file that goes with its user."""
+    if WINDOWS:
+        return os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | getattr(os, "O_TEMPORARY", 0))
+    return os.open(folder, os.O_RDONLY)
+
+
+def _lock(handle: int) -> None:
+    """Lock what is open, without waiting; BlockingIOError or PermissionError where another process has it."""
+    if WINDOWS:
+        msvcrt = importlib.import_module("msvcrt")
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        return
+    import fcntl
+
+    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _stored_assembly(folder: Path) -> solver.Assembly:

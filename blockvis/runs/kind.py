@@ -14,6 +14,7 @@ from typing import Any
 
 import solver
 from blockvis.cases.contents import Case
+from blockvis.cases.key import Key, Section
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import loss_of, mechanism_text
 
@@ -120,6 +121,10 @@ class AnalysisKind(ABC):
         What is lost at collapse: "equilibrium" or "capacity".
     in_studies : bool
         Whether studies repeat it.
+    keys : tuple of Key
+        That it reads from [analysis].
+    sections : tuple of Section
+        Tables of the case file that it has for itself.
     """
 
     name: str
@@ -128,6 +133,8 @@ class AnalysisKind(ABC):
     checkpoint: type[Any] = NoneType
     lost: str = "equilibrium"
     in_studies: bool = False
+    keys: tuple[Key, ...] = ()
+    sections: tuple[Section, ...] = ()
 
     @abstractmethod
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:

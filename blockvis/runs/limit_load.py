@@ -14,6 +14,7 @@ import numpy as np
 
 import solver
 from blockvis.cases.contents import Case
+from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
 from blockvis.numbers import force_text
@@ -78,6 +79,14 @@ class LimitLoadKind(AnalysisKind):
     parameter = solver.LOAD_POSITION
     measured = solver.LOAD_MULTIPLIER
     checkpoint = LimitLoadCheckpoint
+    keys = (
+        Key("flow", one_of(FLOWS), "Whether sliding joints of a limit load dilate (associative) or not", FLOWS[1],
+            default=FLOWS[0]),
+        Key("capacity_at", NUMBERS, "Settlements at which limit loads are wanted; of a rotation in rad", [0.0, 0.02],
+            "m", otherwise="every increment"),
+        Key("displacement", NOT_NEGATIVE, "Within which joints that a settlement has opened may close", 0.001, "m",
+            otherwise=f"{CLOSING:g} block sizes"),
+    )  # fmt: skip
 
     def read(self, top: Table, analysis: Table) -> LimitLoadSettings:
         """Read the keys ``flow``, ``capacity_at`` and ``displacement``."""

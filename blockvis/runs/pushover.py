@@ -11,12 +11,28 @@ import numpy as np
 
 import solver
 from blockvis.cases.contents import Case
+from blockvis.cases.key import PAIR, POSITIVE, TEXT, Key, Section
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import mechanism_text
 from blockvis.suggestions import nearest
 
 from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, begun, needs_dry_joints, needs_live_load
 from .settlement import not_reached, settlement_steps
+
+CONTROL = Section(
+    "control",
+    "The displacement that grows in a pushover",
+    (
+        Key("block", TEXT, "Name of the free block whose displacement grows", "brick 6-4", required=True),
+        Key("direction", PAIR, "Direction in which the displacement counts; its length does not count", [1.0, 0.0],
+            default=(1.0, 0.0)),
+        Key("point", PAIR, "Point of the block, in the drawing", [1.0, 2.0], "m", otherwise="its centroid"),
+        Key("increment", POSITIVE, "Largest step", 0.01, "m", 0.01),
+        Key("limit", POSITIVE, "Displacement at which to stop if capacity is left", 0.5, "m", 1.0),
+        Key("tolerance", POSITIVE, "Width of the bracket of the displacement at zero capacity", 1e-4, "m",
+            otherwise="a hundredth of the increment"),
+    ),
+)  # fmt: skip
 
 
 class PushoverKind(AnalysisKind):
@@ -27,6 +43,7 @@ class PushoverKind(AnalysisKind):
     measured = solver.LOAD_MULTIPLIER
     checkpoint = solver.Checkpoint
     lost = "capacity"
+    sections = (CONTROL,)
 
     def read(self, top: Table, analysis: Table) -> solver.ControlDisplacement | None:
         """Read the control displacement, of [control]."""

@@ -24,6 +24,7 @@ from blockvis.runs.kinds import KINDS
 from blockvis.suggestions import nearest, refuse_unknown
 
 from .sampling import METHODS, Design, designed
+from .study_keys import COMMON_KEYS, LIST_KEYS, SECTIONS, STUDY
 
 #: Columns of the table besides the parameters.
 RESERVED = (
@@ -222,9 +223,11 @@ def read_study(source: str | Path | Mapping[str, Any]) -> Study:
     if not path.is_file():
         raise ValueError(f"there is no study file '{path}'")
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
+        values = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: is not a text file ({error.reason} at byte {error.start})") from None
+        raise ValueError(
+            f"{path}: is not a text file in UTF-8 ({error.reason} at byte {error.start}); save it in UTF-8"
+        ) from None
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path}: {error}; a study file is TOML") from None
     return _study(values, path)
@@ -232,12 +235,11 @@ def read_study(source: str | Path | Mapping[str, Any]) -> Study:
 
 def _study(given: Mapping[str, Any], source: Path) -> Study:
     where = f"{source}: "
-    refuse_unknown(given, ["study", "parameters", "imperfections"], f"{source}")
+    refuse_unknown(given, [section.name.removesuffix(".*") for section in SECTIONS], f"{source}")
     head = given.get("study")
     if not isinstance(head, Mapping):
         raise ValueError(f"{where}[study] is missing; name the case and the number of runs there")
-    keys = ["case", "method", "runs", "repeats", "seed", "seconds", "keep"]
-    refuse_unknown(head, keys, f"{where}[study]")
+    refuse_unknown(head, [key.name for key in STUDY.keys], f"{where}[study]")
     values, case_source = _base_case(head.get("case"), source)
     parameters = _parameters(given.get("parameters", {}), where)
     imperfections = _imperfections(given.get("imperfections", []), where)
@@ -378,7 +380,7 @@ def _parameter(path: str, given: Any, where: str) -> Parameter:
         return Parameter(path, name, also, read_distribution(table, where), (), np.zeros(0), points)
     values = table.pop("values")
     weights = table.pop("weights", None)
-    refuse_unknown(table, ["values", "weights", "name", "also"], where)
+    refuse_unknown(table, [key.name for key in (*LIST_KEYS, *COMMON_KEYS)], where)
     if not isinstance(values, Sequence) or isinstance(values, str) or len(values) == 0:
         raise ValueError(f"{where}: values is {values!r}; give a list of at least one")
     share = np.ones(len(values))

@@ -115,7 +115,7 @@ def problem():
 
 def saved(tmp_path, content):
     path = tmp_path / "a.json"
-    path.write_text(json.dumps(content))
+    path.write_text(json.dumps(content), encoding="utf-8")
     return path
 
 

@@ -17,7 +17,8 @@ pytestmark = pytest.mark.cad
 
 def test_script_with_arcs_becomes_chords_within_the_tolerance(tmp_path):
     (tmp_path / "a.geo").write_text(
-        'SetFactory("OpenCASCADE"); Disk(1) = {0, 0, 0, 1}; Physical Surface("disc") = {1};\n'
+        'SetFactory("OpenCASCADE"); Disk(1) = {0, 0, 0, 1}; Physical Surface("disc") = {1};\n',
+        encoding="utf-8",
     )
     coarse, fine = (read(tmp_path / "a.geo", chord_tolerance=t) for t in (1e-2, 1e-3))
     assert coarse.names == ("disc",)
@@ -42,28 +43,28 @@ def test_solids_of_a_step_file(tmp_path):
 
 @pytest.mark.parametrize("line", ['SystemCall "touch /tmp/x";', 'Include "other.geo";', 'Printf("a") > "file";'])
 def test_a_script_may_not_reach_out(tmp_path, line):
-    (tmp_path / "a.geo").write_text(line)
+    (tmp_path / "a.geo").write_text(line, encoding="utf-8")
     with pytest.raises(ValueError, match="which reaches beyond the file; run gmsh on it yourself"):
         read(tmp_path / "a.geo")
 
 
 def test_a_script_without_end_is_stopped(tmp_path, monkeypatch):
     monkeypatch.setattr(gmsh_cad, "LONGEST_SECONDS", 2)
-    (tmp_path / "a.geo").write_text("For i In {0 : 1e12}\n  x = i;\nEndFor\n")
+    (tmp_path / "a.geo").write_text("For i In {0 : 1e12}\n  x = i;\nEndFor\n", encoding="utf-8")
     with pytest.raises(ValueError, match="gmsh did not finish within 2 s"):
         read(tmp_path / "a.geo")
 
 
 def test_a_missing_library_names_the_packages(tmp_path, monkeypatch):
-    (tmp_path / "gmsh.py").write_text("raise OSError('libGLU.so.1: cannot open shared object file')")
-    (tmp_path / "a.geo").write_text("x = 1;")
+    (tmp_path / "gmsh.py").write_text("raise OSError('libGLU.so.1: cannot open shared object file')", encoding="utf-8")
+    (tmp_path / "a.geo").write_text("x = 1;", encoding="utf-8")
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{':'.join(sys.path)}")
     with pytest.raises(ValueError, match=r"libGLU.so.1.*pip install 'blockvis\[cad\]'.*libglu1-mesa"):
         read(tmp_path / "a.geo")
 
 
 def test_a_script_with_a_fault_gives_the_reason(tmp_path):
-    (tmp_path / "a.geo").write_text("Plane Surface(1) = {77};")
+    (tmp_path / "a.geo").write_text("Plane Surface(1) = {77};", encoding="utf-8")
     with pytest.raises(ValueError, match="cannot be read by gmsh"):
         read(tmp_path / "a.geo")
 
@@ -78,9 +79,9 @@ def step(tmp_path, size=1000, unit=".MILLI."):
     path = tmp_path / "a.step"
     gmsh.write(str(path))
     gmsh.finalize()
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     assert "SI_UNIT(.MILLI.,.METRE.)" in text
-    path.write_text(text.replace("SI_UNIT(.MILLI.,.METRE.)", f"SI_UNIT({unit},.METRE.)"))
+    path.write_text(text.replace("SI_UNIT(.MILLI.,.METRE.)", f"SI_UNIT({unit},.METRE.)"), encoding="utf-8")
     return path
 
 
@@ -130,7 +131,7 @@ Physical Surface("stone") = {1, 11, 21, 31};
 
 def test_curves_of_the_built_in_kernel_in_a_second(tmp_path):
     """Sizes from curvature took gmsh 40 s and 2.7 GB for one quarter circle."""
-    (tmp_path / "a.geo").write_text(CURVES)
+    (tmp_path / "a.geo").write_text(CURVES, encoding="utf-8")
     start = time.perf_counter()
     layout = read_layout(tmp_path / "a.geo")
     assert time.perf_counter() - start < 10.0
@@ -146,7 +147,8 @@ def test_curves_of_the_built_in_kernel_in_a_second(tmp_path):
 def test_transfinite_surfaces_and_fields_of_the_script_are_not_in_the_way(tmp_path):
     (tmp_path / "a.geo").write_text(
         CURVES + "Transfinite Curve {21, 22, 23, 24} = 400; Transfinite Surface {21}; Recombine Surface {21};\n"
-        "Field[1] = MathEval; Field[1].F = '0.0005'; Background Field = 1;\n"
+        "Field[1] = MathEval; Field[1].F = '0.0005'; Background Field = 1;\n",
+        encoding="utf-8",
     )
     start = time.perf_counter()
     assert read(tmp_path / "a.geo").areas[2] == pytest.approx(1 + 2 / 3 * 0.25, rel=2e-3)
@@ -155,15 +157,15 @@ def test_transfinite_surfaces_and_fields_of_the_script_are_not_in_the_way(tmp_pa
 
 def test_a_script_that_asks_for_too_much_memory_is_stopped(tmp_path, monkeypatch):
     monkeypatch.setattr(gmsh_cad, "MOST_MEMORY", 600 * 2**20)
-    (tmp_path / "a.geo").write_text(CURVES)
+    (tmp_path / "a.geo").write_text(CURVES, encoding="utf-8")
     assert read(tmp_path / "a.geo").n_blocks == 4
-    (tmp_path / "b.geo").write_text("For i In {0 : 3e7}\n  Point(i + 1) = {i, 0, 0};\nEndFor\n")
+    (tmp_path / "b.geo").write_text("For i In {0 : 3e7}\n  Point(i + 1) = {i, 0, 0};\nEndFor\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"b.geo': gmsh .* 0.586 GiB of memory.*; run gmsh on it yourself"):
         read(tmp_path / "b.geo")
 
 
 def test_messages_name_the_file_and_no_other(tmp_path):
-    (tmp_path / "a.geo").write_text("Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Line(1) = {1, 2};")
+    (tmp_path / "a.geo").write_text("Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Line(1) = {1, 2};", encoding="utf-8")
     with pytest.raises(ValueError, match=r"a.geo' has no surface cells") as problem:
         read(tmp_path / "a.geo")
     assert "found.msh" not in str(problem.value)
@@ -174,7 +176,8 @@ def test_extruded_and_recombined_volumes(tmp_path):
         "Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Point(3) = {1, 1, 0}; Point(4) = {0, 1, 0};\n"
         "Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1};\n"
         "Curve Loop(1) = {1, 2, 3, 4}; Plane Surface(1) = {1}; Transfinite Surface {1}; Recombine Surface {1};\n"
-        "Extrude {0, 0, 0.5} { Surface{1}; Layers{2}; Recombine; }\n"
+        "Extrude {0, 0, 0.5} { Surface{1}; Layers{2}; Recombine; }\n",
+        encoding="utf-8",
     )
     layout = read_layout(tmp_path / "a.geo", view="xz")
     assert layout.thickness == pytest.approx([1.0])

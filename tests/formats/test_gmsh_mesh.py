@@ -132,11 +132,11 @@ def hostile(text, old, new):
     ],
 )
 def test_broken_files(old, new, message, tmp_path):
-    text = (ASSETS / "semicircular_arch.msh").read_text()
+    text = (ASSETS / "semicircular_arch.msh").read_text(encoding="utf-8")
     if old.startswith("$Nodes"):
         line = text[text.index("$Nodes") :].split("\n")[1]
         old = f"$Nodes\n{line}"
-    (tmp_path / "a.msh").write_text(hostile(text, old, new))
+    (tmp_path / "a.msh").write_text(hostile(text, old, new), encoding="utf-8")
     with pytest.raises(ValueError, match=message):
         read(tmp_path / "a.msh")
 

@@ -30,6 +30,6 @@ STAR = [[(1 + k % 2) * math.cos(k * math.pi / 1250), (1 + k % 2) * math.sin(k * 
 )
 def test_refusals(tmp_path, content, message):
     path = tmp_path / "a.json"
-    path.write_text(content if isinstance(content, str) else json.dumps(content))
+    path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
     with pytest.raises(ValueError, match=message):
         read(path)

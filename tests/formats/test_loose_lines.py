@@ -18,7 +18,8 @@ def dxf(tmp_path, draw):
 
 def svg(tmp_path, body, box="0 0 1000 600"):
     (tmp_path / "a.svg").write_text(
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{box.split()[2]}mm" viewBox="{box}">{body}</svg>'
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{box.split()[2]}mm" viewBox="{box}">{body}</svg>',
+        encoding="utf-8",
     )
     return tmp_path / "a.svg"
 

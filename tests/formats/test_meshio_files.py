@@ -41,6 +41,6 @@ def test_a_reader_that_leaves_the_program_is_held(tmp_path, monkeypatch):
         raise SystemExit(1)
 
     monkeypatch.setattr(meshio, "read", leave)
-    (tmp_path / "a.inp").write_text("x")
+    (tmp_path / "a.inp").write_text("x", encoding="utf-8")
     with pytest.raises(ValueError, match=r"cannot be read by meshio as \.inp: 1; export it again"):
         read(tmp_path / "a.inp")

@@ -40,7 +40,7 @@ def stones(folder, suffix=".stl", n=12):
 @pytest.mark.parametrize("suffix", [".stl", ".ply", ".obj", ".glb"])
 def test_a_folder_of_one_stone_per_file(tmp_path, suffix):
     folder = stones(tmp_path / "stones", suffix)
-    (folder / "notes.txt").write_text("from the scanner")
+    (folder / "notes.txt").write_text("from the scanner", encoding="utf-8")
     layout = read_layout(folder, view="xz")
     assert layout.names == tuple(f"stone {k}" for k in range(1, 13)), "in the order of counting"
     assert layout.thickness == pytest.approx([0.5] * 12)
@@ -79,19 +79,19 @@ def test_info_convert_and_a_case_take_them(tmp_path, capsys):
     assert main(["info", f"{tmp_path}/stones/"]) == 0
     assert "outlines        3" in capsys.readouterr().out
     assert main(["convert", f"{tmp_path}/stones/*.stl", str(tmp_path / "wall.json")]) == 0
-    assert [b["name"] for b in json.loads((tmp_path / "wall.json").read_text())["blocks"]] == [
+    assert [b["name"] for b in json.loads((tmp_path / "wall.json").read_text(encoding="utf-8"))["blocks"]] == [
         "stone 1",
         "stone 2",
         "stone 3",
     ]
     for file in ("stones/", "stones/*.stl"):
-        (tmp_path / "case.toml").write_text(CASE.format(file=file))
+        (tmp_path / "case.toml").write_text(CASE.format(file=file), encoding="utf-8")
         assert case_assembly(read_case(tmp_path / "case.toml")).names == ("stone 1", "stone 2", "stone 3")
 
 
 def test_a_run_knows_when_one_of_its_files_changes(tmp_path):
     folder = stones(tmp_path / "stones", n=3)
-    (tmp_path / "case.toml").write_text(CASE.format(file="stones/*.stl"))
+    (tmp_path / "case.toml").write_text(CASE.format(file="stones/*.stl"), encoding="utf-8")
     run = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out")
     assert run.summary["inputs"]["layout_file"] == "*.stl"
     assert run.summary["inputs"]["layout_sha256"] == checksum_of_files(folder / "*.stl") == checksum_of_files(folder)
@@ -124,7 +124,7 @@ def test_what_is_no_set_of_stones_is_refused(tmp_path):
 
 
 def test_a_name_with_brackets_is_a_name_where_there_is_such_a_file(tmp_path):
-    (tmp_path / "plan [1].svg").write_text("x")
+    (tmp_path / "plan [1].svg").write_text("x", encoding="utf-8")
     assert files_of(tmp_path / "plan [1].svg") == [tmp_path / "plan [1].svg"]
 
 

@@ -51,9 +51,11 @@ def test_pvd_gives_its_first_time(tmp_path):
         quads(1).translate((0, 10 * k, 0)).cast_to_unstructured_grid().save(tmp_path / f"{k}.vtu")
     entries = "".join(f'<DataSet timestep="{k}" part="0" file="{k}.vtu"/>' for k in range(2))
     path = tmp_path / "a.pvd"
-    path.write_text(f'<VTKFile type="Collection" version="0.1"><Collection>{entries}</Collection></VTKFile>')
+    path.write_text(
+        f'<VTKFile type="Collection" version="0.1"><Collection>{entries}</Collection></VTKFile>', encoding="utf-8"
+    )
     assert read(path).centroids[0].tolist() == [0.5, 0.5]
-    path.write_text(path.read_text().replace("1.vtu", "lost.vtu"))
+    path.write_text(path.read_text(encoding="utf-8").replace("1.vtu", "lost.vtu"), encoding="utf-8")
     with pytest.raises(ValueError, match=r"names '.*lost.vtu', which does not exist"):
         read(path)
 
@@ -92,7 +94,8 @@ def test_a_hostile_count_is_refused_before_memory_is_reserved(tmp_path):
     with pytest.raises(ValueError, match=r"announces 900000000000 items in \d+ bytes"):
         read(tmp_path / "a.vtu")
     (tmp_path / "b.vtk").write_text(
-        "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 999999999999 float\n"
+        "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 999999999999 float\n",
+        encoding="utf-8",
     )
     with pytest.raises(ValueError, match="announces 999999999999 items"):
         read(tmp_path / "b.vtk")

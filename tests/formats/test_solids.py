@@ -57,7 +57,8 @@ def test_open_bodies_are_refused(tmp_path):
 def test_a_flat_mesh_is_a_layout(tmp_path):
     (tmp_path / "a.obj").write_text(
         "o left\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\no right\nv 1 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\n"
-        "f 5 6 7\nf 5 7 8\n"
+        "f 5 6 7\nf 5 7 8\n",
+        encoding="utf-8",
     )
     assembly = read(tmp_path / "a.obj")
     assert assembly.names == ("left", "right")
@@ -65,7 +66,7 @@ def test_a_flat_mesh_is_a_layout(tmp_path):
 
 
 def test_not_finite(tmp_path):
-    (tmp_path / "a.obj").write_text("v 0 0 0\nv nan 0 0\nv 1 1 0\nv 0 1 1\nf 1 2 3\nf 1 3 4\n")
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv nan 0 0\nv 1 1 0\nv 0 1 1\nf 1 2 3\nf 1 3 4\n", encoding="utf-8")
     with pytest.raises(ValueError, match="coordinates must be finite"):
         read(tmp_path / "a.obj")
 

@@ -8,7 +8,7 @@ from blockvis.formats.read import read, read_layout
 
 def saved(tmp_path, body, head='width="2000mm" height="1000mm" viewBox="0 0 2000 1000"'):
     path = tmp_path / "a.svg"
-    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {head}>{body}</svg>')
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {head}>{body}</svg>', encoding="utf-8")
     return path
 
 
@@ -84,10 +84,10 @@ def test_refusals(tmp_path, body, message):
 def test_entities_are_refused_before_parsing(tmp_path):
     path = tmp_path / "a.svg"
     bombs = "".join(f'<!ENTITY l{k + 1} "{f"&l{k};" * 10}">' for k in range(9))
-    path.write_text(f'<!DOCTYPE svg [<!ENTITY l0 "ha">{bombs}]><svg><title>&l9;</title></svg>')
+    path.write_text(f'<!DOCTYPE svg [<!ENTITY l0 "ha">{bombs}]><svg><title>&l9;</title></svg>', encoding="utf-8")
     with pytest.raises(ValueError, match="defines XML entities"):
         read(path)
-    path.write_text("<html/>")
+    path.write_text("<html/>", encoding="utf-8")
     with pytest.raises(ValueError, match="root <html>, not <svg>"):
         read(path)
 

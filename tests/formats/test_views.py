@@ -112,22 +112,24 @@ def test_the_view_of_a_case(tmp_path):
     written([box((k, 0, 0), (1, 0.5, 0.25)) for k in range(3)], tmp_path / "row.glb")
     case = tmp_path / "case.toml"
     rest = '[roles]\n"brick 0" = "moving"\n[settlement]\ndirection = [0.0, -1.0]\nincrement = 0.01\nlimit = 0.1\n'
-    case.write_text('[geometry]\nfile = "row.glb"\nview = "xz"\n' + rest)
+    case.write_text('[geometry]\nfile = "row.glb"\nview = "xz"\n' + rest, encoding="utf-8")
     assert case_assembly(read_case(case)).areas == pytest.approx([0.25] * 3)
-    case.write_text('[geometry]\nfile = "row.glb"\nview = "front"\n' + rest)
+    case.write_text('[geometry]\nfile = "row.glb"\nview = "front"\n' + rest, encoding="utf-8")
     with pytest.raises(ValueError, match=r"\[geometry\] view is 'front'; choose from xy, xz, yz"):
         read_case(case)
-    case.write_text('[geometry]\nlayout = "arch"\nview = "xz"\n' + rest)
+    case.write_text('[geometry]\nlayout = "arch"\nview = "xz"\n' + rest, encoding="utf-8")
     with pytest.raises(ValueError, match=r"\[geometry\] view belongs to a file, not to a layout"):
         read_case(case)
 
 
 def test_a_flat_drawing_has_the_view_of_its_plane_only(tmp_path):
-    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 0 2\nv 0 0 2\nf 1 2 3\nf 1 3 4\n")
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 0 2\nv 0 0 2\nf 1 2 3\nf 1 3 4\n", encoding="utf-8")
     assert read(tmp_path / "a.obj", view="xz").areas == pytest.approx([2])
     with pytest.raises(ValueError, match="lies in xz: seen as xy it has no area"):
         read(tmp_path / "a.obj", view="xy")
-    (tmp_path / "a.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"><rect width="2" height="1"/></svg>')
+    (tmp_path / "a.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg"><rect width="2" height="1"/></svg>', encoding="utf-8"
+    )
     assert read(tmp_path / "a.svg", view="xy").n_blocks == 1
     with pytest.raises(ValueError, match="drawn in the plane xy; it has no view xz"):
         read(tmp_path / "a.svg", view="xz")

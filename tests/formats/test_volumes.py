@@ -69,7 +69,7 @@ def test_version_41_and_the_skin_beside_the_volumes(tmp_path):
     lines += [" ".join(map(str, point)) for point in points.tolist()]
     lines += ["$EndNodes", "$Elements", "2 6 1 6", "2 1 2 1", "1 1 2 4", "3 1 4 5"]
     lines += [" ".join(map(str, [k + 2, *(cell + 1)])) for k, cell in enumerate(cells)]
-    (tmp_path / "a.msh").write_text("\n".join([*lines, "$EndElements", ""]))
+    (tmp_path / "a.msh").write_text("\n".join([*lines, "$EndElements", ""]), encoding="utf-8")
     layout = read_layout(tmp_path / "a.msh")
     assert layout.names == ("pier",)
     assert layout.groups == ("pier",)
@@ -158,8 +158,8 @@ def test_a_multiblock_with_centres_and_contacts_gives_its_bodies(tmp_path):
     contact = pv.PolyData(np.array([[1, 0, 0.25], [1, 0.25, 0.25], [1, 0, 0.5]], dtype=float), faces=[3, 0, 1, 2])
     parts = pv.MultiBlock({"rigids": centres, "tacts": grid, "ptc": pv.Line(), "f2f": contact})
     parts.save(tmp_path / "a.vtm")
-    text = (tmp_path / "a.vtm").read_text()
-    (tmp_path / "state_1.vtmb").write_text(text)
+    text = (tmp_path / "a.vtm").read_text(encoding="utf-8")
+    (tmp_path / "state_1.vtmb").write_text(text, encoding="utf-8")
     layout = read_layout(tmp_path / "state_1.vtmb")
     assert layout.n_blocks == 3
     assert any("left out: 'rigids', 'ptc', 'f2f', which draw no blocks" in note for note in layout.notes)
@@ -232,12 +232,13 @@ def test_surfaces_that_enclose_nothing_are_not_flat(tmp_path, suffix):
 def test_version_1_of_msh(tmp_path):
     (tmp_path / "a.msh").write_text(
         "$NOD\n6\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 2 0 0\n6 2 1 0\n$ENDNOD\n"
-        "$ELM\n4\n1 1 0 1 2 1 2\n2 3 7 10 4 1 2 3 4\n3 2 8 11 3 2 5 6\n4 2 8 11 3 2 6 3\n$ENDELM\n"
+        "$ELM\n4\n1 1 0 1 2 1 2\n2 3 7 10 4 1 2 3 4\n3 2 8 11 3 2 5 6\n4 2 8 11 3 2 6 3\n$ENDELM\n",
+        encoding="utf-8",
     )
     layout = read_layout(tmp_path / "a.msh")
     assert layout.groups == ("group 7", "group 8")
     assert read(tmp_path / "a.msh").areas.tolist() == [1.0, 1.0]
-    (tmp_path / "b.msh").write_text("$NOD\n1\n1 0 0 0\n$ENDNOD\n$ELM\n3\n1 2 0 1 3 1 1\n$ENDELM\n")
+    (tmp_path / "b.msh").write_text("$NOD\n1\n1 0 0 0\n$ENDNOD\n$ELM\n3\n1 2 0 1 3 1 1\n$ENDELM\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"is cut off: its section \$ELM announces"):
         read(tmp_path / "b.msh")
 
@@ -245,16 +246,16 @@ def test_version_1_of_msh(tmp_path):
 def test_damaged_cells_are_refused(tmp_path):
     grid = polyhedra(2)
     grid.save(tmp_path / "a.vtu", binary=False)
-    text = (tmp_path / "a.vtu").read_text()
+    text = (tmp_path / "a.vtu").read_text(encoding="utf-8")
     assert "0 3 2 1 4 5" in text
-    (tmp_path / "a.vtu").write_text(text.replace("0 3 2 1 4 5", "0 3 99 1 4 5"))
+    (tmp_path / "a.vtu").write_text(text.replace("0 3 2 1 4 5", "0 3 99 1 4 5"), encoding="utf-8")
     with pytest.raises(ValueError, match=r"a.vtu' has a damaged cell \(a face of a polyhedron uses a point"):
         read(tmp_path / "a.vtu")
     points, cells, _ = bricks("hexahedron", 2)
     pv.UnstructuredGrid({pv.CellType.HEXAHEDRON: cells}, points).save(tmp_path / "b.vtu", binary=False)
-    text = (tmp_path / "b.vtu").read_text()
+    text = (tmp_path / "b.vtu").read_text(encoding="utf-8")
     assert "0 1 2 3 4 5" in text
-    (tmp_path / "b.vtu").write_text(text.replace("0 1 2 3 4 5", "0 1 2 3 4 55"))
+    (tmp_path / "b.vtu").write_text(text.replace("0 1 2 3 4 5", "0 1 2 3 4 55"), encoding="utf-8")
     with pytest.raises(ValueError, match=r"b.vtu' has a damaged cell \(it uses a point that does not exist"):
         read(tmp_path / "b.vtu")
 

@@ -71,7 +71,8 @@ def test_the_limits_bind(tmp_path):
         "import sys; sys.argv = ['', str(64 << 20), '1']; sys.path.insert(0, sys.argv[0])\n"
         f"sys.path.insert(0, {str(READER.parent)!r})\n"
         "import reader\nreader.main(str(64 << 20), '1', [])\n"
-        "try:\n    bytearray(256 << 20)\nexcept MemoryError:\n    print('bound')\n"
+        "try:\n    bytearray(256 << 20)\nexcept MemoryError:\n    print('bound')\n",
+        encoding="utf-8",
     )
     import subprocess
 

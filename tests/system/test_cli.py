@@ -79,10 +79,10 @@ def test_run_writes_the_results_folder(case, capsys, monkeypatch):
 def test_results_are_not_overwritten_without_force(case, capsys):
     out = case.parent / "out"
     out.mkdir()
-    (out / "summary.json").write_text("{}")
+    (out / "summary.json").write_text("{}", encoding="utf-8")
     assert main(["run", str(case), "-o", str(out)]) == 2
     assert "--force" in capsys.readouterr().err
-    assert (out / "summary.json").read_text() == "{}"
+    assert (out / "summary.json").read_text(encoding="utf-8") == "{}"
 
 
 def test_console_script_and_exit_code():
@@ -201,7 +201,7 @@ def test_help_of_a_layout_that_does_not_exist_names_the_nearest(capsys):
 def test_bash_completes_verbs_options_and_layouts(tmp_path, capsys):
     assert main(["completion", "bash"]) == 0
     script = tmp_path / "blockvis.bash"
-    script.write_text(capsys.readouterr().out)
+    script.write_text(capsys.readouterr().out, encoding="utf-8")
     ask = (
         f"source {script}; function said {{ COMP_WORDS=(blockvis $1 $2); COMP_CWORD=$(($# > 1 ? 2 : 1)); "
         '_shtab_blockvis; echo "${COMPREPLY[@]}"; }; said comp; said layout segm; said run --res'
@@ -216,7 +216,7 @@ def test_zsh_gets_a_script_of_its_own(tmp_path, capsys):
     assert text.startswith("#compdef blockvis")
     assert "segmental-arch" in text
     if shutil.which("zsh"):
-        (tmp_path / "_blockvis").write_text(text)
+        (tmp_path / "_blockvis").write_text(text, encoding="utf-8")
         subprocess.run(["zsh", "-n", tmp_path / "_blockvis"], check=True)
 
 

@@ -69,7 +69,7 @@ def folder(tmp_path_factory):
 @pytest.mark.skipif(PVPYTHON is None, reason="pvpython is not installed (Debian: python3-paraview)")
 def test_paraview_reads_every_increment_and_every_array(folder, tmp_path):
     script = tmp_path / "read.py"
-    script.write_text(READ)
+    script.write_text(READ, encoding="utf-8")
     done = subprocess.run([PVPYTHON, script, folder], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     told = json.loads(done.stdout.split("TOLD")[1])
@@ -89,7 +89,7 @@ def test_paraview_reads_every_increment_and_every_array(folder, tmp_path):
 @pytest.mark.skipif(PVPYTHON is None, reason="pvpython is not installed (Debian: python3-paraview)")
 def test_warp_by_vector_as_it_comes_does_not_move_the_blocks_twice(folder, tmp_path):
     script = tmp_path / "warp.py"
-    script.write_text(WARP)
+    script.write_text(WARP, encoding="utf-8")
     done = subprocess.run([PVPYTHON, script, folder], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     (_, vector), points = json.loads(done.stdout.split("TOLD")[1])
@@ -113,4 +113,4 @@ def test_paraview_script_runs(folder, tmp_path):
 
 
 def test_paraview_script_is_python(folder):
-    compile((folder / "paraview_colours.py").read_text(), "paraview_colours.py", "exec")
+    compile((folder / "paraview_colours.py").read_text(encoding="utf-8"), "paraview_colours.py", "exec")

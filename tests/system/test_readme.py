@@ -51,7 +51,9 @@ def test_files_and_rooms_that_contributing_names_exist():
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     named = [name for name in re.findall(r"`([\w./]+)`", text) if "/" in name or name.endswith(".py")]
     there = {
-        f"/{path.relative_to(ROOT)}" for top in ("solver", "blockvis", "tests") for path in (ROOT / top).rglob("*")
+        f"/{path.relative_to(ROOT).as_posix()}"
+        for top in ("solver", "blockvis", "tests")
+        for path in (ROOT / top).rglob("*")
     }
     there |= {"/solver", "/blockvis", "/.ci/run"}
     assert len(named) > 10

@@ -79,7 +79,7 @@ def test_slider_moves_the_blocks(tmp_path):
       const slider = document.getElementById("frame"); slider.value = 6;
       slider.dispatchEvent(new Event("input")); } }, 20)</script>"""
     moved = tmp_path / "moved.html"
-    moved.write_text(page.read_text().replace("</body>", move + "</body>"))
+    moved.write_text(page.read_text(encoding="utf-8").replace("</body>", move + "</body>"), encoding="utf-8")
     attributes = body_of(moved, tmp_path)
     assert attributes["frame"] == "6"
     assert float(attributes["corners"]) == pytest.approx(checksum(response, response.increments[6]), abs=0.02)

@@ -178,7 +178,9 @@ def test_hostile_files_from_the_command_line_to_the_browser(tmp_path):
         for k, (name, (x, y)) in enumerate(bodies.items())
     ]
     layout = tmp_path / f"{HOSTILE[3]}.json"
-    layout.write_text(json.dumps({"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}))
+    layout.write_text(
+        json.dumps({"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}), encoding="utf-8"
+    )
 
     def quoted(text):
         return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -41,7 +41,9 @@ def told(page, tmp_path, script, *options, anchor=""):
     """What a script has put into ``out`` on the page."""
     asked = tmp_path / "asked.html"
     text = page.read_text(encoding="utf-8")
-    asked.write_text(text.replace("</body>\n</html>", ASK.replace("SCRIPT", script) + "</body>\n</html>"), "utf-8")
+    asked.write_text(
+        text.replace("</body>\n</html>", ASK.replace("SCRIPT", script) + "</body>\n</html>"), "utf-8", encoding="utf-8"
+    )
     body = re.search(r"<body[^>]*>", visited(asked, tmp_path, "--dump-dom", *options, anchor=anchor)).group()
     found = json.loads(html.unescape(re.search(r'data-out="([^"]*)"', body).group(1)))
     assert "error" not in found, found["error"]
@@ -59,7 +61,7 @@ def test_title_names_case_file_date_and_version(tmp_path):
         '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.05\nlimit = 0.05\n'
         "[analysis]\nfalling_frames = 0\n[output]\nanimation = false\n"
     )
-    (tmp_path / "garden wall.toml").write_text(text)
+    (tmp_path / "garden wall.toml").write_text(text, encoding="utf-8")
     run = blockvis.run_case(tmp_path / "garden wall.toml", tmp_path / "out")
     page = report_html(run.response, text)
     title = re.search("<title>(.*?)</title>", page).group(1)
@@ -297,7 +299,11 @@ def test_axe_finds_nothing(scheme, tmp_path):
     response = replace(parted(wall(6, 5), 4, 3), message="made up")
     page = write_report(response, tmp_path / "report.html", "# a case\n" * 80)
     axe = AXE.read_text(encoding="utf-8").replace("</script", "<\\/script")
-    page.write_text(page.read_text("utf-8").replace("<script id", f"<script>{axe}</script><script id", 1), "utf-8")
+    page.write_text(
+        page.read_text("utf-8", encoding="utf-8").replace("<script id", f"<script>{axe}</script><script id", 1),
+        "utf-8",
+        encoding="utf-8",
+    )
     rules = '{ runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"] }'
     script = f"""key("n"); const found = await axe.run(document, {rules}); out.rules = found.passes.length;
       out.wrong = found.violations.map((one) => [one.id, one.nodes.map((node) => node.html)]);"""

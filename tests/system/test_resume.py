@@ -327,7 +327,6 @@ def test_damaged_checkpoint_is_refused(whole, tmp_path, capsys):
 
 
 def test_two_runs_cannot_write_to_one_folder(whole, tmp_path):
-    pytest.importorskip("fcntl", reason="the system has no file locks")
     assembly = generators.arch()
     first = ResultsFolder(tmp_path / "out", assembly)
     for overwrite in (False, True):

@@ -218,10 +218,10 @@ def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tm
 
 def test_a_folder_that_is_no_study_is_refused(arches, tmp_path, capsys):
     (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "thesis.tex").write_text("precious")
+    (tmp_path / "out" / "thesis.tex").write_text("precious", encoding="utf-8")
     assert main(["sweep", str(arches), "-o", str(tmp_path / "out")]) == 2
     assert "holds something that is no study" in capsys.readouterr().err
-    assert (tmp_path / "out" / "thesis.tex").read_text() == "precious"
+    assert (tmp_path / "out" / "thesis.tex").read_text(encoding="utf-8") == "precious"
 
 
 def test_a_row_half_written_is_made_again(arches, tmp_path):

@@ -105,13 +105,13 @@ def test_a_deformed_pose_is_written(tmp_path):
 def test_units(tmp_path):
     path = tmp_path / "a.json"
     blocks = [{"outline": (UNIT * 250).tolist()}]
-    path.write_text(json.dumps({"unit": "mm", "blocks": blocks}))
+    path.write_text(json.dumps({"unit": "mm", "blocks": blocks}), encoding="utf-8")
     assert read(path).areas[0] == pytest.approx(0.0625)
     assert read(path, unit="cm").areas[0] == pytest.approx(6.25)
     assert "it was read in cm because that was asked for" in read_layout(path, unit="cm").notes[0]
-    path.write_text(json.dumps({"blocks": [{"outline": UNIT.tolist()}]}))
+    path.write_text(json.dumps({"blocks": [{"outline": UNIT.tolist()}]}), encoding="utf-8")
     assert read_layout(path).notes == ("the file does not say its unit; m was assumed",)
-    path.write_text(json.dumps({"unit": "in", "blocks": [{"outline": (UNIT * 0.2).tolist()}]}))
+    path.write_text(json.dumps({"unit": "in", "blocks": [{"outline": (UNIT * 0.2).tolist()}]}), encoding="utf-8")
     clash = read_layout(path)
     assert clash.unit == "m"
     assert "unit clash: the file says its unit is in" in clash.notes[0]
@@ -122,14 +122,14 @@ def test_units(tmp_path):
 
 
 def test_missing_and_empty_files(tmp_path):
-    (tmp_path / "arch.msh").write_text("")
+    (tmp_path / "arch.msh").write_text("", encoding="utf-8")
     with pytest.raises(ValueError, match=r"there is no file .*arc.msh'; did you mean arch.msh"):
         read(tmp_path / "arc.msh")
     with pytest.raises(FileNotFoundError):
         read(tmp_path / "arc.msh")
     with pytest.raises(ValueError, match=r"is empty \(0 bytes\)"):
         read(tmp_path / "arch.msh")
-    (tmp_path / "arch.xyz").write_text("x")
+    (tmp_path / "arch.xyz").write_text("x", encoding="utf-8")
     with pytest.raises(ValueError, match=r"cannot read '.xyz'; use one of .*\.dxf"):
         read(tmp_path / "arch.xyz")
 
@@ -141,7 +141,9 @@ def test_halves_of_characters_are_replaced_and_noted(tmp_path):
         {"name": "c\u0000d \U0001f9f1", "outline": [[0, 1], [1, 1], [1, 2], [0, 2]]},
     ]
     path = tmp_path / "halves.json"
-    path.write_text(json.dumps({"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}))
+    path.write_text(
+        json.dumps({"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}), encoding="utf-8"
+    )
     drawing = read_layout(path)
     assert drawing.names == ("a\ufffdb", "c\u0000d \U0001f9f1")
     assert drawing.materials == ("m\ufffd", "")

@@ -25,7 +25,7 @@ def test_png_has_a_curve_and_the_collapse(tmp_path):
 
 
 def test_svg_says_what_it_shows(tmp_path):
-    text = draw_curve(arch_response(), tmp_path / "curve.svg").read_text()
+    text = draw_curve(arch_response(), tmp_path / "curve.svg").read_text(encoding="utf-8")
     said = re.findall(r"<!-- (.*?) -->", text)
     assert "settlement [m]" in said
     assert "reaction [kN]" in said
@@ -46,7 +46,7 @@ def test_a_structure_without_any_equilibrium_has_an_empty_curve(tmp_path):
 
 
 def said(response, path):
-    return re.findall(r"<!-- (.*?) -->", draw_curve(response, path).read_text())
+    return re.findall(r"<!-- (.*?) -->", draw_curve(response, path).read_text(encoding="utf-8"))
 
 
 def test_a_failed_run_says_so_in_the_curve(tmp_path):
@@ -62,7 +62,8 @@ def test_the_collapse_has_the_count_of_its_mechanism_and_the_case_its_name(tmp_p
     assert "5 hinges" in said(arch_response(), tmp_path / "curve.svg")
     (tmp_path / "garden.toml").write_text(
         '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.05\nlimit = 0.05\n'
-        "[analysis]\nfalling_frames = 0\n[output]\nanimation = false\n"
+        "[analysis]\nfalling_frames = 0\n[output]\nanimation = false\n",
+        encoding="utf-8",
     )
     run = blockvis.run_case(tmp_path / "garden.toml", tmp_path / "out")
     assert "garden" in said(run.response, tmp_path / "named.svg")

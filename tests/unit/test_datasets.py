@@ -74,7 +74,7 @@ def test_contacts_come_back_through_pyvista(tmp_path):
 def test_vtu_is_inline_binary_with_long_headers(tmp_path):
     response = parted(wall(12, 12), 2, 0)
     path = write_vtu(contact_dataset(response.assembly, response.increments[0]), tmp_path / "contacts.vtu")
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     assert len(text) > 10_000
     assert 'header_type="UInt64"' in text
     assert "vtkZLibDataCompressor" in text

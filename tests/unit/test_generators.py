@@ -374,7 +374,9 @@ def test_openings_that_overlap_with_their_heads_are_both_named():
 
 def _generated() -> list[str]:
     return [
-        path.name for path in sorted(EXAMPLES.glob("*.toml")) if "layout" in tomllib.loads(path.read_text())["geometry"]
+        path.name
+        for path in sorted(EXAMPLES.glob("*.toml"))
+        if "layout" in tomllib.loads(path.read_text(encoding="utf-8"))["geometry"]
     ]
 
 

@@ -128,7 +128,7 @@ def test_units_are_in_the_files(tmp_path):
     blocks, joints = (pv.read(out / "increments" / f"{part}_00003.vtu") for part in ("blocks", "joints"))
     assert "displacement [m]" in list(blocks.field_data["units"])
     assert {"opening [m]", "slip [m]", "normal_force [N]", "shear_force [N]"} <= set(joints.field_data["units"])
-    assert (out / "joints.pvd").read_text().count("joints_") == len(arch_response().increments)
+    assert (out / "joints.pvd").read_text(encoding="utf-8").count("joints_") == len(arch_response().increments)
 
 
 def test_a_case_chooses_the_undeformed_shape(tmp_path):
@@ -136,13 +136,13 @@ def test_a_case_chooses_the_undeformed_shape(tmp_path):
         '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.05\nlimit = 0.05\n'
         '[analysis]\nfalling_frames = 0\n[output]\nanimation = false\nvtu = "undeformed"\n'
     )
-    (tmp_path / "case.toml").write_text(text)
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
     run = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out")
     file = sorted((run.folder / "increments").glob("blocks_*.vtu"))[-1]
     mesh = pv.read(file)
     np.testing.assert_allclose(mesh.points[:, :2], run.response.assembly.vertices, atol=1e-12)
     assert np.abs(mesh["displacement"]).max() > 0.04
-    (tmp_path / "case.toml").write_text(text.replace("undeformed", "deformed"))
+    (tmp_path / "case.toml").write_text(text.replace("undeformed", "deformed"), encoding="utf-8")
     with pytest.raises(ValueError, match=r"\[output\] vtu is 'deformed'.*moved, undeformed"):
         blockvis.read_case(tmp_path / "case.toml")
 

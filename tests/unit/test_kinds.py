@@ -42,7 +42,9 @@ def _compared_names(path: Path) -> list[tuple[int, str]]:
 
 def test_the_search_for_comparisons_finds_them(tmp_path):
     module = tmp_path / "module.py"
-    module.write_text('if kind in ("pushover", "other"):\n    pass\nanalysis = "settlement"\nx != "limit load"\n')
+    module.write_text(
+        'if kind in ("pushover", "other"):\n    pass\nanalysis = "settlement"\nx != "limit load"\n', encoding="utf-8"
+    )
     assert sorted(_compared_names(module)) == [(1, "pushover"), (4, "limit load")]
 
 

@@ -65,7 +65,7 @@ def test_summary_console_report_and_curve_tell_them_apart(tmp_path):
     page = report_html(response)
     assert "<h1>Local loss at a settlement of" in page
     assert "1.962 kN = 0.0123 W, a local loss" in page
-    said = re.findall(r"<!-- (.*?) -->", draw_curve(response, tmp_path / "curve.svg").read_text())
+    said = re.findall(r"<!-- (.*?) -->", draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8"))
     assert any(line.startswith("local loss at ") for line in said)
     assert lost_text(response) == "a local loss"
     assert lost_text(arch_response()) == "collapse"

@@ -91,7 +91,8 @@ def test_a_case_of_rubble_runs(tmp_path):
     )
     (tmp_path / "case.toml").write_text(
         f'[geometry]\nfile = "rubble.dxf"\njoint_thickness = "auto"\n{ground}[material]\nfriction_coefficient = 0.6\n'
-        "[settlement]\ndirection = [0, -1]\nincrement = 0.002\nlimit = 0.004\n[output]\nanimation = false\n"
+        "[settlement]\ndirection = [0, -1]\nincrement = 0.002\nlimit = 0.004\n[output]\nanimation = false\n",
+        encoding="utf-8",
     )
     with pytest.warns(UserWarning, match='joint_thickness "auto" found'):
         run = run_case(tmp_path / "case.toml", tmp_path / "out")
@@ -217,7 +218,8 @@ def test_mortar_that_is_drawn_is_given_away_however_wide_and_openings_in_it_stay
         '<svg xmlns="http://www.w3.org/2000/svg"><g id="mortar">'
         f'<path d="{path([ring_of(border), *holes])}"/></g><g id="stone">'
         + "".join(f'<path d="{path([hole])}"/>' for hole in holes[:-1])
-        + "</g></svg>"
+        + "</g></svg>",
+        encoding="utf-8",
     )
     for ignore in ((), "mortar"):
         assembly = read(tmp_path / "a.svg", joint_thickness="auto", closing="voronoi", ignore=ignore)

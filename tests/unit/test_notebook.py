@@ -1,4 +1,13 @@
-"""What a notebook shows of a response."""
+"""What a notebook shows of a response, a collapse and an assembly."""
+
+import base64
+import io
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from PIL import Image
 
 import blockvis
 import solver
@@ -12,3 +21,64 @@ def test_response_plots_itself_once_blockvis_is_imported():
     assert shown == blockvis.show(response)._repr_html_()
     assert "iframe" in shown
     assert "voussoir 1" not in shown.split("srcdoc")[0]
+
+
+@pytest.fixture(scope="module")
+def collapsed():
+    spread = solver.Settlement(direction=(1, 0), increment=0.1, limit=0.5)
+    return solver.settle(generators.arch(voussoirs=5), spread, friction_coefficient=2.0)
+
+
+def test_a_response_is_shown_by_its_pictures_and_numbers(collapsed):
+    shown = collapsed._repr_html_()
+    pictures = [base64.b64decode(data) for data in re.findall(r"base64,([A-Za-z0-9+/=]+)", shown)]
+    sizes = [Image.open(io.BytesIO(picture)).size for picture in pictures]
+    assert sizes[0] == (1280, 720)
+    assert len(sizes) == 2, "the mechanism and the curve"
+    assert all(np.ptp(np.asarray(Image.open(io.BytesIO(picture)))) > 100 for picture in pictures), "something is drawn"
+    assert f"{collapsed.collapse.displacement:.6g} m" in shown
+    assert "array(" not in shown
+
+
+def test_a_response_without_increments_is_shown_by_its_message():
+    assembly = generators.arch(voussoirs=5)
+    empty = solver.Response(
+        assembly,
+        (),
+        solver.Interfaces(),
+        solver.self_weight(assembly),
+        (),
+        solver.Status.SOLVER_FAILED,
+        "why & <how>",
+    )
+    assert "why &amp; &lt;how&gt;" in empty._repr_html_()
+
+
+def test_a_collapse_is_shown_by_its_numbers(collapsed):
+    shown = ElementTree.fromstring(collapsed.collapse._repr_html_())
+    rows = {row[0].text: row[1].text for row in shown.iter("tr")}
+    low, high = collapsed.collapse.bracket
+    assert rows["equilibrium at"] == f"{low:.6g} m"
+    assert rows["no equilibrium at"] == f"{high:.6g} m"
+    assert rows["mechanism"] == collapsed.collapse.words
+
+
+def test_an_assembly_is_shown_block_by_block():
+    block = np.array([[0, 0], [2, 0], [2, 1], [0, 1]])
+    assembly = solver.Assembly.from_outlines(
+        [block, block + np.array([0, 1])],
+        names=["ground", "a < b"],
+        roles=["moving", "free"],
+        density=2000.0,
+        thickness=0.5,
+    )
+    shown = ElementTree.fromstring(assembly._repr_html_())
+    svg = "{http://www.w3.org/2000/svg}"
+    polygons = list(shown.iter(f"{svg}polygon"))
+    assert [polygon.find(f"{svg}title").text for polygon in polygons] == ["ground", "a < b"]
+    # 2 m are as wide as the picture; the upper block is above, where y is less.
+    assert polygons[0].get("points") == "0.00,420.00 420.00,420.00 420.00,210.00 0.00,210.00"
+    assert polygons[1].get("points").startswith("0.00,210.00")
+    rows = {row[0].text: row[1].text for row in shown.iter("tr")}
+    assert rows["blocks"] == "2: 1 free, 1 moving"
+    assert rows["weight"] == "19.62 kN"

@@ -118,7 +118,7 @@ def test_meshes_without_flat_blocks_stay_with_pyvista(tmp_path):
     skin = ball.extract_surface(algorithm="dataset_surface").triangulate()
     pv.save_meshio(tmp_path / "skin.msh", skin, file_format="gmsh22")
     assert pv.read(tmp_path / "skin.msh").n_cells == skin.n_cells
-    (tmp_path / "broken.msh").write_text("no mesh")
+    (tmp_path / "broken.msh").write_text("no mesh", encoding="utf-8")
     with pytest.raises(ValueError, match="is not a gmsh mesh: it has no section"):
         pv.read(tmp_path / "broken.msh")
 

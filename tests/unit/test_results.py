@@ -41,14 +41,14 @@ def test_reopens_as_the_same_response(response, folder):
 
 
 def test_csv_counts_every_contact_once(response, folder):
-    rows = list(csv.DictReader((folder / "response.csv").read_text().splitlines()))
+    rows = list(csv.DictReader((folder / "response.csv").read_text(encoding="utf-8").splitlines()))
     for row, increment in zip(rows, response.path, strict=True):
         counted = sum(int(row[f"contacts_{s}"]) for s in ("open", "sticking", "sliding", "hinging"))
         assert counted == len(increment.contacts)
 
 
 def test_summary_reports_the_worst_residuals(response, folder):
-    summary = json.loads((folder / "summary.json").read_text())
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     worst = max(i.certificate.equilibrium_residual for i in response.path)
     assert summary["largest_residuals"]["equilibrium_residual"] == worst
     assert worst < 1e-8

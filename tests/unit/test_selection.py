@@ -156,7 +156,7 @@ def test_keys_of_the_case(tmp_path):
     drawn(tmp_path, outline(box(2000, 0, 300, 100), "steel"))
     text = '[geometry]\nfile = "wall.dxf"\nignore = ["steel"]\njoint_thickness = "auto"\nclosing = "faces"\n'
     text += '[roles]\n"block 2F" = "moving"\n[settlement]\ndirection = [0, -1]\n'
-    (tmp_path / "case.toml").write_text(text)
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
     case = read_case(tmp_path / "case.toml")
     assert (case.ignore, case.only, case.closing) == (("steel",), (), "faces")
     with pytest.warns(UserWarning, match="1 outline, as asked for on layer 'steel'"):
@@ -186,7 +186,7 @@ def test_info_honours_roles_of_layers_and_draws_what_was_left_out(tmp_path):
     )
     found = inspect(path)
     assert "'free' 16, 'fixed' 1, 'moving' 1" in str(found)
-    picture = draw_inspection(found, tmp_path / "a.svg").read_text()
+    picture = draw_inspection(found, tmp_path / "a.svg").read_text(encoding="utf-8")
     for words in ("left out: 1", "moving: 1", "fixed: 1", "gap between facing edges"):
         assert words in picture
 

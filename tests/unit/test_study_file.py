@@ -105,7 +105,8 @@ def test_every_run_is_a_case_with_its_values_and_its_seed(study_file):
 
 def test_imperfections_of_the_case_keep_their_seed(study_file, tmp_path):
     (tmp_path / "case.toml").write_text(
-        CASE + '[[imperfections]]\nkind = "density"\ndistribution = "lognormal"\ndeviation = 0.1\nseed = 77\n'
+        CASE + '[[imperfections]]\nkind = "density"\ndistribution = "lognormal"\ndeviation = 0.1\nseed = 77\n',
+        encoding="utf-8",
     )
     with open(study_file, "a", encoding="utf-8") as file:
         file.write('[[imperfections]]\nkind = "friction"\ndistribution = "lognormal"\ndeviation = 0.1\n')

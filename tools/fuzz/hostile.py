@@ -272,7 +272,9 @@ def written(folder: Path) -> list[Path]:
     inside = folder / "inside"
     inside.mkdir()
     (folder / "outside.vtu").write_text(_vtu(), encoding="utf-8")
-    (folder / "outside.inp").write_text("*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n*ELEMENT, TYPE=CPS3\n1, 1, 2, 3\n")
+    (folder / "outside.inp").write_text(
+        "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n*ELEMENT, TYPE=CPS3\n1, 1, 2, 3\n", encoding="utf-8"
+    )
     paths = []
     for name, content in FILES.items():
         data = content()

@@ -1,0 +1,330 @@
+"""Every key of the case file, in the order of its tables; a test holds them against the code that reads them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import solver
+from blockvis.generators import LAYOUTS
+from blockvis.layout.joints.close import WAYS
+from blockvis.layout.units import UNITS
+from blockvis.layout.views import VIEWS
+from blockvis.runs.kinds import KINDS
+from blockvis.video_suffixes import VIDEO_SUFFIXES
+
+from .build import DENSITY, THICKNESS
+from .distributions import KINDS as DISTRIBUTIONS
+from .imperfections import IMPERFECTIONS
+from .key import (
+    NOT_NEGATIVE,
+    NUMBER,
+    OUTLINE,
+    PAIR,
+    POSITIVE,
+    TEXT,
+    TEXTS,
+    Key,
+    Section,
+    ValueKind,
+    one_of,
+    whole,
+)
+
+_FRICTION = solver.InterfaceLaw.friction_coefficient
+_CONTROLS = solver.Controls()
+
+#: More increments or frames than this are taken for a typing error.
+MOST_STEPS = 1_000_000
+
+
+def _in_any_letters(words: tuple[str, ...]) -> str:
+    """Write a pattern of these words in capital or small letters, "-" and "_" for a space as layouts accept them."""
+
+    def accepted(letter: str) -> str:
+        if letter in " -":
+            return "[ _-]"
+        return "[cCçÇ]" if letter == "c" else f"[{letter}{letter.upper()}]"
+
+    return "|".join("".join(map(accepted, word)) for word in words)
+
+
+_LAYOUT = ValueKind(
+    "text",
+    {"anyOf": [{"enum": list(LAYOUTS)}, {"type": "string", "pattern": f"^({_in_any_letters(tuple(LAYOUTS))})$"}]},
+)
+_UNIT = ValueKind("text", {"anyOf": [{"enum": list(UNITS)}, {"type": "string"}]})
+_THICKNESS_OR_AUTO = ValueKind('number of at least 0, or "auto"', {"anyOf": [NOT_NEGATIVE.schema, {"const": "auto"}]})
+_endings = "|".join("".join(f"[{c}{c.upper()}]" if c.isalpha() else re.escape(c) for c in s) for s in VIDEO_SUFFIXES)
+_FILM = ValueKind(
+    f"name of a file ending in {', '.join(VIDEO_SUFFIXES)}, or false",
+    {"anyOf": [{"type": "string", "pattern": rf"^[^/\\]*({_endings})$"}, {"const": False}]},
+)
+_TWO_NAMES = ValueKind("two texts", {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2})
+_PLACES = ValueKind(
+    "three numbers: from, to, number of places",
+    {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
+)
+
+_NEEDED, _UNLIMITED = "required where the distribution has it", "; normal and lognormal have none"
+
+#: Numbers of the distributions; :data:`blockvis.cases.distributions.KINDS` says which of them each one takes.
+DISTRIBUTION_KEYS = (
+    Key(
+        "distribution",
+        one_of(tuple(DISTRIBUTIONS)),
+        "Probability distribution; normal and lognormal may be cut off by lower and upper",
+        "normal",
+        required=True,
+    ),
+    Key("mean", NUMBER, "Mean of normal and lognormal, before they are cut off", 0.6, otherwise=_NEEDED),
+    Key(
+        "deviation",
+        POSITIVE,
+        "Standard deviation of normal and lognormal, before they are cut off",
+        0.1,
+        otherwise=_NEEDED,
+    ),
+    Key("lower", NUMBER, "Lower limit", 0.2, otherwise=_NEEDED + _UNLIMITED),
+    Key("upper", NUMBER, "Upper limit", 1.0, otherwise=_NEEDED + _UNLIMITED),
+    Key("mode", NUMBER, "Most probable value of triangular", 0.6, otherwise=_NEEDED),
+    Key("alpha", POSITIVE, "First shape parameter of beta", 2.0, otherwise=_NEEDED),
+    Key("beta", POSITIVE, "Second shape parameter of beta", 3.0, otherwise=_NEEDED),
+)
+
+
+def _strength() -> tuple[Key, ...]:
+    return (
+        Key(
+            "cohesion",
+            NOT_NEGATIVE,
+            "Cohesion of the joints, in limit loads without a settlement",
+            1e5,
+            "Pa",
+            solver.InterfaceLaw.cohesion,
+        ),
+        Key(
+            "compressive_strength",
+            POSITIVE,
+            "Compressive strength of the joints, in limit loads without a settlement",
+            5e6,
+            "Pa",
+            otherwise="infinite",
+        ),
+    )
+
+
+GEOMETRY = Section(
+    "geometry",
+    "Where the blocks are: a file, or a layout by its parameters",
+    (
+        Key(
+            "file",
+            TEXT,
+            "Layout file, relative to the case file; or a folder, or a pattern of files, one per stone",
+            "facade.dxf",
+            otherwise="layout is given instead",
+        ),
+        Key("layout", _LAYOUT, "Name of a parametric layout", "segmental arch", otherwise="file is given instead"),
+        Key(
+            "parameters",
+            ValueKind("table", {"type": "object"}),
+            "Parameters of the layout, see [geometry.parameters]",
+            {"span": 4.0},
+            otherwise="each parameter at its default",
+        ),
+        Key("unit", _UNIT, "Unit of the file's lengths, where the file does not say or is wrong", "mm",
+            otherwise="what the file states, else m"),
+        Key("view", one_of(tuple(VIEWS)), "Coordinates to take as x and y, of a drawing in space", "xz",
+            otherwise="those in which the bodies lie side by side"),
+        Key("ignore", TEXTS, "Layers, groups, materials and names, or patterns of them, to leave out",
+            ["axes", "dim*"], default=()),
+        Key("only", TEXTS, "Layers, groups, materials and names, or patterns of them, beside which all is left out",
+            ["stones"], default=()),
+        Key("thickness", POSITIVE, "Thickness out of plane of blocks for which the file has none", 0.25, "m",
+            THICKNESS),
+        Key("joint_thickness", _THICKNESS_OR_AUTO,
+            'Gaps between facing edges up to this width are closed; "auto" measures them', "auto", "m", 0.0),
+        Key("closing", one_of(WAYS),
+            'How joints are closed: "faces" moves edges to their midline, "voronoi" gives mortar to the nearest stone',
+            "faces", default="auto"),
+        Key("outline_tolerance", NOT_NEGATIVE,
+            "Corners within this distance of a simpler outline are dropped; 0 keeps every corner", 0.002, "m",
+            otherwise="a hundredth of a block where outlines have more than 24 corners in the mean, else 0"),
+        Key("overlap_tolerance", POSITIVE, "Overlap of two blocks that is resolved to its midline", 0.001, "m",
+            otherwise="a thousandth of the width of the thinnest block"),
+    ),
+    required=True,
+)  # fmt: skip
+
+PARAMETERS = Section(
+    "geometry.parameters",
+    "Parameters of the layout; blockvis layout takes the same",
+    names=ValueKind("number, text, list or table", {}),
+    example={"span": 4.0, "rise": 1.0, "voussoirs": 15},
+)
+
+ROLES = Section(
+    "roles",
+    "Role of blocks by their name, group (layer) or material, or a pattern of them; it holds over what the file says",
+    names=one_of(solver.ROLES),
+    example={"left springer": "fixed", "right springer": "moving"},
+)
+
+SUPPORTS = Section(
+    "supports",
+    "A support that the drawing does not contain",
+    (
+        Key("name", TEXT, "Name of the support", "ground left", default="support"),
+        Key("role", one_of((solver.FIXED, solver.MOVING)), "Whether the support stands or settles", "moving",
+            default=solver.FIXED),
+        Key("outline", OUTLINE, "Corners in order", [[-0.5, -0.3], [4.0, -0.3], [4.0, 0.0], [-0.5, 0.0]], "m",
+            required=True),
+        Key("material", TEXT, "Material, for [[interfaces]]", "rock", otherwise="none"),
+    ),
+    several=True,
+)  # fmt: skip
+
+MATERIAL = Section(
+    "material",
+    "Blocks and joints for which nothing else is said",
+    (
+        Key("density", POSITIVE, "Density of blocks for which the file has none; of every block of a parametric layout",
+            2000.0, "kg/m³", DENSITY),
+        Key("friction_coefficient", NOT_NEGATIVE, "Coefficient of friction, the tangent of the angle of friction",
+            0.6, default=_FRICTION),
+        *_strength(),
+    ),
+)  # fmt: skip
+
+MATERIALS = Section(
+    "materials.*",
+    "Blocks of one material, by its name in the layout file",
+    (Key("density", POSITIVE, "Density of its blocks, whatever the file says", 2400.0, "kg/m³",
+         otherwise="the file's, else that of [material]"),),
+)  # fmt: skip
+
+INTERFACES = Section(
+    "interfaces",
+    "Joints between two materials",
+    (
+        Key("materials", _TWO_NAMES, "The two materials; the same one twice for joints within it", ["stone", "brick"],
+            required=True),
+        Key("friction_coefficient", NOT_NEGATIVE, "Coefficient of friction of these joints", 0.4, required=True),
+        *_strength(),
+    ),
+    several=True,
+)  # fmt: skip
+
+IMPERFECTION_KEYS = (
+    Key("kind", one_of(tuple(IMPERFECTIONS)),
+        "What scatters: corners (each coordinate, m), friction of each joint, density of each block (both as factors)",
+        "vertices", required=True),
+    *(replace(key, otherwise="0 for vertices, 1 for friction and density") if key.name == "mean" else key
+      for key in DISTRIBUTION_KEYS),
+)  # fmt: skip
+
+IMPERFECTIONS_SECTION = Section(
+    "imperfections",
+    "Random scatter, one table of each kind; joints stay closed and faces plane",
+    (
+        IMPERFECTION_KEYS[0],
+        Key("seed", whole(0), "Of the random numbers; the same seed gives the same blocks", 1, default=0),
+        *IMPERFECTION_KEYS[1:],
+    ),
+    several=True,
+)
+
+SETTLEMENT = Section(
+    "settlement",
+    "How moving supports move; several tables [[settlement]] are phases, one after another",
+    (
+        Key("direction", PAIR, "Direction of the translation; its length does not count", [0.0, -1.0],
+            otherwise="no translation"),
+        Key("rotation_centre", PAIR, "Point about which the supports turn", [2.0, 0.0], "m", otherwise="no rotation"),
+        Key("rotation", NUMBER,
+            "Without a direction 1 for counter-clockwise or -1 for clockwise; with one the angle per distance", 1.0,
+            "rad/m", otherwise="1 with a rotation_centre, else 0"),
+        Key("increment", POSITIVE, "Largest step of the settlement; of a rotation alone in rad", 0.01, "m", 0.01),
+        Key("limit", POSITIVE, "Settlement at which to stop if nothing has collapsed; of a rotation alone in rad", 0.5,
+            "m", 1.0),
+        Key("tolerance", POSITIVE, "Width of the bracket of the collapse; of a rotation alone in rad", 1e-4, "m",
+            otherwise="a hundredth of the increment"),
+        Key("blocks", TEXTS, "Names of the moving supports that take part; the others stand still", ["ground right"],
+            otherwise="all moving supports"),
+    ),
+    several=True,
+)  # fmt: skip
+
+LOADS = Section(
+    "loads",
+    "A load beside self-weight",
+    (
+        Key("kind", one_of(("dead", "live")), "Dead loads act from the start; live loads are scaled by the multiplier",
+            "live", default="dead"),
+        Key("blocks", TEXT, "Name of the free blocks on which it acts, or a pattern", "brick 10-*", default="*"),
+        Key("weight_fraction", PAIR, "Force as a fraction of each block's weight: a horizontal acceleration",
+            [1.0, 0.0], otherwise="none"),
+        Key("force", PAIR, "Force on each of the blocks", [0.0, -500.0], "N", (0.0, 0.0)),
+        Key("point", PAIR, "Point in the drawing at which the force acts", [1.0, 2.0], "m",
+            otherwise="the centroid of each block"),
+        Key("moment", NUMBER, "Moment on each of the blocks, counter-clockwise", 100.0, "N·m", 0.0),
+        Key("pressure", NUMBER, "Pressure on the first faces in the way of direction, or on an edge", 1000.0, "Pa",
+            otherwise="none"),
+        Key("direction", PAIR, "Direction in which the pressure pushes", [1.0, 0.0], default=(0.0, -1.0)),
+        Key("edge", whole(1), "Number of the edge into which the pressure pushes, counter-clockwise from the first "
+            "corner", 2, otherwise="the faces in the way of direction"),
+        Key("positions", _PLACES,
+            "Places x of a live force that moves over what is topmost there", [-1.9, 1.9, 77], "m", otherwise="none"),
+    ),
+    several=True,
+)  # fmt: skip
+
+ANALYSIS = Section(
+    "analysis",
+    "What is asked for, and how increments are found",
+    (
+        Key("kind", one_of(tuple(KINDS)),
+            "Settlement: until equilibrium is lost; limit load: the multiplier of the live loads at failure; pushover: "
+            "the multiplier over a control displacement", "limit load", default=next(iter(KINDS))),
+        *(key for kind in KINDS.values() for key in kind.keys),
+        Key("increments", one_of(solver.INCREMENTS),
+            'How increments are found: "linear program", one per increment (Portioli and Cascini, 2017), or "coulomb", '
+            "the path that Coulomb friction leaves where many joints slide", "coulomb", default=_CONTROLS.increments),
+        Key("event_refinement", whole(1, MOST_STEPS),
+            "Where the mechanism changes, an increment is taken again in steps down to one part in so many", 8,
+            default=_CONTROLS.event_refinement),
+        Key("correctors", whole(1, MOST_STEPS), "Largest number of corrections within an increment", 25,
+            default=_CONTROLS.correctors),
+        Key("falling_frames", whole(0, MOST_STEPS), "Frames of the mechanism after collapse", 40,
+            default=_CONTROLS.falling_frames),
+        Key("trust_region", POSITIVE, "Largest movement of a block within one program", 0.1, "m",
+            otherwise="the block size, or ten increments where that is more"),
+    ),
+)  # fmt: skip
+
+OUTPUT = Section(
+    "output",
+    "What is written beside the results",
+    (Key("animation", _FILM, "Name of the film in the results folder; false for none", "collapse.gif",
+         default="collapse.mp4"),
+     Key("vtu", one_of(("moved", "undeformed")), "Where the points of the VTU files are: where the blocks have moved "
+         "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved")),
+)  # fmt: skip
+
+#: Every table of the case file with its keys.
+SECTIONS = (
+    GEOMETRY,
+    PARAMETERS,
+    ROLES,
+    SUPPORTS,
+    MATERIAL,
+    MATERIALS,
+    INTERFACES,
+    IMPERFECTIONS_SECTION,
+    SETTLEMENT,
+    LOADS,
+    ANALYSIS,
+    *(section for kind in KINDS.values() for section in kind.sections),
+    OUTPUT,
+)

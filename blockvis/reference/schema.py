@@ -1,0 +1,159 @@
+"""JSON schemas of case and study files, with which editors complete and check TOML."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from blockvis.cases import case_keys
+from blockvis.cases.distributions import CUT_OFF, KINDS
+from blockvis.cases.key import Key, Section
+from blockvis.generators import LAYOUTS
+from blockvis.generators.catalogue import described
+from blockvis.studies import study_keys
+
+#: The draft of JSON schema that editors of TOML read.
+DRAFT = "http://json-schema.org/draft-07/schema#"
+
+#: Types of the parameters of layouts as their signatures have them.
+_TYPES = {"int": "integer", "float": "number", "str": "string", "Sequence": "array"}
+
+
+def case_schema() -> dict[str, Any]:
+    """Make the JSON schema of the case file.
+
+    Returns
+    -------
+    dict
+        What the file's keys and the kinds of their values are; whether they fit together, the run says.
+    """
+    return {"$schema": DRAFT, "title": "blockvis case file"} | _case()
+
+
+def study_schema() -> dict[str, Any]:
+    """Make the JSON schema of the study file."""
+    study, parameter, imperfections = study_keys.SECTIONS
+    head = _table(study)
+    head["properties"]["case"] = {
+        "anyOf": [{"type": "string"}, _case()],
+        "description": head["properties"]["case"]["description"],
+    }
+    varied = _table(parameter)
+    varied["allOf"] = [
+        {"anyOf": [{"required": ["values"]}, {"required": ["distribution"]}]},
+        *_distributions(also=_without_distribution(parameter)),
+    ]
+    return {
+        "$schema": DRAFT,
+        "title": "blockvis study file",
+        "type": "object",
+        "properties": {
+            "study": head,
+            "parameters": {
+                "type": "object",
+                "description": parameter.meaning,
+                "additionalProperties": {"anyOf": [{"type": "array", "minItems": 1}, varied]},
+            },
+            "imperfections": _one_or_several(imperfections, _scattered(imperfections)),
+        },
+        "required": ["study"],
+        "additionalProperties": False,
+    }
+
+
+SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {"case": case_schema, "study": study_schema}
+
+
+def _case() -> dict[str, Any]:
+    tables: dict[str, Any] = {}
+    for section in case_keys.SECTIONS:
+        name, _, rest = section.name.partition(".")
+        if rest == "*":
+            tables[name] = {
+                "type": "object",
+                "description": section.meaning,
+                "additionalProperties": _table(section),
+            }
+        elif rest:
+            tables[name]["properties"][rest] = _table(section)
+        elif section is case_keys.IMPERFECTIONS_SECTION:
+            tables[name] = _one_or_several(section, _scattered(section))
+        else:
+            tables[name] = _one_or_several(section, _table(section))
+    tables["geometry"] |= {
+        "oneOf": [{"required": ["file"], "not": {"required": ["parameters"]}}, {"required": ["layout"]}],
+        "allOf": [_parameters(layout) for layout in LAYOUTS],
+    }
+    return {
+        "type": "object",
+        "properties": tables,
+        "required": [section.name for section in case_keys.SECTIONS if section.required],
+        "additionalProperties": False,
+    }
+
+
+def _table(section: Section) -> dict[str, Any]:
+    table: dict[str, Any] = {"type": "object", "description": section.meaning}
+    if section.names is not None:
+        return table | {"additionalProperties": dict(section.names.schema)}
+    table["properties"] = {key.name: _value(key) for key in section.keys}
+    table["additionalProperties"] = False
+    required = [key.name for key in section.keys if key.required]
+    return table | ({"required": required} if required else {})
+
+
+def _value(key: Key) -> dict[str, Any]:
+    unit = f" [{key.unit}]" if key.unit else ""
+    missing = f". If missing: {key.otherwise}" if key.otherwise else ""
+    value = dict(key.kind.schema) | {"description": f"{key.meaning}{unit}{missing}", "examples": [key.example]}
+    if key.default is not None:
+        value["default"] = list(key.default) if isinstance(key.default, tuple) else key.default
+    return value
+
+
+def _one_or_several(section: Section, table: Mapping[str, Any]) -> dict[str, Any]:
+    if not section.several:
+        return dict(table)
+    return {"description": section.meaning, "anyOf": [dict(table), {"type": "array", "items": dict(table)}]}
+
+
+def _scattered(section: Section) -> dict[str, Any]:
+    return _table(section) | {"allOf": _distributions(also=_without_distribution(section))}
+
+
+def _without_distribution(section: Section) -> list[str]:
+    """Names of the keys that do not belong to a distribution."""
+    numbers = {key.name for key in case_keys.DISTRIBUTION_KEYS}
+    return [key.name for key in section.keys if key.name not in numbers]
+
+
+def _distributions(also: Sequence[str]) -> list[dict[str, Any]]:
+    """Say which numbers each distribution takes."""
+    found = []
+    for kind, numbers in KINDS.items():
+        known = [*also, "distribution", *numbers, *(("lower", "upper") if kind in CUT_OFF else ())]
+        found.append(
+            {
+                "if": {"properties": {"distribution": {"const": kind}}, "required": ["distribution"]},
+                "then": {"propertyNames": {"enum": known}},
+            }
+        )
+    return found
+
+
+def _parameters(layout: str) -> dict[str, Any]:
+    """Say which parameters a layout takes."""
+    words, properties = described(layout), {}
+    for name, parameter in inspect.signature(LAYOUTS[layout]).parameters.items():
+        kind, meaning = words.get(name, ("", ""))
+        properties[name] = {"description": f"{kind}. {meaning}".strip(". ")}
+        first = str(parameter.annotation).split("[")[0].split(" |")[0]
+        if first in _TYPES:
+            properties[name]["type"] = _TYPES[first]
+        if parameter.default is not None:
+            properties[name]["default"] = parameter.default
+    return {
+        "if": {"properties": {"layout": {"const": layout}}, "required": ["layout"]},
+        "then": {"properties": {"parameters": {"properties": properties, "additionalProperties": False}}},
+    }

@@ -1,0 +1,143 @@
+"""The tables of keys against the code that reads them: every key, its default, its choices, its example."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import solver
+from blockvis.cases import case_keys, imperfections
+from blockvis.cases.case import case_of
+from blockvis.cases.toml_table import Table
+from blockvis.runs.kinds import KINDS
+from blockvis.studies import study_keys
+from blockvis.studies.study_file import read_study
+
+ROOT = Path(__file__).parents[2]
+
+#: A case with every table: what is read of it is what can be read.
+EVERY_TABLE: dict[str, Any] = {
+    "geometry": {"file": "wall.dxf"},
+    "roles": {"ground": "fixed"},
+    "supports": [{"outline": [[0, 0], [1, 0], [1, 1]]}],
+    "material": {},
+    "materials": {"brick": {"density": 1800.0}},
+    "interfaces": [{"materials": ["brick", "brick"], "friction_coefficient": 0.5}],
+    "imperfections": [{"kind": "friction", "distribution": "lognormal", "deviation": 0.1}],
+    "settlement": [{"direction": [0, -1]}],
+    "loads": [{"kind": "live", "force": [1.0, 0.0]}],
+    "analysis": {"kind": "pushover"},
+    "control": {"block": "brick 1-1"},
+    "output": {},
+}
+
+#: Keys that a table takes as tables of their own.
+TABLES = {"parameters", "roles", "materials"}
+
+
+@pytest.fixture(scope="module")
+def read() -> dict[str, dict[str, tuple[Any, tuple[str, ...]]]]:
+    """Every key that the reader asks a table for, with its default and choices."""
+    found: dict[str, dict[str, tuple[Any, tuple[str, ...]]]] = {}
+    take, text = Table.take, Table.text
+
+    def taken(table: Table, key: str, default: Any = None) -> Any:
+        keys = found.setdefault(table.where, {})
+        keys[key] = (default, keys.get(key, (None, ()))[1])
+        return take(table, key, default)
+
+    def texted(table: Table, key: str, default: str | None = None, *, among: tuple[str, ...] = ()) -> Any:
+        value = text(table, key, default, among=among)
+        found[table.where][key] = (default, tuple(among))
+        return value
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Table, "take", taken)
+        patched.setattr(Table, "text", texted)
+        case_of(EVERY_TABLE, Path("case.toml"))
+    return {where.replace(".brick", ".*"): keys for where, keys in found.items()}
+
+
+SECTIONS = {section.name: section for section in case_keys.SECTIONS}
+READ_AS_TABLE = sorted(name for name, s in SECTIONS.items() if s.keys and name != "imperfections")
+
+
+def test_the_tables_are_those_of_the_reader(read):
+    assert {name.partition(".")[0] for name in SECTIONS} == set(read[""])
+    assert set(EVERY_TABLE) == set(read[""]), "EVERY_TABLE lacks a table"
+
+
+@pytest.mark.parametrize("name", READ_AS_TABLE)
+def test_the_keys_of_a_table_are_those_of_the_reader(read, name):
+    assert {key.name for key in SECTIONS[name].keys} == set(read[name])
+
+
+@pytest.mark.parametrize("name", READ_AS_TABLE)
+def test_defaults_and_choices_are_those_of_the_reader(read, name):
+    for key in SECTIONS[name].keys:
+        default, choices = read[name][key.name]
+        if default is not None and key.name not in TABLES:
+            assert tuple(default) == key.default if isinstance(default, list) else default == key.default, key.name
+        if choices:
+            assert key.choices == choices, key.name
+        assert key.required or key.default is not None or key.otherwise, f"{key.name}: say what holds without it"
+
+
+def test_the_other_choices_are_those_of_the_code():
+    assert SECTIONS["roles"].names.schema["enum"] == list(solver.ROLES)
+    assert SECTIONS["analysis"].key("kind").choices == tuple(KINDS)
+
+
+def test_the_keys_of_imperfections_are_those_that_are_read():
+    known = {key.name for key in case_keys.IMPERFECTIONS_SECTION.keys}
+    numbers = {number for needed in case_keys.DISTRIBUTIONS.values() for number in needed}
+    assert known == {"kind", "seed", "distribution"} | numbers
+    for key in known - {"kind", "seed", "distribution"}:
+        kind = next(kind for kind, needed in case_keys.DISTRIBUTIONS.items() if key in needed)
+        right = {"mean": 1.0, "deviation": 0.1, "lower": 0.5, "upper": 2.0, "mode": 1.0, "alpha": 2.0, "beta": 3.0}
+        values = {number: right[number] for number in case_keys.DISTRIBUTIONS[kind]}
+        imperfections.read_imperfection({"kind": "vertices", "distribution": kind} | values, "case")
+        with pytest.raises(ValueError, match=f"{key}"):
+            imperfections.read_imperfection({"kind": "vertices", "distribution": kind} | values | {key: "x"}, "case")
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.toml")), ids=lambda path: path.name)
+def test_every_key_of_the_examples_is_in_the_tables(path):
+    for name, table in tomllib.loads(path.read_text(encoding="utf-8")).items():
+        for one in table if isinstance(table, list) else [table]:
+            if SECTIONS[name].names is None:
+                assert set(one) <= {key.name for key in SECTIONS[name].keys}
+
+
+def test_the_keys_of_a_study_are_those_that_are_read(tmp_path):
+    """The reader refuses by the lists of the table; each key of it must then be read, not only let through."""
+    (tmp_path / "case.toml").write_text(
+        '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\n', encoding="utf-8"
+    )
+
+    def refused(**head: Any) -> str:
+        with pytest.raises(ValueError) as error:
+            read_study(
+                {
+                    "study": {"case": str(tmp_path / "case.toml")} | head,
+                    "parameters": {"material.friction_coefficient": [0.5]},
+                }
+            )
+        return str(error.value)
+
+    for key in study_keys.STUDY.keys:
+        head = {"method": "grid"} if key.name == "repeats" else {}
+        assert key.name in refused(**head | {key.name: [[]]}), key.name
+    assert "has no 'cases'" in refused(cases=1)
+
+
+def test_every_example_is_a_value_of_its_kind():
+    import jsonschema
+
+    for section in (*case_keys.SECTIONS, *study_keys.SECTIONS):
+        for key in section.keys:
+            jsonschema.validate(key.example, dict(key.kind.schema))
+            if key.default is not None:
+                default = list(key.default) if isinstance(key.default, tuple) else key.default
+                jsonschema.validate(default, dict(key.kind.schema))
