@@ -52,9 +52,9 @@ def test_files_and_rooms_that_contributing_names_exist():
     named = [name for name in re.findall(r"`([\w./]+)`", text) if "/" in name or name.endswith(".py")]
     there = {
         f"/{path.relative_to(ROOT).as_posix()}"
-        for top in ("solver", "blockvis", "tests")
+        for top in ("solver", "blockvis", "tests", "docs", "tools")
         for path in (ROOT / top).rglob("*")
     }
-    there |= {"/solver", "/blockvis", "/.ci/run"}
+    there |= {"/solver", "/blockvis", "/docs", "/.ci/run"}
     assert len(named) > 10
     assert [name for name in named if not any(path.endswith(f"/{name.strip('/')}") for path in there)] == []
