@@ -131,7 +131,12 @@ def write(file: Path) -> None:
     with tempfile.TemporaryDirectory() as cache:
         # Compiled tests that other runs have left do not report what they compare.
         environment = {**os.environ, "PYTHONPYCACHEPREFIX": cache}
-        subprocess.run([sys.executable, __file__, "--here", str(file)], check=True, env=environment)
+        command = [sys.executable, __file__, "--here", str(file)]
+        run = subprocess.run(
+            command, env=environment, capture_output=True, text=True, encoding="utf-8", errors="replace"
+        )
+        if run.returncode:
+            raise SystemExit(f"{run.stdout}{run.stderr}")
 
 
 if __name__ == "__main__":
