@@ -289,9 +289,9 @@ ANALYSIS = Section(
             "the multiplier over a control displacement", "limit load", default=next(iter(KINDS))),
         *(key for kind in KINDS.values() for key in kind.keys),
         Key("increments", one_of(solver.INCREMENTS),
-            'How increments are found: "coulomb", the path that Coulomb friction leaves, or "linear program", one per '
-            "increment (Portioli and Cascini, 2017)", "coulomb", default=_CONTROLS.increments,
-            otherwise='"coulomb"; "linear program" for settlements of more than 500 free blocks'),
+            'How increments are found: "coulomb", the path that friction without lift leaves, or "linear program", one '
+            "per increment (Portioli and Cascini, 2017), of settlements only", "coulomb",
+            otherwise='"coulomb"; of settlements of more than 500 free blocks "linear program"'),
         Key("event_refinement", whole(1, MOST_STEPS),
             "Where the mechanism changes, an increment is taken again in steps down to one part in so many", 8,
             default=_CONTROLS.event_refinement),

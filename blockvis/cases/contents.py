@@ -16,7 +16,7 @@ from .loads import LoadCase
 
 @dataclass(frozen=True)
 class Case:
-    """A checked case file. The keys are those of the file; see the README.
+    """A checked case file. The keys are those of the file; see `docs/cases.md`.
 
     Attributes
     ----------

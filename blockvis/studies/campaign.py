@@ -71,7 +71,7 @@ def study(
     Returns
     -------
     pandas.DataFrame
-        A row per run; see the README for its columns.
+        A row per run; `docs/results.md` names its columns.
 
     Raises
     ------

@@ -91,7 +91,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Study:
-    """A checked study. The keys are those of the study file; see the README.
+    """A checked study. The keys are those of the study file; see `docs/studies.md`.
 
     Attributes
     ----------

@@ -1,0 +1,24 @@
+"""
+Portal with a settling foot
+===========================
+
+A lintel on two columns of blocks; the right foot sinks. By statics each column carries half of the lintel at first,
+and the lintel tilts about its bearings until it slides off.
+"""
+
+import blockvis
+import solver
+from blockvis import generators
+
+portal = generators.portal(span=2.0, height=2.4, column_width=0.5, column_blocks=4, lintel_height=0.5)
+sink = solver.Settlement(direction=(0, -1), increment=0.05, limit=0.6)
+response = solver.settle(portal, sink, friction_coefficient=0.6)
+print(response)
+print(f"reaction at first {response.reaction[0]:.0f} N of {response.total_weight:.0f} N")
+assert response.stop is solver.Status.LIMIT_REACHED
+assert 0.3 < response.reaction[0] / response.total_weight < 0.5 + 1e-9
+
+# %%
+# Forces at the contact points, and what each joint does, after 0.3 m and after 0.6 m.
+blockvis.draw_still(response, 6, "after_300_mm.png")
+blockvis.draw_still(response, len(response.path) - 1, "after_600_mm.png")

@@ -1,0 +1,22 @@
+"""
+Panel in running bond
+=====================
+
+How much of a brick panel hangs on the ground that begins to settle? The kinematics of the cracked wedge give 25/218
+of its weight for this one, friction 0.3.
+"""
+
+import blockvis
+import solver
+from blockvis import generators
+
+panel = generators.panel(nb=3, nc=4, x_s=3.0)
+sink = solver.Settlement(direction=(0, -1), increment=0.02, limit=0.1)
+response = solver.settle(panel, sink, friction_coefficient=0.3)
+share = response.reaction[0] / response.total_weight
+print(f"{share:.6f}, exactly {25 / 218:.6f}")
+assert abs(share - 25 / 218) < 1e-6
+
+# %%
+# A staircase crack climbs from the edge of the ground that settles.
+blockvis.draw_still(response, len(response.path) - 1, "panel.png")
