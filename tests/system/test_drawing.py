@@ -105,6 +105,8 @@ sys.exit(blockvis.cli.main(sys.argv[1:]))
         [sys.executable, "-c", code, "run", str(case), "-o", str(out)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
         env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        # Where the tests run in the background the shell has Ctrl-C ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     assert run.stdout.readline() == "drawing\n"
     time.sleep(0.5)

@@ -42,7 +42,7 @@ def told(page, tmp_path, script, *options, anchor=""):
     asked = tmp_path / "asked.html"
     text = page.read_text(encoding="utf-8")
     asked.write_text(
-        text.replace("</body>\n</html>", ASK.replace("SCRIPT", script) + "</body>\n</html>"), "utf-8", encoding="utf-8"
+        text.replace("</body>\n</html>", ASK.replace("SCRIPT", script) + "</body>\n</html>"), encoding="utf-8"
     )
     body = re.search(r"<body[^>]*>", visited(asked, tmp_path, "--dump-dom", *options, anchor=anchor)).group()
     found = json.loads(html.unescape(re.search(r'data-out="([^"]*)"', body).group(1)))
@@ -300,8 +300,7 @@ def test_axe_finds_nothing(scheme, tmp_path):
     page = write_report(response, tmp_path / "report.html", "# a case\n" * 80)
     axe = AXE.read_text(encoding="utf-8").replace("</script", "<\\/script")
     page.write_text(
-        page.read_text("utf-8", encoding="utf-8").replace("<script id", f"<script>{axe}</script><script id", 1),
-        "utf-8",
+        page.read_text(encoding="utf-8").replace("<script id", f"<script>{axe}</script><script id", 1),
         encoding="utf-8",
     )
     rules = '{ runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"] }'
