@@ -30,7 +30,7 @@ animation = "collapse.gif"
 #: Where two runs may differ, and what makes them the same again.
 TIMINGS = {
     "response.csv": (rb",[^,\n]*\n", rb"\n"),
-    "report.html": (rb"[\d.]+ s</", rb"</"),
+    "report.html": (rb"[\d.]+ s</|\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC", rb"</"),
     "summary.json": (rb'"(seconds|finished)": [^\n]*', rb""),
 }
 
