@@ -36,8 +36,8 @@ TIMINGS = {
 }
 
 
-#: Largest difference of a colour, out of 255, between two encodings of the same picture: 9 were seen.
-SHADES = 24
+#: Mean difference of a colour, out of 255, between two encodings of the same picture; another picture has several.
+SHADES = 0.5
 
 
 def _pictures(path: Path) -> list[np.ndarray]:
@@ -70,7 +70,7 @@ def test_two_runs_write_the_same_bytes_and_can_be_run_again(tmp_path, drawn):
         if name.endswith(".gif"):
             # ffmpeg's palette of a picture may be off by a few shades from one encoding to the next.
             for first, second in zip(_pictures(one / name), _pictures(other / name), strict=True):
-                assert np.abs(first - second).max() <= SHADES
+                assert np.abs(first - second).mean() <= SHADES
         else:
             assert _without_timings(one / name) == _without_timings(other / name), name
 
