@@ -38,7 +38,7 @@ ITERATIONS, FRACTION = 60, 0.99
 BALANCE, EQUATIONS, PRODUCT = 1e-9, 1e-8, 1e-9
 
 #: Mean product of force and distance, in block weights and sizes, at which a solution that converges no further counts.
-PRODUCT_LEFT = 1e-11
+PRODUCT_LEFT = 1e-9
 
 #: Start: distances in parts of a step and an elastic give, forces in mean block weights.
 FIRST_DISTANCE, FIRST_FORCE = 0.1, 0.05
