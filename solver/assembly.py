@@ -174,11 +174,6 @@ class Assembly:
         """Number of blocks, supports included."""
         return len(self.names)
 
-    @property
-    def dimension(self) -> int:
-        """2 for blocks in the plane, 3 in space."""
-        return self.vertices.shape[1]
-
     @cached_property
     def free(self) -> np.ndarray:
         """(n_blocks,) bool array: true where the block is not a support."""

@@ -479,6 +479,9 @@ class Path:
         """Whether no movement whatever lets the supports go on: proved by a linear program without end."""
         if self.model.live is not None:
             return False
+        if self.model.dimension == 3:
+            # What nothing can balance but the supports: forces that press on them without limit.
+            return bool(np.isinf(self.proved(place).bounds.low))
         self.programs += 1
         try:
             solve_program(self.model, place.pose, self.driver.rate(place.s) * length)
@@ -707,7 +710,7 @@ class Path:
 
     def _light_blocks_stand(self, pose: Pose) -> bool:
         """Whether blocks too light for the others' programs stand where the others do."""
-        if self.model.live is not None or not light_blocks(self.model).any():
+        if self.model.live is not None or self.model.dimension == 3 or not light_blocks(self.model).any():
             return True
         self.programs += 1
         return not solve_program(self.model, pose).falling
@@ -773,7 +776,7 @@ class Path:
         length = MECHANISM * self.model.length / self.lever
         before = next((one for one in self.marks if place.s - one.s >= length), None)
         try:
-            if self.model.live is None:
+            if self.model.live is None and self.model.dimension == 2:
                 found = solve_program(self.model, place.pose, self.driver.rate(place.s) * length)
                 if not found.falling:
                     return found.motion / length
