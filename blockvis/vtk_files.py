@@ -7,20 +7,21 @@ from collections.abc import Iterable
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-import pyvista as pv
+from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 from .atomic_files import write_whole
 
 
 def write_vtu(
-    dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True, durable: bool = True
+    dataset: vtkUnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True, durable: bool = True
 ) -> Path:
     """Write a dataset as VTU, whole or not at all.
 
     Parameters
     ----------
-    dataset : pyvista.UnstructuredGrid
+    dataset : vtkUnstructuredGrid
+        As those of pyvista are.
     path : path
         Its folder is made if it does not exist.
     last, durable : bool

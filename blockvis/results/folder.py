@@ -171,16 +171,16 @@ class ResultsFolder:
         """
         from blockvis.vtk_files import write_vtu
 
-        from .datasets import block_dataset, contact_dataset, joint_dataset
+        from .datasets import block_grid, contact_grid, joint_grid
 
         number = len(self.increments)
         folder = self.path / "increments"
-        for part, dataset in (
-            ("blocks", block_dataset(self.assembly, increment, shape=self.shape)),
-            ("contacts", contact_dataset(self.assembly, increment, shape=self.shape)),
-            ("joints", joint_dataset(self.assembly, increment, shape=self.shape, joints=self._movements.joints)),
+        for part, grid in (
+            ("blocks", block_grid(self.assembly, increment, shape=self.shape)),
+            ("contacts", contact_grid(self.assembly, increment, shape=self.shape)),
+            ("joints", joint_grid(self.assembly, increment, shape=self.shape, joints=self._movements.joints)),
         ):
-            write_vtu(dataset, folder / f"{part}_{number:05d}.vtu", last=False)
+            write_vtu(grid, folder / f"{part}_{number:05d}.vtu", last=False)
         write_whole(self._files.file(number), packed_increment(increment))
         self.increments.append(self._files.without_arrays(number, increment))
         self._add_row(number, increment)
