@@ -49,7 +49,11 @@ def write_vtu(
 
 
 def write_pvd(
-    path: str | os.PathLike[str], entries: Iterable[tuple[float, str | os.PathLike[str]]], *, last: bool = True
+    path: str | os.PathLike[str],
+    entries: Iterable[tuple[float, str | os.PathLike[str]]],
+    *,
+    last: bool = True,
+    durable: bool = True,
 ) -> Path:
     """Write the list of files of a time series (PVD), whole or not at all.
 
@@ -58,7 +62,7 @@ def write_pvd(
     path : path
     entries : iterable of (time, file)
         Files as given, relative to the folder of ``path``.
-    last : bool
+    last, durable : bool
         As of :func:`blockvis.atomic_files.whole_file`.
 
     Returns
@@ -76,4 +80,13 @@ def write_pvd(
         "  </Collection>",
         "</VTKFile>",
     ]
-    return write_whole(path, "\n".join(lines) + "\n", last=last)
+    return write_whole(path, "\n".join(lines) + "\n", last=last, durable=durable)
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a VTK file is there to its last tag."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        file.seek(max(path.stat().st_size - 64, 0))
+        return file.read().rstrip().endswith(b"</VTKFile>")
