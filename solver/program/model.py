@@ -97,6 +97,11 @@ class Model:
         """Sum of the loads on the free blocks in units of the program."""
         return float(np.abs(self.scaled_load[self.assembly.free, : self.dimension]).sum())
 
+    @property
+    def live_force(self) -> float:
+        """Resultant of the live loads at a multiplier of 1 [N]; zero without."""
+        return 0.0 if self.live is None else float(np.linalg.norm(self.live[:, : self.dimension].sum(axis=0)))
+
 
 def largest_movement(model: Model, motion: np.ndarray) -> float:
     """Largest movement of a block [m], rotations times the unit of length."""
