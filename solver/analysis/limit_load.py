@@ -40,9 +40,9 @@ FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE = 1e-6, 1e-7
 #: and then at most, near the forces of the lowest, to convergence.
 WANDERING, SETTLING = 40, 100
 
-#: Cost of a change of a normal force in the non-associative programs, in multipliers: it only decides between equals;
-#: the second in space, where solutions are interior ones and a smaller cost is lost in their rounding. It is seen in the
-#: motion, which a last program without it gives.
+#: Cost of a change of a normal force in the non-associative programs, in multipliers: it only decides between equals.
+#: The second in space, where solutions are interior ones and a smaller cost is lost in their rounding; it is seen in
+#: the motion, which a last program without it gives.
 CHANGE_COST, CHANGE_COST_IN_SPACE = 1e-8, 1e-5
 
 
@@ -102,7 +102,8 @@ def limit_load(
 
     Its dual is the kinematic program: minimise - dead · q over mechanisms q with N(q) ≥ μ |T(q)| at every closed
     contact point and live · q = 1. Livesley (1978), https://doi.org/10.1002/nme.1620121207, for the static form; both
-    bounds are recomputed from the forces and from the mechanism. The multiplier is the exact limit load of the model
+    bounds are recomputed from the forces and from the mechanism. In space the forces of a point are in its round cone
+    |T| ≤ μ N, and the program is a conic one. The multiplier is the exact limit load of the model
     with associative flow, and an upper bound for every other flow rule with the same friction.
 
     Cohesion c and compressive strength σ of the interfaces, off by default, give each contact point its part A of the
@@ -120,13 +121,13 @@ def limit_load(
     https://doi.org/10.1016/j.compstruc.2006.02.005: the friction cone of each point is replaced by
     |T| ≤ μ N⁰ + ψ (N - N⁰), with N⁰ out of the normal forces of the programs before and a dilatancy ψ that falls from
     μ to zero. Ours first wanders among equal solutions, which leads to low multipliers, and then settles near the
-    lowest. Where it converges (N = N⁰) the forces obey Coulomb friction and balance the loads, the mechanism does not
-    lift where it slides, and the power of the loads is what friction takes: a complete solution for friction without
-    dilatancy, never above the associative value. It is not proved to be the least: such a structure may have several
-    limit loads, depending on how it was loaded, and may fall below this one. Its two values agree where it has
-    converged, but are no bounds. Convergence is not proved either; "not converged" says so and gives the last
-    program. Where the associative limit load is unbounded, so is what is given here, although friction without
-    dilatancy might slide.
+    lowest; solutions in space are interior ones, which wander less. Where it converges (N = N⁰) the forces obey Coulomb
+    friction and balance the loads, the mechanism does not lift where it slides, and the power of the loads is what
+    friction takes: a complete solution for friction without dilatancy, never above the associative value. It is not
+    proved to be the least: such a structure may have several limit loads, depending on how it was loaded, and may fall
+    below this one. Its two values agree where it has converged, but are no bounds. Convergence is not proved either;
+    "not converged" says so and gives the last program. Where the associative limit load is unbounded, so is what is
+    given here, although friction without dilatancy might slide.
     """
     if flow not in ("associative", "non-associative"):
         raise ValueError(f"flow is '{flow}'; it is 'associative' or 'non-associative'")
@@ -216,9 +217,7 @@ class _Problem:
         # What a unit of normal force costs in multipliers of the scaled live load.
         price = np.zeros(len(contacts))
         if displacement > 0.0:
-            total = float(
-                np.hypot.reduce(live[:, :d], axis=1).sum() + np.hypot.reduce(np.abs(live[:, d:]), axis=1).sum()
-            )
+            total = float(_lengths(live[:, :d]).sum() + _lengths(live[:, d:]).sum())
             price = np.where(contacts.gaps > closed_gap, contacts.gaps, 0.0) / displacement * (size / total)
         return cls(
             assembly=assembly,
@@ -307,11 +306,7 @@ class _Problem:
                 normal = lowest[1]
             state = self._without_dilatancy(normal, dilatancy, start.unbalanced, 0.0 if wandering else change_cost)
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
-            excess = (
-                np.hypot.reduce(np.abs(state.forces[:, 1:]), axis=1)
-                - self.friction * state.forces[:, 0]
-                - self.cohesion
-            )
+            excess = _lengths(state.forces[:, 1:]) - self.friction * state.forces[:, 0] - self.cohesion
             change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
             if (
                 not (wandering or state.falls)
@@ -370,7 +365,7 @@ class _Problem:
         relative[:, 0] += self.price * max(live_power, 0.0)
         drag = self.cohesion if state.drag is None else state.drag
         slope = self.friction if state.drag is None else np.zeros(len(relative))
-        slip, brittle = np.hypot.reduce(np.abs(relative[:, 1:]), axis=1), np.isfinite(self.crushing)
+        slip, brittle = _lengths(relative[:, 1:]), np.isfinite(self.crushing)
         # What crushes may come closer than what is rigid, at the price of its strength.
         closer = np.where(brittle, np.maximum(slope * slip - relative[:, 0], 0.0), 0.0)
         crushed = np.where(brittle, self.crushing, 0.0) * closer
@@ -444,6 +439,11 @@ def limit_load_envelope(
         for x in positions
     )
     return Envelope(positions, limits)
+
+
+def _lengths(vectors: np.ndarray) -> np.ndarray:
+    """(n,) array: lengths of vectors, of a single number its absolute value."""
+    return np.hypot.reduce(np.abs(vectors), axis=1)
 
 
 def checked_live(assembly: Assembly, loads: Loads) -> Loads:

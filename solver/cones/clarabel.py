@@ -10,8 +10,8 @@ import scipy.sparse as sp
 
 from .problem import ConicProgram, ConicSolution, checked, raise_if_proved
 
-#: Ways through Clarabel: (tolerance of gaps and residuals, settings). Each is judged by our own check, so the order is a
-#: matter of speed only. The first asks for two digits more than are needed: they cost an iteration in thirty.
+#: Ways through Clarabel: (tolerance of gaps and residuals, settings). Each is judged by our own check, so the order is
+#: a matter of speed only. The first asks for two digits more than are needed: they cost an iteration in thirty.
 ROUTES: dict[str, tuple[float, dict[str, object]]] = {
     "clarabel": (1e-11, {}),
     "clarabel at 1e-9": (1e-9, {}),
