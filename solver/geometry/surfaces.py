@@ -10,8 +10,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from solver.tolerances import CORNER_TOLERANCE, DRAWN_GAP
+from solver.tolerances import DRAWN_GAP
 
+from .convex_parts import NoParts
+from .flat_faces import ONE_WAY, SLIVER, edges_of, merged_faces, renumbered
 from .polyhedra import Polyhedra
 from .solids import Solids, dot
 
@@ -22,13 +24,6 @@ WELDED = 1e-6
 #: A block with less volume than this fraction of its surface to the power 3/2 is a sheet: double precision leaves about
 #: six digits of its centroid.
 SMALLEST_SHAPE_FACTOR = 1e-9
-
-#: Neighbouring faces within the flatness of one plane are one face where their normals differ by less than this cosine;
-#: slivers, whose normals are rounding, are not asked.
-ONE_WAY = 0.9
-
-#: A face smaller than this fraction of the largest is a sliver.
-SLIVER = 1e-6
 
 #: What a block is in a file: its corners, and the corners around each of its faces.
 Surface = tuple[ArrayLike, Sequence[Sequence[int]]]
@@ -48,7 +43,8 @@ def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
     ------
     ValueError
         Names the block and the place: coordinates that are not finite, a surface that is not closed, in several pieces
-        or without volume, a face that is not plane to a thousandth of the width of its block.
+        or without volume, a face that is not plane to a thousandth of the width of its block, a surface that crosses
+        itself.
     """
     surfaces = [_welded(*_checked(solid, name)) for solid, name in zip(solids, names, strict=True)]
     for name, (vertices, faces) in zip(names, surfaces, strict=True):
@@ -81,8 +77,13 @@ def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
     in_an_edge = np.flatnonzero(np.bincount(joined.corners) == 2)
     split = np.union1d(joined.block_of_face[_coplanar_faces(joined, flatness)], joined.block_of_vertex[in_an_edge])
     for block in split.tolist():
-        surfaces[block] = _merged(surfaces[block], float(flatness[block]))
-    return _joined(surfaces) if len(split) else joined
+        surfaces[block] = merged_faces(surfaces[block], float(flatness[block]))
+    shapes = _joined(surfaces) if len(split) else joined
+    try:
+        _ = shapes.parts
+    except NoParts as error:
+        raise ValueError(f"block {error.block} ('{names[error.block]}') {error.why}") from None
+    return shapes
 
 
 def _checked(solid: Surface, name: str) -> tuple[np.ndarray, list[list[int]]]:
@@ -131,20 +132,11 @@ def _welded(vertices: np.ndarray, faces: list[list[int]]) -> tuple[np.ndarray, l
         same = first[which].tolist()
         faces = [_without_repeats([same[corner] for corner in face]) for face in faces]
         faces = [face for face in faces if len(face) > 2]
-    return _renumbered(vertices, faces)
+    return renumbered(vertices, faces)
 
 
 def _without_repeats(face: list[int]) -> list[int]:
     return [corner for k, corner in enumerate(face) if corner != face[k - 1]]
-
-
-def _renumbered(vertices: np.ndarray, faces: list[list[int]]) -> tuple[np.ndarray, list[list[int]]]:
-    """Leave out the corners of no face."""
-    used = sorted({corner for face in faces for corner in face})
-    if len(used) == len(vertices):
-        return vertices, faces
-    place = {corner: k for k, corner in enumerate(used)}
-    return vertices[used], [[place[corner] for corner in face] for face in faces]
 
 
 def _joined(surfaces: Sequence[tuple[np.ndarray, list[list[int]]]]) -> Polyhedra:
@@ -181,7 +173,7 @@ def _oriented(vertices: np.ndarray, faces: list[list[int]], name: str) -> list[l
             raise ValueError(
                 f"block '{name}': face {k} passes {_place(vertices[twice])} twice; split it into faces without holes"
             )
-        for a, b in _edges(face):
+        for a, b in edges_of(face):
             owners.setdefault((min(a, b), max(a, b)), []).append(k)
     for (a, b), those in owners.items():
         if len(those) != 2:
@@ -196,17 +188,13 @@ def _oriented(vertices: np.ndarray, faces: list[list[int]], name: str) -> list[l
         turned.setdefault(seed, False)
         while queue:
             k = queue.pop()
-            for a, b in _edges(faces[k]):
+            for a, b in edges_of(faces[k]):
                 first, second = owners[min(a, b), max(a, b)]
                 other = second if first == k else first
                 if other not in turned:
-                    turned[other] = turned[k] != ((a, b) in _edges(faces[other]))
+                    turned[other] = turned[k] != ((a, b) in edges_of(faces[other]))
                     queue.append(other)
     return [face[::-1] if turned[k] else face for k, face in enumerate(faces)]
-
-
-def _edges(face: Sequence[int]) -> list[tuple[int, int]]:
-    return [(face[k - 1], face[k]) for k in range(len(face))]
 
 
 def _place(point: np.ndarray) -> str:
@@ -255,76 +243,3 @@ def _coplanar_faces(solids: Solids, flatness: np.ndarray) -> np.ndarray:
     areas = solids.face_areas
     largest = np.maximum.reduceat(areas, solids.faces_of_block[:-1])
     return np.unique(np.append(face[same], np.flatnonzero(areas <= SLIVER * largest[solids.block_of_face])))
-
-
-def _merged(surface: tuple[np.ndarray, list[list[int]]], flatness: float) -> tuple[np.ndarray, list[list[int]]]:
-    """One face of neighbouring ones in one plane, and no corner in the middle of an edge.
-
-    Parameters
-    ----------
-    surface : (vertices, faces)
-    flatness : float [m]
-        Corners may be so far out of the plane.
-    """
-    vertices, faces = surface
-    areas = np.array([_area(vertices[face]) for face in faces])
-    sizes = np.linalg.norm(areas, axis=1)
-    owner = {edge: k for k, face in enumerate(faces) for edge in _edges(face)}
-    group = [-1] * len(faces)
-    loops: list[list[int]] = []
-    for seed in np.argsort(-sizes, kind="stable").tolist():
-        if group[seed] >= 0:
-            continue
-        group[seed] = seed
-        members, queue = [seed], [seed]
-        normal, middle = areas[seed] / max(sizes[seed], 1e-300), vertices[faces[seed]].mean(axis=0)
-        while queue:
-            for a, b in _edges(faces[queue.pop()]):
-                other = owner[b, a]
-                sliver = sizes[other] <= SLIVER * sizes[seed]
-                same_way = sliver or areas[other] @ normal > ONE_WAY * sizes[other]
-                flat = np.abs((vertices[faces[other]] - middle) @ normal).max() <= flatness
-                if group[other] < 0 and same_way and flat:
-                    group[other] = seed
-                    members.append(other)
-                    queue.append(other)
-        outline = _outline([faces[k] for k in members])
-        loops += [faces[k] for k in members] if outline is None else [outline]
-    return _renumbered(vertices, _without_straight_corners(vertices, loops))
-
-
-def _area(points: np.ndarray) -> np.ndarray:
-    arms = points - points[0]
-    return np.cross(arms[1:-1], arms[2:]).sum(axis=0) / 2.0
-
-
-def _outline(faces: list[list[int]]) -> list[int] | None:
-    """Corners around faces that lie side by side; None where these do not form one simple loop."""
-    edges = {edge for face in faces for edge in _edges(face)}
-    following = {a: b for a, b in edges if (b, a) not in edges}
-    if len(following) != sum((b, a) not in edges for a, b in edges):
-        return None
-    start = next(iter(following), None)
-    if start is None:
-        return None
-    loop = [start]
-    while following[loop[-1]] != start:
-        loop.append(following[loop[-1]])
-    return loop if len(loop) == len(following) else None
-
-
-def _without_straight_corners(vertices: np.ndarray, faces: list[list[int]]) -> list[list[int]]:
-    """Leave out corners between two faces only, in the middle of a straight edge."""
-    count = np.bincount([corner for face in faces for corner in face], minlength=len(vertices))
-    for corner in np.flatnonzero(count == 2).tolist():
-        for face in faces:
-            if corner in face:
-                k = face.index(corner)
-                before, after = vertices[face[k - 1]], vertices[face[(k + 1) % len(face)]]
-                break
-        along = after - before
-        length = float(np.linalg.norm(along))
-        away = float(np.linalg.norm(np.cross(vertices[corner] - before, along)))
-        if away <= CORNER_TOLERANCE * length**2:
-            faces = [[c for c in face if c != corner] for face in faces]
-    return [face for face in faces if len(face) > 2]
