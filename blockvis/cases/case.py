@@ -121,6 +121,9 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     if file is not None and parameters:
         raise geometry.error("parameters", "belong to a layout, not to a file")
     view, ignore, only = _chosen(geometry, file)
+    dimension = geometry.take("dimension", "auto")
+    if isinstance(dimension, bool) or dimension not in (2, 3, "auto"):
+        raise geometry.error("dimension", f'is {shortened(dimension)}; give 2, 3 or "auto"')
     joint = geometry.take("joint_thickness", 0.0)
     if joint != "auto":
         joint = geometry.number("joint_thickness", 0.0)
@@ -159,6 +162,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         parameters=dict(parameters),
         unit=geometry.text("unit"),
         view=view,
+        dimension=dimension,
         ignore=ignore,
         only=only,
         thickness=geometry.number("thickness", positive=True),

@@ -60,6 +60,7 @@ _FILM = ValueKind(
     f"name of a file ending in {', '.join(VIDEO_SUFFIXES)}, or false",
     {"anyOf": [{"type": "string", "pattern": rf"^[^/\\]*({_endings})$"}, {"const": False}]},
 )
+_DIMENSION = ValueKind('2, 3 or "auto"', {"enum": [2, 3, "auto"]})
 _TWO_NAMES = ValueKind("two texts", {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2})
 _PLACES = ValueKind(
     "three numbers: from, to, number of places",
@@ -137,6 +138,8 @@ GEOMETRY = Section(
             otherwise="what the file states, else m"),
         Key("view", one_of(tuple(VIEWS)), "Coordinates to take as x and y, of a drawing in space", "xz",
             otherwise="those in which the bodies lie side by side"),
+        Key("dimension", _DIMENSION, "Whether blocks are in the plane or in space, where gravity acts along -z", 3,
+            otherwise="in space where bodies are not prisms side by side", default="auto"),
         Key("ignore", TEXTS, "Layers, groups, materials and names, or patterns of them, to leave out",
             ["axes", "dim*"], default=()),
         Key("only", TEXTS, "Layers, groups, materials and names, or patterns of them, beside which all is left out",
