@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,15 @@ class Polyhedra(Solids):
     def size(self, chosen: np.ndarray) -> float:
         """Edge of the cube as large as the mean of the chosen blocks, (n_blocks,) bool, [m]."""
         return float(np.cbrt(self.volumes[chosen].mean()))
+
+    @cached_property
+    def gyration(self) -> np.ndarray:
+        """(n_blocks,) array [m²]: square of the radius of gyration of each block, the mean about all axes."""
+        return np.asarray(np.trace(self.inertia, axis1=1, axis2=2) / (3.0 * self.volumes))
+
+    def shifted(self, by: np.ndarray) -> Polyhedra:
+        """Move the drawing by (3,) [m]."""
+        return replace(self, vertices=self.vertices + by)
 
     @cached_property
     def _own(self) -> np.ndarray:
