@@ -18,6 +18,7 @@ from blockvis.layout.units import doubt
 from blockvis.suggestions import nearest
 
 from .contents import Case
+from .coordinates import check_coordinates
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
 
@@ -73,6 +74,7 @@ def case_assembly(case: Case) -> solver.Assembly:
             f'{case.source}: no block is a moving support; give one of these the role "moving" under [roles] or add '
             f"[[supports]]: {', '.join(groups)}"
         )
+    check_coordinates(case, assembly)
     _note_numbers(assembly, case.source)
     _note_units(case, assembly)
     return imperfect(assembly, case.imperfections)

@@ -24,6 +24,8 @@ from .key import (
     POSITIVE,
     TEXT,
     TEXTS,
+    TRIPLE,
+    VECTOR,
     Key,
     Section,
     ValueKind,
@@ -60,7 +62,8 @@ _FILM = ValueKind(
     f"name of a file ending in {', '.join(VIDEO_SUFFIXES)}, or false",
     {"anyOf": [{"type": "string", "pattern": rf"^[^/\\]*({_endings})$"}, {"const": False}]},
 )
-_DIMENSION = ValueKind('2, 3 or "auto"', {"enum": [2, 3, "auto"]})
+_DIMENSION = ValueKind('2, 3 or "auto"', {"anyOf": [{"enum": [2, 3]}, {"const": "auto"}]})
+_MOMENT = ValueKind("number, in space three", {"anyOf": [NUMBER.schema, TRIPLE.schema]})
 _TWO_NAMES = ValueKind("two texts", {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2})
 _PLACES = ValueKind(
     "three numbers: from, to, number of places",
@@ -181,8 +184,9 @@ SUPPORTS = Section(
         Key("name", TEXT, "Name of the support", "ground left", default="support"),
         Key("role", one_of((solver.FIXED, solver.MOVING)), "Whether the support stands or settles", "moving",
             default=solver.FIXED),
-        Key("outline", OUTLINE, "Corners in order", [[-0.5, -0.3], [4.0, -0.3], [4.0, 0.0], [-0.5, 0.0]], "m",
-            required=True),
+        Key("outline", OUTLINE, "Corners in order; in space those of its plan",
+            [[-0.5, -0.3], [4.0, -0.3], [4.0, 0.0], [-0.5, 0.0]], "m", required=True),
+        Key("levels", PAIR, "In space, z of its bottom and top", [-0.3, 0.0], "m", otherwise="required in space"),
         Key("material", TEXT, "Material, for [[interfaces]]", "rock", otherwise="none"),
     ),
     several=True,
@@ -242,12 +246,17 @@ SETTLEMENT = Section(
     "settlement",
     "How moving supports move; several tables [[settlement]] are phases, one after another",
     (
-        Key("direction", PAIR, "Direction of the translation; its length does not count", [0.0, -1.0],
+        Key("direction", VECTOR, "Direction of the translation; its length does not count", [0.0, -1.0],
             otherwise="no translation"),
-        Key("rotation_centre", PAIR, "Point about which the supports turn", [2.0, 0.0], "m", otherwise="no rotation"),
+        Key("rotation_centre", VECTOR, "Point about which the supports turn", [2.0, 0.0], "m",
+            otherwise="no rotation"),
+        Key("rotation_axis", TRIPLE, "In space, the axis about which the supports turn, counter-clockwise seen from "
+            "its tip", [0.0, 1.0, 0.0], otherwise="no rotation; required in space with a rotation_centre"),
         Key("rotation", NUMBER,
             "Without a direction 1 for counter-clockwise or -1 for clockwise; with one the angle per distance", 1.0,
             "rad/m", otherwise="1 with a rotation_centre, else 0"),
+        Key("radial_from", PAIR, "In space, instead of a direction: x and y of a vertical axis from which each support "
+            "moves away, level", [0.0, 0.0], "m", otherwise="no radial motion"),
         Key("increment", POSITIVE, "Largest step of the settlement; of a rotation alone in rad", 0.01, "m", 0.01),
         Key("limit", POSITIVE, "Settlement at which to stop if nothing has collapsed; of a rotation alone in rad", 0.5,
             "m", 1.0),
@@ -266,12 +275,13 @@ LOADS = Section(
         Key("kind", one_of(("dead", "live")), "Dead loads act from the start; live loads are scaled by the multiplier",
             "live", default="dead"),
         Key("blocks", TEXT, "Name of the free blocks on which it acts, or a pattern", "brick 10-*", default="*"),
-        Key("weight_fraction", PAIR, "Force as a fraction of each block's weight: a horizontal acceleration",
+        Key("weight_fraction", VECTOR, "Force as a fraction of each block's weight: a horizontal acceleration",
             [1.0, 0.0], otherwise="none"),
-        Key("force", PAIR, "Force on each of the blocks", [0.0, -500.0], "N", (0.0, 0.0)),
-        Key("point", PAIR, "Point in the drawing at which the force acts", [1.0, 2.0], "m",
+        Key("force", VECTOR, "Force on each of the blocks", [0.0, -500.0], "N", (0.0, 0.0)),
+        Key("point", VECTOR, "Point in the drawing at which the force acts", [1.0, 2.0], "m",
             otherwise="the centroid of each block"),
-        Key("moment", NUMBER, "Moment on each of the blocks, counter-clockwise", 100.0, "N·m", 0.0),
+        Key("moment", _MOMENT, "Moment on each of the blocks, counter-clockwise; in space about x, y and z", 100.0,
+            "N·m", 0.0),
         Key("pressure", NUMBER, "Pressure on the first faces in the way of direction, or on an edge", 1000.0, "Pa",
             otherwise="none"),
         Key("direction", PAIR, "Direction in which the pressure pushes", [1.0, 0.0], default=(0.0, -1.0)),
