@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,6 +72,9 @@ class Settlement:
         Names of the moving supports that take part; all by default, the others stand still in this phase.
     stops : sequence of float [m or rad]
         Settlements that no step goes across: the path has an increment at each of them that it reaches.
+    profile : mapping of str to (float, float, float), optional [m, m, rad]
+        Instead of one motion for all: how each support, by its name, moves and turns about its own centroid. Only the
+        proportions count: s is the largest displacement of a centroid, or the largest angle where none moves.
     """
 
     direction: Sequence[float] | None = None
@@ -82,10 +85,13 @@ class Settlement:
     tolerance: float | None = None
     blocks: tuple[str, ...] | None = None
     stops: tuple[float, ...] = ()
+    profile: Mapping[str, Sequence[float]] | None = None
 
     def __post_init__(self) -> None:
         """Check the values; make the direction a unit vector, and the rotation without one a sign."""
-        if self.direction is None and self.rotation_centre is None:
+        if self.profile is not None:
+            self._check_profile()
+        elif self.direction is None and self.rotation_centre is None:
             raise ValueError("a settlement needs a direction, or a rotation_centre and rotation")
         for name in ("direction", "rotation_centre"):
             if getattr(self, name) is not None:
@@ -102,6 +108,27 @@ class Settlement:
         if self.rotation_centre is not None and self.direction is None:
             object.__setattr__(self, "rotation", float(np.sign(self.rotation)))
         self._check_steps()
+
+    def _check_profile(self) -> None:
+        """Scale the profile so that its largest displacement, or angle where nothing is displaced, is 1."""
+        if self.direction is not None or self.rotation_centre is not None or self.blocks is not None:
+            raise ValueError(
+                "a settlement with a profile has its supports and motions; give no direction, centre or blocks"
+            )
+        motions = {name: np.asarray(motion, dtype=float) for name, motion in (self.profile or {}).items()}
+        for name, motion in motions.items():
+            if motion.shape != (3,) or not np.isfinite(motion).all():
+                raise ValueError(f"settlement profile of '{name}' is {motion.tolist()}; give [dx, dy, rotation]")
+        table = np.array(list(motions.values())).reshape(-1, 3)
+        largest = float(np.hypot(table[:, 0], table[:, 1]).max(initial=0.0)) or float(
+            np.abs(table[:, 2]).max(initial=0)
+        )
+        if largest == 0.0:
+            raise ValueError("the settlement profile moves no support; give one of them a displacement or a rotation")
+        # What is scaled already, as when it is read from a summary, keeps its last digits.
+        largest = 1.0 if abs(largest - 1.0) < 1e-12 else largest
+        scaled = {name: tuple((motion / largest).tolist()) for name, motion in motions.items()}
+        object.__setattr__(self, "profile", scaled)
 
     def _check_steps(self) -> None:
         if self.tolerance is None:
@@ -122,14 +149,17 @@ class Settlement:
     @property
     def unit(self) -> str:
         """Unit of the parameter s: "m", or "rad" for a pure rotation."""
+        if self.profile is not None:
+            return "m" if any(motion[0] or motion[1] for motion in self.profile.values()) else "rad"
         return "rad" if self.direction is None else "m"
 
     def taking_part(self, assembly: Assembly) -> np.ndarray:
         """(n_blocks,) bool array: the supports that this settlement moves."""
-        if self.blocks is None:
+        blocks = self.blocks if self.profile is None else tuple(self.profile)
+        if blocks is None:
             return assembly.moving
         chosen = np.zeros(assembly.n_blocks, dtype=bool)
-        chosen[[assembly.index(name) for name in self.blocks]] = True
+        chosen[[assembly.index(name) for name in blocks]] = True
         return chosen & assembly.moving
 
     def displaced(self, assembly: Assembly, start: Pose, s: float) -> Pose:
@@ -138,8 +168,11 @@ class Settlement:
         Rotations follow the true arc about the (travelling) centre.
         """
         part = self.taking_part(assembly)
-        travel, angle, centre = self._motion(s)
         positions, rotations = start.positions.copy(), start.rotations.copy()
+        if self.profile is not None:
+            rate = self.rate(assembly, start, s)
+            return Pose(positions + s * rate[:, :2], rotations + s * rate[:, 2:])
+        travel, angle, centre = self._motion(s)
         turn = rotation_matrices(np.array([[angle]]))[0]
         positions[part] = centre + travel + (start.positions[part] - centre) @ turn.T
         rotations[part] += angle
@@ -148,8 +181,12 @@ class Settlement:
     def rate(self, assembly: Assembly, start: Pose, s: float) -> np.ndarray:
         """(n_blocks, 3) array: velocity of each support per unit of s, at s; zero for other blocks."""
         part = self.taking_part(assembly)
-        _, angle, centre = self._motion(s)
         rate = np.zeros((assembly.n_blocks, 3))
+        if self.profile is not None:
+            for name, motion in self.profile.items():
+                rate[assembly.index(name)] = motion
+            return np.where(part[:, None], rate, 0.0)
+        _, angle, centre = self._motion(s)
         direction = np.zeros(2) if self.direction is None else np.asarray(self.direction)
         rate[part, :2] = direction
         if self.rotation_centre is not None:

@@ -24,6 +24,7 @@ from .case_keys import MOST_STEPS
 from .contents import Case
 from .imperfections import Imperfection, read_imperfection
 from .loads import LoadCase
+from .profiles import Profile, read_profile
 from .toml_table import Table, is_number, shortened, toml_value
 from .value_paths import parse_path, put
 
@@ -138,6 +139,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         densities[name] = one.number("density", positive=True)
         one.finish()
     analysis = top.table("analysis")
+    motions = [_settlement(entry) for entry in top.tables("settlement")]
     kind = KINDS[analysis.text("kind", next(iter(KINDS)), among=tuple(KINDS))]
     # Every kind reads its keys: one that is given to another kind is named, not ignored.
     settings = {name: known.read(top, analysis) for name, known in KINDS.items()}
@@ -174,7 +176,8 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         **_strength(material),
         interfaces=dict(_interface(entry) for entry in top.tables("interfaces")),
         imperfections=_imperfections(top),
-        settlements=tuple(_settlement(entry) for entry in top.tables("settlement")),
+        settlements=tuple(settlement for settlement, _ in motions),
+        profiles=tuple(profile for _, profile in motions),
         loads=tuple(_load(entry) for entry in top.tables("loads")),
         analysis=kind.name,
         settings=settings[kind.name],
@@ -280,7 +283,8 @@ def _imperfections(top: Table) -> tuple[Imperfection, ...]:
     return tuple(found.values())
 
 
-def _settlement(table: Table) -> solver.Settlement:
+def _settlement(table: Table) -> tuple[solver.Settlement, Profile | None]:
+    """Read a settlement, and its profile along x, of which only the assembly can make motions of supports."""
     blocks = table.take("blocks")
     if blocks is not None:
         blocks = tuple([blocks] if isinstance(blocks, str) else blocks if isinstance(blocks, (list, tuple)) else [None])
@@ -294,6 +298,7 @@ def _settlement(table: Table) -> solver.Settlement:
         "limit": table.number("limit", 1.0, positive=True),
         "tolerance": table.number("tolerance", positive=True),
     }
+    profile = read_profile(table)
     table.finish()
     if keys["limit"] / keys["increment"] > MOST_STEPS:
         raise table.error(
@@ -301,10 +306,19 @@ def _settlement(table: Table) -> solver.Settlement:
             f"is {keys['increment']:g}: {keys['limit'] / keys['increment']:.3g} of them make the limit of "
             f"{keys['limit']:g}; at most {MOST_STEPS} do",
         )
+    if profile is not None:
+        taken = ["rotation_centre", "rotation", *(("direction", "blocks") if isinstance(profile, dict) else ())]
+        for key in taken:
+            if table.values.get(key) is not None:
+                raise table.error(key, "does not go with this profile, which says how each support moves")
+    if isinstance(profile, Profile):
+        keys["direction"] = keys["direction"] or (0.0, -1.0)
     if keys["rotation"] is None:
         keys["rotation"] = 1.0 if keys["rotation_centre"] is not None else 0.0
     try:
-        return solver.Settlement(**keys, blocks=blocks)
+        if isinstance(profile, dict):
+            return solver.Settlement(**keys, profile=profile), None
+        return solver.Settlement(**keys, blocks=blocks), profile
     except ValueError as error:
         raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 

@@ -49,6 +49,26 @@ def _in_any_letters(words: tuple[str, ...]) -> str:
     return "|".join("".join(map(accepted, word)) for word in words)
 
 
+_PROFILE = ValueKind(
+    "table: kind, centre, inflection, depth; points; or supports",
+    {
+        "type": "object",
+        "properties": {
+            "kind": {"enum": ["gaussian", "points", "supports"]},
+            "centre": NUMBER.schema,
+            "inflection": POSITIVE.schema,
+            "depth": NUMBER.schema,
+            "points": {"type": "array", "items": PAIR.schema, "minItems": 2},
+            "supports": {
+                "type": "object",
+                "additionalProperties": {
+                    "type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3
+                },
+            },
+        },
+        "additionalProperties": False,
+    },
+)  # fmt: skip
 _LAYOUT = ValueKind(
     "text",
     {"anyOf": [{"enum": list(LAYOUTS)}, {"type": "string", "pattern": f"^({_in_any_letters(tuple(LAYOUTS))})$"}]},
@@ -250,6 +270,9 @@ SETTLEMENT = Section(
             "m", 1.0),
         Key("tolerance", POSITIVE, "Width of the bracket of the collapse; of a rotation alone in rad", 1e-4, "m",
             otherwise="a hundredth of the increment"),
+        Key("profile", _PROFILE, "How far each support goes, in proportion: a Gaussian trough or heave along x, points "
+            "of a table, or one vector and rotation per support; s is the largest displacement of a support's centroid",
+            {"kind": "gaussian", "centre": 1.5, "inflection": 0.8}, "m", otherwise="all go as far"),
         Key("blocks", TEXTS, "Names of the moving supports that take part; the others stand still", ["ground right"],
             otherwise="all moving supports"),
     ),

@@ -12,6 +12,7 @@ import solver
 
 from .imperfections import Imperfection
 from .loads import LoadCase
+from .profiles import Profile
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class Case:
         Name of the kind of analysis.
     settings : optional
         What that kind has read from its own keys; see :meth:`blockvis.runs.kind.AnalysisKind.read`.
+    profiles : tuple of Profile or None
+        Of the settlements along x; :func:`blockvis.cases.build.case_settlements` makes motions of supports of them.
     vtu : {"moved", "undeformed"}
         Shape of the blocks in the VTU files.
     """
@@ -56,6 +59,7 @@ class Case:
     interfaces: Mapping[tuple[str, str], solver.InterfaceLaw] = field(default_factory=dict)
     imperfections: tuple[Imperfection, ...] = ()
     settlements: tuple[solver.Settlement, ...] = ()
+    profiles: tuple[Profile | None, ...] = ()
     loads: tuple[LoadCase, ...] = ()
     analysis: str = "settlement"
     settings: Any = None
