@@ -22,6 +22,7 @@ from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .case_keys import MOST_STEPS
 from .contents import Case
+from .explain_settings import read_explain
 from .imperfections import Imperfection, read_imperfection
 from .loads import LoadCase
 from .profiles import Profile, read_profile
@@ -49,6 +50,12 @@ def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
         the remedy.
     """
     path = Path(path)
+    text = case_file_text(path)
+    return parse_case(changed_text(text, path, changes) if changes else text, path)
+
+
+def case_file_text(path: Path) -> str:
+    """Read the text of a case file; raises ``ValueError`` where it is missing, a layout, or no text."""
     if not path.is_file():
         near = files_like(path, "*.toml", or_any=True)
         hint = f"; beside it are {', '.join(near)}" if near else ""
@@ -60,12 +67,11 @@ def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
         )
     try:
         # Editors of Windows begin a file with a mark of its encoding.
-        text = path.read_text(encoding="utf-8-sig")
+        return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(
             f"{path}: is not a text file in UTF-8 ({error.reason} at byte {error.start}); save it in UTF-8"
         ) from None
-    return parse_case(changed_text(text, path, changes) if changes else text, path)
 
 
 def changed_text(text: str, source: Path, changes: Sequence[str]) -> str:
@@ -100,14 +106,18 @@ def changed_text(text: str, source: Path, changes: Sequence[str]) -> str:
 
 def parse_case(text: str, source: Path) -> Case:
     """Read a case from the text of a case file; paths in it are relative to the folder of ``source``."""
+    return case_of(parsed_toml(text, source), source, text)
+
+
+def parsed_toml(text: str, source: Path) -> dict[str, Any]:
+    """Parse the text of a case file; raises ``ValueError`` with the place where it is no TOML."""
     try:
-        values = tomllib.loads(text)
+        return tomllib.loads(text)
     except RecursionError:
         raise ValueError(f"{source}: nests lists or tables without end; a case file has a handful of them") from None
     except ValueError as error:
         hint = "; write paths with / or in single quotes" if "\\" in text else ""
         raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"{hint}') from None
-    return case_of(values, source, text)
 
 
 def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
@@ -182,6 +192,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         analysis=kind.name,
         settings=settings[kind.name],
         controls=_controls(analysis, geometry.number("overlap_tolerance", positive=True)),
+        explain=read_explain(top.table("explain")),
         animation=animation or None,
         vtu=output.text("vtu", "moved", among=("moved", "undeformed")),
     )

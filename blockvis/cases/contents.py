@@ -10,6 +10,7 @@ from typing import Any
 
 import solver
 
+from .explain_settings import ExplainSettings
 from .imperfections import Imperfection
 from .loads import LoadCase
 from .profiles import Profile
@@ -31,6 +32,8 @@ class Case:
         What that kind has read from its own keys; see :meth:`blockvis.runs.kind.AnalysisKind.read`.
     profiles : tuple of Profile or None
         Of the settlements along x; :func:`blockvis.cases.build.case_settlements` makes motions of supports of them.
+    explain : ExplainSettings
+        What ``blockvis explain`` looks for; other analyses leave it alone.
     vtu : {"moved", "undeformed"}
         Shape of the blocks in the VTU files.
     """
@@ -64,5 +67,6 @@ class Case:
     analysis: str = "settlement"
     settings: Any = None
     controls: solver.Controls = field(default_factory=solver.Controls)
+    explain: ExplainSettings = field(default_factory=ExplainSettings)
     animation: str | None = "collapse.mp4"
     vtu: str = "moved"
