@@ -70,6 +70,10 @@ class Layout:
         """Number of coordinates: 2."""
         return 2
 
+    def corners(self, block: int) -> np.ndarray:
+        """(n, 2) array [m]: the corners of a block."""
+        return self.outlines[block]
+
     def chosen(self, blocks: Sequence[int] | np.ndarray) -> Layout:
         """Take only these blocks, in this order."""
         keep = [int(i) for i in blocks]
@@ -138,7 +142,9 @@ def standing(layout: Layout, thickness: float) -> SolidLayout:
     depth = np.full(layout.n_blocks, np.nan) if layout.thickness is None else layout.thickness
     depth = np.where(np.isnan(depth), thickness, depth)
     return SolidLayout(
-        solids=tuple(extruded(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)),
+        solids=tuple(
+            extruded(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)
+        ),
         names=layout.names,
         groups=layout.groups,
         roles=layout.roles,
