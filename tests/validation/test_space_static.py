@@ -50,10 +50,10 @@ def on_ground(solids, extent=5.0):
     return solver.Assembly.from_solids([*solids, ground], roles=["free"] * len(solids) + ["fixed"])
 
 
-def limit(assembly, live, friction, flow="associative"):
+def limit(assembly, live, friction, flow="associative", **options):
     """The limit load, proved by its certificate."""
     loads = solver.Loads(solver.self_weight(assembly).dead, live)
-    found = solver.limit_load(assembly, loads=loads, friction_coefficient=friction, flow=flow)
+    found = solver.limit_load(assembly, loads=loads, friction_coefficient=friction, flow=flow, **options)
     assert found.certificate.equilibrium_residual < 1e-8
     assert found.certificate.complementarity < 1e-8
     assert found.certificate.kinematic_violation < 1e-8
@@ -227,3 +227,87 @@ def test_cones_and_cuts_agree_on_a_wall(monkeypatch):
     for other in (cuts, own):
         assert other.exists
         np.testing.assert_allclose([other.low, other.high], [round_cones.low, round_cones.high], rtol=EXACT)
+
+
+TURNED = (np.sqrt(2.0) + np.arcsinh(1.0)) / 6.0
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+def test_a_turned_cube_under_a_uniform_pressure(flow):
+    """μ N a (√2 + asinh 1) / 6, a little more than half of what its corners resist; says which law was used."""
+    assembly = on_ground([box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))])
+    live = np.zeros((2, 6))
+    live[0, 5] = assembly.masses[0] * solver.GRAVITY
+    found = limit(assembly, live, 0.5, flow, torsion="uniform")
+    assert pytest.approx(0.191299, abs=1e-6) == 0.5 * TURNED
+    assert found.multiplier == pytest.approx(0.5 * TURNED, rel=EXACT)
+    assert found.torsion == "uniform"
+    assert "uniform torsion" in str(found)
+    # What is reported at the points has the same resultants.
+    on_block = solver.block_forces(found.contacts, found.pose, found.forces)[0]
+    np.testing.assert_allclose(
+        on_block, np.array([0, 0, 1, 0, 0, -found.multiplier]) * live[0, 5], atol=1e-6 * live[0, 5]
+    )
+
+
+@pytest.mark.parametrize("eccentricity", [0.0, 0.2, 1.0])
+def test_a_cube_pushed_beside_its_middle_under_a_uniform_pressure(eccentricity):
+    """Shear and torsion together: α √(1 + (e / r)²) = μ."""
+    assembly = on_ground([box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))])
+    weight = assembly.masses[0] * solver.GRAVITY
+    live = solver.point_load(assembly, 0, (weight, 0.0, 0.0), point=(0.0, eccentricity, 0.0))
+    found = limit(assembly, live, 0.4, torsion="uniform")
+    assert found.multiplier == pytest.approx(0.4 / np.hypot(1.0, eccentricity / TURNED), rel=EXACT)
+
+
+def test_a_turned_triangle_and_a_turned_plate():
+    """Far from the origin of the drawing: μ N times the mean distance from the centroid, here by integration."""
+    outlines = [
+        np.array([[np.cos(t), np.sin(t)] for t in np.radians([90.0, 210.0, 330.0])]),
+        np.array([[-1.5, -0.25], [1.5, -0.25], [1.5, 0.25], [-1.5, 0.25]]),
+    ]
+    for outline in outlines:
+        assembly = on_ground([prism((outline + np.array([0.7, 0.3])).tolist(), 0.0, 0.5)])
+        live = np.zeros((2, 6))
+        live[0, 5] = assembly.masses[0] * solver.GRAVITY
+        found = limit(assembly, live, 0.5, torsion="uniform")
+        assert found.multiplier == pytest.approx(0.5 * mean_distance(outline), rel=1e-5)
+
+
+def mean_distance(outline, cells=400):
+    """Mean distance of a polygon's points from the origin, its centroid, from the middles of many small triangles."""
+    total = area = 0.0
+    s = (np.arange(cells) + 0.5) / cells
+    for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        across = a + s[:, None] * (b - a)
+        # Along a ray the mean of r with weight r is two thirds of its length.
+        part = abs(a[0] * b[1] - a[1] * b[0]) / 2.0
+        total += part * 2.0 / 3.0 * np.linalg.norm(across, axis=1).mean()
+        area += part
+    return total / area
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+def test_cohesion_and_crushing_of_a_face(flow):
+    """Pushed at its base it slides at μ + c A / W; overturns with a toe that crushes at b / h (σ A / W - 1)."""
+    assembly = on_ground([prism(PRISM, 0.0, 2.0)])
+    weight, area = assembly.masses[0] * solver.GRAVITY, 0.6
+    dead = solver.self_weight(assembly).dead
+    at_base = solver.point_load(assembly, 0, (0.6 * weight, 0.8 * weight, 0.0), point=(0.0, 0.0, 0.0))
+    sticky = Interfaces(InterfaceLaw(0.3, cohesion=0.2 * weight / area))
+    found = solver.limit_load(assembly, loads=solver.Loads(dead, at_base), interfaces=sticky, flow=flow)
+    assert found.multiplier == pytest.approx(0.5, rel=EXACT)
+    brittle = Interfaces(InterfaceLaw(2.0, compressive_strength=1.5 * weight / area))
+    found = solver.limit_load(assembly, loads=solver.Loads(dead, push(assembly, 0.0)), interfaces=brittle, flow=flow)
+    assert found.multiplier == pytest.approx(0.5 * (1.5 - 1.0), rel=EXACT)
+
+
+def test_torsion_of_faces_is_for_blocks_in_space():
+    assembly = on_ground([box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))])
+    loads = solver.Loads(solver.self_weight(assembly).dead, push(assembly, 0.0))
+    with pytest.raises(ValueError, match="torsion is 'exact'; it is 'points' or 'uniform'"):
+        solver.limit_load(assembly, loads=loads, torsion="exact")
+    square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+    flat = solver.Assembly.from_outlines([square])
+    with pytest.raises(ValueError, match="blocks in the plane have none"):
+        solver.limit_load(flat, loads=solver.Loads(np.zeros((1, 3)), np.ones((1, 3))), torsion="uniform")
