@@ -311,3 +311,67 @@ def test_torsion_of_faces_is_for_blocks_in_space():
     flat = solver.Assembly.from_outlines([square])
     with pytest.raises(ValueError, match="blocks in the plane have none"):
         solver.limit_load(flat, loads=solver.Loads(np.zeros((1, 3)), np.ones((1, 3))), torsion="uniform")
+
+
+@pytest.mark.slow
+def test_a_prism_pushed_over():
+    """0.2 × 0.3 × 1, geometry updated: α = tan(atan 0.2 - asin d) at the displacement d of its top above the edge."""
+    assembly = on_ground([box((0.0, 0.0, 0.0), (0.2, 0.3, 1.0))])
+    loads = solver.Loads(solver.self_weight(assembly).dead, push(assembly, 0.0))
+    control = solver.ControlDisplacement(
+        "block 0", (1.0, 0.0, 0.0), point=(0.2, 0.15, 1.0), increment=0.08, limit=0.3, tolerance=1e-3
+    )
+    response = solver.pushover(assembly, control, loads=loads, friction_coefficient=0.7)
+    assert response.stop is solver.Status.COLLAPSED
+    multiplier = np.array([increment.load_multiplier for increment in response.path])
+    assert multiplier == pytest.approx(np.tan(np.arctan(0.2) - np.arcsin(response.settlement)), abs=EXACT)
+    assert response.collapse.displacement == pytest.approx(np.sin(np.arctan(0.2)), abs=1e-3)
+
+
+def test_a_cube_pushed_along_its_diagonal_slides_and_does_not_lift():
+    assembly = on_ground([box((0.0, 0.0, 0.0), (0.5, 0.5, 0.4))])
+    loads = solver.Loads(solver.self_weight(assembly).dead, push(assembly, 45.0))
+    control = solver.ControlDisplacement("block 0", (1.0, 1.0, 0.0), increment=0.1, limit=0.2)
+    response = solver.pushover(assembly, control, loads=loads, friction_coefficient=0.3)
+    assert response.stop is solver.Status.LIMIT_REACHED
+    assert [increment.load_multiplier for increment in response.path] == pytest.approx(
+        [0.3] * len(response.path), abs=EXACT
+    )
+    last = response.path[-1].pose.displacements(assembly)[0]
+    assert last == pytest.approx([0.2 / np.sqrt(2.0), 0.2 / np.sqrt(2.0), 0.0, 0.0, 0.0, 0.0], abs=1e-7)
+
+
+def test_what_a_limit_load_in_space_can_be():
+    """Pressed onto the ground without limit; leaning over and held by its live load; leaning, and not held."""
+    assembly = on_ground([prism(PRISM, 0.0, 2.0)])
+    dead, weight = solver.self_weight(assembly).dead, assembly.masses[0] * solver.GRAVITY
+    down = solver.weight_fraction(assembly, (0.0, 0.1, -1.0), np.array([0]))
+    found = solver.limit_load(assembly, loads=solver.Loads(dead, down))
+    assert found.status is solver.LimitStatus.UNBOUNDED
+    assert found.multiplier == np.inf
+    leaning = dead + solver.point_load(assembly, 0, moment=(0.0, 0.6 * weight, 0.0))
+    back = solver.point_load(assembly, 0, moment=(0.0, -weight, 0.0))
+    found = solver.limit_load(assembly, loads=solver.Loads(leaning, back), friction_coefficient=0.5)
+    assert found.status is solver.LimitStatus.HELD
+    assert found.multiplier == pytest.approx(1.1, rel=EXACT)
+    found = solver.limit_load(assembly, loads=solver.Loads(leaning, push(assembly, 90.0)), friction_coefficient=0.5)
+    assert found.status is solver.LimitStatus.NO_EQUILIBRIUM
+    # It turns over the edge in its way, which is along y.
+    assert found.mechanism[0, 4] > 0.5 * np.abs(found.mechanism[0]).max()
+
+
+def test_blocks_between_a_support_that_presses_and_one_that_does_not_give_way():
+    """Friction and the thrust of a flat arch bound the reaction from below; from above nothing does."""
+    for count in (1, 10):
+        row = [box((k, 0.0, 0.0), (k + 1.0, 1.0, 1.0)) for k in range(count)]
+        sides = [box((-1.0, -1.0, -1.0), (0.0, 2.0, 2.0)), box((count, -1.0, -1.0), (count + 1.0, 2.0, 2.0))]
+        roles = ["free"] * count + ["fixed", "moving"]
+        assembly = solver.Assembly.from_solids([*row, *sides], roles=roles)
+        presses = np.zeros((count + 2, 6))
+        presses[-1, 0] = -1.0
+        found = bounds(assembly, 0.6, presses)
+        weight = count * assembly.masses[0] * solver.GRAVITY
+        assert found.exists
+        # Friction at both ends takes W = 2 μ R; a flat arch of n cubes, as thick as they are high, thrusts with W n / 8.
+        assert -found.high == pytest.approx(max(weight / 1.2, weight * count / 8.0), rel=EXACT)
+        assert found.low == -np.inf
