@@ -372,6 +372,6 @@ def test_blocks_between_a_support_that_presses_and_one_that_does_not_give_way():
         found = bounds(assembly, 0.6, presses)
         weight = count * assembly.masses[0] * solver.GRAVITY
         assert found.exists
-        # Friction at both ends takes W = 2 μ R; a flat arch of n cubes, as thick as they are high, thrusts with W n / 8.
+        # Friction at both ends takes W = 2 μ R; a flat arch of n cubes thrusts with W n / 8.
         assert -found.high == pytest.approx(max(weight / 1.2, weight * count / 8.0), rel=EXACT)
         assert found.low == -np.inf
