@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import solver
+from blockvis import generators
 from solver.cones.solve import CUTS, OWN, solve_cones
 from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose
@@ -328,6 +329,7 @@ def test_a_prism_pushed_over():
     assert response.collapse.displacement == pytest.approx(np.sin(np.arctan(0.2)), abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_cube_pushed_along_its_diagonal_slides_and_does_not_lift():
     assembly = on_ground([box((0.0, 0.0, 0.0), (0.5, 0.5, 0.4))])
     loads = solver.Loads(solver.self_weight(assembly).dead, push(assembly, 45.0))
@@ -375,3 +377,13 @@ def test_blocks_between_a_support_that_presses_and_one_that_does_not_give_way():
         # Friction at both ends takes W = 2 μ R; a flat arch of n cubes thrusts with W n / 8.
         assert -found.high == pytest.approx(max(weight / 1.2, weight * count / 8.0), rel=EXACT)
         assert found.low == -np.inf
+
+
+def test_the_thrust_of_a_dome_whose_springers_begin_to_move_out():
+    """A cap of 15° on 8 lunes of 6 stones, t / R 0.12: H / W = 0.1661226, from the statics of a lune."""
+    stones = generators.dome(lunes=8, courses=6, thickness_ratio=0.12, cap=15.0)
+    out = np.zeros((stones.n_blocks, 6))
+    out[stones.moving, :2] = stones.centroids[stones.moving, :2]
+    out[stones.moving] /= np.linalg.norm(out[stones.moving], axis=1)[:, None]
+    weight = stones.masses[stones.free].sum() * solver.GRAVITY
+    assert bounds(stones, 0.7, out).low / weight == pytest.approx(0.1661226, rel=EXACT)
