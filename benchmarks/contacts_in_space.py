@@ -11,6 +11,7 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import solver
@@ -36,7 +37,7 @@ def wall_of(blocks: int) -> solver.Assembly:
     for course in range(courses):
         shift = 0.5 * (course % 2)
         joints = [0.0, *(length * (k + 1 - shift) for k in range(bricks - 1 + course % 2)), bricks * length]
-        for left, right in zip(joints, joints[1:], strict=False):
+        for left, right in pairwise(joints):
             solids.append(box((left, 0.0, course * height), (right, thickness, (course + 1) * height)))
     return solver.Assembly.from_solids(solids, roles=["fixed"] + ["free"] * (len(solids) - 1))
 

@@ -9,7 +9,6 @@ import solver
 from blockvis import generators
 from solver.kinematics import Pose, moved, moved_vertices, rotation_matrices
 
-
 #: Here coal 3.0.3 gives a polygon of half the area, whose corners are on no edge of the faces.
 LOST_BY_COAL = 4
 
