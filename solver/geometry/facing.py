@@ -21,6 +21,10 @@ FACING = 0.05
 #: Separations that differ by less than this, in widths, are equal: then the faces that oppose each other better count.
 SAME_SEPARATION = 1e-6
 
+#: Others than those that oppose each other best have to do so at least with this cosine: neighbours across a corner,
+#: which touch along an edge alone, open by a right angle in a wall and by a little less in a dome.
+OTHERS_FACING = 0.5
+
 #: Faces of a part that are tried against the one that leads, beside the one that opposes it best.
 OTHERS_TRIED = 6
 
@@ -99,7 +103,7 @@ class FacingParts:
             face_i, face_j = (first, answer) if ours else (answer, first)
             new = (face_i != self.face_i[pair]) | (face_j != self.face_j[pair])
             cosine = dot(faces.normals[face_i], faces.normals[face_j])
-            new &= cosine <= -FACING
+            new &= cosine <= -OTHERS_FACING
             tried.append((pair[new], face_i[new], face_j[new], cosine[new]))
         pair, face_i, face_j, cosine = (np.concatenate(column) for column in zip(*tried, strict=True))
         order = np.lexsort((face_j, face_i, cosine, pair))

@@ -59,7 +59,6 @@ def edge_separations(
     once = np.flatnonzero(np.arange(len(solids.corners)) < solids.twins)
     first = np.searchsorted(once, solids.face_offsets[solids.faces_of_block])
     count = np.diff(first)
-    face = solids.face_of_corner
     apart = np.full(len(i), -np.inf)
     found_own, found_other = np.zeros((2, len(i)), dtype=np.int64)
     for k in alike(count[i], count[j]):
@@ -73,9 +72,13 @@ def edge_separations(
         sides = outward(solids, faces, other)[:, None] - outward(solids, faces, own)[:, :, None]
         sense = np.sign(dot(normal, sides))
         normal, holds = unit(normal) * sense[..., None], holds & (sense != 0.0)
-        for edges, side, axis in ((own, -1.0, 2), (other, 1.0, 1)):
-            for one in (face[edges], face[solids.twins[edges]]):
-                holds &= side * dot(np.expand_dims(faces.normals[one], axis), normal) >= -ALONG
+        for edges, way, side, axis in ((own, along_a, 1.0, 2), (other, along_b, -1.0, 1)):
+            for face, sense in (
+                (solids.face_of_corner[edges], 1.0),
+                (solids.face_of_corner[solids.twins[edges]], -1.0),
+            ):
+                inward = sense * cross(faces.normals[face], way)
+                holds &= side * dot(np.expand_dims(inward, axis), normal) >= -ALONG
         distance = np.where(holds, dot(a[:, :, None] - b[:, None], normal), -np.inf).reshape(len(k), -1)
         best = distance.argmax(axis=1)
         row = np.arange(len(k))
