@@ -174,11 +174,10 @@ def find_points(
 
     tried = np.flatnonzero(pairs.shallow & pairs.face_each_other)
     alone = pairs.shallow & ~pairs.face_each_other
-    found = [
-        measured(*_tips(solids, faces, vertices, pairs[alone], reach)),
-        measured(*_crossed_edges(solids, faces, vertices, pairs[pairs.cosine > OPPOSED], reach)),
-    ]
-    found = [contacts[near(contacts)] for contacts in found]
+    tips = measured(*_tips(solids, faces, vertices, pairs[alone], reach))
+    crossed = measured(*_crossed_edges(solids, faces, vertices, pairs[pairs.cosine > OPPOSED], reach))
+    crossed = crossed[near(crossed)]
+    found = [tips[near(tips)], crossed]
     # Where the faces that oppose each other best do not cover each other, others may.
     left = pairs[tried]
     resolved = np.zeros(len(left), dtype=bool)
@@ -199,13 +198,16 @@ def find_points(
     contacts = joined_contacts(found)
     kind, first, second, _ = contacts.features.T
     contacts = contacts[np.lexsort((second, first, kind))]
-    cut = np.bincount(block_of_part)[np.stack([contacts.block_a, contacts.block_b])] > 1
-    return _once(contacts, cut.any(axis=0), CORNER_TOLERANCE * float(widths.min()))
+    # Parts of one block may have a point in common, and edges across each other a corner of a polygon.
+    several = np.bincount(block_of_part, minlength=len(widths)) > 1
+    several[crossed.block_a] = True
+    twice = several[contacts.block_a] | several[contacts.block_b]
+    return _once(contacts, twice, CORNER_TOLERANCE * float(widths.min()))
 
 
-def _once(contacts: Contacts, cut: np.ndarray, near: float) -> Contacts:
-    """Keep one of several points at one place with one normal, where two parts of a block, ``cut``, meet another."""
-    chosen = np.flatnonzero(cut)
+def _once(contacts: Contacts, twice: np.ndarray, near: float) -> Contacts:
+    """Keep one of several points of two blocks at one place with one normal, among those chosen, (n,) bool."""
+    chosen = np.flatnonzero(twice)
     pairs = (
         cKDTree(contacts.points[chosen]).query_pairs(near, output_type="ndarray") if len(chosen) else np.zeros((0, 2))
     )

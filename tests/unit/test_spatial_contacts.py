@@ -227,3 +227,23 @@ def test_overlaps_are_those_that_share_volume(scene):
         for direction in np.concatenate([directions, -directions])
     )
     assert depth[0] <= ways + 1e-9
+
+
+def test_a_joint_that_is_a_little_warped_is_closed_at_its_corners():
+    lower, faces = box((0, 0, 0), (1, 0.8, 0.5))
+    upper, _ = box((0, 0, 0.5), (1, 0.8, 1.0))
+    lower[6, 2] = upper[2, 2] = 0.5 + 2e-4
+    contacts = found([(lower, faces), (upper, faces)])
+    assert len(contacts) == 4
+    np.testing.assert_allclose(contacts.gaps, 0.0, atol=1e-12)
+
+
+def test_edges_across_each_other_are_one_point():
+    """Two roofs, ridge across ridge, so flat that their flanks cover each other too."""
+    ends = np.array([[-1.0, 0, 0], [1, 0, 0]])
+    flank = np.array([0.0, 1.0, -0.3])
+    lower = np.concatenate([ends, ends + flank, ends + flank * [1, -1, 1]])
+    upper = lower[:, [1, 0, 2]] * [1, 1, -1]
+    contacts = found([hull_of(lower), hull_of(upper)], 1e-6)
+    np.testing.assert_allclose(contacts.points, [[0.0, 0.0, 0.0]], atol=1e-9)
+    np.testing.assert_allclose(np.abs(contacts.frames[:, 0, 2]), 1.0)

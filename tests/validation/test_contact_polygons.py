@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, Voronoi
 
 import solver
 from blockvis import generators
@@ -138,3 +138,26 @@ def test_extruded_structures_have_the_points_of_the_plane(name, size):
         found = rows(solid[np.abs(solid.points[:, 1] - end) < 1e-9], False)
         np.testing.assert_allclose(found, expected, atol=2e-9)
     assert len(solid) == 2 * len(flat)
+
+
+def test_cells_of_space_touch_in_their_common_faces():
+    """A cube cut into the cells around random points, with faces and edges of all sizes: every face, to its area."""
+    random = np.random.default_rng(1)
+    points, n = random.uniform(0.0, 1.0, (120, 3)), 120
+    mirrored = [np.where(np.arange(3) == k, 2 * wall - points, points) for k in range(3) for wall in (0, 1)]
+    cells = Voronoi(np.concatenate([points, *mirrored]))
+    solids = [hull_of(cells.vertices[cells.regions[cells.point_region[k]]]) for k in range(n)]
+    assembly = solver.Assembly.from_solids(solids)
+    assert assembly.shapes.volumes.sum() == pytest.approx(1.0, rel=1e-9)
+    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-7)
+    pairs, joint = contacts.joints()
+    found = dict(zip(map(tuple, pairs.tolist()), np.bincount(joint, contacts.areas), strict=True))
+    expected = {}
+    for pair, ring in zip(cells.ridge_points, cells.ridge_vertices, strict=True):
+        if (pair < n).all():
+            arms = cells.vertices[ring] - cells.vertices[ring[0]]
+            i, j = sorted(pair.tolist())
+            expected[i, j] = np.linalg.norm(np.cross(arms[1:-1], arms[2:]).sum(axis=0)) / 2.0
+    assert set(found) == set(expected)
+    np.testing.assert_allclose([found[pair] for pair in expected], list(expected.values()), atol=1e-9)
+    np.testing.assert_allclose(contacts.gaps, 0.0, atol=1e-9)
