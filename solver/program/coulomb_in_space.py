@@ -22,11 +22,9 @@ from .factors import factorised
 from .step import (
     BALANCE,
     CAREFUL,
-    CORRECTION,
     EQUATIONS,
     FIRST_DISTANCE,
     FIRST_FORCE,
-    FRACTION,
     ITERATIONS,
     LOOK_BACK,
     LOST,
@@ -43,6 +41,13 @@ from .step import (
 
 #: Newton's iterations on the answers of the contact points, and how often a change may be halved that leads away.
 TRIALS, HALVINGS = 25, 6
+
+#: Part of the way to the nearest bound that is gone: less than in the plane, since shear forces that turn about a round
+#: cone soon leave it where they are close to its edge.
+SPARE = 0.9
+
+#: Part of the mean product that is left after as many steps as one looks back, from which on the path leads nowhere.
+STALLED = 0.5
 
 #: Nearest that a point comes to the boundary of its cone, squared, as a part of its axis: keeps the scaling finite.
 INSIDE = 1e-20
@@ -110,6 +115,7 @@ def _followed(
     scale, no_slip = step.size + along, step.shear.T
     gap, slip = step.gap, step.slip.T
     motion, short, recent, lost = np.zeros(len(step.load)), False, [1.0] * LOOK_BACK, 0
+    means: list[float] = []
     for iteration in range(ITERATIONS):
         normal, shear = forces[0], mu * forces[1:]
         gap_error = distances[0] - (gap + across * (normal - step.normal))
@@ -126,6 +132,9 @@ def _followed(
         wrong = max(float(np.abs(gap_error).max()), float(np.abs(slip_error).max()), abs(behind))
         if out < BALANCE and wrong < EQUATIONS * scale and largest < PRODUCT * across:
             return Moved(motion, normal, shear.T, multiplier, iteration, forces, distances, pattern)
+        means.append(mean)
+        if len(means) > LOOK_BACK and out < BALANCE and mean > STALLED * means[-1 - LOOK_BACK]:
+            break
         if sum(part < SHORT for part in recent[-LOOK_BACK:]) >= LOST:
             lost, recent = lost + 1, [1.0] * LOOK_BACK
             if lost > 1:
@@ -136,15 +145,14 @@ def _followed(
         part = newton.longest(found)
         after = _mean(forces + part * found.forces, distances + part * found.distances)
         centring = min(max((after / mean) ** 3, 1e-3), 0.8)
-        most = CORRECTION * mean
-        second = np.clip(found.forces[0] * found.distances[0], -most, most)
-        third = np.clip(_product(newton.scaled(found.forces), newton.unscaled(found.distances[1:])), -most, most)
+        second = found.forces[0] * found.distances[0]
+        third = _product(newton.scaled(found.forces), newton.unscaled(found.distances[1:]))
         if careful or short:
             centring, second, third = (1.0 if short else max(centring, CAREFUL)), 0.0 * second, 0.0 * third
         aims = -_product(newton.middle, newton.middle) - third
         aims[0] += centring * mean
         found = newton.direction(centring * mean - across_products - second, aims, *errors)
-        part = FRACTION * newton.longest(found)
+        part = SPARE * newton.longest(found)
         if not (part > 0.0 and np.isfinite(found.motion).all()):
             break
         short = part < SHORT and not short
