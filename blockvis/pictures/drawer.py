@@ -236,7 +236,7 @@ class Drawer:
             title=title or head,
             detail=note or detail,
             badge=badge or (badge_of(self.response) if falling else FAILED_BADGE if failed else ""),
-            keys=self.keys(),
+            keys=self._keys_of_tints() if blocks_only else self.keys(),
             pixel=self.scene.pixel,
             beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, parameter=s)),
         )
@@ -286,12 +286,7 @@ class Drawer:
     def keys(self) -> list[Key]:
         """Return the legend: what is marked in any of the increments, so that it is the same in all pictures."""
         if self._keys is None:
-            keys = []
-            if self._swing is not None and self._swing.moves:
-                together = int(self._swing.parts.max(initial=-1)) + 1 <= MOST_PARTS
-                colour = palette.PARTS[0] if together else palette.RAMP[5]
-                words = "parts of the last mechanism" if together else "faster in the last mechanism"
-                keys.append(Key("area", words, (int(colour[0]), int(colour[1]), int(colour[2]))))
+            keys = self._keys_of_tints()
             if self.look.joints:
                 seen = self._seen
                 keys += [Key("area", "open joint", palette.OPEN)] if seen.cracks else []
@@ -316,6 +311,15 @@ class Drawer:
                 keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT))
             self._keys = keys
         return self._keys
+
+    def _keys_of_tints(self) -> list[Key]:
+        """Return what the legend says of the colours of the blocks: all of it where only they are drawn."""
+        if self._swing is None or not self._swing.moves:
+            return []
+        together = int(self._swing.parts.max(initial=-1)) + 1 <= MOST_PARTS
+        red, green, blue = palette.PARTS[0] if together else palette.RAMP[5]
+        words = "parts of the last mechanism" if together else "faster in the last mechanism"
+        return [Key("area", words, (int(red), int(green), int(blue)))]
 
     @property
     def many(self) -> bool:

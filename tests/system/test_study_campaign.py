@@ -204,6 +204,7 @@ def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tm
     )
     kept = json.loads((out / "results" / "run_000005" / "summary.json").read_text(encoding="utf-8"))
     assert kept["collapse_displacement"] == pytest.approx(table.loc[5, "collapse_displacement"], abs=1e-12)
+    assert kept["mechanism"] == table.loc[5, "mechanism"], "one word for the mechanism in table and folder"
     response = blockvis.open_results(out / "results" / "run_000005")
     assert response.interfaces.default.friction_coefficient == pytest.approx(table.loc[5, "friction"])
 
