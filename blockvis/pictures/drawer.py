@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
@@ -24,11 +25,13 @@ from .annotations import (
     settlement_arrows,
 )
 from .captions import FAILED_BADGE, FALL_BADGE, badge_of, lost_text, matters, state_text
-from .curves import CurvePanel
 from .flat_scene import Scene, magnified
 from .frame import ColourBar, Key, Sheet, framed
 from .live_load import LiveLoads
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
+
+if TYPE_CHECKING:
+    from .curves import CurvePanel
 
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
@@ -155,7 +158,12 @@ class Drawer:
         bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
         beside = round(0.36 * size[0]) if curve else 0
         self.sheet = Sheet(size, bar, beside)
-        self.panel = CurvePanel(response, _size_of(self.sheet.beside), self.sheet.text) if curve else None
+        self.panel: CurvePanel | None = None
+        if curve:
+            # Figures and axes of matplotlib are loaded where a curve is drawn only.
+            from .curves import CurvePanel
+
+            self.panel = CurvePanel(response, _size_of(self.sheet.beside), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
         frame = frame.holding(self.live.tails)
         fill = palette.block_colours(assembly.materials, assembly.free)

@@ -286,9 +286,12 @@ def test_finished_run_says_so_and_draws_what_is_missing(whole, tmp_path, capsys)
     out = shutil.copytree(whole / "out", tmp_path / "out")
     before = (out / "response.csv").read_bytes()
     assert not (out / "mechanism.png").exists()
+    cut = out / "increments" / "joints_00001.vtu"
+    cut.write_bytes(b"")
     assert main(["run", "--resume", str(out)]) == 0
     assert "had finished (collapsed)" in capsys.readouterr().err
     assert (out / "mechanism.png").stat().st_size > 500
+    assert cut.read_bytes() == (whole / "out" / "increments" / cut.name).read_bytes(), "as a power cut may leave it"
     assert (out / "response.csv").read_bytes() == before
 
 
