@@ -22,8 +22,10 @@ from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .case_keys import MOST_STEPS
 from .contents import Case
+from .explain_settings import read_explain
 from .imperfections import Imperfection, read_imperfection
 from .loads import LoadCase
+from .profiles import Profile, read_profile
 from .toml_table import Table, is_number, shortened, toml_value
 from .value_paths import parse_path, put
 
@@ -48,6 +50,12 @@ def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
         the remedy.
     """
     path = Path(path)
+    text = case_file_text(path)
+    return parse_case(changed_text(text, path, changes) if changes else text, path)
+
+
+def case_file_text(path: Path) -> str:
+    """Read the text of a case file; raises ``ValueError`` where it is missing, a layout, or no text."""
     if not path.is_file():
         near = files_like(path, "*.toml", or_any=True)
         hint = f"; beside it are {', '.join(near)}" if near else ""
@@ -59,12 +67,11 @@ def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
         )
     try:
         # Editors of Windows begin a file with a mark of its encoding.
-        text = path.read_text(encoding="utf-8-sig")
+        return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(
             f"{path}: is not a text file in UTF-8 ({error.reason} at byte {error.start}); save it in UTF-8"
         ) from None
-    return parse_case(changed_text(text, path, changes) if changes else text, path)
 
 
 def changed_text(text: str, source: Path, changes: Sequence[str]) -> str:
@@ -99,14 +106,18 @@ def changed_text(text: str, source: Path, changes: Sequence[str]) -> str:
 
 def parse_case(text: str, source: Path) -> Case:
     """Read a case from the text of a case file; paths in it are relative to the folder of ``source``."""
+    return case_of(parsed_toml(text, source), source, text)
+
+
+def parsed_toml(text: str, source: Path) -> dict[str, Any]:
+    """Parse the text of a case file; raises ``ValueError`` with the place where it is no TOML."""
     try:
-        values = tomllib.loads(text)
+        return tomllib.loads(text)
     except RecursionError:
         raise ValueError(f"{source}: nests lists or tables without end; a case file has a handful of them") from None
     except ValueError as error:
         hint = "; write paths with / or in single quotes" if "\\" in text else ""
         raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"{hint}') from None
-    return case_of(values, source, text)
 
 
 def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
@@ -121,6 +132,9 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     if file is not None and parameters:
         raise geometry.error("parameters", "belong to a layout, not to a file")
     view, ignore, only = _chosen(geometry, file)
+    dimension = geometry.take("dimension", "auto")
+    if isinstance(dimension, bool) or dimension not in (2, 3, "auto"):
+        raise geometry.error("dimension", f'is {shortened(dimension)}; give 2, 3 or "auto"')
     joint = geometry.take("joint_thickness", 0.0)
     if joint != "auto":
         joint = geometry.number("joint_thickness", 0.0)
@@ -138,6 +152,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         densities[name] = one.number("density", positive=True)
         one.finish()
     analysis = top.table("analysis")
+    motions = [_settlement(entry) for entry in top.tables("settlement")]
     kind = KINDS[analysis.text("kind", next(iter(KINDS)), among=tuple(KINDS))]
     # Every kind reads its keys: one that is given to another kind is named, not ignored.
     settings = {name: known.read(top, analysis) for name, known in KINDS.items()}
@@ -159,6 +174,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         parameters=dict(parameters),
         unit=geometry.text("unit"),
         view=view,
+        dimension=dimension,
         ignore=ignore,
         only=only,
         thickness=geometry.number("thickness", positive=True),
@@ -174,11 +190,13 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         **_strength(material),
         interfaces=dict(_interface(entry) for entry in top.tables("interfaces")),
         imperfections=_imperfections(top),
-        settlements=tuple(_settlement(entry) for entry in top.tables("settlement")),
+        settlements=tuple(settlement for settlement, _ in motions),
+        profiles=tuple(profile for _, profile in motions),
         loads=tuple(_load(entry) for entry in top.tables("loads")),
         analysis=kind.name,
         settings=settings[kind.name],
         controls=_controls(analysis, geometry.number("overlap_tolerance", positive=True)),
+        explain=read_explain(top.table("explain")),
         animation=animation or None,
         vtu=output.text("vtu", "moved", among=("moved", "undeformed")),
     )
@@ -240,6 +258,9 @@ def _support(table: Table) -> Mapping[str, Any]:
         "role": table.text("role", solver.FIXED, among=(solver.FIXED, solver.MOVING)),
         "outline": table.take("outline"),
     }
+    levels = table.pair("levels", words="[bottom, top]")
+    if levels is not None:
+        support["levels"] = list(levels)
     if not isinstance(support["outline"], list) or len(support["outline"]) < 3:
         raise table.error("outline", f"is {shortened(support['outline'])}; give at least three corners [[x, y], ...]")
     for corner in support["outline"]:
@@ -280,20 +301,24 @@ def _imperfections(top: Table) -> tuple[Imperfection, ...]:
     return tuple(found.values())
 
 
-def _settlement(table: Table) -> solver.Settlement:
+def _settlement(table: Table) -> tuple[solver.Settlement, Profile | None]:
+    """Read a settlement, and its profile along x, of which only the assembly can make motions of supports."""
     blocks = table.take("blocks")
     if blocks is not None:
         blocks = tuple([blocks] if isinstance(blocks, str) else blocks if isinstance(blocks, (list, tuple)) else [None])
         if not all(isinstance(name, str) for name in blocks):
             raise table.error("blocks", f"is {shortened(table.values['blocks'])}; give names of supports in quotes")
     keys = {
-        "direction": table.pair("direction"),
-        "rotation_centre": table.pair("rotation_centre"),
+        "direction": table.vector("direction"),
+        "rotation_centre": table.vector("rotation_centre"),
+        "rotation_axis": table.triple("rotation_axis"),
         "rotation": table.number("rotation"),
+        "radial_from": table.pair("radial_from"),
         "increment": table.number("increment", 0.01, positive=True),
         "limit": table.number("limit", 1.0, positive=True),
         "tolerance": table.number("tolerance", positive=True),
     }
+    profile = read_profile(table)
     table.finish()
     if keys["limit"] / keys["increment"] > MOST_STEPS:
         raise table.error(
@@ -301,10 +326,19 @@ def _settlement(table: Table) -> solver.Settlement:
             f"is {keys['increment']:g}: {keys['limit'] / keys['increment']:.3g} of them make the limit of "
             f"{keys['limit']:g}; at most {MOST_STEPS} do",
         )
+    if profile is not None:
+        taken = ["rotation_centre", "rotation", *(("direction", "blocks") if isinstance(profile, dict) else ())]
+        for key in taken:
+            if table.values.get(key) is not None:
+                raise table.error(key, "does not go with this profile, which says how each support moves")
+    if isinstance(profile, Profile):
+        keys["direction"] = keys["direction"] or (0.0, -1.0)
     if keys["rotation"] is None:
         keys["rotation"] = 1.0 if keys["rotation_centre"] is not None else 0.0
     try:
-        return solver.Settlement(**keys, blocks=blocks)
+        if isinstance(profile, dict):
+            return solver.Settlement(**keys, profile=profile), None
+        return solver.Settlement(**keys, blocks=blocks), profile
     except ValueError as error:
         raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 
@@ -314,10 +348,10 @@ def _load(table: Table) -> LoadCase:
     load = LoadCase(
         kind=table.text("kind", "dead", among=("dead", "live")),
         blocks=table.text("blocks", "*"),
-        weight_fraction=table.pair("weight_fraction"),
-        force=table.pair("force", (0.0, 0.0)),
-        point=table.pair("point"),
-        moment=table.number("moment", 0.0),
+        weight_fraction=table.vector("weight_fraction"),
+        force=table.vector("force", (0.0, 0.0)),
+        point=table.vector("point"),
+        moment=_moment(table),
         pressure=table.number("pressure"),
         direction=table.pair("direction", (0.0, -1.0)),
         edge=table.whole("edge", 1),
@@ -332,14 +366,23 @@ def _load(table: Table) -> LoadCase:
     if load.edge is not None and "direction" in given:
         raise table.error("direction", "and edge are both given; pressure on an edge is perpendicular to it")
     if load.positions:
-        if load.kind != "live" or load.force == (0.0, 0.0):
+        if load.kind != "live" or not load.has_force:
             raise table.error("positions", 'are those of a live force; give kind = "live" and force = [fx, fy]')
         for key in ("blocks", "weight_fraction", "point", "moment", "pressure"):
             if key in given:
                 raise table.error(key, "does not go with positions: the force acts on the topmost block at each")
-    elif load.weight_fraction is None and load.pressure is None and load.force == (0.0, 0.0) and not load.moment:
+    elif load.weight_fraction is None and load.pressure is None and not (load.has_force or load.has_moment):
         raise table.error("force", "is missing or zero; give force, moment, weight_fraction or pressure")
     return load
+
+
+def _moment(table: Table) -> float | tuple[float, float, float]:
+    """Read a moment: a number, in space three."""
+    if isinstance(table.values.get("moment"), list | tuple):
+        found: tuple[float, float, float] = table.triple("moment")
+        return found
+    moment: float = table.number("moment", 0.0)
+    return moment
 
 
 def _positions(table: Table) -> tuple[float, ...]:

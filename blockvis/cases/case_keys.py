@@ -15,15 +15,19 @@ from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .build import DENSITY, THICKNESS
 from .distributions import KINDS as DISTRIBUTIONS
+from .explain_settings import DIRECTIONS, ExplainSettings
 from .imperfections import IMPERFECTIONS
 from .key import (
     NOT_NEGATIVE,
     NUMBER,
+    NUMBERS,
     OUTLINE,
     PAIR,
     POSITIVE,
     TEXT,
     TEXTS,
+    TRIPLE,
+    VECTOR,
     Key,
     Section,
     ValueKind,
@@ -33,6 +37,7 @@ from .key import (
 
 _FRICTION = solver.InterfaceLaw.friction_coefficient
 _CONTROLS = solver.Controls()
+_EXPLAIN = ExplainSettings()
 
 #: More increments or frames than this are taken for a typing error.
 MOST_STEPS = 1_000_000
@@ -49,6 +54,31 @@ def _in_any_letters(words: tuple[str, ...]) -> str:
     return "|".join("".join(map(accepted, word)) for word in words)
 
 
+_PROFILE = ValueKind(
+    "table: kind, centre, inflection, depth; points; or supports",
+    {
+        "type": "object",
+        "properties": {
+            "kind": {"enum": ["gaussian", "points", "supports"]},
+            "centre": NUMBER.schema,
+            "inflection": POSITIVE.schema,
+            "depth": NUMBER.schema,
+            "points": {"type": "array", "items": PAIR.schema, "minItems": 2},
+            "supports": {
+                "type": "object",
+                "additionalProperties": {
+                    "type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3
+                },
+            },
+        },
+        "additionalProperties": False,
+    },
+)  # fmt: skip
+_TRUE_OR_FALSE = ValueKind("true or false", {"type": "boolean"})
+_GROUPS = ValueKind(
+    "list of names, or of lists of names",
+    {"anyOf": [{"type": "string"}, {"type": "array", "items": TEXTS.schema}]},
+)
 _LAYOUT = ValueKind(
     "text",
     {"anyOf": [{"enum": list(LAYOUTS)}, {"type": "string", "pattern": f"^({_in_any_letters(tuple(LAYOUTS))})$"}]},
@@ -60,6 +90,8 @@ _FILM = ValueKind(
     f"name of a file ending in {', '.join(VIDEO_SUFFIXES)}, or false",
     {"anyOf": [{"type": "string", "pattern": rf"^[^/\\]*({_endings})$"}, {"const": False}]},
 )
+_DIMENSION = ValueKind('2, 3 or "auto"', {"anyOf": [{"enum": [2, 3]}, {"const": "auto"}]})
+_MOMENT = ValueKind("number, in space three", {"anyOf": [NUMBER.schema, TRIPLE.schema]})
 _TWO_NAMES = ValueKind("two texts", {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2})
 _PLACES = ValueKind(
     "three numbers: from, to, number of places",
@@ -137,6 +169,8 @@ GEOMETRY = Section(
             otherwise="what the file states, else m"),
         Key("view", one_of(tuple(VIEWS)), "Coordinates to take as x and y, of a drawing in space", "xz",
             otherwise="those in which the bodies lie side by side"),
+        Key("dimension", _DIMENSION, "Whether blocks are in the plane or in space, where gravity acts along -z", 3,
+            otherwise="in space where bodies are not prisms side by side", default="auto"),
         Key("ignore", TEXTS, "Layers, groups, materials and names, or patterns of them, to leave out",
             ["axes", "dim*"], default=()),
         Key("only", TEXTS, "Layers, groups, materials and names, or patterns of them, beside which all is left out",
@@ -178,8 +212,9 @@ SUPPORTS = Section(
         Key("name", TEXT, "Name of the support", "ground left", default="support"),
         Key("role", one_of((solver.FIXED, solver.MOVING)), "Whether the support stands or settles", "moving",
             default=solver.FIXED),
-        Key("outline", OUTLINE, "Corners in order", [[-0.5, -0.3], [4.0, -0.3], [4.0, 0.0], [-0.5, 0.0]], "m",
-            required=True),
+        Key("outline", OUTLINE, "Corners in order; in space those of its plan",
+            [[-0.5, -0.3], [4.0, -0.3], [4.0, 0.0], [-0.5, 0.0]], "m", required=True),
+        Key("levels", PAIR, "In space, z of its bottom and top", [-0.3, 0.0], "m", otherwise="required in space"),
         Key("material", TEXT, "Material, for [[interfaces]]", "rock", otherwise="none"),
     ),
     several=True,
@@ -239,17 +274,25 @@ SETTLEMENT = Section(
     "settlement",
     "How moving supports move; several tables [[settlement]] are phases, one after another",
     (
-        Key("direction", PAIR, "Direction of the translation; its length does not count", [0.0, -1.0],
+        Key("direction", VECTOR, "Direction of the translation; its length does not count", [0.0, -1.0],
             otherwise="no translation"),
-        Key("rotation_centre", PAIR, "Point about which the supports turn", [2.0, 0.0], "m", otherwise="no rotation"),
+        Key("rotation_centre", VECTOR, "Point about which the supports turn", [2.0, 0.0], "m",
+            otherwise="no rotation"),
+        Key("rotation_axis", TRIPLE, "In space, the axis about which the supports turn, counter-clockwise seen from "
+            "its tip", [0.0, 1.0, 0.0], otherwise="no rotation; required in space with a rotation_centre"),
         Key("rotation", NUMBER,
             "Without a direction 1 for counter-clockwise or -1 for clockwise; with one the angle per distance", 1.0,
             "rad/m", otherwise="1 with a rotation_centre, else 0"),
+        Key("radial_from", PAIR, "In space, instead of a direction: x and y of a vertical axis from which each support "
+            "moves away, level", [0.0, 0.0], "m", otherwise="no radial motion"),
         Key("increment", POSITIVE, "Largest step of the settlement; of a rotation alone in rad", 0.01, "m", 0.01),
         Key("limit", POSITIVE, "Settlement at which to stop if nothing has collapsed; of a rotation alone in rad", 0.5,
             "m", 1.0),
         Key("tolerance", POSITIVE, "Width of the bracket of the collapse; of a rotation alone in rad", 1e-4, "m",
             otherwise="a hundredth of the increment"),
+        Key("profile", _PROFILE, "How far each support goes, in proportion: a Gaussian trough or heave along x, points "
+            "of a table, or one vector and rotation per support; s is the largest displacement of a support's centroid",
+            {"kind": "gaussian", "centre": 1.5, "inflection": 0.8}, "m", otherwise="all go as far"),
         Key("blocks", TEXTS, "Names of the moving supports that take part; the others stand still", ["ground right"],
             otherwise="all moving supports"),
     ),
@@ -263,12 +306,13 @@ LOADS = Section(
         Key("kind", one_of(("dead", "live")), "Dead loads act from the start; live loads are scaled by the multiplier",
             "live", default="dead"),
         Key("blocks", TEXT, "Name of the free blocks on which it acts, or a pattern", "brick 10-*", default="*"),
-        Key("weight_fraction", PAIR, "Force as a fraction of each block's weight: a horizontal acceleration",
+        Key("weight_fraction", VECTOR, "Force as a fraction of each block's weight: a horizontal acceleration",
             [1.0, 0.0], otherwise="none"),
-        Key("force", PAIR, "Force on each of the blocks", [0.0, -500.0], "N", (0.0, 0.0)),
-        Key("point", PAIR, "Point in the drawing at which the force acts", [1.0, 2.0], "m",
+        Key("force", VECTOR, "Force on each of the blocks", [0.0, -500.0], "N", (0.0, 0.0)),
+        Key("point", VECTOR, "Point in the drawing at which the force acts", [1.0, 2.0], "m",
             otherwise="the centroid of each block"),
-        Key("moment", NUMBER, "Moment on each of the blocks, counter-clockwise", 100.0, "N·m", 0.0),
+        Key("moment", _MOMENT, "Moment on each of the blocks, counter-clockwise; in space about x, y and z", 100.0,
+            "N·m", 0.0),
         Key("pressure", NUMBER, "Pressure on the first faces in the way of direction, or on an edge", 1000.0, "Pa",
             otherwise="none"),
         Key("direction", PAIR, "Direction in which the pressure pushes", [1.0, 0.0], default=(0.0, -1.0)),
@@ -313,6 +357,32 @@ OUTPUT = Section(
          "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved")),
 )  # fmt: skip
 
+EXPLAIN = Section(
+    "explain",
+    "What blockvis explain looks for; every key has a default",
+    (
+        Key("supports", _GROUPS, "Supports that may have moved, or groups that moved as one", ["pier", ["left", "right"]],
+            otherwise="each support of the drawing"),
+        Key("directions", ValueKind("list of texts", {"type": "array", "items": {"enum": list(DIRECTIONS)}}),
+            "Ways in which they may have moved", ["down", "rotation"], default=_EXPLAIN.directions),
+        Key("trough", _TRUE_OR_FALSE, "Whether troughs and slopes of the ground are candidates", True,
+            otherwise="where the structure stands on three places or more"),
+        Key("centres", NUMBERS, "Places x at which a trough may be deepest", [1.0, 2.0], "m",
+            otherwise="five over the width of the structure"),
+        Key("inflections", NUMBERS, "Distances from there to where a trough may be steepest", [0.5, 1.0], "m",
+            otherwise="a sixth and a third of the width"),
+        Key("friction", PAIR, "Range of the friction coefficient of [material]; others follow in proportion", [0.4, 0.7],
+            otherwise="from 0.8 to 1.25 times that of the case"),
+        Key("limit", POSITIVE, "Largest displacement of a support", 0.1, "m",
+            otherwise="ten to twenty times the widest crack"),
+        Key("model_uncertainty", POSITIVE, "Standard deviation of computed widths, as a fraction of them", 0.3,
+            default=_EXPLAIN.model_uncertainty),
+        Key("place_uncertainty", NOT_NEGATIVE, "Within which a crack at x, y may be another joint of the model", 0.1, "m",
+            otherwise="half the block size"),
+        Key("outliers", POSITIVE, "Probability that an observation has another cause", 0.1, default=_EXPLAIN.outliers),
+    ),
+)  # fmt: skip
+
 #: Every table of the case file with its keys.
 SECTIONS = (
     GEOMETRY,
@@ -327,5 +397,6 @@ SECTIONS = (
     LOADS,
     ANALYSIS,
     *(section for kind in KINDS.values() for section in kind.sections),
+    EXPLAIN,
     OUTPUT,
 )

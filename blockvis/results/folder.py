@@ -19,6 +19,7 @@ import solver
 from blockvis.atomic_files import PARTIAL, WINDOWS, flush, make_folder, remove, write_whole
 from blockvis.video_suffixes import VIDEO_SUFFIXES
 
+from .cracks import MOST_LISTED, cracks_of
 from .increments import StoredIncrements, packed_increment
 from .joints import InitialJoints, LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
@@ -208,7 +209,9 @@ class ResultsFolder:
         write_whole(self.path / "joints.csv", self._movements.table())
         for name, text in (tables or {}).items():
             write_whole(self.path / name, text)
-        summary = summary_of(response, seconds=seconds, record=self.record, own=own or {})
+        cracks = cracks_of(self.assembly, response.path[-1].pose, self._movements.joints) if response.path else []
+        listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
+        summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_whole(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
         return summary
