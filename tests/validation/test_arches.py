@@ -66,7 +66,8 @@ def test_sinking(embrace, ratio, n, collapse, first, last, h_first, h_last):
 
 
 @pytest.mark.parametrize(
-    "increment", [0.02, pytest.param(0.01, **THOROUGH), pytest.param(0.0025, marks=pytest.mark.slow)]
+    "increment",
+    [*(pytest.param(h, **THOROUGH) for h in (0.02, 0.01)), pytest.param(0.0025, marks=pytest.mark.slow)],
 )
 def test_collapse_does_not_depend_on_the_increment(increment):
     """Correctors and the collapse bracket leave no error of the increment: the bracket's width is what remains."""
