@@ -123,7 +123,7 @@ def test_without_dilatancy_a_wall_carries_no_more(name):
         assert limit.multiplier < 0.95 * WALLS[name][1]
 
 
-@pytest.mark.parametrize("n", [1, 5])
+@pytest.mark.parametrize("n", [1, pytest.param(5, marks=pytest.mark.thorough)])
 def test_overturning_block_and_stack(n):
     assembly = stack(n)
     control = ControlDisplacement(assembly.names[n - 1], (1, 0), point=(0.2, 1.0), increment=0.01, limit=0.5)
