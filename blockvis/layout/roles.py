@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fnmatch
-import re
 from collections.abc import Mapping
 
 import solver
@@ -20,16 +19,10 @@ def checked_role(role: str, whose: str) -> str:
 
 
 def roles_of(layout: AnyLayout, roles: Mapping[str, str]) -> list[str]:
-    """Role of every block: the caller's, else the file's, else its group or name if that is a role, else free.
-
-    In space, where modellers number the objects of a drawing, a group or name may begin with a role: "fixed 2",
-    "moving.001"; one that begins with "support" is fixed.
-    """
+    """Role of every block: the caller's, else the file's, else its group or name if that is a role, else free."""
     found = []
     for name, group, role in zip(layout.names, layout.groups, layout.roles, strict=True):
         said = (role, group.strip().lower(), name.strip().lower())
-        if layout.dimension == 3:
-            said = (*said, _begins_with(group), _begins_with(name))
         found.append(next((word for word in said if word in solver.ROLES), solver.FREE))
     labels = {"name": layout.names, "group": layout.groups, "material": layout.materials}
     by_name: list[tuple[list[int], str]] = []
@@ -55,13 +48,6 @@ def roles_of(layout: AnyLayout, roles: Mapping[str, str]) -> list[str]:
         for i in hits:
             found[i] = role
     return found
-
-
-def _begins_with(label: str) -> str:
-    """Role with which a label begins, "" for none."""
-    word = re.match(r"[a-z]*", label.strip().lower())
-    begin = word[0] if word else ""
-    return solver.FIXED if begin in ("support", "supports") else begin
 
 
 def _unmatched(key: str, layout: AnyLayout) -> str:

@@ -109,7 +109,7 @@ def test_convert_and_info(tmp_path, capsys):
     assert "blocks in space 13" in said
     assert "'free' 9, 'moving' 4" in said
     assert "weight" in said
-    assert "largest block   'springer" in said
+    assert "largest block   'stone 1-" in said
     weight = 9.81 * generators.dome(lunes=4, courses=2).masses[:9].sum()
     assert f"weight          {weight:.6g} N, supports" in said
 
