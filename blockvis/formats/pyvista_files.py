@@ -443,8 +443,8 @@ def _add_words(attributes: Any, name: str, words: list[str]) -> None:
     attributes.AddArray(array)
 
 
-def write(layout: Layout, path: Path) -> None:
-    """Write .vtu, .vtp or .vtk: a polygon cell per block, double precision, lengths in m."""
+def write(layout: AnyLayout, path: Path) -> None:
+    """Write .vtu, .vtp or .vtk: a cell per block, polygon or polyhedron, double precision, lengths in m."""
     grid = dataset_of(layout)
     if path.suffix.lower() == ".vtp":
         surface = _surface(grid)

@@ -9,7 +9,7 @@ import numpy as np
 
 import solver
 
-from .assemble import roles_of
+from .roles import roles_of
 from .joints.close import Proposal, proposed
 from .joints.facing_edges import Facing
 from .layout import Layout
