@@ -218,7 +218,7 @@ def solids_of_bodies(
             f"file's unit, of '{name}' at ({', '.join(f'{x:.6g}' for x in place)})"
         )
     if lying and view is None:
-        notes.append(f"{found.up_says}: its (x, y, z) were read as (x, -z, y); give view = \"xz\" if z is up")
+        notes.append(f'{found.up_says}: its (x, y, z) were read as (x, -z, y); give view = "xz" if z is up')
     layout = SolidLayout(
         solids=tuple(solids),
         names=tuple(body.name for body in asked.bodies),
@@ -340,14 +340,13 @@ class NotFlat(ValueError):
 
 def _not_flat(seen: Sequence[_Seen], bodies: Sequence[Body], path: Path | str, view: str | None) -> NotFlat:
     """Make the error for bodies that are not prisms side by side, with the reason in every view that was tried."""
-    remedy = (
-        "dimension = 3 reads them in space; in the plane leave out all but one leaf (ignore), or draw its outlines"
-    )
+    remedy = "dimension = 3 reads them in space; in the plane leave out all but one leaf (ignore), or draw its outlines"
     if view is None and not any(len(one.outlines) for one in seen):
         holed = [one.refused for one in seen if "no extrusion" not in one.refused]
         if holed:
             return NotFlat(f"'{path}': {holed[0]}; dimension = 3 reads the blocks in space", holed[0])
-        reason = f"body '{seen[0].refused.split("'")[1]}' is no extrusion along x, y or z"
+        name = seen[0].refused.split("'")[1]
+        reason = f"body '{name}' is no extrusion along x, y or z"
         return NotFlat(
             f"'{path}' is not prismatic: {reason}; dimension = 3 reads the blocks in space, in the plane export "
             "extrusions of their outlines along an axis",

@@ -215,7 +215,13 @@ def read(
     solver.Assembly
     """
     layout = read_layout(
-        path, unit=unit, chord_tolerance=chord_tolerance, view=view, ignore=ignore, only=only, dimension=dimension,
+        path,
+        unit=unit,
+        chord_tolerance=chord_tolerance,
+        view=view,
+        ignore=ignore,
+        only=only,
+        dimension=dimension,
         thickness=thickness,
     )
     if chord_tolerance is not None and outline_tolerance is None:

@@ -92,7 +92,9 @@ def faced(
         plane = (
             sides[members.index(held[0])] * faces.planes[held[0]]
             if held
-            else _common_plane([faces.rings[k] for k in members], sides * 1.0, faces.planes[members], faces.areas[members])
+            else _common_plane(
+                [faces.rings[k] for k in members], sides * 1.0, faces.planes[members], faces.areas[members]
+            )
         )
         for k, side in zip(members, sides, strict=True):
             if not anchored[faces.block[k]]:
@@ -158,17 +160,13 @@ def _gap(faces: _Faces, a: int, b: int, near: float) -> tuple[float] | None:
         return None
     corners = middle + shapely.get_coordinates(common) @ frame.T
     # The height of each plane above the corners of what both cover, along the common normal.
-    heights = [
-        (faces.planes[k, 3] - corners @ faces.planes[k, :3]) / (faces.planes[k, :3] @ normal) for k in (a, b)
-    ]
+    heights = [(faces.planes[k, 3] - corners @ faces.planes[k, :3]) / (faces.planes[k, :3] @ normal) for k in (a, b)]
     gap = heights[1] - heights[0]
     largest = float(gap[np.abs(gap).argmax()])
     return (largest,) if abs(largest) <= near else None
 
 
-def _groups(
-    faces: _Faces, one: np.ndarray, other: np.ndarray, near: float
-) -> list[tuple[list[int], np.ndarray]]:
+def _groups(faces: _Faces, one: np.ndarray, other: np.ndarray, near: float) -> list[tuple[list[int], np.ndarray]]:
     """Group the faces that share a plane, and the side of it on which the block of each lies: 1 or -1."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -209,9 +207,7 @@ def _flat_groups(
     ]
 
 
-def _common_plane(
-    rings: Sequence[np.ndarray], sides: np.ndarray, planes: np.ndarray, areas: np.ndarray
-) -> np.ndarray:
+def _common_plane(rings: Sequence[np.ndarray], sides: np.ndarray, planes: np.ndarray, areas: np.ndarray) -> np.ndarray:
     """(4,) array: the plane nearest to faces, as the first of them is seen."""
     if len(rings) <= 2:
         normal = (sides[:, None] * planes[:, :3] * areas.min()).sum(axis=0)

@@ -138,7 +138,9 @@ def standing(layout: Layout, thickness: float) -> SolidLayout:
     depth = np.full(layout.n_blocks, np.nan) if layout.thickness is None else layout.thickness
     depth = np.where(np.isnan(depth), thickness, depth)
     return SolidLayout(
-        solids=tuple(extruded(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)),
+        solids=tuple(
+            extruded(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)
+        ),
         names=layout.names,
         groups=layout.groups,
         roles=layout.roles,

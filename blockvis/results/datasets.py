@@ -1,4 +1,7 @@
-"""Assemblies and increments as pyvista datasets: blocks as polygons, joints as lines, contact points as vertices."""
+"""Assemblies and increments as pyvista datasets: blocks, joints and contact points.
+
+In the plane blocks are polygons and joints lines, in space polyhedra and faces; contact points are vertices.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,13 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonCore import vtkDataArray, vtkStringArray
+from vtkmodules.vtkCommonDataModel import vtkCellArray
 
 import solver
 
+from .joint_faces import JointFaces, face_states, joint_faces
 from .joints import InitialJoints, initial_joints, joint_states
 
 #: Numbers of the roles in the cell array ``role``; their names are in the field array ``role_names``.
@@ -24,14 +29,14 @@ SHAPES = ("moved", "undeformed")
 #: Units of the arrays; those that are not here are names, numbers of blocks or states, or have no unit.
 UNITS = {
     "displacement": "m", "reference": "m", "to_reference": "m", "rotation": "rad", "force": "N", "normal_force": "N",
-    "shear_force": "N", "gap": "m", "opening": "m", "slip": "m", "length": "m",
+    "shear_force": "N", "gap": "m", "opening": "m", "slip": "m", "length": "m", "area": "m²", "shear": "N",
 }  # fmt: skip
 
 
 def block_dataset(
     assembly: solver.Assembly, increment: solver.Increment | None = None, *, shape: str = "moved"
 ) -> pv.UnstructuredGrid:
-    """Make a dataset of the blocks of one increment, one polygon cell per block, non-convex outlines too.
+    """Make a dataset of the blocks of one increment, one cell per block: a polygon, or in space a polyhedron.
 
     Parameters
     ----------
@@ -46,7 +51,8 @@ def block_dataset(
     -------
     pyvista.UnstructuredGrid
         Cell arrays ``block_id``, ``name``, ``role`` (number), ``role_name``, ``material_id``, ``material``,
-        ``displacement`` (n_blocks, 3) of the centroids [m] and ``rotation`` [rad]; point arrays ``displacement``
+        ``displacement`` (n_blocks, 3) of the centroids [m] and ``rotation`` [rad], in space a vector; point arrays
+        ``displacement``
         (n_vertices, 3) [m], ``reference``, the coordinates in the layout [m], and of moved shapes ``to_reference``, the
         vector back to them [m]; field arrays ``units`` as "displacement [m]", ``settlement`` (the parameter: of a
         pushover the control displacement, of a load that moves its position), ``phase``, ``load_multiplier``,
@@ -61,7 +67,10 @@ def block_dataset(
     """
     pose = solver.Pose.initial(assembly) if increment is None else increment.pose
     corners = solver.moved_vertices(assembly, pose)
-    grid = pv.UnstructuredGrid(_polygon_cells(assembly.offsets), _cell_types(assembly), _in_space(corners))
+    if assembly.dimension == 2:
+        grid = pv.UnstructuredGrid(_polygon_cells(assembly.offsets), _cell_types(assembly), _in_space(corners))
+    else:
+        grid = _polyhedra(assembly.shapes, corners)
     materials = sorted(set(assembly.materials))
     number = {material: k for k, material in enumerate(materials)}
     moved = pose.displacements(assembly)
@@ -69,8 +78,8 @@ def block_dataset(
         "block_id": np.arange(assembly.n_blocks, dtype=np.int32),
         "role": np.array([ROLE_NUMBERS[str(role)] for role in assembly.roles], dtype=np.int32),
         "material_id": np.array([number[material] for material in assembly.materials], dtype=np.int32),
-        "displacement": _in_space(moved[:, :2]),
-        "rotation": moved[:, 2].copy(),
+        "displacement": _in_space(moved[:, : assembly.dimension]),
+        "rotation": moved[:, assembly.dimension :].squeeze(axis=1) if assembly.dimension == 2 else moved[:, 3:].copy(),
     }
     for name, array in cells.items():
         grid.cell_data[name] = array
@@ -90,9 +99,9 @@ def joint_dataset(
     increment: solver.Increment,
     *,
     shape: str = "moved",
-    joints: InitialJoints | None = None,
+    joints: InitialJoints | JointFaces | None = None,
 ) -> pv.UnstructuredGrid:
-    """Make a dataset of the joints of one increment: a line cell for each, midway between its two faces.
+    """Make a dataset of the joints of one increment: a line for each, in space a face, midway between its two faces.
 
     Parameters
     ----------
@@ -100,7 +109,7 @@ def joint_dataset(
     increment : solver.Increment
     shape : {"moved", "undeformed"}
         As of :func:`block_dataset`.
-    joints : InitialJoints, optional
+    joints : InitialJoints or JointFaces, optional
         Of the assembly, where they are at hand.
 
     Returns
@@ -109,8 +118,15 @@ def joint_dataset(
         Cell arrays ``opening`` and ``slip`` [m], ``normal_force`` (compression positive) and ``shear_force`` [N] on
         ``block_a``, ``length`` of the faces in common [m], ``block_a``, ``block_b``, ``joint`` (their names) and
         ``initial``: 1 for joints of the layout, 0 for blocks that have come to touch since, whose opening and slip are
-        0. In frames of a fall there are no forces. Point and field arrays as those of :func:`block_dataset`.
+        0. In frames of a fall there are no forces. Point and field arrays as those of :func:`block_dataset`. In space
+        ``slip`` and ``shear_force`` are sizes, ``area`` [m²] takes the place of ``length``, ``normal`` and ``force``
+        [N] are vectors, and the point array ``gap`` [m] is the distance of the faces at each corner.
     """
+    if assembly.dimension == 3:
+        return _face_dataset(
+            assembly, increment, joints if isinstance(joints, JointFaces) else joint_faces(assembly), shape
+        )
+    assert not isinstance(joints, JointFaces)
     states = joint_states(assembly, initial_joints(assembly) if joints is None else joints, increment)
     n = len(states.ends)
     points = states.ends.reshape(-1, 2)
@@ -127,6 +143,45 @@ def joint_dataset(
             "normal_force": states.normal_force,
             "shear_force": states.shear_force,
             "length": np.hypot(*(states.ends[:, 1] - states.ends[:, 0]).T),
+            "block_a": states.block_a.astype(np.int32),
+            "block_b": states.block_b.astype(np.int32),
+            "initial": states.initial.astype(np.int32),
+        },
+    )
+    names = assembly.names
+    words = (f"{names[a]} | {names[b]}" for a, b in zip(states.block_a, states.block_b, strict=True))
+    grid.GetCellData().AddArray(_strings("joint", words))
+    _describe(grid, increment)
+    _state_units(grid)
+    return grid
+
+
+def _face_dataset(
+    assembly: solver.Assembly, increment: solver.Increment, joints: JointFaces, shape: str
+) -> pv.UnstructuredGrid:
+    """Make the dataset of joints in space: polygons, and lines or vertices where blocks touch at an edge or a corner."""
+    states = face_states(assembly, joints, increment)
+    rings, counts = states.rings, np.diff(states.rings.offsets)
+    kinds = np.array([pv.CellType.VERTEX, pv.CellType.LINE, pv.CellType.POLYGON], dtype=np.uint8)
+    grid = pv.UnstructuredGrid(
+        np.insert(np.arange(len(rings.points)), rings.offsets[:-1], counts),
+        kinds[np.minimum(counts, 3) - 1],
+        rings.points,
+    )
+    blocks = states.block_a[rings.ring], states.block_b[rings.ring]
+    initial = solver.Pose.initial(assembly)
+    _give_shape(grid, solver.carried_between(rings.points, *blocks, increment.pose, initial), shape)
+    _add(grid.GetPointData(), {"gap": states.gaps})
+    _add(
+        grid.GetCellData(),
+        {
+            "opening": states.opening,
+            "slip": np.linalg.norm(states.slip, axis=1),
+            "normal_force": states.normal_force,
+            "shear_force": states.shear_force,
+            "area": rings.areas(),
+            "normal": states.normals,
+            "force": states.force,
             "block_a": states.block_a.astype(np.int32),
             "block_b": states.block_b.astype(np.int32),
             "initial": states.initial.astype(np.int32),
@@ -159,7 +214,8 @@ def contact_dataset(
         ``normal_force`` (compression positive) and ``shear_force`` [N], ``gap`` [m], ``friction``, ``state``
         (number of :class:`solver.ContactState`), ``block_a`` and ``block_b``, ``displacement`` and ``reference`` as of
         :func:`block_dataset`; its field arrays, and ``state_names``. In frames of a fall, which are no
-        equilibrium, forces are 0.
+        equilibrium, forces are 0. In space ``shear_force`` is the size of ``shear`` [N], its vector, and ``slip`` [m] is
+        how far block a has moved along block b there since the layout.
     """
     contacts = increment.contacts
     n = len(contacts.points)
@@ -170,19 +226,23 @@ def contact_dataset(
     _give_shape(grid, drawn, shape)
     normal, tangent = contacts.frames[:, 0], contacts.frames[:, 1]
     balanced = increment.forces * (increment.status != solver.Status.FALLING)
-    force = balanced[:, :1] * normal + balanced[:, 1:] * tangent
+    shear = np.einsum("ki,kij->kj", balanced[:, 1:], contacts.frames[:, 1:])
+    force = balanced[:, :1] * normal + shear
+    in_space = assembly.dimension == 3
     points = {
         "normal": _in_space(normal),
         "tangent": _in_space(tangent),
         "force": _in_space(force),
         "normal_force": balanced[:, 0],
-        "shear_force": balanced[:, 1],
+        "shear_force": np.linalg.norm(shear, axis=1) if in_space else balanced[:, 1],
         "gap": np.asarray(contacts.gaps, dtype=float),
         "friction": np.asarray(increment.friction, dtype=float),
         "state": increment.states.astype(np.int32),
         "block_a": contacts.block_a.astype(np.int32),
         "block_b": contacts.block_b.astype(np.int32),
     }
+    if in_space:
+        points |= {"shear": shear, "slip": _slip(assembly, increment)}
     _add(grid.GetPointData(), points)
     grid.GetFieldData().AddArray(_strings("state_names", [state.name.lower() for state in solver.ContactState]))
     _describe(grid, increment)
@@ -270,6 +330,36 @@ def _strings(name: str, words: Iterable[str]) -> vtkStringArray:
     return array
 
 
+def _slip(assembly: solver.Assembly, increment: solver.Increment) -> np.ndarray:
+    """(n_contacts, 3) array [m]: how far block a has moved along block b at each contact point since the layout."""
+    contacts, initial = increment.contacts, solver.Pose.initial(assembly)
+    on_a, on_b = (
+        solver.carried(contacts.points, block, increment.pose, initial)
+        for block in (contacts.block_a, contacts.block_b)
+    )
+    # What now lies together was apart by so much, seen with the layout's axes.
+    moved = solver.turned(on_b - on_a, increment.pose.rotations[contacts.block_b])
+    normal = contacts.frames[:, 0]
+    return np.asarray(moved - (moved * normal).sum(axis=1)[:, None] * normal)
+
+
+def _polyhedra(shapes: solver.Polyhedra, corners: np.ndarray) -> pv.UnstructuredGrid:
+    """Make one polyhedron cell per block, the corners of all blocks (n_vertices, 3) [m] as its points."""
+
+    def cells(offsets: np.ndarray, members: np.ndarray) -> vtkCellArray:
+        array = vtkCellArray()
+        array.SetData(*(numpy_to_vtkIdTypeArray(of.astype(np.int64), deep=True) for of in (offsets, members)))
+        return array
+
+    grid = pv.UnstructuredGrid()
+    grid.points = np.array(corners)
+    types = numpy_to_vtk(np.full(len(shapes), int(pv.CellType.POLYHEDRON), np.uint8), deep=True)
+    blocks = cells(shapes.offsets, np.arange(len(shapes.vertices)))
+    faces = cells(shapes.face_offsets, shapes.corners)
+    grid.SetPolyhedralCells(types, blocks, cells(shapes.faces_of_block, np.arange(len(shapes.block_of_face))), faces)
+    return grid
+
+
 def _polygon_cells(offsets: np.ndarray) -> np.ndarray:
     counts = np.diff(offsets)
     return np.insert(np.arange(offsets[-1]), offsets[:-1], counts)
@@ -280,5 +370,5 @@ def _cell_types(assembly: solver.Assembly) -> np.ndarray:
 
 
 def _in_space(vectors: np.ndarray) -> np.ndarray:
-    """(n, 2) vectors with a zero third component, as VTK wants them."""
-    return np.column_stack([vectors, np.zeros(len(vectors))])
+    """(n, 2) or (n, 3) vectors with three components, as VTK wants them."""
+    return vectors if vectors.shape[1] == 3 else np.column_stack([vectors, np.zeros(len(vectors))])

@@ -20,6 +20,7 @@ from blockvis.atomic_files import PARTIAL, WINDOWS, make_folder, remove, write_w
 from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .increments import StoredIncrements, packed_increment
+from .joint_faces import LargestMovementsInSpace
 from .joints import LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
@@ -221,7 +222,8 @@ class ResultsFolder:
         self._rows = io.StringIO()
         self._table = csv.writer(self._rows, lineterminator="\n")
         self._table.writerow((*COLUMNS, *own_columns(self.parameter)))
-        self._movements = LargestMovements(self.assembly, self.parameter)
+        kind = LargestMovements if self.assembly.dimension == 2 else LargestMovementsInSpace
+        self._movements = kind(self.assembly, self.parameter)
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
@@ -293,18 +295,38 @@ def _stored_assembly(folder: Path) -> solver.Assembly:
         raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
     try:
         stored = checked_arrays(folder / "assembly.npz")
-        offsets = stored["offsets"].tolist()
+        names, roles, materials = (list(map(str, stored[key])) for key in ("names", "roles", "materials"))
         # Checked like a layout: the file may come from anywhere.
+        if "corners" in stored:
+            return solver.Assembly.from_solids(
+                _stored_solids(stored), names=names, roles=roles, density=stored["density"], materials=materials
+            )
         return solver.Assembly.from_outlines(
-            [stored["vertices"][first:last] for first, last in pairwise(offsets)],
-            names=list(map(str, stored["names"])),
-            roles=list(map(str, stored["roles"])),
+            [stored["vertices"][first:last] for first, last in pairwise(stored["offsets"].tolist())],
+            names=names,
+            roles=roles,
             density=stored["density"],
             thickness=stored["thickness"],
-            materials=list(map(str, stored["materials"])),
+            materials=materials,
         )
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise ValueError(f"'{folder / 'assembly.npz'}' cannot be read ({error}); run the case again") from None
+
+
+def _stored_solids(stored: Mapping[str, np.ndarray]) -> list[tuple[np.ndarray, list[list[int]]]]:
+    """Corners and faces of each block in space, the corners of a face numbered within the block."""
+    offsets, faces = (
+        stored["offsets"].tolist(),
+        np.searchsorted(stored["block_of_face"], np.arange(len(stored["offsets"]))),
+    )
+    loops = [
+        stored["corners"][first:last] - stored["offsets"][block]
+        for (first, last), block in zip(pairwise(stored["face_offsets"].tolist()), stored["block_of_face"], strict=True)
+    ]
+    return [
+        (stored["vertices"][first:last], [loop.tolist() for loop in loops[low:high]])
+        for (first, last), (low, high) in zip(pairwise(offsets), pairwise(faces.tolist()), strict=True)
+    ]
 
 
 def stored_case(folder: str | Path) -> str:
@@ -359,7 +381,7 @@ def _collapse_of(
 ) -> solver.Collapse | None:
     if summary.get("collapse_bracket") is None:
         return None
-    mechanism = np.zeros((assembly.n_blocks, 3))
+    mechanism = np.zeros((assembly.n_blocks, 3 * assembly.dimension - 3))
     falling = [i for i in increments if i.status == solver.Status.FALLING]
     if falling:
         motion = falling[0].velocity
