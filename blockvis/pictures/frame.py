@@ -248,7 +248,7 @@ class Frame:
 
     Attributes
     ----------
-    low, high : (2,) arrays [m]
+    low, high : (d,) arrays [m]
         Opposite corners.
     """
 
@@ -257,7 +257,7 @@ class Frame:
 
     @property
     def size(self) -> np.ndarray:
-        """(2,) array [m]: width and height."""
+        """(d,) array [m]: width and height, in space depth and height."""
         return self.high - self.low
 
     def holding(self, points: np.ndarray) -> Frame:
@@ -278,17 +278,21 @@ class Frame:
 
 
 class _Box:
-    """Bounds of all points so far."""
+    """Bounds of all points so far, in d dimensions."""
 
-    def __init__(self) -> None:
-        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
+    def __init__(self, d: int) -> None:
+        self.low, self.high = np.full(d, np.inf), np.full(d, -np.inf)
 
     def hold(self, points: np.ndarray) -> None:
         self.low, self.high = np.minimum(self.low, points.min(axis=0)), np.maximum(self.high, points.max(axis=0))
 
 
 def framed(
-    assembly: solver.Assembly, poses: Iterable[solver.Pose], margin: float = 0.04, supports: float = 0.13
+    assembly: solver.Assembly,
+    poses: Iterable[solver.Pose],
+    margin: float = 0.04,
+    supports: float = 0.13,
+    axes: np.ndarray | None = None,
 ) -> Frame:
     """Frame in which every free block stays over all poses.
 
@@ -302,11 +306,15 @@ def framed(
     supports : float
         Supports are shown as far as this fraction of the larger dimension beyond the free blocks; layouts have
         supports of any extent.
+    axes : (2, d) array, optional
+        Unit vectors to the right and up in the picture; the axes of the drawing by default.
     """
     free = assembly.free[assembly.block_of_vertex]
-    inner, outer = _Box(), _Box()
+    d = assembly.dimension if axes is None else len(axes)
+    inner, outer = _Box(d), _Box(d)
     for pose in poses:
         corners = solver.moved_vertices(assembly, pose)
+        corners = corners if axes is None else corners @ axes.T
         inner.hold(corners[free] if free.any() else corners)
         outer.hold(corners[~free] if (~free).any() else corners)
     low, high = inner.low, inner.high
