@@ -274,7 +274,8 @@ class SolidDrawer:
         width = max(7.0 * thin, 2.4)
         scene.lines("hinge rim", found.hinges, palette.PAPER, 1.8 * width, forward=4.0)
         scene.lines("hinge", found.hinges, palette.HINGE, width, forward=5.0)
-        scene.lines("hidden hinge", found.hinges, palette.HINGE, 0.5 * width, forward=IN_FRONT_OF_ALL, opacity=0.3)
+        dashes = _dashed(found.hinges, 12.0 * max(thin, 0.6) * scene.pixel)
+        scene.lines("hidden hinge", dashes, palette.HINGE, 0.22 * width, forward=IN_FRONT_OF_ALL)
 
     def _draw_cracks(self, found: SolidMarks, thin: float) -> None:
         """Fill what lies between faces, and draw a line where that would be too thin to see."""
@@ -339,6 +340,17 @@ class SolidDrawer:
             self.scene.arrows("settlement", places, directions, self._arrow)
 
 
+def _dashed(ends: np.ndarray, length: float) -> np.ndarray:
+    """(m, 2, 3) array [m]: dashes of a length [m], with gaps as long, along lines (n, 2, 3)."""
+    along = ends[:, 1] - ends[:, 0]
+    counts = np.maximum(1, np.round(np.linalg.norm(along, axis=1) / (2.0 * length))).astype(int)
+    line = np.repeat(np.arange(len(ends)), counts)
+    place = np.arange(len(line)) - np.repeat(np.cumsum(counts) - counts, counts)
+    # Half a gap at either end.
+    shares = (place[:, None] + np.array([0.25, 0.75])) / counts[line][:, None]
+    return ends[line, :1] + shares[:, :, None] * along[line][:, None]
+
+
 def _opening_text(length: float) -> str:
     return f"{1e3 * length:.2g} mm" if length < 0.0995 else f"{length:.2g} m"
 
@@ -347,9 +359,7 @@ def _tuple(colour: Any) -> tuple[int, int, int]:
     return int(colour[0]), int(colour[1]), int(colour[2])
 
 
-def _arrows(
-    tails: np.ndarray, tips: np.ndarray, thick: float
-) -> list[tuple[tuple[int, int, int], np.ndarray]]:
+def _arrows(tails: np.ndarray, tips: np.ndarray, thick: float) -> list[tuple[tuple[int, int, int], np.ndarray]]:
     """Polygons of arrows from tails (n, 2) to tips (n, 2) [pixels] with a white rim, back to front."""
     shapes: list[tuple[tuple[int, int, int], np.ndarray]] = []
     for grown, colour in ((0.35 * thick, palette.PAPER), (0.0, palette.SETTLEMENT)):

@@ -86,9 +86,7 @@ def solid_marks(
     openings = np.stack([gaps[:, 0] + share * (gaps[:, 1] - gaps[:, 0]) for share in (first, last)], axis=1)
     joint = rings.ring[start]
     extent = np.sqrt(np.maximum(rings.areas(), 1e-300))
-    turn = np.linalg.norm(
-        increment.pose.rotations[joints.block_a] - increment.pose.rotations[joints.block_b], axis=1
-    )
+    turn = np.linalg.norm(increment.pose.rotations[joints.block_a] - increment.pose.rotations[joints.block_b], axis=1)
     nearest = -rings.largest(-now.gaps)
     gapes = (turn > STEEPEST) | (nearest > np.minimum(WIDEST * size, extent))
     mechanism = solver.mechanism_of(assembly, increment)
@@ -108,9 +106,7 @@ def solid_marks(
     return SolidMarks(cracks, openings, gapes[joint], edges, exposed, np.stack(ends, axis=1))
 
 
-def hinge_lines(
-    assembly: solver.Assembly, increment: solver.Increment, mechanism: solver.Mechanism
-) -> np.ndarray:
+def hinge_lines(assembly: solver.Assembly, increment: solver.Increment, mechanism: solver.Mechanism) -> np.ndarray:
     """(n, 2) int array: of each hinge the two contact points farthest from each other that do not open.
 
     Parameters
@@ -142,9 +138,7 @@ def _sliding_faces(
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Edges (n, 2, 3) around the faces that slide, and the faces themselves, of both blocks."""
     count = 1 + int(max(joints.block_b.max(initial=0), mechanism.sliding.max(initial=0)))
-    slides = np.isin(
-        joints.block_a * count + joints.block_b, mechanism.sliding[:, 0] * count + mechanism.sliding[:, 1]
-    )
+    slides = np.isin(joints.block_a * count + joints.block_b, mechanism.sliding[:, 0] * count + mechanism.sliding[:, 1])
     rings = joints.rings
     chosen = np.flatnonzero(slides[rings.ring])
     middle = (on_a + on_b) / 2.0
