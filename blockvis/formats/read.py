@@ -88,7 +88,7 @@ def read_layout(
     reading = Reading(unit=unit, chord_tolerance=chord_tolerance, view=checked_view(view), ignore=ignore, only=only)
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
-    content = found[0] if files == [path] else of_files(found, files, path)
+    content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)
     layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
     layout = replace(layout, source=str(path))
     if isinstance(layout, SolidLayout):
@@ -148,6 +148,13 @@ def _in_dimension(
             raise
         layout = solids_of_bodies(content, path, None, ignore, only)
         return replace(layout, notes=(f"blocks in space: {error.reason}", *layout.notes))
+
+
+def _apart(content: AnyLayout | Bodies, path: Path) -> Layout | Bodies:
+    """Refuse layouts in space as files of one stone each: they hold all blocks."""
+    if isinstance(content, SolidLayout):
+        raise ValueError(f"'{path}' stands for layouts of blocks in space; give one of them")
+    return content
 
 
 def _in_metres(layout: SolidLayout, unit: str | None) -> SolidLayout:

@@ -165,7 +165,8 @@ def _obj_lines(solids: list[Solid], rows: list[dict[str, Any]], what: str) -> li
 
 
 def _ply_lines(solids: list[Solid], rows: list[dict[str, Any]], what: str) -> list[str]:
-    found = [_whole_faces(points, faces) for points, faces in solids]
+    # Triangles: polygons of several lengths keep their block_id in few readers.
+    found = [triangles_of(points, faces).tolist() for points, faces in solids]
     lines = ["ply", "format ascii 1.0", f"comment {what}"]
     lines += [f"comment blockvis {json.dumps(row)}" for row in rows]
     lines += [f"element vertex {sum(len(points) for points, _ in solids)}"]
@@ -186,7 +187,7 @@ def _ply_lines(solids: list[Solid], rows: list[dict[str, Any]], what: str) -> li
 
 def _whole_faces(points: np.ndarray, faces: list[list[int]]) -> list[list[int]]:
     """Faces as they are; those with re-entrant corners, which many programs cut in fans, as triangles."""
-    whole = []
+    whole: list[list[int]] = []
     for face in faces:
         ring = points[face]
         turns = np.cross(np.roll(ring, -1, axis=0) - ring, np.roll(ring, -2, axis=0) - np.roll(ring, -1, axis=0))

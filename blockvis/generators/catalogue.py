@@ -39,8 +39,23 @@ LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
 }
 
 
+#: Those of blocks in space.
+IN_SPACE = ("extruded arch", "barrel vault", "dome")
+
+
 #: Kinds of parameters without a unit, in plain words.
 _KINDS = {"float": "", "int": "whole number", "int, optional": "whole number, optional", "bool": "true or false"}
+
+
+def dimension_of(name: str) -> int:
+    """Say whether a layout lies in the plane, 2, or in space, 3.
+
+    Examples
+    --------
+    >>> dimension_of("dome")
+    3
+    """
+    return 3 if _plain(name) in IN_SPACE else 2
 
 
 def parameters_of(name: str) -> dict[str, Any]:

@@ -11,18 +11,20 @@ import numpy as np
 
 import solver
 
-from .layout import Layout
+from .assemble_solids import assemble_solids
+from .layout import AnyLayout, Layout
 from .repair import duplicates, repaired
 from .roles import checked_role, roles_of
 from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
+from .solid_layout import SolidLayout
 
 #: Beginnings of the notes of a layout that change what is analysed.
 TOLD = ("unit", "left out", "ignore", "cut", "joined", "the middle planes", "elevations were ignored")
 
 
 def assemble(
-    layout: Layout,
+    layout: AnyLayout,
     *,
     roles: Mapping[str, str] | None = None,
     supports: Sequence[Mapping[str, Any]] = (),
@@ -37,7 +39,9 @@ def assemble(
 
     Parameters
     ----------
-    layout : Layout
+    layout : Layout or SolidLayout
+        Of blocks in space; thickness, closing and outline_tolerance belong to the plane, see
+        :func:`blockvis.layout.assemble_solids.assemble_solids` for the others.
     roles : mapping of str to {"free", "fixed", "moving"}, optional
         Keys are names of blocks, groups (layers) or materials, or patterns of them (``"springer *"``). A block's
         own name holds over its group, a name over a pattern, a later key over an earlier one.
@@ -69,6 +73,19 @@ def assemble(
     ValueError
         For an unknown role, a key of ``roles`` that matches no block, and an overlap deeper than the tolerance.
     """
+    if isinstance(layout, SolidLayout):
+        if isinstance(joint_thickness, str):
+            raise ValueError(
+                f'joint_thickness is "{joint_thickness}", which measures joints in the plane; give it in m'
+            )
+        return assemble_solids(
+            layout,
+            roles=roles,
+            supports=supports,
+            density=density,
+            joint_thickness=joint_thickness,
+            overlap_tolerance=overlap_tolerance,
+        )
     for note in layout.notes:
         if note.startswith(TOLD):
             warnings.warn(f"{layout.source}: {note}", stacklevel=2)

@@ -11,8 +11,8 @@ import numpy as np
 
 import solver
 
-from .facing import DEFAULT_FACING, faced
 from .faces import width_of
+from .facing import DEFAULT_FACING, faced
 from .roles import checked_role, roles_of
 from .solid_layout import SolidLayout
 from .solids import Solid, prism

@@ -65,8 +65,9 @@ def with_rows(layout: Drawn, rows: Sequence[Any]) -> Drawn:
     for name, role in zip(words("name", layout.names), roles, strict=True):
         if role and role not in solver.ROLES:
             raise ValueError(f"block '{name}' has role '{role}' in the file; roles are {', '.join(solver.ROLES)}")
-    # Blocks in space have no thickness out of a plane.
-    thickness = {"thickness": numbers("thickness")} if isinstance(layout, Layout) else {}
+    if isinstance(layout, Layout):
+        # Blocks in space have no thickness out of a plane.
+        layout = replace(layout, thickness=numbers("thickness"))
     return replace(
         layout,
         names=words("name", layout.names),
@@ -74,7 +75,6 @@ def with_rows(layout: Drawn, rows: Sequence[Any]) -> Drawn:
         roles=roles,
         materials=words("material", [""] * layout.n_blocks),
         density=numbers("density"),
-        **thickness,
     )
 
 

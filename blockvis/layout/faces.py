@@ -1,4 +1,4 @@
-"""Plane faces of blocks in space: from the triangles around a body, and from corners to the planes they should lie in."""
+"""Plane faces of blocks in space: joined from the triangles around a body, and fitted where they are warped."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def with_plane_faces(points: np.ndarray, triangles: np.ndarray, tolerance: float
 
 
 def fitted(points: np.ndarray, faces: list[list[int]], near: float) -> PlaneSolid:
-    """Fit a plane to each face and move the corners to where the planes meet; a face warped by more is cut in triangles.
+    """Fit a plane to each face and move the corners to where planes meet; what is warped by more is cut in triangles.
 
     Parameters
     ----------
@@ -249,8 +249,8 @@ def _without_straight(points: np.ndarray, faces: list[list[int]], near: float) -
     rings = [[corner for corner in ring if corner not in drop] for ring in faces]
     rings = [ring for ring in rings if len(ring) > 2]
     used = np.unique(np.concatenate([np.array(ring) for ring in rings]))
-    number = {int(old): new for new, old in enumerate(used)}
-    return points[used], [[number[corner] for corner in ring] for ring in rings]
+    place = {int(old): new for new, old in enumerate(used)}
+    return points[used], [[place[corner] for corner in ring] for ring in rings]
 
 
 def _beside(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:

@@ -88,14 +88,12 @@ def faced(
         rough_here = rough & np.isin(one, members)
         if not rough_here.any():
             continue
-        held = [k for k in members if anchored[faces.block[k]]]
-        plane = (
-            sides[members.index(held[0])] * faces.planes[held[0]]
-            if held
-            else _common_plane(
-                [faces.rings[k] for k in members], sides * 1.0, faces.planes[members], faces.areas[members]
-            )
-        )
+        held = [n for n, k in enumerate(members) if anchored[faces.block[k]]]
+        if held:
+            plane = sides[held[0]] * faces.planes[members[held[0]]]
+        else:
+            rings = [faces.rings[k] for k in members]
+            plane = _common_plane(rings, sides, faces.planes[members], faces.areas[members])
         for k, side in zip(members, sides, strict=True):
             if not anchored[faces.block[k]]:
                 planes[k], changed[k] = side * plane, True

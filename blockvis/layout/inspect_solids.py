@@ -56,6 +56,11 @@ class SolidInspection:
         return self.volumes * np.where(np.isnan(density), DENSITY, density)[self.kept] * solver.GRAVITY
 
     @property
+    def joint_thickness(self) -> float:
+        """Joint thickness that closes the joints [m]: 0, as joints in space are not measured."""
+        return 0.0
+
+    @property
     def low(self) -> np.ndarray:
         """(3,) array [m]: the corner of the box around all blocks with the smallest coordinates."""
         return np.asarray(self.layout.points.min(axis=0))

@@ -70,6 +70,10 @@ class Layout:
         """Number of coordinates: 2."""
         return 2
 
+    def corners(self, block: int) -> np.ndarray:
+        """(n, 2) array [m]: the corners of a block."""
+        return self.outlines[block]
+
     def chosen(self, blocks: Sequence[int] | np.ndarray) -> Layout:
         """Take only these blocks, in this order."""
         keep = [int(i) for i in blocks]

@@ -79,6 +79,10 @@ class SolidLayout:
         """(n_points, 3) array [m]: the corners of all blocks."""
         return np.concatenate([points for points, _ in self.solids]) if self.solids else np.zeros((0, 3))
 
+    def corners(self, block: int) -> np.ndarray:
+        """(n, 3) array [m]: the corners of a block."""
+        return self.solids[block][0]
+
     def chosen(self, blocks: Sequence[int] | np.ndarray) -> SolidLayout:
         """Take only these blocks, in this order."""
         keep = [int(i) for i in blocks]

@@ -61,12 +61,8 @@ def triangles_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> np.ndarr
             found.append(np.array([face]))
             continue
         ring = points[list(face)]
-        normal = area_vector(ring)
-        kept = [k for k in range(3) if k != int(np.abs(normal).argmax())]
-        turned = normal[int(np.abs(normal).argmax())] * (1.0 if kept != [0, 2] else -1.0) < 0.0
-        order = list(face)[::-1] if turned else list(face)
-        cut = np.array(order)[triangles_of_ring(points[order][:, kept])]
-        found.append(cut[:, ::-1] if turned else cut)
+        across = int(np.abs(area_vector(ring)).argmax())
+        found.append(np.array(face)[triangles_of_ring(np.delete(ring, across, axis=1))])
     return np.concatenate(found)
 
 
