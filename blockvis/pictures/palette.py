@@ -16,6 +16,8 @@ SLIDING = (126, 55, 178)
 FORCE = (20, 92, 168)
 HINGE = (17, 17, 17)
 SETTLEMENT = (0, 121, 107)
+#: Of supports that move, where their motion is not hatched.
+MOVING = (127, 187, 180)
 LIVE = (190, 24, 118)
 WARNING = (190, 30, 30)
 

@@ -105,7 +105,7 @@ class SolidDrawer:
         self.sheet = Sheet(size, bar, beside)
         self.panel = CurvePanel(response, size_of(self.sheet.beside), self.sheet.text) if curve else None
         fill = palette.block_colours(assembly.materials, assembly.free)
-        fill[assembly.moving] = np.asarray(palette.SETTLEMENT) // 2 + 127
+        fill[assembly.moving] = palette.MOVING
         self.fill = fill
         self.tints = None
         if look.colour_by == "mechanism" and self._swing.moves:
@@ -244,7 +244,7 @@ class SolidDrawer:
                 text = "compression " if self.look.forces == "thrust" else "contact force "
                 keys.append(Key("line", f"{text}up to {force_text(self._strongest)}", palette.FORCE))
             if self.assembly.moving.any():
-                keys.append(Key("area", "moving support", _tuple(np.asarray(palette.SETTLEMENT) // 2 + 127)))
+                keys.append(Key("area", "moving support", palette.MOVING))
             if self._motion is not None:
                 keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT))
             self._keys = keys

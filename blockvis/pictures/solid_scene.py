@@ -16,9 +16,7 @@ import solver
 from . import palette
 from .frame import Frame
 from .solid_view import View
-
-#: Edges between faces that differ by less than this cosine are not drawn.
-FLAT = 0.9995
+from .surface import sharp_edges, triangles_of
 
 #: How much of the light comes from all sides, and from the lamp above the left shoulder.
 AMBIENT, DIFFUSE = 0.50, 0.58
@@ -80,7 +78,8 @@ class SolidScene:
         self._plotter = _plotter((size[0] * finer, size[1] * finer))
         self._layers: dict[str, Any] = {}
         self._look_at()
-        self._surface, self._block = surface_of(assembly.shapes)
+        triangles, self._block = triangles_of(assembly.shapes)
+        self._surface = pv.PolyData.from_regular_faces(np.array(assembly.vertices), triangles)
         self._surface.cell_data["colour"] = block_fill[self._block]
         self._plotter.add_mesh(
             self._surface, scalars="colour", rgb=True, ambient=AMBIENT, diffuse=DIFFUSE, specular=0.0,
@@ -245,39 +244,6 @@ class SolidScene:
         mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -6.0 * forward)
         mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, -6.0 * forward)
         self._layers[layer] = actor
-
-
-def surface_of(shapes: solver.Polyhedra) -> tuple[pv.PolyData, np.ndarray]:
-    """Make the triangles of all faces, on the vertices as they are, and find the block of each triangle.
-
-    Parameters
-    ----------
-    shapes : solver.Polyhedra
-
-    Returns
-    -------
-    pyvista.PolyData
-    (n_triangles,) int array
-    """
-    counts = np.diff(shapes.face_offsets)
-    faces = np.insert(shapes.corners, shapes.face_offsets[:-1], counts)
-    surface = pv.PolyData(np.array(shapes.vertices), faces=faces)
-    surface.cell_data["block"] = shapes.block_of_face
-    # Fans would cover what a re-entrant corner leaves out.
-    triangles = surface.triangulate() if (counts > 3).any() else surface
-    block = np.asarray(triangles.cell_data["block"])
-    triangles.clear_data()
-    return triangles, block
-
-
-def sharp_edges(shapes: solver.Polyhedra) -> np.ndarray:
-    """(n, 2) int array: vertices at both ends of each edge between faces that are not in one plane."""
-    normals = shapes.faces(shapes.vertices).normals[shapes.face_of_corner]
-    twins = shapes.twins
-    sharp = (normals * normals[twins]).sum(axis=1) < FLAT
-    once = np.arange(len(twins)) < twins
-    corners = np.flatnonzero(sharp & once)
-    return np.stack([shapes.corners[corners], shapes.corners[shapes.next_corner[corners]]], axis=1)
 
 
 def _line_cells(ends: np.ndarray) -> np.ndarray:
