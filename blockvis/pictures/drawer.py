@@ -376,7 +376,7 @@ class Drawer:
         bars = [points - half - side, points + half - side, points + half + side, points - half + side]
         scene.polygons("force", np.stack(bars, axis=1), palette.FORCE)
         if self.look.forces == "thrust":
-            scene.lines("force line", _thrust_line(points, blocks, self.assembly), palette.FORCE, scene.size[1] / 500.0)
+            scene.lines("force line", thrust_line(points, blocks, self.assembly), palette.FORCE, scene.size[1] / 500.0)
 
     def _force_scale(self) -> tuple[float, float]:
         """Length per force [m/N] and the force of the legend [N]; 0 where none is drawn."""
@@ -486,13 +486,13 @@ def joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, np
     return contacts.points[carrying], force[carrying], blocks[carrying]
 
 
-def _thrust_line(points: np.ndarray, blocks: np.ndarray, assembly: solver.Assembly) -> np.ndarray:
-    """(n, 2, 2) array [m]: the line from joint to joint, where every block has two at most: an arch, a column."""
+def thrust_line(points: np.ndarray, blocks: np.ndarray, assembly: solver.Assembly) -> np.ndarray:
+    """(n, 2, d) array [m]: the line from joint to joint, where every block has two at most: an arch, a column."""
     owner = np.concatenate([blocks[:, 0], blocks[:, 1]])
     which = np.concatenate([np.arange(len(blocks))] * 2)
     counts = np.bincount(owner, minlength=assembly.n_blocks)
     if counts[assembly.free].max(initial=0) > 2:
-        return np.zeros((0, 2, 2))
+        return np.zeros((0, 2, points.shape[1]))
     order = np.argsort(owner, kind="stable")
     owner, which = owner[order], which[order]
     pairs = (owner[1:] == owner[:-1]) & assembly.free[owner[1:]]

@@ -32,6 +32,7 @@ from .drawer import (
     joint_forces,
     largest_displacement,
     size_of,
+    thrust_line,
 )
 from .flat_scene import magnified
 from .frame import ColourBar, Key, Sheet, framed
@@ -48,9 +49,6 @@ ARROW = 0.09
 
 #: The arrows of a mechanism are longer than the way it is drawn by, to be seen on the blocks.
 LONGER = 1.6
-
-#: Layers that a fall has not.
-OF_STATICS = ("crack", "crack line", "sliding", "exposed", "hinge", "hinge rim", "hidden hinge", "force", "settlement")
 
 
 class SolidDrawer:
@@ -299,7 +297,7 @@ class SolidDrawer:
             return
         if increment.status == solver.Status.FALLING:
             # Without equilibrium the forces have no meaning.
-            self.scene.clear("force")
+            self.scene.clear("force", "force line")
             return
         points, forces, blocks = joint_forces(increment, self.look.forces)
         size = np.linalg.norm(forces, axis=1)
@@ -308,7 +306,12 @@ class SolidDrawer:
         points = solver.carried_between(points, blocks[:, 0], blocks[:, 1], increment.pose, shown)
         half = 0.5 * self._force_length * forces
         ends = np.stack([points - half, points + half], axis=1)
-        self.scene.lines("force", ends, palette.FORCE, max(2.0, self.scene.size[1] / 320.0))
+        # They lie inside the blocks.
+        width = max(2.5, self.scene.size[1] / 240.0)
+        self.scene.lines("force", ends, palette.FORCE, width, forward=IN_FRONT_OF_ALL)
+        if self.look.forces == "thrust":
+            line = thrust_line(points, blocks, self.assembly)
+            self.scene.lines("force line", line, palette.FORCE, 0.6 * width, forward=IN_FRONT_OF_ALL)
 
     def _length_per_force(self) -> float:
         """Length per force [m/N]; 0 where none is drawn."""
