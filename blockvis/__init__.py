@@ -20,6 +20,7 @@ import solver
 if TYPE_CHECKING:
     from .cases.case import Case as Case
     from .cases.case import read_case as read_case
+    from .explanation.explain import explain as explain
     from .formats.read import inspect as inspect
     from .formats.read import read as read
     from .formats.read import read_layout as read_layout
@@ -43,6 +44,7 @@ _HOMES = {
     "draw_curve": "pictures.curves",
     "draw_mechanism": "pictures.render",
     "draw_still": "pictures.render",
+    "explain": "explanation.explain",
     "inspect": "formats.read",
     "open_results": "runs.reopen",
     "read": "formats.read",

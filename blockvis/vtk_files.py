@@ -11,8 +11,8 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-import pyvista as pv
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 from .atomic_files import write_whole
@@ -22,13 +22,14 @@ _FACES = re.compile(r'<DataArray [^>]*Name="face_connectivity".*Name="polyhedron
 
 
 def write_vtu(
-    dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True, durable: bool = True
+    dataset: vtkUnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True, durable: bool = True
 ) -> Path:
     """Write a dataset as VTU, whole or not at all.
 
     Parameters
     ----------
-    dataset : pyvista.UnstructuredGrid
+    dataset : vtkUnstructuredGrid
+        As those of pyvista are.
     path : path
         Its folder is made if it does not exist.
     last, durable : bool
@@ -60,17 +61,15 @@ def write_vtu(
     return write_whole(path, text, last=last, durable=durable)
 
 
-def _face_arrays(dataset: pv.UnstructuredGrid) -> str:
+def _face_arrays(dataset: vtkUnstructuredGrid) -> str:
     """Write the faces of polyhedra as streams: of each the number of its faces, of each face its points."""
-    faces, of_cell = dataset.GetPolyhedronFaces(), dataset.GetPolyhedronFaceLocations()
-    points, starts, listed, cells = (
-        vtk_to_numpy(array.AsImplicitArray() if hasattr(array, "AsImplicitArray") else array).astype(np.int64)
-        for of in (faces, of_cell)
+    points, starts, _, cells = (
+        vtk_to_numpy(array).astype(np.int64)
+        for of in (dataset.GetPolyhedronFaces(), dataset.GetPolyhedronFaceLocations())
         for array in (of.GetConnectivityArray(), of.GetOffsetsArray())
     )
-    assert (np.diff(listed) == 1).all()
-    # The count of points before each face, and the count of faces before each cell.
     with_sizes = np.insert(points, starts[:-1], np.diff(starts))
+    # Where each cell begins among the sizes and points, and where it ends with the count of its faces before it.
     begin = starts[cells] + cells
     stream = np.insert(with_sizes, begin[:-1], np.diff(cells))
     ends = begin[1:] + np.arange(1, len(cells))
@@ -89,7 +88,11 @@ def _encoded(values: np.ndarray) -> str:
 
 
 def write_pvd(
-    path: str | os.PathLike[str], entries: Iterable[tuple[float, str | os.PathLike[str]]], *, last: bool = True
+    path: str | os.PathLike[str],
+    entries: Iterable[tuple[float, str | os.PathLike[str]]],
+    *,
+    last: bool = True,
+    durable: bool = True,
 ) -> Path:
     """Write the list of files of a time series (PVD), whole or not at all.
 
@@ -98,7 +101,7 @@ def write_pvd(
     path : path
     entries : iterable of (time, file)
         Files as given, relative to the folder of ``path``.
-    last : bool
+    last, durable : bool
         As of :func:`blockvis.atomic_files.whole_file`.
 
     Returns
@@ -116,4 +119,13 @@ def write_pvd(
         "  </Collection>",
         "</VTKFile>",
     ]
-    return write_whole(path, "\n".join(lines) + "\n", last=last)
+    return write_whole(path, "\n".join(lines) + "\n", last=last, durable=durable)
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a VTK file is there to its last tag."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        file.seek(max(path.stat().st_size - 64, 0))
+        return file.read().rstrip().endswith(b"</VTKFile>")

@@ -128,8 +128,9 @@ class Assembly:
         Parameters
         ----------
         solids : sequence of (vertices, faces)
-            Corners (n, 3) [m] of each block, and around each of its faces the numbers of the corners there, all faces
-            in the same sense seen from outside.
+            Corners (n, 3) [m] of each block, and around each of its faces the numbers of the corners there, in either
+            sense. Corners at the same place become one, and neighbouring faces in one plane, triangles for example,
+            one face.
         names : sequence of str, optional
             Defaults to ``"block 0"``, ``"block 1"`` ...; a name used twice gets a number.
         roles : sequence of {"free", "fixed", "moving"}, optional
@@ -139,8 +140,9 @@ class Assembly:
         Raises
         ------
         ValueError
-            For a surface that is not closed or without volume, with coordinates that are not finite, an unknown role,
-            or a density that is not positive.
+            For a surface that is not closed, in several pieces or without volume, a face that is not plane to a
+            thousandth of the width of its block, coordinates that are not finite, an unknown role, or a density that is
+            not positive.
 
         Examples
         --------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,6 +77,9 @@ class Settlement:
         In space, the axis about which the supports turn, counter-clockwise seen from its tip.
     radial_from : (2,) sequence [m], optional
         In space, instead of a direction: x and y of a vertical axis from which each support moves away, level.
+    profile : mapping of str to (float, float, float), optional [m, m, rad]
+        Instead of one motion for all: how each support, by its name, moves and turns about its own centroid. Only the
+        proportions count: s is the largest displacement of a centroid, or the largest angle where none moves.
 
     Raises
     ------
@@ -94,11 +97,33 @@ class Settlement:
     stops: tuple[float, ...] = ()
     rotation_axis: Sequence[float] | None = None
     radial_from: Sequence[float] | None = None
+    profile: Mapping[str, Sequence[float]] | None = None
 
     def __post_init__(self) -> None:
         """Check the values; make the direction a unit vector, and the rotation without one a sign."""
-        if self.direction is None and self.rotation_centre is None and self.radial_from is None:
+        if self.profile is not None:
+            self._check_profile()
+        elif self.direction is None and self.rotation_centre is None and self.radial_from is None:
             raise ValueError("a settlement needs a direction, or a rotation_centre and rotation")
+        self._check_vectors()
+        if self.radial_from is not None and (self.direction is not None or self.rotation_centre is not None):
+            raise ValueError("a settlement with radial_from has neither direction nor rotation_centre; leave them out")
+        turns_in_space = self.rotation_centre is not None and len(self.rotation_centre) == 3
+        if turns_in_space != (self.rotation_axis is not None):
+            raise ValueError(
+                "in space a rotation needs rotation_centre = [x, y, z] and rotation_axis = [x, y, z], the axis about "
+                "which the supports turn; in the plane only rotation_centre = [x, y]"
+            )
+        if self.rotation_centre is not None and not (np.isfinite(self.rotation) and self.rotation != 0.0):
+            raise ValueError(f"settlement rotation is {self.rotation:g}; with a rotation_centre it must not be zero")
+        if self.rotation_centre is None and self.rotation != 0.0:
+            raise ValueError("settlement has a rotation but no rotation_centre")
+        if self.rotation_centre is not None and self.direction is None:
+            object.__setattr__(self, "rotation", float(np.sign(self.rotation)))
+        self._check_steps()
+
+    def _check_vectors(self) -> None:
+        """Make numbers of what is given, and unit vectors of directions."""
         for name, counts in (
             ("direction", (2, 3)),
             ("rotation_centre", (2, 3)),
@@ -116,21 +141,27 @@ class Settlement:
                 what = "direction in which the support moves" if name == "direction" else "axis about which it turns"
                 raise ValueError(f"settlement {name} is {[0] * len(vector)}; give the {what}")
             object.__setattr__(self, name, tuple(part / length for part in vector))
-        if self.radial_from is not None and (self.direction is not None or self.rotation_centre is not None):
-            raise ValueError("a settlement with radial_from has neither direction nor rotation_centre; leave them out")
-        turns_in_space = self.rotation_centre is not None and len(self.rotation_centre) == 3
-        if turns_in_space != (self.rotation_axis is not None):
+
+    def _check_profile(self) -> None:
+        """Scale the profile so that its largest displacement, or angle where nothing is displaced, is 1."""
+        if any(given is not None for given in (self.direction, self.rotation_centre, self.radial_from, self.blocks)):
             raise ValueError(
-                "in space a rotation needs rotation_centre = [x, y, z] and rotation_axis = [x, y, z], the axis about "
-                "which the supports turn; in the plane only rotation_centre = [x, y]"
+                "a settlement with a profile has its supports and motions; give no direction, centre or blocks"
             )
-        if self.rotation_centre is not None and not (np.isfinite(self.rotation) and self.rotation != 0.0):
-            raise ValueError(f"settlement rotation is {self.rotation:g}; with a rotation_centre it must not be zero")
-        if self.rotation_centre is None and self.rotation != 0.0:
-            raise ValueError("settlement has a rotation but no rotation_centre")
-        if self.rotation_centre is not None and self.direction is None:
-            object.__setattr__(self, "rotation", float(np.sign(self.rotation)))
-        self._check_steps()
+        motions = {name: np.asarray(motion, dtype=float) for name, motion in (self.profile or {}).items()}
+        for name, motion in motions.items():
+            if motion.shape != (3,) or not np.isfinite(motion).all():
+                raise ValueError(f"settlement profile of '{name}' is {motion.tolist()}; give [dx, dy, rotation]")
+        table = np.array(list(motions.values())).reshape(-1, 3)
+        largest = float(np.hypot(table[:, 0], table[:, 1]).max(initial=0.0)) or float(
+            np.abs(table[:, 2]).max(initial=0)
+        )
+        if largest == 0.0:
+            raise ValueError("the settlement profile moves no support; give one of them a displacement or a rotation")
+        # What is scaled already, as when it is read from a summary, keeps its last digits.
+        largest = 1.0 if abs(largest - 1.0) < 1e-12 else largest
+        scaled = {name: tuple((motion / largest).tolist()) for name, motion in motions.items()}
+        object.__setattr__(self, "profile", scaled)
 
     def _check_steps(self) -> None:
         if self.tolerance is None:
@@ -151,20 +182,25 @@ class Settlement:
     @property
     def unit(self) -> str:
         """Unit of the parameter s: "m", or "rad" for a pure rotation."""
+        if self.profile is not None:
+            return "m" if any(motion[0] or motion[1] for motion in self.profile.values()) else "rad"
         return "rad" if self.direction is None and self.radial_from is None else "m"
 
     @property
     def dimension(self) -> int:
         """2 in the plane, 3 in space."""
+        if self.profile is not None:
+            return 2
         given = self.direction if self.direction is not None else self.rotation_centre
         return 3 if given is None else len(given)
 
     def taking_part(self, assembly: Assembly) -> np.ndarray:
         """(n_blocks,) bool array: the supports that this settlement moves."""
-        if self.blocks is None:
+        blocks = self.blocks if self.profile is None else tuple(self.profile)
+        if blocks is None:
             return assembly.moving
         chosen = np.zeros(assembly.n_blocks, dtype=bool)
-        chosen[[assembly.index(name) for name in self.blocks]] = True
+        chosen[[assembly.index(name) for name in blocks]] = True
         return chosen & assembly.moving
 
     def displaced(self, assembly: Assembly, start: Pose, s: float) -> Pose:
@@ -173,8 +209,11 @@ class Settlement:
         Rotations follow the true arc about the (travelling) centre.
         """
         part = self.taking_part(assembly)
-        travel, angle, centre = self._motion(assembly, start, part, s)
         positions, rotations = start.positions.copy(), start.rotations.copy()
+        if self.profile is not None:
+            rate = self.rate(assembly, start, s)
+            return Pose(positions + s * rate[:, :2], rotations + s * rate[:, 2:])
+        travel, angle, centre = self._motion(assembly, start, part, s)
         turn = np.broadcast_to(angle, rotations[part].shape)
         positions[part] = centre + travel + turned(start.positions[part] - centre, turn)
         rotations[part] = composed_rotations(start.rotations[part], turn)
@@ -183,8 +222,12 @@ class Settlement:
     def rate(self, assembly: Assembly, start: Pose, s: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity of each support per unit of s, at s; zero for other blocks."""
         part, d = self.taking_part(assembly), assembly.dimension
-        _, angle, centre = self._motion(assembly, start, part, s)
         rate = _no_load(assembly)
+        if self.profile is not None:
+            for name, motion in self.profile.items():
+                rate[assembly.index(name)] = motion
+            return np.where(part[:, None], rate, 0.0)
+        _, angle, centre = self._motion(assembly, start, part, s)
         rate[part, :d] = self._motion(assembly, start, part, 1.0)[0]
         if self.rotation_centre is not None:
             spin = self._motion(assembly, start, part, 1.0)[1]

@@ -21,6 +21,7 @@ from .contents import Case
 from .coordinates import check_coordinates
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
+from .profiles import cut_ground, with_profiles
 
 #: The weight of a block lighter than this fraction of the whole may be lost in rounding errors of the other forces.
 LIGHTEST = 1e-14
@@ -77,6 +78,7 @@ def case_assembly(case: Case) -> solver.Assembly:
     check_coordinates(case, assembly)
     _note_numbers(assembly, case.source)
     _note_units(case, assembly)
+    assembly = cut_ground(assembly, case.profiles)
     return imperfect(assembly, case.imperfections)
 
 
@@ -203,3 +205,8 @@ def case_interfaces(case: Case) -> solver.Interfaces:
 def case_loads(case: Case, assembly: solver.Assembly) -> solver.Loads:
     """Sum self-weight and the loads of a case that do not move [N, N·m]."""
     return loads_of(case.loads, assembly, case.source)
+
+
+def case_settlements(case: Case, assembly: solver.Assembly) -> tuple[solver.Settlement, ...]:
+    """Settlements of a case, those with a profile as the motion of each support of the assembly."""
+    return with_profiles(case.settlements, case.profiles, assembly, case.source)

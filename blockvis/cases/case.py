@@ -22,8 +22,10 @@ from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .case_keys import MOST_STEPS
 from .contents import Case
+from .explain_settings import read_explain
 from .imperfections import Imperfection, read_imperfection
 from .loads import LoadCase
+from .profiles import Profile, read_profile
 from .toml_table import Table, is_number, shortened, toml_value
 from .value_paths import parse_path, put
 
@@ -48,6 +50,12 @@ def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
         the remedy.
     """
     path = Path(path)
+    text = case_file_text(path)
+    return parse_case(changed_text(text, path, changes) if changes else text, path)
+
+
+def case_file_text(path: Path) -> str:
+    """Read the text of a case file; raises ``ValueError`` where it is missing, a layout, or no text."""
     if not path.is_file():
         near = files_like(path, "*.toml", or_any=True)
         hint = f"; beside it are {', '.join(near)}" if near else ""
@@ -59,12 +67,11 @@ def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
         )
     try:
         # Editors of Windows begin a file with a mark of its encoding.
-        text = path.read_text(encoding="utf-8-sig")
+        return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(
             f"{path}: is not a text file in UTF-8 ({error.reason} at byte {error.start}); save it in UTF-8"
         ) from None
-    return parse_case(changed_text(text, path, changes) if changes else text, path)
 
 
 def changed_text(text: str, source: Path, changes: Sequence[str]) -> str:
@@ -99,14 +106,18 @@ def changed_text(text: str, source: Path, changes: Sequence[str]) -> str:
 
 def parse_case(text: str, source: Path) -> Case:
     """Read a case from the text of a case file; paths in it are relative to the folder of ``source``."""
+    return case_of(parsed_toml(text, source), source, text)
+
+
+def parsed_toml(text: str, source: Path) -> dict[str, Any]:
+    """Parse the text of a case file; raises ``ValueError`` with the place where it is no TOML."""
     try:
-        values = tomllib.loads(text)
+        return tomllib.loads(text)
     except RecursionError:
         raise ValueError(f"{source}: nests lists or tables without end; a case file has a handful of them") from None
     except ValueError as error:
         hint = "; write paths with / or in single quotes" if "\\" in text else ""
         raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"{hint}') from None
-    return case_of(values, source, text)
 
 
 def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
@@ -141,6 +152,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         densities[name] = one.number("density", positive=True)
         one.finish()
     analysis = top.table("analysis")
+    motions = [_settlement(entry) for entry in top.tables("settlement")]
     kind = KINDS[analysis.text("kind", next(iter(KINDS)), among=tuple(KINDS))]
     # Every kind reads its keys: one that is given to another kind is named, not ignored.
     settings = {name: known.read(top, analysis) for name, known in KINDS.items()}
@@ -178,11 +190,13 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         **_strength(material),
         interfaces=dict(_interface(entry) for entry in top.tables("interfaces")),
         imperfections=_imperfections(top),
-        settlements=tuple(_settlement(entry) for entry in top.tables("settlement")),
+        settlements=tuple(settlement for settlement, _ in motions),
+        profiles=tuple(profile for _, profile in motions),
         loads=tuple(_load(entry) for entry in top.tables("loads")),
         analysis=kind.name,
         settings=settings[kind.name],
         controls=_controls(analysis, geometry.number("overlap_tolerance", positive=True)),
+        explain=read_explain(top.table("explain")),
         animation=animation or None,
         vtu=output.text("vtu", "moved", among=("moved", "undeformed")),
     )
@@ -287,7 +301,8 @@ def _imperfections(top: Table) -> tuple[Imperfection, ...]:
     return tuple(found.values())
 
 
-def _settlement(table: Table) -> solver.Settlement:
+def _settlement(table: Table) -> tuple[solver.Settlement, Profile | None]:
+    """Read a settlement, and its profile along x, of which only the assembly can make motions of supports."""
     blocks = table.take("blocks")
     if blocks is not None:
         blocks = tuple([blocks] if isinstance(blocks, str) else blocks if isinstance(blocks, (list, tuple)) else [None])
@@ -303,6 +318,7 @@ def _settlement(table: Table) -> solver.Settlement:
         "limit": table.number("limit", 1.0, positive=True),
         "tolerance": table.number("tolerance", positive=True),
     }
+    profile = read_profile(table)
     table.finish()
     if keys["limit"] / keys["increment"] > MOST_STEPS:
         raise table.error(
@@ -310,10 +326,19 @@ def _settlement(table: Table) -> solver.Settlement:
             f"is {keys['increment']:g}: {keys['limit'] / keys['increment']:.3g} of them make the limit of "
             f"{keys['limit']:g}; at most {MOST_STEPS} do",
         )
+    if profile is not None:
+        taken = ["rotation_centre", "rotation", *(("direction", "blocks") if isinstance(profile, dict) else ())]
+        for key in taken:
+            if table.values.get(key) is not None:
+                raise table.error(key, "does not go with this profile, which says how each support moves")
+    if isinstance(profile, Profile):
+        keys["direction"] = keys["direction"] or (0.0, -1.0)
     if keys["rotation"] is None:
         keys["rotation"] = 1.0 if keys["rotation_centre"] is not None else 0.0
     try:
-        return solver.Settlement(**keys, blocks=blocks)
+        if isinstance(profile, dict):
+            return solver.Settlement(**keys, profile=profile), None
+        return solver.Settlement(**keys, blocks=blocks), profile
     except ValueError as error:
         raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 

@@ -15,10 +15,12 @@ from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .build import DENSITY, THICKNESS
 from .distributions import KINDS as DISTRIBUTIONS
+from .explain_settings import DIRECTIONS, ExplainSettings
 from .imperfections import IMPERFECTIONS
 from .key import (
     NOT_NEGATIVE,
     NUMBER,
+    NUMBERS,
     OUTLINE,
     PAIR,
     POSITIVE,
@@ -35,6 +37,7 @@ from .key import (
 
 _FRICTION = solver.InterfaceLaw.friction_coefficient
 _CONTROLS = solver.Controls()
+_EXPLAIN = ExplainSettings()
 
 #: More increments or frames than this are taken for a typing error.
 MOST_STEPS = 1_000_000
@@ -51,6 +54,31 @@ def _in_any_letters(words: tuple[str, ...]) -> str:
     return "|".join("".join(map(accepted, word)) for word in words)
 
 
+_PROFILE = ValueKind(
+    "table: kind, centre, inflection, depth; points; or supports",
+    {
+        "type": "object",
+        "properties": {
+            "kind": {"enum": ["gaussian", "points", "supports"]},
+            "centre": NUMBER.schema,
+            "inflection": POSITIVE.schema,
+            "depth": NUMBER.schema,
+            "points": {"type": "array", "items": PAIR.schema, "minItems": 2},
+            "supports": {
+                "type": "object",
+                "additionalProperties": {
+                    "type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3
+                },
+            },
+        },
+        "additionalProperties": False,
+    },
+)  # fmt: skip
+_TRUE_OR_FALSE = ValueKind("true or false", {"type": "boolean"})
+_GROUPS = ValueKind(
+    "list of names, or of lists of names",
+    {"anyOf": [{"type": "string"}, {"type": "array", "items": TEXTS.schema}]},
+)
 _LAYOUT = ValueKind(
     "text",
     {"anyOf": [{"enum": list(LAYOUTS)}, {"type": "string", "pattern": f"^({_in_any_letters(tuple(LAYOUTS))})$"}]},
@@ -262,6 +290,9 @@ SETTLEMENT = Section(
             "m", 1.0),
         Key("tolerance", POSITIVE, "Width of the bracket of the collapse; of a rotation alone in rad", 1e-4, "m",
             otherwise="a hundredth of the increment"),
+        Key("profile", _PROFILE, "How far each support goes, in proportion: a Gaussian trough or heave along x, points "
+            "of a table, or one vector and rotation per support; s is the largest displacement of a support's centroid",
+            {"kind": "gaussian", "centre": 1.5, "inflection": 0.8}, "m", otherwise="all go as far"),
         Key("blocks", TEXTS, "Names of the moving supports that take part; the others stand still", ["ground right"],
             otherwise="all moving supports"),
     ),
@@ -326,6 +357,32 @@ OUTPUT = Section(
          "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved")),
 )  # fmt: skip
 
+EXPLAIN = Section(
+    "explain",
+    "What blockvis explain looks for; every key has a default",
+    (
+        Key("supports", _GROUPS, "Supports that may have moved, or groups that moved as one", ["pier", ["left", "right"]],
+            otherwise="each support of the drawing"),
+        Key("directions", ValueKind("list of texts", {"type": "array", "items": {"enum": list(DIRECTIONS)}}),
+            "Ways in which they may have moved", ["down", "rotation"], default=_EXPLAIN.directions),
+        Key("trough", _TRUE_OR_FALSE, "Whether troughs and slopes of the ground are candidates", True,
+            otherwise="where the structure stands on three places or more"),
+        Key("centres", NUMBERS, "Places x at which a trough may be deepest", [1.0, 2.0], "m",
+            otherwise="five over the width of the structure"),
+        Key("inflections", NUMBERS, "Distances from there to where a trough may be steepest", [0.5, 1.0], "m",
+            otherwise="a sixth and a third of the width"),
+        Key("friction", PAIR, "Range of the friction coefficient of [material]; others follow in proportion", [0.4, 0.7],
+            otherwise="from 0.8 to 1.25 times that of the case"),
+        Key("limit", POSITIVE, "Largest displacement of a support", 0.1, "m",
+            otherwise="ten to twenty times the widest crack"),
+        Key("model_uncertainty", POSITIVE, "Standard deviation of computed widths, as a fraction of them", 0.3,
+            default=_EXPLAIN.model_uncertainty),
+        Key("place_uncertainty", NOT_NEGATIVE, "Within which a crack at x, y may be another joint of the model", 0.1, "m",
+            otherwise="half the block size"),
+        Key("outliers", POSITIVE, "Probability that an observation has another cause", 0.1, default=_EXPLAIN.outliers),
+    ),
+)  # fmt: skip
+
 #: Every table of the case file with its keys.
 SECTIONS = (
     GEOMETRY,
@@ -340,5 +397,6 @@ SECTIONS = (
     LOADS,
     ANALYSIS,
     *(section for kind in KINDS.values() for section in kind.sections),
+    EXPLAIN,
     OUTPUT,
 )

@@ -10,8 +10,10 @@ from typing import Any
 
 import solver
 
+from .explain_settings import ExplainSettings
 from .imperfections import Imperfection
 from .loads import LoadCase
+from .profiles import Profile
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,10 @@ class Case:
         Name of the kind of analysis.
     settings : optional
         What that kind has read from its own keys; see :meth:`blockvis.runs.kind.AnalysisKind.read`.
+    profiles : tuple of Profile or None
+        Of the settlements along x; :func:`blockvis.cases.build.case_settlements` makes motions of supports of them.
+    explain : ExplainSettings
+        What ``blockvis explain`` looks for; other analyses leave it alone.
     vtu : {"moved", "undeformed"}
         Shape of the blocks in the VTU files.
     """
@@ -57,9 +63,11 @@ class Case:
     interfaces: Mapping[tuple[str, str], solver.InterfaceLaw] = field(default_factory=dict)
     imperfections: tuple[Imperfection, ...] = ()
     settlements: tuple[solver.Settlement, ...] = ()
+    profiles: tuple[Profile | None, ...] = ()
     loads: tuple[LoadCase, ...] = ()
     analysis: str = "settlement"
     settings: Any = None
     controls: solver.Controls = field(default_factory=solver.Controls)
+    explain: ExplainSettings = field(default_factory=ExplainSettings)
     animation: str | None = "collapse.mp4"
     vtu: str = "moved"

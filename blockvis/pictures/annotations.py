@@ -8,10 +8,8 @@ import numpy as np
 import shapely
 
 import solver
+from blockvis.results.cracks import SMALLEST_OPENING
 from blockvis.results.joints import InitialJoints, faces_at
-
-#: A joint is shown open from this fraction of the block size on; on an ordinary brick it is a tenth of a millimetre.
-SMALLEST_OPENING = 1e-3
 
 #: What lies between faces is a crack until they are apart by this many block sizes, or by their own length: then the
 #: blocks have parted, and it is air. Of faces that are turned against each other by more than this angle [rad] only the

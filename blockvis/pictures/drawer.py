@@ -12,7 +12,8 @@ from PIL import Image
 import solver
 from blockvis.fall import CAPTION, Fall, falling_increment
 from blockvis.numbers import force_text, rounded_length
-from blockvis.results.joints import initial_joints
+from blockvis.results.cracks import cracks_of
+from blockvis.results.joints import faces_at, initial_joints
 
 from . import palette
 from .annotations import (
@@ -26,7 +27,7 @@ from .annotations import (
 from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, matters
 from .curves import CurvePanel
 from .flat_scene import Scene, magnified
-from .frame import ColourBar, Key, Sheet, framed
+from .frame import ColourBar, Key, Sheet, framed, write_labels
 from .live_load import LiveLoads
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 
@@ -44,6 +45,9 @@ OF_STATICS = (
     *("crack", "crack edge", "sliding", "hinge", "hinge top", "force", "force line", "ground"),
     *("arrow rim", "arrow top", "live rim", "live top"),
 )
+
+#: Most crack lines whose width is written.
+MOST_WIDTHS = 6
 
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
@@ -200,6 +204,7 @@ class Drawer:
         note: str = "",
         badge: str = "",
         blocks_only: bool = False,
+        widths: bool = False,
     ) -> Image.Image:
         """Draw one increment; for frames in between, with its blocks at another pose.
 
@@ -214,6 +219,8 @@ class Drawer:
             First and second line of the caption, and the warning, instead of those of the increment.
         blocks_only : bool
             Leave out what statics knows: joints, forces, what stands on what, and where supports go.
+        widths : bool
+            Write the largest width of the widest crack lines beside them [mm].
         """
         increment = increment if pose is not None else self._shown(increment)
         true = increment.pose if pose is None else pose
@@ -231,8 +238,11 @@ class Drawer:
         falling = increment.status == solver.Status.FALLING
         failed = self.response.stop == solver.Status.SOLVER_FAILED
         head, detail = caption_of(self.response, increment, self.look.magnification)
+        picture = self.scene.image()
+        if widths and self.look.joints and not falling:
+            self._write_widths(picture, true, shown)
         return self.sheet.composed(
-            self.scene.image(),
+            picture,
             title=title or head,
             detail=note or detail,
             badge=badge or (badge_of(self.response) if falling else FAILED_BADGE if failed else ""),
@@ -352,6 +362,14 @@ class Drawer:
         radius = float(np.clip(0.09 * self.assembly.block_size / scene.pixel, 3.0 * thin, 11.0 * thin))
         scene.discs("hinge/rim", found.hinges, radius * 1.35, palette.PAPER)
         scene.discs("hinge top", found.hinges, radius, palette.HINGE)
+
+    def _write_widths(self, picture: Image.Image, pose: solver.Pose, shown: solver.Pose) -> None:
+        """Write the widths of the widest crack lines at a pose beside them, where there is room."""
+        cracks = cracks_of(self.assembly, pose, self.joints)[: 2 * MOST_WIDTHS]
+        on_a, on_b, _ = faces_at(self.assembly, self.joints, shown)
+        widest = [int(crack.joints[0]) for crack in cracks]
+        places = self.scene.at_pixel((on_a + on_b)[widest].mean(axis=1) / 2.0)
+        write_labels(picture, places, [f"{1e3 * crack.width:.3g} mm" for crack in cracks], self.sheet.text, MOST_WIDTHS)
 
     def _line(self, pixels: float) -> float:
         return max(pixels, 1.2)

@@ -212,6 +212,43 @@ class Sheet:
         draw.text((left, top - 0.6 * self.text), f"displacement\n[{unit}]", palette.INK, font, anchor="ld")
 
 
+def write_labels(picture: Image.Image, places: np.ndarray, words: Sequence[str], text: int, most: int) -> None:
+    """Write labels on paper beside places of a picture, in their order, each where none lies yet.
+
+    Parameters
+    ----------
+    picture : PIL.Image.Image
+        Drawn upon.
+    places : (n, 2) array [pixel]
+    words : sequence of str
+        One per place.
+    text : int
+        Height of the text in pixels.
+    most : int
+        Labels written at most.
+    """
+    draw, font = ImageDraw.Draw(picture), _font(round(0.85 * text))
+    high, pad = 1.2 * text, 0.25 * text
+    written: list[tuple[float, float, float, float]] = []
+    for (x, y), label in zip(places.tolist(), words, strict=True):
+        wide = font.getlength(label) + 2.0 * pad
+        for left, top in (
+            (x + 0.6 * text, y - high / 2.0),
+            (x - 0.6 * text - wide, y - high / 2.0),
+            (x - wide / 2.0, y - 0.6 * text - high),
+            (x - wide / 2.0, y + 0.6 * text),
+        ):
+            box = (left, top, left + wide, top + high)
+            inside = box[0] >= 0 and box[1] >= 0 and box[2] <= picture.width and box[3] <= picture.height
+            if inside and not any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in written):
+                draw.rounded_rectangle(box, 0.25 * text, fill=palette.PAPER, outline=palette.OPEN)
+                draw.text((left + wide / 2.0, top + high / 2.0), label, palette.INK, font, anchor="mm")
+                written.append(box)
+                break
+        if len(written) == most:
+            return
+
+
 def _swatch(draw: ImageDraw.ImageDraw, key: Key, x: float, y: float, wide: float, text: float) -> None:
     if key.kind == "area":
         draw.rectangle((x, y - 0.38 * text, x + wide, y + 0.38 * text), fill=key.colour)

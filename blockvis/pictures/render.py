@@ -58,7 +58,7 @@ def draw_still(
         Resultant of each joint, forces at the contact points, or neither; "auto" draws resultants where the blocks
         are few enough to see them.
     joints : bool
-        Mark open and sliding joints and hinges.
+        Mark open and sliding joints and hinges, and write the widths of the widest cracks [mm].
     curve : bool
         Put the reaction curve beside the blocks.
 
@@ -69,7 +69,7 @@ def draw_still(
     _check_response(response)
     chosen = response.increments[increment] if isinstance(increment, int) else increment
     look = Look(magnification, colour_by, forces, joints)
-    return _save(_drawer(response, look, size, (chosen,), curve=curve, finer=1).picture(chosen), path)
+    return _save(_drawer(response, look, size, (chosen,), curve=curve, finer=1).picture(chosen, widths=True), path)
 
 
 def draw_mechanism(
@@ -96,7 +96,8 @@ def draw_mechanism(
     drawer = _drawer(response, Look(forces="none"), size, (swing.increment,), extra=(swing.displaced,), finer=1)
     if swing.moves:
         drawer.show_motion(swing)
-    return _save(drawer.picture(swing.increment, note=_mechanism_note(response, swing.parts)), path)
+    note = _mechanism_note(response, swing.parts)
+    return _save(drawer.picture(swing.increment, note=note, widths=True), path)
 
 
 def animate(

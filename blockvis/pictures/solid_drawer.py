@@ -149,6 +149,7 @@ class SolidDrawer:
         title: str = "",
         note: str = "",
         badge: str = "",
+        widths: bool = False,
     ) -> Image.Image:
         """Draw one increment; for frames in between, with its blocks at another pose.
 
@@ -161,6 +162,8 @@ class SolidDrawer:
             The parameter there.
         title, note, badge : str
             First and second line of the caption, and the warning, instead of those of the increment.
+        widths : bool
+            In the plane they are written at the widest cracks; here the legend has the scale of the colours.
         """
         increment = increment if pose is not None else self._shown(increment)
         true = increment.pose if pose is None else pose

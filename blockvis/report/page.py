@@ -21,7 +21,6 @@ from blockvis.fall import CAPTION, Fall, falling_increment
 from blockvis.numbers import force_text, rounded_length
 from blockvis.pictures import palette
 from blockvis.pictures.annotations import (
-    SMALLEST_OPENING,
     SMALLEST_RESULTANT,
     STEEPEST,
     WIDEST,
@@ -46,6 +45,7 @@ from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 from blockvis.results.about import about, loss_of
+from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.runs.kinds import KINDS
 
@@ -61,6 +61,9 @@ PATH_SECONDS, FALL_SECONDS, PAUSE = 6.0, 0.06, 0.6
 
 #: How the picture of blocks in space is turned and moved.
 TURNING = "the mouse or Shift with the arrows turns the picture, the mouse with Shift moves it"
+
+#: Crack lines that the table of the page lists.
+LISTED_CRACKS = 8
 
 #: Above this many blocks dots of hinges and lines of sliding joints hide the cracks: they are off until asked for.
 FEW_BLOCKS = 300
@@ -136,6 +139,7 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
         script=_script(response.assembly.dimension),
         turning=TURNING if response.assembly.dimension == 3 else "Shift with the arrows moves the picture",
         summary=html_rows(summary_rows(response, fall)),
+        cracks=_cracks(response),
         certificate=html_rows(_certificate(response)),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
         case_open=" open" if case_text else "",
@@ -161,6 +165,14 @@ def _notes(response: solver.Response) -> str:
     """List the notes of the run."""
     items = "".join(f"<li>{html.escape(note)}</li>" for note in dict.fromkeys(response.notes))
     return f'<h2>Notes</h2><ul id="notes">{items}</ul>' if items else ""
+
+
+def _cracks(response: solver.Response) -> str:
+    """List the crack lines of the last equilibrium."""
+    if not response.path or response.assembly.dimension == 3:
+        return ""
+    rows = crack_rows(cracks_of(response.assembly, response.path[-1].pose), LISTED_CRACKS)
+    return f'<h2>Cracks at the last equilibrium</h2><table id="crack-lines">{html_rows(rows)}</table>' if rows else ""
 
 
 def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> list[_Frame]:

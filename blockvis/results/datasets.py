@@ -1,23 +1,34 @@
-"""Assemblies and increments as pyvista datasets: blocks, joints and contact points.
+"""Assemblies and increments as VTK grids: blocks, joints and contact points.
 
 In the plane blocks are polygons and joints lines, in space polyhedra and faces; contact points are vertices.
+A run writes them without pyvista, whose import takes longer than the files of a small structure; who asks for a dataset
+is given one of pyvista's.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyvista as pv
-from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-from vtkmodules.vtkCommonCore import vtkDataArray, vtkStringArray
-from vtkmodules.vtkCommonDataModel import vtkCellArray
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints, vtkStringArray
+from vtkmodules.vtkCommonDataModel import (
+    VTK_LINE,
+    VTK_POLYGON,
+    VTK_POLYHEDRON,
+    VTK_VERTEX,
+    vtkCellArray,
+    vtkUnstructuredGrid,
+)
 
 import solver
 
 from .joint_faces import JointFaces, face_states, joint_faces
 from .joints import InitialJoints, initial_joints, joint_states
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 #: Numbers of the roles in the cell array ``role``; their names are in the field array ``role_names``.
 ROLE_NUMBERS = {role: number for number, role in enumerate(solver.ROLES)}
@@ -52,8 +63,7 @@ def block_dataset(
     pyvista.UnstructuredGrid
         Cell arrays ``block_id``, ``name``, ``role`` (number), ``role_name``, ``material_id``, ``material``,
         ``displacement`` (n_blocks, 3) of the centroids [m] and ``rotation`` [rad], in space a vector; point arrays
-        ``displacement``
-        (n_vertices, 3) [m], ``reference``, the coordinates in the layout [m], and of moved shapes ``to_reference``, the
+        ``displacement`` (n_vertices, 3) [m], ``reference``, the coordinates in the layout [m], and of moved shapes ``to_reference``, the
         vector back to them [m]; field arrays ``units`` as "displacement [m]", ``settlement`` (the parameter: of a
         pushover the control displacement, of a load that moves its position), ``phase``, ``load_multiplier``,
         ``reaction`` [N or N·m], ``status``, ``role_names`` and ``material_names``.
@@ -65,24 +75,30 @@ def block_dataset(
     >>> str(block_dataset(one).cell_data["name"][0])
     'lintel'
     """
+    return _as_dataset(block_grid(assembly, increment, shape=shape))
+
+
+def block_grid(
+    assembly: solver.Assembly, increment: solver.Increment | None = None, *, shape: str = "moved"
+) -> vtkUnstructuredGrid:
+    """Make what :func:`block_dataset` wraps."""
     pose = solver.Pose.initial(assembly) if increment is None else increment.pose
     corners = solver.moved_vertices(assembly, pose)
     if assembly.dimension == 2:
-        grid = pv.UnstructuredGrid(_polygon_cells(assembly.offsets), _cell_types(assembly), _in_space(corners))
+        grid = _grid(corners, assembly.offsets, VTK_POLYGON)
     else:
         grid = _polyhedra(assembly.shapes, corners)
     materials = sorted(set(assembly.materials))
     number = {material: k for k, material in enumerate(materials)}
-    moved = pose.displacements(assembly)
     cells = {
         "block_id": np.arange(assembly.n_blocks, dtype=np.int32),
         "role": np.array([ROLE_NUMBERS[str(role)] for role in assembly.roles], dtype=np.int32),
         "material_id": np.array([number[material] for material in assembly.materials], dtype=np.int32),
-        "displacement": _in_space(moved[:, : assembly.dimension]),
-        "rotation": moved[:, assembly.dimension :].squeeze(axis=1) if assembly.dimension == 2 else moved[:, 3:].copy(),
+        "displacement": _in_space(pose.positions - assembly.centroids),
+        "rotation": pose.rotations[:, 0].copy() if assembly.dimension == 2 else pose.rotations.copy(),
     }
-    for name, array in cells.items():
-        grid.cell_data[name] = array
+    add_arrays(grid.GetCellData(), cells)
+    grid.GetCellData().SetActiveScalars("block_id")
     for name, words in (("name", assembly.names), ("role_name", assembly.roles), ("material", assembly.materials)):
         grid.GetCellData().AddArray(_strings(name, words))
     _give_shape(grid, assembly.vertices, shape)
@@ -122,20 +138,26 @@ def joint_dataset(
         ``slip`` and ``shear_force`` are sizes, ``area`` [m²] takes the place of ``length``, ``normal`` and ``force``
         [N] are vectors, and the point array ``gap`` [m] is the distance of the faces at each corner.
     """
+    return _as_dataset(joint_grid(assembly, increment, shape=shape, joints=joints))
+
+
+def joint_grid(
+    assembly: solver.Assembly,
+    increment: solver.Increment,
+    *,
+    shape: str = "moved",
+    joints: InitialJoints | JointFaces | None = None,
+) -> vtkUnstructuredGrid:
+    """Make what :func:`joint_dataset` wraps."""
     if assembly.dimension == 3:
-        return _face_dataset(
+        return _face_grid(
             assembly, increment, joints if isinstance(joints, JointFaces) else joint_faces(assembly), shape
         )
     assert not isinstance(joints, JointFaces)
     states = joint_states(assembly, initial_joints(assembly) if joints is None else joints, increment)
-    n = len(states.ends)
-    points = states.ends.reshape(-1, 2)
-    cells = np.column_stack([np.full(n, 2), np.arange(2 * n).reshape(n, 2)]).ravel()
-    grid = pv.UnstructuredGrid(cells, np.full(n, int(pv.CellType.LINE), np.uint8), _in_space(points))
     blocks = (np.repeat(states.block_a, 2), np.repeat(states.block_b, 2))
-    initial = solver.Pose.initial(assembly)
-    _give_shape(grid, solver.carried_between(points, *blocks, increment.pose, initial), shape)
-    _add(
+    grid = _grid_between(assembly, increment, states.ends.reshape(-1, 2), blocks, VTK_LINE, shape)
+    add_arrays(
         grid.GetCellData(),
         {
             "opening": states.opening,
@@ -156,23 +178,19 @@ def joint_dataset(
     return grid
 
 
-def _face_dataset(
+def _face_grid(
     assembly: solver.Assembly, increment: solver.Increment, joints: JointFaces, shape: str
-) -> pv.UnstructuredGrid:
-    """Make the dataset of joints in space: polygons, and lines or vertices where blocks touch at an edge or a corner."""
+) -> vtkUnstructuredGrid:
+    """Make the grid of joints in space: polygons, and lines or vertices where blocks touch at an edge or a corner."""
     states = face_states(assembly, joints, increment)
-    rings, counts = states.rings, np.diff(states.rings.offsets)
-    kinds = np.array([pv.CellType.VERTEX, pv.CellType.LINE, pv.CellType.POLYGON], dtype=np.uint8)
-    grid = pv.UnstructuredGrid(
-        np.insert(np.arange(len(rings.points)), rings.offsets[:-1], counts),
-        kinds[np.minimum(counts, 3) - 1],
-        rings.points,
-    )
+    rings = states.rings
+    kinds = np.array([VTK_VERTEX, VTK_LINE, VTK_POLYGON], dtype=np.uint8)
+    grid = _grid(rings.points, rings.offsets, kinds[np.minimum(np.diff(rings.offsets), 3) - 1])
     blocks = states.block_a[rings.ring], states.block_b[rings.ring]
     initial = solver.Pose.initial(assembly)
     _give_shape(grid, solver.carried_between(rings.points, *blocks, increment.pose, initial), shape)
-    _add(grid.GetPointData(), {"gap": states.gaps})
-    _add(
+    add_arrays(grid.GetPointData(), {"gap": states.gaps})
+    add_arrays(
         grid.GetCellData(),
         {
             "opening": states.opening,
@@ -217,13 +235,16 @@ def contact_dataset(
         equilibrium, forces are 0. In space ``shear_force`` is the size of ``shear`` [N], its vector, and ``slip`` [m] is
         how far block a has moved along block b there since the layout.
     """
+    return _as_dataset(contact_grid(assembly, increment, shape=shape))
+
+
+def contact_grid(
+    assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
+) -> vtkUnstructuredGrid:
+    """Make what :func:`contact_dataset` wraps."""
     contacts = increment.contacts
-    n = len(contacts.points)
-    vertices = np.column_stack([np.ones(n, dtype=np.int64), np.arange(n)]).ravel()
-    grid = pv.UnstructuredGrid(vertices, np.full(n, int(pv.CellType.VERTEX), np.uint8), _in_space(contacts.points))
-    initial = solver.Pose.initial(assembly)
-    drawn = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, initial)
-    _give_shape(grid, drawn, shape)
+    blocks = (contacts.block_a, contacts.block_b)
+    grid = _grid_between(assembly, increment, contacts.points, blocks, VTK_VERTEX, shape)
     normal, tangent = contacts.frames[:, 0], contacts.frames[:, 1]
     balanced = increment.forces * (increment.status != solver.Status.FALLING)
     shear = np.einsum("ki,kij->kj", balanced[:, 1:], contacts.frames[:, 1:])
@@ -243,7 +264,7 @@ def contact_dataset(
     }
     if in_space:
         points |= {"shear": shear, "slip": _slip(assembly, increment)}
-    _add(grid.GetPointData(), points)
+    add_arrays(grid.GetPointData(), points)
     grid.GetFieldData().AddArray(_strings("state_names", [state.name.lower() for state in solver.ContactState]))
     _describe(grid, increment)
     _state_units(grid)
@@ -277,39 +298,115 @@ def output_times(increments: Sequence[solver.Increment]) -> list[float]:
     return times
 
 
-def _describe(grid: pv.UnstructuredGrid, increment: solver.Increment) -> None:
-    grid.field_data["settlement"] = np.array([increment.parameter])
-    grid.field_data["phase"] = np.array([increment.phase])
-    grid.field_data["load_multiplier"] = np.array([increment.load_multiplier])
-    grid.field_data["reaction"] = np.array([increment.reaction])
+def _as_dataset(grid: vtkUnstructuredGrid) -> pv.UnstructuredGrid:
+    import pyvista as pv
+
+    return pv.UnstructuredGrid(grid)
+
+
+def _grid(points: np.ndarray, offsets: np.ndarray, kind: int | np.ndarray) -> vtkUnstructuredGrid:
+    """Make a grid of cells of their own points, (n, d) [m]: cell i of offsets[i] to offsets[i + 1]."""
+    grid = _grid_of_points(points)
+    kinds = np.broadcast_to(np.asarray(kind, dtype=np.uint8), len(offsets) - 1)
+    grid.SetCells(numpy_to_vtk(np.ascontiguousarray(kinds), deep=True), _cells(offsets, np.arange(len(points))))
+    return grid
+
+
+def _polyhedra(shapes: solver.Polyhedra, corners: np.ndarray) -> vtkUnstructuredGrid:
+    """Make a grid of one polyhedron per block, with the corners of all blocks, (n_vertices, 3) [m]."""
+    grid = _grid_of_points(corners)
+    grid.SetPolyhedralCells(
+        numpy_to_vtk(np.full(len(shapes), VTK_POLYHEDRON, dtype=np.uint8), deep=True),
+        _cells(shapes.offsets, np.arange(len(corners))),
+        _cells(shapes.faces_of_block, np.arange(len(shapes.block_of_face))),
+        _cells(shapes.face_offsets, shapes.corners),
+    )
+    return grid
+
+
+def _grid_of_points(points: np.ndarray) -> vtkUnstructuredGrid:
+    grid, nodes = vtkUnstructuredGrid(), vtkPoints()
+    nodes.SetData(numpy_to_vtk(np.ascontiguousarray(_in_space(points)), deep=True))
+    grid.SetPoints(nodes)
+    return grid
+
+
+def _cells(offsets: np.ndarray, members: np.ndarray) -> vtkCellArray:
+    cells = vtkCellArray()
+    cells.SetData(*(numpy_to_vtk(np.asarray(ids, dtype=np.int64), deep=True) for ids in (offsets, members)))
+    return cells
+
+
+def _slip(assembly: solver.Assembly, increment: solver.Increment) -> np.ndarray:
+    """(n_contacts, 3) array [m]: how far block a has moved along block b at each contact point since the layout."""
+    contacts, initial = increment.contacts, solver.Pose.initial(assembly)
+    on_a, on_b = (
+        solver.carried(contacts.points, block, increment.pose, initial)
+        for block in (contacts.block_a, contacts.block_b)
+    )
+    # What now lies together was apart by so much, seen with the axes of the layout.
+    moved = solver.turned(on_b - on_a, increment.pose.rotations[contacts.block_b])
+    normal = contacts.frames[:, 0]
+    return np.asarray(moved - (moved * normal).sum(axis=1)[:, None] * normal)
+
+
+def _grid_between(
+    assembly: solver.Assembly,
+    increment: solver.Increment,
+    points: np.ndarray,
+    blocks: tuple[np.ndarray, np.ndarray],
+    kind: int,
+    shape: str,
+) -> vtkUnstructuredGrid:
+    """Make a grid of vertices or lines, whose points, (n, d) [m], lie between two blocks each."""
+    grid = _grid(points, np.arange(0, len(points) + 1, 2 if kind == VTK_LINE else 1), kind)
+    initial = solver.Pose.initial(assembly)
+    _give_shape(grid, solver.carried_between(points, *blocks, increment.pose, initial), shape)
+    return grid
+
+
+def _describe(grid: vtkUnstructuredGrid, increment: solver.Increment) -> None:
+    numbers = {
+        "settlement": increment.parameter,
+        "phase": increment.phase,
+        "load_multiplier": increment.load_multiplier,
+        "reaction": increment.reaction,
+    }
+    add_arrays(grid.GetFieldData(), {name: np.array([number]) for name, number in numbers.items()})
     grid.GetFieldData().AddArray(_strings("status", [str(increment.status)]))
 
 
-def _add(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
-    """Add arrays that may be empty: blocks in the air have no contact point, and pyvista refuses empty arrays."""
+def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
+    """Add arrays to the point, cell or field data of a VTK grid.
+
+    Parameters
+    ----------
+    attributes : vtkFieldData
+    arrays : mapping from name to array
+    """
     for name, array in arrays.items():
         values = numpy_to_vtk(np.ascontiguousarray(array), deep=True)
         values.SetName(name)
         attributes.AddArray(values)
 
 
-def _give_shape(grid: pv.UnstructuredGrid, reference: np.ndarray, shape: str) -> None:
-    """Let the points of a moved grid stay or go where the layout has them, (n, 2) [m], and say how far they move.
+def _give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str) -> None:
+    """Let the points of a moved grid stay or go where the layout has them, (n, d) [m], and say how far they move.
 
     The active vectors are what Warp By Vector takes first: of moved shapes those that do not move them a second time.
     """
     if shape not in SHAPES:
         raise ValueError(f"shape is '{shape}'; choose from {', '.join(SHAPES)}")
     drawn = _in_space(reference)
-    moved = np.asarray(grid.points).reshape(-1, 3) - drawn
+    moved = vtk_to_numpy(grid.GetPoints().GetData()) - drawn
     vectors = {"to_reference": -moved} if shape == "moved" else {}
-    _add(grid.GetPointData(), vectors | {"displacement": moved, "reference": drawn})
+    add_arrays(grid.GetPointData(), vectors | {"displacement": moved, "reference": drawn})
     grid.GetPointData().SetActiveVectors("to_reference" if shape == "moved" else "displacement")
     if shape == "undeformed":
-        grid.points = drawn
+        grid.GetPoints().SetData(numpy_to_vtk(np.ascontiguousarray(drawn), deep=True))
 
 
-def _state_units(grid: pv.UnstructuredGrid) -> None:
+def _state_units(grid: vtkUnstructuredGrid) -> None:
     """Write the unit of each array into its metadata and into the field array ``units``."""
     listed = []
     for attributes in (grid.GetPointData(), grid.GetCellData()):
@@ -328,45 +425,6 @@ def _strings(name: str, words: Iterable[str]) -> vtkStringArray:
     for word in words:
         array.InsertNextValue(str(word))
     return array
-
-
-def _slip(assembly: solver.Assembly, increment: solver.Increment) -> np.ndarray:
-    """(n_contacts, 3) array [m]: how far block a has moved along block b at each contact point since the layout."""
-    contacts, initial = increment.contacts, solver.Pose.initial(assembly)
-    on_a, on_b = (
-        solver.carried(contacts.points, block, increment.pose, initial)
-        for block in (contacts.block_a, contacts.block_b)
-    )
-    # What now lies together was apart by so much, seen with the layout's axes.
-    moved = solver.turned(on_b - on_a, increment.pose.rotations[contacts.block_b])
-    normal = contacts.frames[:, 0]
-    return np.asarray(moved - (moved * normal).sum(axis=1)[:, None] * normal)
-
-
-def _polyhedra(shapes: solver.Polyhedra, corners: np.ndarray) -> pv.UnstructuredGrid:
-    """Make one polyhedron cell per block, the corners of all blocks (n_vertices, 3) [m] as its points."""
-
-    def cells(offsets: np.ndarray, members: np.ndarray) -> vtkCellArray:
-        array = vtkCellArray()
-        array.SetData(*(numpy_to_vtkIdTypeArray(of.astype(np.int64), deep=True) for of in (offsets, members)))
-        return array
-
-    grid = pv.UnstructuredGrid()
-    grid.points = np.array(corners)
-    types = numpy_to_vtk(np.full(len(shapes), int(pv.CellType.POLYHEDRON), np.uint8), deep=True)
-    blocks = cells(shapes.offsets, np.arange(len(shapes.vertices)))
-    faces = cells(shapes.face_offsets, shapes.corners)
-    grid.SetPolyhedralCells(types, blocks, cells(shapes.faces_of_block, np.arange(len(shapes.block_of_face))), faces)
-    return grid
-
-
-def _polygon_cells(offsets: np.ndarray) -> np.ndarray:
-    counts = np.diff(offsets)
-    return np.insert(np.arange(offsets[-1]), offsets[:-1], counts)
-
-
-def _cell_types(assembly: solver.Assembly) -> np.ndarray:
-    return np.full(assembly.n_blocks, int(pv.CellType.POLYGON), dtype=np.uint8)
 
 
 def _in_space(vectors: np.ndarray) -> np.ndarray:

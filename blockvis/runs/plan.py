@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import solver
-from blockvis.cases.build import case_interfaces, case_loads
+from blockvis.cases.build import case_interfaces, case_loads, case_settlements
 from blockvis.cases.contents import Case
 
 from .kind import AnalysisRun, RunInput
@@ -38,6 +39,7 @@ def planned(
     kind = KINDS[case.analysis]
     if not isinstance(resume, kind.checkpoint | None):
         raise ValueError(f"a {case.analysis} cannot go on from a {type(resume).__name__}")
+    case = replace(case, settlements=case_settlements(case, assembly), profiles=())
     given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly))
     if case.settlements:
         solver.check_settlement(assembly, case.settlements, case.controls)

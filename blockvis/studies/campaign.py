@@ -135,11 +135,14 @@ def run_study(
         records = StudyFolder(folder, plan, force=force)
         todo = records.missing(retry_failed=retry_failed)
         if todo:
-            with local_cluster(min(workers or _cores(), len(todo))) as client:
+            with local_cluster(min(workers or cores(), len(todo))) as client:
                 carry_out(records, todo, client, progress)
     else:
+        from blockvis.cases.case import case_of
+
         # The folder is not changed unless the scheduler answers.
-        with _existing_cluster(scheduler, plan) as client:
+        file = case_of(plan.values, plan.case_source).file
+        with existing_cluster(scheduler, "" if file is None else str(file)) as client:
             records = StudyFolder(folder, plan, force=force)
             carry_out(records, records.missing(retry_failed=retry_failed), client, progress)
     _finish(records, sorted({*plan.keep, *keep}))
@@ -178,7 +181,8 @@ def _keep(records: StudyFolder, run: int) -> None:
     run_case(parse_case(case_file.read_text(encoding="utf-8"), case_file), folder, overwrite=True)
 
 
-def _cores() -> int:
+def cores() -> int:
+    """Count the cores that processes of this machine may use."""
     from dask.system import CPU_COUNT
 
     return int(CPU_COUNT)
@@ -238,10 +242,16 @@ def _ignore_interrupts() -> Any:
 
 
 @contextmanager
-def _existing_cluster(address: str, plan: Study) -> Iterator[Client]:
-    from distributed import Client
+def existing_cluster(address: str, file: str) -> Iterator[Client]:
+    """Find a cluster by the address of its scheduler, and check that its workers can do the runs.
 
-    from blockvis.cases.case import case_of
+    Parameters
+    ----------
+    address : str
+    file : str
+        Layout file that every worker must see; empty for none.
+    """
+    from distributed import Client
 
     try:
         client = Client(address, timeout=ANSWER)
@@ -257,8 +267,7 @@ def _existing_cluster(address: str, plan: Study) -> Iterator[Client]:
             raise ValueError(
                 f"the scheduler at '{address}' has no workers; start some with: dask worker {address} --nthreads 1"
             ) from None
-        file = case_of(plan.values, plan.case_source).file
-        _check_workers(client, "" if file is None else str(file))
+        _check_workers(client, file)
         yield client
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.cases.build import case_assembly, case_interfaces, case_loads
+from blockvis.cases.build import case_assembly, case_interfaces, case_loads, case_settlements
 from blockvis.cases.case import Case, case_of
 from blockvis.pictures.annotations import settlement_arrows
 from blockvis.results.about import loss_in
@@ -93,6 +93,7 @@ def _reason(error: Exception) -> str:
 
 def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
     assembly = case_assembly(case)
+    case = replace(case, settlements=case_settlements(case, assembly), profiles=())
     # The first frame of the fall shows the mechanism; the others are not needed.
     controls = replace(case.controls, falling_frames=1)
     steps = solver.settlement_increments(

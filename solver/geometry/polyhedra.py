@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from .contacts import Contacts
+from .convex_parts import ConvexParts, convex_parts
 from .solids import Solids
 from .spatial_contacts import find_points, measured_points
 from .spatial_overlaps import overlap_depths_in_space
@@ -27,6 +28,11 @@ class Polyhedra(Solids):
         return float(np.cbrt(self.volumes[chosen].mean()))
 
     @cached_property
+    def parts(self) -> ConvexParts:
+        """Convex parts of the blocks: the blocks themselves where all are convex."""
+        return convex_parts(self)
+
+    @cached_property
     def gyration(self) -> np.ndarray:
         """(n_blocks,) array [m²]: square of the radius of gyration of each block, the mean about all axes."""
         return np.asarray(np.trace(self.inertia, axis1=1, axis2=2) / (3.0 * self.volumes))
@@ -35,18 +41,19 @@ class Polyhedra(Solids):
         """Move the drawing by (3,) [m]."""
         return replace(self, vertices=self.vertices + by)
 
-    @cached_property
-    def _own(self) -> np.ndarray:
-        return np.arange(len(self))
-
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
         """Find contact points with a gap up to ``reach`` [m], one of their blocks of the useful, (n_blocks,) bool."""
-        return find_points(self, self._own, vertices, reach, useful, self.widths)
+        parts = self.parts
+        return find_points(parts.solids, parts.block_of_part, parts.placed(vertices), reach, useful, self.widths)
 
     def measure(self, vertices: np.ndarray, contacts: Contacts) -> Contacts:
         """Measure the contact points between the same features, with the corners (n_vertices, 3) [m] elsewhere."""
-        return measured_points(self, self._own, vertices, contacts.features, contacts.areas)
+        parts = self.parts
+        return measured_points(
+            parts.solids, parts.block_of_part, parts.placed(vertices), contacts.features, contacts.areas
+        )
 
     def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pairs of blocks that overlap by more than ``tolerance`` [m]; see :func:`overlap_depths_in_space`."""
-        return overlap_depths_in_space(self, self._own, vertices, tolerance)
+        parts = self.parts
+        return overlap_depths_in_space(parts.solids, parts.block_of_part, parts.placed(vertices), tolerance)

@@ -11,6 +11,7 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import box_pairs, boxes, expand_ranges
 from .contacts import Contacts
+from .portions import alike
 from .solids import Faces, Solids, cross, dot, unit
 
 #: Two faces face each other where the cosine between the outward normal of one and the inward normal of the other is
@@ -38,9 +39,6 @@ ON_FACE, ON_CORNER, ACROSS = 0, 1, 2
 
 #: Places along edges are kept as multiples of this part of them, which is far below what a geometry is exact to.
 GRAIN = 2.0**-29
-
-#: Arrays of no more than so many numbers are worked on at a time.
-PORTION = 2_000_000
 
 
 def _places(along_a: np.ndarray, along_b: np.ndarray, parallel: np.ndarray) -> np.ndarray:
@@ -251,18 +249,6 @@ def _near_parts(
     return i[chosen], j[chosen]
 
 
-def _alike(*counts: np.ndarray) -> Iterator[np.ndarray]:
-    """Numbers of the pairs that have the same counts, in portions that fit into memory."""
-    keys = np.zeros(len(counts[0]), dtype=np.int64)
-    for count in counts:
-        keys = keys * (int(count.max(initial=0)) + 1) + count
-    order = np.argsort(keys, kind="stable")
-    for group in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1):
-        if len(group):
-            portion = max(1, PORTION // int(np.prod([count[group[0]] for count in counts])))
-            yield from np.split(group, np.arange(portion, len(group), portion))
-
-
 def face_separations(
     solids: Solids, faces: Faces, vertices: np.ndarray, i: np.ndarray, j: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -270,7 +256,7 @@ def face_separations(
     first_face, first_vertex = solids.faces_of_block, solids.offsets
     n_faces, n_vertices = np.diff(first_face)[i], np.diff(first_vertex)[j]
     apart, leading = np.empty(len(i)), np.empty(len(i), dtype=np.int64)
-    for k in _alike(n_faces, n_vertices):
+    for k in alike(n_faces, n_vertices):
         face = first_face[i[k]][:, None] + np.arange(n_faces[k[0]])
         vertex = first_vertex[j[k]][:, None] + np.arange(n_vertices[k[0]])
         # From a corner near by, for the digits of coordinates far from the origin.
@@ -289,7 +275,7 @@ def _opposed_faces(solids: Solids, faces: Faces, leading: np.ndarray, j: np.ndar
     first = solids.faces_of_block
     counts = np.diff(first)[j]
     answer = np.empty(len(j), dtype=np.int64)
-    for k in _alike(counts):
+    for k in alike(counts):
         face = first[j[k]][:, None] + np.arange(counts[k[0]])
         answer[k] = face[np.arange(len(k)), dot(faces.normals[face], faces.normals[leading[k]][:, None]).argmin(axis=1)]
     return answer
@@ -334,7 +320,7 @@ def _clipped(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Features and areas of the corners of the polygons in which two faces cover each other."""
     sizes = np.diff(solids.face_offsets)
-    for k in _alike(sizes[pairs.face_i], sizes[pairs.face_j]):
+    for k in alike(sizes[pairs.face_i], sizes[pairs.face_j]):
         yield _clipped_alike(solids, faces, vertices, pairs.face_i[k], pairs.face_j[k])
     yield np.zeros((0, 4), dtype=np.int64), np.zeros(0)
 
@@ -566,7 +552,7 @@ def edge_separations(
     face = solids.face_of_corner
     apart = np.full(len(i), -np.inf)
     found_own, found_other = np.zeros((2, len(i)), dtype=np.int64)
-    for k in _alike(count[i], count[j]):
+    for k in alike(count[i], count[j]):
         own = once[first[i[k]][:, None] + np.arange(count[i[k[0]]])]
         other = once[first[j[k]][:, None] + np.arange(count[j[k[0]]])]
         a, b = vertices[solids.corners[own]], vertices[solids.corners[other]]

@@ -269,7 +269,7 @@ class _Newton:
         behind: float,
     ) -> _Direction:
         """The change that alters each product by its aim and takes the errors away."""
-        step, normal, gap = self.step, self.forces[0], self.distances[0]
+        step, normal = self.step, self.forces[0]
         for_normal = across_aims / normal + gap_error
         aimed = self.scaled(_divided(along_aims, self.middle))
         for_shear = aimed[1:] + slip_error
@@ -287,9 +287,14 @@ class _Newton:
         d_normal = (for_normal - relative[0]) / self.k_normal
         lean = self._lean(for_shear - self.h_normal * d_normal - relative[1:])
         forces = np.concatenate([d_normal[None], lean])
-        d_gap = (across_aims - gap * d_normal) / normal
-        d_cone = aimed - self.scaled(self.scaled(forces))
-        return _Direction(motion, relative, multiplier, forces, np.concatenate([d_gap[None], d_cone]))
+        # Distances by the equations that they are linear in: through the scaling, which is steep at what slides, they
+        # would lose their digits. γ by the product alone.
+        across, along = step.give
+        d_gap = relative[0] + across * d_normal - gap_error
+        d_slip = relative[1:] + along * step.friction * lean - slip_error
+        lean_now, apart = self.forces[1:], self.distances[1:]
+        d_cone = (along_aims[0] - (apart * forces).sum(axis=0) - (lean_now * d_slip).sum(axis=0)) / normal
+        return _Direction(motion, relative, multiplier, forces, np.stack([d_gap, d_cone, *d_slip]))
 
 
 def _in_answers(

@@ -56,9 +56,21 @@ ENDS = {
 }
 
 
+#: Three to twelve seconds each: walls that slide on settling supports, a study, and what others show too.
+THOROUGH = {
+    "arch_friction",
+    "arch_pushed_after_settlement",
+    "panel_with_opening",
+    "portal_frame",
+    "wall_horizontal_after_settlement",
+    "wall_loaded",
+    "wall_self_weight",
+}
+
+
 def marks_of(name):
     """What an example is marked with."""
-    return [pytest.mark.slow] if name in SLOW else []
+    return [pytest.mark.slow] if name in SLOW else [pytest.mark.thorough] if name in THOROUGH else []
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,276 @@
+"""Profiles of settlement: a trough along x, or points of a table, as the motion of each support."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+import solver
+from blockvis.suggestions import nearest
+
+from .toml_table import Table, is_number, shortened
+
+#: Pieces of a support narrower than this fraction of the block size are not cut off.
+NARROWEST = 0.02
+
+#: Blocks stand on a support that is within this fraction of the block size.
+TOUCHING = 2e-3
+
+#: A profile that leaves the chord over a support by less than this fraction of its largest value tilts it as it is.
+STRAIGHT = 1e-3
+
+
+@dataclass(frozen=True)
+class Profile:
+    """How far the ground goes at each x, in proportion.
+
+    Attributes
+    ----------
+    kind : {"gaussian", "points"}
+    centre, inflection : float [m]
+        Of a Gaussian trough: where it is deepest, and how far from there it is steepest.
+    depth : float
+        Of a Gaussian trough at its centre; negative for a heave.
+    points : tuple of (float, float) [m, any]
+        Places x and how far the ground goes there, straight between them and level beyond.
+    """
+
+    kind: str
+    centre: float = 0.0
+    inflection: float = 1.0
+    depth: float = 1.0
+    points: tuple[tuple[float, float], ...] = ()
+
+    def value(self, x: np.ndarray) -> np.ndarray:
+        """(n,) array: how far the ground goes at places x, (n,) [m]."""
+        x = np.asarray(x, dtype=float)
+        if self.kind == "gaussian":
+            return np.asarray(self.depth * np.exp(-(((x - self.centre) / self.inflection) ** 2) / 2.0))
+        places, values = np.array(self.points).T
+        return np.interp(x, places, values)
+
+    def slope(self, x: np.ndarray) -> np.ndarray:
+        """(n,) array [1/m]: slope of the profile; at a corner of it the mean of both sides."""
+        x = np.asarray(x, dtype=float)
+        if self.kind == "gaussian":
+            return self.value(x) * (self.centre - x) / self.inflection**2
+        step = 1e-6 * (self.points[-1][0] - self.points[0][0])
+        return np.asarray((self.value(x + step) - self.value(x - step)) / (2.0 * step))
+
+    def bends(self, low: float, high: float) -> bool:
+        """Whether the profile leaves the straight line between two places x [m]."""
+        x = np.linspace(low, high, 101)
+        values = self.value(x)
+        scale = float(np.abs(self.value(np.array([self.centre, *(x for x, _ in self.points)]))).max())
+        chord = values[0] + (values[-1] - values[0]) * np.linspace(0.0, 1.0, 101)
+        return bool(np.abs(values - chord).max() > STRAIGHT * scale)
+
+    def motions(
+        self, assembly: solver.Assembly, blocks: Sequence[int], direction: tuple[float, float]
+    ) -> dict[str, tuple[float, float, float]]:
+        """Motion of each support: the value at its centroid along a direction, and the tilt of the ground there.
+
+        Parameters
+        ----------
+        assembly : solver.Assembly
+        blocks : sequence of int
+            Supports.
+        direction : (float, float)
+            Unit vector in which the ground goes.
+        """
+        x = assembly.centroids[list(blocks), 0]
+        table = (
+            np.stack([self.value(x) * direction[0], self.value(x) * direction[1], self.slope(x) * direction[1]], 1)
+            + 0.0
+        )
+        return {
+            assembly.names[b]: (float(dx), float(dy), float(turn))
+            for b, (dx, dy, turn) in zip(blocks, table.tolist(), strict=True)
+        }
+
+
+def read_profile(table: Table) -> Profile | dict[str, tuple[float, float, float]] | None:
+    """Read ``profile`` of a settlement; the motions of supports where it gives these."""
+    given = table.take("profile")
+    if given is None:
+        return None
+    if not isinstance(given, dict):
+        raise table.error(
+            "profile",
+            f'is {shortened(given)}; give {{ kind = "gaussian", centre = x, inflection = i }}, '
+            '{ points = [[x, s], ...] } or { supports = { "name" = [dx, dy, rotation] } }',
+        )
+    inner = Table(given, f"{table.where}.profile", table.source)
+    choices = [key for key in ("points", "supports") if key in given]
+    kind = inner.text("kind", choices[0] if choices else "gaussian", among=("gaussian", "points", "supports"))
+    if choices not in ([], [kind]):
+        raise inner.error("kind", f"is '{kind}', but {' and '.join(choices)} are given; give one kind of profile")
+    found: Profile | dict[str, tuple[float, float, float]]
+    if kind == "gaussian":
+        centre, inflection = inner.number("centre"), inner.number("inflection", positive=True)
+        depth = inner.number("depth", 1.0)
+        for key, value, what in (
+            ("centre", centre, "the x where it is deepest"),
+            ("inflection", inflection, "the distance from there to where it is steepest"),
+        ):
+            if value is None:
+                raise inner.error(key, f"is missing; give {what}, in m")
+        if depth == 0.0:
+            raise inner.error("depth", "is 0; give 1, or -1 for a heave: the settlement scales it")
+        found = Profile("gaussian", centre, inflection, depth)
+    elif kind == "points":
+        found = Profile("points", points=_points(inner))
+    else:
+        found = _motions(inner)
+    inner.finish()
+    return found
+
+
+def _points(table: Table) -> tuple[tuple[float, float], ...]:
+    given = table.take("points")
+    right = isinstance(given, list) and len(given) > 1
+    if not right or not all(isinstance(p, list) and len(p) == 2 and all(map(is_number, p)) for p in given):
+        raise table.error("points", f"is {shortened(given)}; give at least two pairs [[x, s], ...]")
+    points = tuple(sorted((float(x), float(s)) for x, s in given))
+    for (x, _), (following, _) in pairwise(points):
+        if x == following:
+            raise table.error("points", f"has two values at x = {x:g}; give one for each x")
+    if not any(s for _, s in points):
+        raise table.error("points", "are all 0; give a value other than 0")
+    return points
+
+
+def _motions(table: Table) -> dict[str, tuple[float, float, float]]:
+    given = table.take("supports")
+    if not isinstance(given, dict) or not given:
+        raise table.error("supports", f'is {shortened(given)}; give {{ "name" = [dx, dy, rotation], ... }}')
+    for name, motion in given.items():
+        if not isinstance(motion, list) or len(motion) not in (2, 3) or not all(map(is_number, motion)):
+            raise table.error("supports", f'"{name}" is {shortened(motion)}; give [dx, dy] or [dx, dy, rotation]')
+    padded = {str(name): (*map(float, motion), 0.0)[:3] for name, motion in given.items()}
+    return {name: (dx, dy, rotation) for name, (dx, dy, rotation) in padded.items()}
+
+
+def with_profiles(
+    settlements: Sequence[solver.Settlement],
+    profiles: Sequence[Profile | None],
+    assembly: solver.Assembly,
+    source: Path,
+) -> tuple[solver.Settlement, ...]:
+    """Give each support its own motion, where a settlement has a profile.
+
+    Parameters
+    ----------
+    settlements : sequence of solver.Settlement
+    profiles : sequence of Profile or None
+        One per settlement, or none at all.
+    assembly : solver.Assembly
+        Its ground cut for the profiles.
+    source : Path
+        The case file, for messages.
+
+    Raises
+    ------
+    ValueError
+        For a support that a profile names and that is no moving support.
+    """
+    found = []
+    for k, settlement in enumerate(settlements):
+        profile = profiles[k] if k < len(profiles) else None
+        where = f"{source}: [settlement{f' {k + 1}' if len(settlements) > 1 else ''}] profile"
+        if profile is None:
+            for name in settlement.profile or ():
+                _check_support(name, assembly, where)
+            found.append(settlement)
+            continue
+        blocks = np.flatnonzero(settlement.taking_part(assembly)).tolist()
+        motions = profile.motions(assembly, blocks, settlement.direction)  # type: ignore[arg-type]
+        if not any(any(motion) for motion in motions.values()):
+            raise ValueError(f"{where} moves none of the {len(blocks)} supports; look at its places x")
+        found.append(replace(settlement, direction=None, blocks=None, profile=motions))
+    return tuple(found)
+
+
+def _check_support(name: str, assembly: solver.Assembly, where: str) -> None:
+    supports = [assembly.names[i] for i in np.flatnonzero(~assembly.free)]
+    if name not in supports:
+        kind = "a free block" if name in assembly.names else "no block"
+        raise ValueError(
+            f"{where}: '{name}' is {kind}{nearest(name, supports)}; supports are {', '.join(supports[:12]) or 'none'}"
+        )
+    if not assembly.moving[assembly.index(name)]:
+        raise ValueError(f"{where}: '{name}' is fixed; give it the role \"moving\" under [roles]")
+
+
+def cut_ground(
+    assembly: solver.Assembly, profiles: Sequence[Profile | None], *, chosen: Sequence[int] | None = None
+) -> solver.Assembly:
+    """Cut supports that carry several blocks under the joints between these, where a profile bends over them.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    profiles : sequence of Profile or None
+    chosen : sequence of int, optional
+        Supports that are cut whatever the profiles; by default the moving ones over which a profile bends.
+
+    Returns
+    -------
+    solver.Assembly
+        The pieces of a support "ground" are named "ground 1", "ground 2" ... from left to right.
+    """
+    bending = [profile for profile in profiles if profile is not None]
+    if chosen is None:
+        extents = {int(i): assembly.outline(int(i))[:, 0] for i in np.flatnonzero(assembly.moving)} if bending else {}
+        chosen = [i for i, x in extents.items() if any(p.bends(float(x.min()), float(x.max())) for p in bending)]
+    pieces = {i: cut for i in chosen if len(cut := _cut(assembly, i)) > 1}
+    if not pieces:
+        return assembly
+    rows: list[tuple[Any, int, str]] = []
+    for i in range(assembly.n_blocks):
+        parts = pieces.get(i, [assembly.outline(i)])
+        names = [f"{assembly.names[i]} {k}" for k in range(1, len(parts) + 1)] if i in pieces else [assembly.names[i]]
+        rows += [(outline, i, name) for outline, name in zip(parts, names, strict=True)]
+    listed = ", ".join(f"'{assembly.names[i]}' into {len(cut)} pieces" for i, cut in pieces.items())
+    warnings.warn(f"the ground follows the profile: cut under the joints of the first course, {listed}", stacklevel=3)
+    owner = [i for _, i, _ in rows]
+    return solver.Assembly.from_outlines(
+        [outline for outline, _, _ in rows],
+        names=[name for _, _, name in rows],
+        roles=assembly.roles[owner].tolist(),
+        density=assembly.density[owner],
+        thickness=assembly.thickness[owner],
+        materials=[assembly.materials[i] for i in owner],
+    )
+
+
+def _cut(assembly: solver.Assembly, support: int) -> list[np.ndarray]:
+    """Outlines of the pieces of a support, cut upright where a block on it begins or ends, from left to right."""
+    contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * TOUCHING * assembly.block_size)
+    pair = np.stack([contacts.block_a, contacts.block_b], axis=1)
+    near = (pair == support).any(axis=1) & (np.abs(contacts.gaps) <= TOUCHING * assembly.block_size)
+    other, x = pair[near].sum(axis=1) - support, contacts.points[near, 0]
+    feet = np.array(sorted((x[other == k].min(), x[other == k].max()) for k in np.unique(other))).reshape(-1, 2)
+    outline = assembly.outline(support)
+    least = NARROWEST * assembly.block_size
+    cuts: list[float] = []
+    # Where nothing stands, under a door or beside the wall, the ground is a piece of its own.
+    for x in np.sort(feet.ravel()).tolist():
+        inside = outline[:, 0].min() + least < x < outline[:, 0].max() - least
+        if inside and (not cuts or x > cuts[-1] + least):
+            cuts.append(x)
+    low, high = outline.min(axis=0) - 1.0, outline.max(axis=0) + 1.0
+    edges = [float(low[0]), *cuts, float(high[0])]
+    polygon, found = shapely.Polygon(outline), []
+    for left, right in pairwise(edges):
+        for part in shapely.get_parts(shapely.intersection(polygon, shapely.box(left, low[1], right, high[1]))):
+            if part.geom_type == "Polygon" and part.area > 0.0:
+                found.append(shapely.get_coordinates(part)[:-1])
+    return found

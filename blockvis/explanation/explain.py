@@ -1,0 +1,307 @@
+"""From observations to ranked causes: the runs, the comparison, the refinement around the best."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.cases.build import case_assembly
+from blockvis.cases.case import Case, case_file_text, case_of, parsed_toml
+from blockvis.runs.kind import needs_dry_joints
+from blockvis.runs.progress import StudyProgress
+
+from .candidates import (
+    Candidate,
+    Ground,
+    candidates_of,
+    ground_of,
+    opens_cracks,
+    per_amount,
+    refined,
+    scaled_motions,
+    twins_of,
+)
+from .forward import Order, Run, all_followed, ordered, workers_for
+from .likelihood import Comparison, Trial, Trust, tried
+from .observations import Observations, read_observations
+from .ranking import Cause, Measurement, alike, next_measurement, ranked, unexplained
+
+#: Range of the coefficient of friction, as fractions of that of the case, where the case gives none.
+FRICTIONS = (0.8, 1.25)
+
+#: Causes that are looked at more closely: so probable at least, and at most so many.
+WORTH_IT, MOST_REFINED = 0.01, 4
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What may have caused what was observed.
+
+    Attributes
+    ----------
+    case : Case
+    assembly : solver.Assembly
+        As it was analysed: every support fixed, the ground cut where troughs were looked at.
+    observations : Observations
+    comparison : Comparison
+    causes : tuple of Cause
+        The most probable first; empty where no candidate stands at any amount.
+    unexplained : tuple of int
+        Numbers of the observed widths that the best cause does not make.
+    made_by_none : tuple of int
+        Those of them that no candidate makes.
+    next_measurement : Measurement or None
+        The joint that would tell the first causes apart best.
+    runs : dict
+        Of the candidates: ``explain(..., runs=...)`` takes them instead of following them again.
+    notes : tuple of str
+    """
+
+    case: Case
+    assembly: solver.Assembly
+    observations: Observations
+    comparison: Comparison
+    causes: tuple[Cause, ...]
+    unexplained: tuple[int, ...]
+    made_by_none: tuple[int, ...]
+    next_measurement: Measurement | None
+    runs: dict[Any, Run] = field(repr=False, default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def alike(self) -> tuple[Cause, ...]:
+        """The best cause, and those that the observations cannot tell from it."""
+        return tuple(alike(self.causes)) if self.causes else ()
+
+    def __str__(self) -> str:
+        """Say in words what came out."""
+        from .words import in_words
+
+        return in_words(self)
+
+    def _repr_html_(self) -> str:
+        """Show the words in a notebook."""
+        import html
+
+        return f"<pre>{html.escape(str(self))}</pre>"
+
+
+def explain(
+    case: Case | str | Path,
+    observed: str | Path | Sequence[Mapping[str, Any]],
+    folder: str | Path | None = None,
+    *,
+    overwrite: bool = False,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    runs: dict[Any, Run] | None = None,
+    progress: bool = False,
+) -> Explanation:
+    """Find the movements of the supports that may have caused observed cracks, in the order of their probability.
+
+    Parameters
+    ----------
+    case : Case, or path of a case file
+        Of the undamaged structure; it needs no settlement. Its table [explain] says which causes are looked at.
+    observed : path, or sequence of mappings
+        A table of widths or displaced points, its rows, or a drawing of the damaged state.
+    folder : str or Path, optional
+        Where explain.html, explain.json and explain.png are written; nothing is by default.
+    overwrite : bool
+        Whether an explanation in the folder may be replaced.
+    workers : int, optional
+        Processes of this machine; None for one per core.
+    scheduler : str, optional
+        Address of a Dask scheduler that exists, ``tcp://host:8786``.
+    runs : dict, optional
+        ``Explanation.runs`` of an earlier explanation: those that fit are not followed again, new ones are added.
+    progress : bool
+        Whether a bar counts the runs.
+
+    Returns
+    -------
+    Explanation
+
+    Raises
+    ------
+    ValueError
+        For bad input, before anything is followed.
+
+    Notes
+    -----
+    One run along s gives every amount of a movement. The probability of a cause is by Bayes' rule, with a prior that
+    weighs causes alike and amounts evenly in their logarithm; see `docs/explain.md`. Nothing is drawn at random: the
+    same input gives the same answer.
+    """
+    from .write import refuse_explanation, write_explanation
+
+    if folder is not None:
+        refuse_explanation(folder, overwrite)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        if not isinstance(case, Case):
+            case = read_explained(case)
+        case = replace(case, settlements=(), profiles=())
+        drawn = case_assembly(case)
+        needs_dry_joints(case)
+        solver.check_settlement(*_any_settlement(drawn), case.controls)
+        observations = read_observations(observed, drawn)
+        ground = ground_of(drawn, case.explain, case.source)
+    notes = [*(str(warning.message) for warning in caught), *ground.notes]
+    for note in notes:
+        warnings.warn(note, stacklevel=2)
+    search = _Search(case, ground, observations, {} if runs is None else runs)
+    first = candidates_of(ground, case.explain, case.source)
+    if not len(observations.points):
+        first = [one for one in first if opens_cracks(ground.assembly, one)]
+    about = 3 * len(first)
+    with workers_for(about, workers, scheduler) as client:
+        search.follow(first, (search.frictions[1],), client, progress)
+        worth = [c for c in search.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
+        around = refined(ground, [cause.best.candidate for cause in worth], first)
+        search.follow(around, (search.frictions[1],), client, progress)
+        worth = [c for c in search.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
+        closer = [one for cause in worth for one in _closest(cause)]
+        search.follow(closer, (search.frictions[0], search.frictions[2]), client, progress)
+    causes = search.ranked()
+    by_best = by_any = np.zeros(0, dtype=bool)
+    if causes:
+        by_best, by_any = unexplained(search.comparison, causes, search.trials)
+    found = Explanation(
+        case=case,
+        assembly=ground.assembly,
+        observations=observations,
+        comparison=search.comparison,
+        causes=tuple(causes),
+        unexplained=tuple(np.flatnonzero(by_best).tolist()),
+        made_by_none=tuple(np.flatnonzero(by_any).tolist()),
+        next_measurement=next_measurement(search.comparison, causes) if causes else None,
+        runs=search.runs,
+        notes=tuple(notes),
+    )
+    if folder is not None:
+        write_explanation(found, folder, overwrite=overwrite)
+    return found
+
+
+def read_explained(path: str | Path) -> Case:
+    """Read the case file of an undamaged structure: it may have no settlement, for that is what is looked for."""
+    path = Path(path)
+    text = case_file_text(path)
+    values = parsed_toml(text, path)
+    kind = values.get("analysis", {})
+    if isinstance(kind, Mapping) and kind.get("kind", "settlement") != "settlement":
+        raise ValueError(f'{path}: explain follows settlements, but [analysis] kind is "{kind["kind"]}"; leave it out')
+    values["settlement"] = values.get("settlement", {"direction": [0.0, -1.0]})
+    return replace(case_of(values, path, text), settlements=(), profiles=())
+
+
+def _any_settlement(assembly: solver.Assembly) -> tuple[solver.Assembly, tuple[solver.Settlement, ...]]:
+    """Make a settlement of every support, with which the blocks are checked."""
+    roles = np.where(assembly.free, solver.FREE, solver.MOVING)
+    return assembly.with_roles(roles), (solver.Settlement(direction=(0.0, -1.0)),) if not assembly.free.all() else ()
+
+
+def _closest(cause: Cause) -> list[Candidate]:
+    """The candidates of a cause whose friction is worth varying: the likeliest ones, at most three."""
+    order = np.argsort(-np.array(cause.weights), kind="stable")[:3]
+    return [cause.trials[k].candidate for k in order if cause.weights[k] > 0.05]
+
+
+class _Search:
+    """The trials so far.
+
+    Parameters
+    ----------
+    case : Case
+    ground : Ground
+    observations : Observations
+    runs : dict
+        Followed earlier, by what they depend on.
+    """
+
+    def __init__(self, case: Case, ground: Ground, observations: Observations, runs: dict[Any, Run]) -> None:
+        self.case, self.ground, self.observations, self.runs = case, ground, observations, runs
+        settings, size = case.explain, ground.assembly.block_size
+        place = 0.5 * size if settings.place_uncertainty is None else settings.place_uncertainty
+        self.comparison = Comparison(
+            ground.assembly, observations, Trust(settings.model_uncertainty, place, settings.outliers)
+        )
+        own = case.friction_coefficient
+        low, high = settings.friction or (FRICTIONS[0] * own, FRICTIONS[1] * own)
+        middle = float(np.clip(own, low, high)) if settings.friction is None else 0.5 * (low + high)
+        self.frictions = (low, middle, high)
+        self.candidates: list[Candidate] = []
+        self.trials: list[Trial] = []
+        # Runs for a little more than the widest crack serve other observations of the same structure, too.
+        self.widest = float(2.0 ** np.ceil(np.log2(observations.largest)))
+
+    @property
+    def apart(self) -> bool:
+        """Whether the observations tell movements apart that differ by a translation of everything."""
+        return len(self.observations.points) > 0
+
+    def follow(self, candidates: Sequence[Candidate], frictions: Sequence[float], client: Any, progress: bool) -> None:
+        """Follow candidates at some frictions, and compare them with the observations."""
+        new = [one for one in candidates if one not in self.candidates]
+        self.candidates += new
+        twins = twins_of(self.ground.assembly, self.candidates)
+        wanted: list[tuple[Candidate, float]] = []
+        orders: dict[Any, Order] = {}
+        for one in candidates:
+            for friction in dict.fromkeys(frictions):
+                if any(t.candidate == one and t.friction == friction for t in self.trials):
+                    continue
+                wanted.append((one, friction))
+                shared = self.candidates[twins[self.candidates.index(one)].of]
+                key = self._key(shared, friction)
+                if key not in self.runs and key not in orders:
+                    orders[key] = ordered(
+                        self.case,
+                        self.ground.assembly,
+                        scaled_motions(shared),
+                        friction,
+                        self.widest,
+                        self.case.explain.limit,
+                    )
+        bar = StudyProgress(len(orders), shown=None if progress else False)
+        try:
+            found = all_followed(list(orders.values()), client, bar)
+        finally:
+            bar.done()
+        self.runs.update(zip(orders, found, strict=True))
+        for one, friction in wanted:
+            twin = twins[self.candidates.index(one)]
+            factor, unit = per_amount(one)
+            twin = replace(twin, scale=twin.scale * factor, travel=twin.travel / factor)
+            shared = self.candidates[twin.of]
+            order = ordered(
+                self.case, self.ground.assembly, scaled_motions(shared), friction, self.widest, self.case.explain.limit
+            )
+            self.trials.append(
+                tried(
+                    self.comparison,
+                    one,
+                    friction,
+                    self.runs[self._key(shared, friction)],
+                    twin,
+                    shared,
+                    unit,
+                    order.settlement.limit * twin.scale,
+                )
+            )
+
+    def ranked(self) -> list[Cause]:
+        """Order the causes so far."""
+        return ranked(self.trials, apart=self.apart)
+
+    def _key(self, candidate: Candidate, friction: float) -> Any:
+        """What a run depends on, within one case."""
+        motions = tuple(sorted(scaled_motions(candidate).items()))
+        return (motions, friction, self.widest, self.case.explain.limit)

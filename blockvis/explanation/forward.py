@@ -1,0 +1,254 @@
+"""Forward runs: what each candidate does to the structure, for every amount of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import solver
+from blockvis.cases.build import case_interfaces, case_loads
+from blockvis.cases.contents import Case
+from blockvis.extras import MissingExtra, require
+from blockvis.results.joints import initial_joints, opening_and_slip
+from blockvis.runs.progress import StudyProgress
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+#: Increments up to the largest amount of a candidate.
+INCREMENTS = 20
+
+#: The first of them is divided, where hinges form: parts of it that have an increment of their own.
+STOPS = (0.125, 0.25, 0.5)
+
+#: A run stops where a joint is open by so many times the widest observed crack, rounded up to a power of two.
+ENOUGH = 1.6
+
+#: The largest displacement of a support, in such cracks, where the case gives none.
+FARTHEST = 10.0
+
+#: With fewer runs than this, processes cost more than they save.
+FEWEST_FOR_PROCESSES = 8
+
+
+@dataclass(frozen=True)
+class Order:
+    """One run: a structure, and how its supports move.
+
+    Attributes
+    ----------
+    assembly : solver.Assembly
+        Its supports that move have the role "moving".
+    settlement : solver.Settlement
+    interfaces : solver.Interfaces
+    loads : solver.Loads
+    controls : solver.Controls
+    enough : float [m]
+        Opening at which the run may stop.
+    """
+
+    assembly: solver.Assembly
+    settlement: solver.Settlement
+    interfaces: solver.Interfaces
+    loads: solver.Loads
+    controls: solver.Controls
+    enough: float
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a candidate does, for every amount.
+
+    Attributes
+    ----------
+    amounts : (n,) array [m or rad]
+        Of the increments in equilibrium, from 0; empty where there is none.
+    moved : (n, n_blocks, 3) array [m, m, rad]
+        Displacement and rotation of each block.
+    openings : (n, n_joints) array [m]
+        Of the joints of the layout.
+    collapsed : bool
+        Whether the structure falls beyond the last amount.
+    message : str
+        Why it ended.
+    """
+
+    amounts: np.ndarray
+    moved: np.ndarray
+    openings: np.ndarray
+    collapsed: bool
+    message: str
+
+    def at(self, amounts: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Interpolate values (n, ...) of the increments at amounts (m,): (m, ...) array."""
+        place = np.clip(np.searchsorted(self.amounts, amounts, side="right") - 1, 0, max(len(self.amounts) - 2, 0))
+        following = np.minimum(place + 1, len(self.amounts) - 1)
+        step = np.maximum(self.amounts[following] - self.amounts[place], 1e-300)
+        rest = np.clip((amounts - self.amounts[place]) / step, 0.0, 1.0)
+        rest = rest.reshape(-1, *[1] * (values.ndim - 1))
+        return np.asarray(values[place] * (1.0 - rest) + values[following] * rest)
+
+
+def lever_of(assembly: solver.Assembly, settlement: solver.Settlement) -> float:
+    """Largest movement of a support where it carries something, per unit of the settlement [m or m/rad]."""
+    reach = 2e-3 * assembly.block_size
+    contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * reach)
+    pose = solver.Pose.initial(assembly)
+    rate = settlement.rate(assembly, pose, 0.0)
+    speeds = [
+        np.hypot(*solver.point_velocities(contacts.points, block, pose, rate).T)
+        for block in (contacts.block_a, contacts.block_b)
+    ]
+    return float(np.max(speeds)) or 1.0
+
+
+def ordered(
+    case: Case,
+    assembly: solver.Assembly,
+    motions: Any,
+    friction: float,
+    widest: float,
+    limit: float | None,
+) -> Order:
+    """State the run of a candidate.
+
+    Parameters
+    ----------
+    case : Case
+    assembly : solver.Assembly
+        Every support fixed.
+    motions : mapping of str to (float, float, float)
+    friction : float
+        Coefficient of [material]; those of pairs of materials follow in proportion.
+    widest : float [m]
+        Of the observed cracks.
+    limit : float, optional [m]
+        Largest displacement of a support.
+    """
+    roles = assembly.roles.astype("<U6").copy()
+    roles[[assembly.index(name) for name in motions]] = solver.MOVING
+    moving = assembly.with_roles(roles)
+    lever = lever_of(moving, solver.Settlement(profile=motions))
+    farthest = (FARTHEST * widest if limit is None else limit) / lever
+    step = farthest / INCREMENTS
+    stops = tuple(part * step for part in STOPS)
+    settlement = solver.Settlement(profile=motions, increment=step, limit=farthest, stops=stops)
+    factor = friction / case.friction_coefficient if case.friction_coefficient > 0.0 else 1.0
+    laws = {
+        pair: replace(law, friction_coefficient=factor * law.friction_coefficient)
+        for pair, law in case.interfaces.items()
+    }
+    varied = replace(case, friction_coefficient=friction, interfaces=laws)
+    controls = replace(case.controls, falling_frames=0)
+    return Order(moving, settlement, case_interfaces(varied), case_loads(case, moving), controls, ENOUGH * widest)
+
+
+def followed(order: Order) -> Run:
+    """Carry out a run; one that cannot be solved ends where it came to."""
+    assembly = order.assembly
+    joints = initial_joints(assembly)
+    amounts, moved, openings = [], [], []
+    steps = solver.settlement_increments(
+        assembly,
+        (order.settlement,),
+        interfaces=order.interfaces,
+        loads=order.loads,
+        controls=order.controls,
+    )
+    collapsed, message = False, ""
+    while True:
+        try:
+            increment = next(steps)
+        except StopIteration as stop:
+            ending: solver.Ending = stop.value
+            collapsed = ending.stop in (solver.Status.COLLAPSED, solver.Status.NO_INITIAL_EQUILIBRIUM)
+            message = ending.message
+            break
+        except solver.SolveError as error:
+            message = str(error)
+            break
+        if increment.status != solver.Status.EQUILIBRIUM:
+            continue
+        amounts.append(increment.parameter)
+        moved.append(increment.pose.displacements(assembly))
+        openings.append(np.maximum(opening_and_slip(assembly, joints, increment.pose)[:, 0], 0.0))
+        if openings[-1].max(initial=0.0) > order.enough:
+            steps.close()
+            break
+    n = len(joints.block_a)
+    return Run(
+        np.array(amounts),
+        np.array(moved).reshape(-1, assembly.n_blocks, 3),
+        np.array(openings).reshape(-1, n),
+        collapsed,
+        message,
+    )
+
+
+@contextmanager
+def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterator[Client | None]:
+    """Start or find the Dask workers of the runs; None where this process makes them.
+
+    Parameters
+    ----------
+    runs : int
+        About so many there will be.
+    workers : int, optional
+        Processes of this machine; one per core where the extra ``studies`` is installed and the runs are many.
+    scheduler : str, optional
+        Address of a Dask scheduler that exists.
+    """
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers is {workers}; give at least 1")
+    from blockvis.studies import campaign
+
+    if scheduler is not None:
+        require("studies", "explain on a Dask cluster")
+        with campaign.existing_cluster(scheduler, "") as client:
+            yield client
+        return
+    if workers == 1 or (workers is None and runs < FEWEST_FOR_PROCESSES):
+        yield None
+        return
+    try:
+        require("studies", "explain with several processes")
+    except MissingExtra:
+        if workers is not None:
+            raise
+        yield None
+        return
+    count = min(workers or campaign.cores(), runs)
+    if count < 2:
+        yield None
+        return
+    with campaign.local_cluster(count) as client:
+        yield client
+
+
+def all_followed(orders: Sequence[Order], client: Client | None, progress: StudyProgress | None = None) -> list[Run]:
+    """Carry out runs, on the workers of a Dask client or here.
+
+    Parameters
+    ----------
+    orders : sequence of Order
+    client : distributed.Client, optional
+    progress : StudyProgress, optional
+        Counts them.
+    """
+    count: Callable[[], None] = (lambda: None) if progress is None else progress.finished
+    if client is None:
+        found = []
+        for order in orders:
+            found.append(followed(order))
+            count()
+        return found
+    futures = client.map(followed, orders, pure=False)
+    found = []
+    for future in futures:
+        found.append(future.result())
+        count()
+    return found

@@ -1,0 +1,440 @@
+"""What was observed: widths of cracks at places, displaced points, or a drawing of the damaged state."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from scipy.optimize import linear_sum_assignment
+
+import solver
+from blockvis.formats import FORMATS
+from blockvis.formats.read import read_layout
+from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
+from blockvis.suggestions import files_like, nearest
+
+#: Uncertainty of a width, as a fraction of it, and the least [m], where the observations give none.
+WIDTH_UNCERTAINTY, LEAST_UNCERTAINTY = 0.2, 2e-4
+
+#: Uncertainty of a displaced point [m] where the observations give none.
+POINT_UNCERTAINTY = 1e-3
+
+#: A crack farther than this from any joint, in block sizes, is a mistake in its coordinates or their unit.
+FARTHEST = 2.0
+
+#: A width of more than this, in block sizes, is a mistake in its unit.
+WIDEST = 1.0
+
+#: Blocks of a drawing of the damaged state have moved by less than this, in block sizes, or are others.
+FARTHEST_BLOCK = 1.5
+
+#: Metres per unit of a column.
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+
+#: Columns, by the words that tables have for them.
+COLUMNS = {
+    "joint": "joint", "block_a": "block_a", "block_b": "block_b", "block": "block", "x": "x", "y": "y",
+    "width": "width", "opening": "width", "crack_width": "width",
+    "uncertainty": "uncertainty", "sigma": "uncertainty", "error": "uncertainty",
+    "dx": "dx", "dy": "dy", "displaced_x": "displaced_x", "displaced_y": "displaced_y",
+}  # fmt: skip
+
+#: Columns that hold lengths.
+LENGTHS = ("x", "y", "width", "uncertainty", "dx", "dy", "displaced_x", "displaced_y")
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Widths of cracks, and displacements of points, where and how certain they are.
+
+    Attributes
+    ----------
+    places : (n, 2) array [m]
+        Of the widths, in the drawing.
+    named : (n,) bool array
+        Whether the joint itself is known, not only a place.
+    widths, uncertainties : (n,) arrays [m]
+        A width of 0 is a closed joint.
+    labels : tuple of str
+        Of the widths, in words.
+    points : (m, 2) array [m]
+        Of the displacements, in the drawing.
+    blocks : tuple of str
+        On which the points lie.
+    displacements : (m, 2) array [m]
+    point_uncertainties : (m,) array [m]
+        Of each coordinate.
+    source : str
+    """
+
+    places: np.ndarray
+    named: np.ndarray
+    widths: np.ndarray
+    uncertainties: np.ndarray
+    labels: tuple[str, ...]
+    points: np.ndarray
+    blocks: tuple[str, ...]
+    displacements: np.ndarray
+    point_uncertainties: np.ndarray
+    source: str = ""
+
+    @property
+    def largest(self) -> float:
+        """The largest width or displacement [m]."""
+        moved = np.hypot(*self.displacements.T) if len(self.points) else np.zeros(0)
+        return float(max(self.widths.max(initial=0.0), moved.max(initial=0.0)))
+
+
+def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly: solver.Assembly) -> Observations:
+    """Read observations.
+
+    Parameters
+    ----------
+    source : str, Path or sequence of mappings
+        A table (.csv), a drawing of the damaged state in any layout format, or the rows of a table.
+    assembly : solver.Assembly
+        As drawn.
+
+    Raises
+    ------
+    ValueError
+        For a file, row or column that cannot be used; names the file, the line, the column and the remedy.
+    """
+    if not isinstance(source, str | Path):
+        rows = [{str(key): value for key, value in row.items()} for row in source]
+        return _of_rows(enumerate(rows, start=1), list(rows[0]) if rows else [], assembly, "observations", "row")
+    path = Path(source)
+    if not path.exists():
+        near = files_like(path, "*.csv", or_any=True)
+        raise ValueError(f"there are no observations '{path}'" + (f"; beside it are {', '.join(near)}" if near else ""))
+    if path.suffix.lower() in FORMATS:
+        return _of_drawing(path, assembly)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(
+            f"{path}: is no table in UTF-8 ({error.reason} at byte {error.start}), and '{path.suffix}' is no layout "
+            "format; save it as CSV in UTF-8"
+        ) from None
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not lines:
+        raise ValueError(f"{path}: is empty; its first line names the columns, for instance: joint,width [mm]")
+    # Tables of some countries have a semicolon between columns, and a comma in their numbers.
+    mark = max(",;\t", key=lines[0].count)
+    table = csv.reader(io.StringIO(text), delimiter=mark)
+    header = [cell.strip() for cell in next(table)]
+
+    def numbered() -> Iterator[tuple[int, dict[str, Any]]]:
+        for cells in table:
+            if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
+                if mark != ",":
+                    cells = [re.sub(r"^(\s*[-+]?\d*),(\d+\s*)$", r"\1.\2", cell) for cell in cells]
+                yield table.line_num, dict(zip(header, cells, strict=False))
+
+    return _of_rows(numbered(), header, assembly, str(path), "line")
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A column of the table: its name there, and metres per unit of what it holds."""
+
+    name: str
+    factor: float
+
+
+def _columns(header: Sequence[str], where: str) -> dict[str, _Column]:
+    found: dict[str, _Column] = {}
+    unused = []
+    for name in header:
+        match = re.match(r"^\s*(.*?)\s*(?:[\[(]\s*(\w+)\s*[\])])?\s*$", name)
+        words, unit = (match.group(1), match.group(2)) if match else (name, None)
+        key = re.sub(r"[\s-]+", "_", words.strip().lower())
+        if key not in COLUMNS and unit is None and key.rpartition("_")[2] in UNITS:
+            key, _, unit = key.rpartition("_")
+        known = COLUMNS.get(key)
+        if known is None:
+            hint = nearest(key, list(COLUMNS))
+            if hint:
+                raise ValueError(f"{where}: column '{name}' is not known{hint}; rename or remove it")
+            unused.append(name)
+            continue
+        if known in found:
+            raise ValueError(f"{where}: columns '{found[known].name}' and '{name}' hold the same; remove one")
+        if unit is not None and (unit.lower() not in UNITS or known not in LENGTHS):
+            raise ValueError(f"{where}: column '{name}' has the unit '{unit}'; lengths are in {', '.join(UNITS)}")
+        found[known] = _Column(name, UNITS[unit.lower()] if unit else 1.0)
+    if unused:
+        warnings.warn(f"{where}: columns left out: {', '.join(unused)}", stacklevel=4)
+    where_given = "joint" in found or {"block_a", "block_b"} <= set(found) or {"x", "y"} <= set(found)
+    moved = {"dx", "dy"} <= set(found) or {"displaced_x", "displaced_y"} <= set(found)
+    if not moved and "width" not in found:
+        missing = "width"
+    elif not moved and not where_given:
+        missing = next((f"block_{k}" for k in "ab" if f"block_{'ba'[k == 'b']}" in found), "joint")
+        missing = next((k for k, o in (("x", "y"), ("y", "x")) if o in found and k not in found), missing)
+    elif not where_given and "block" not in found:
+        missing = "block"
+    else:
+        return found
+    raise ValueError(
+        f"{where}: has no column '{missing}'; its columns are {', '.join(header) or 'none'}. Give width and joint "
+        '("A | B"), block_a and block_b, or x and y; or block and dx, dy; with units as in: width [mm]'
+    )
+
+
+def _of_rows(
+    rows: Iterator[tuple[int, dict[str, Any]]] | Any,
+    header: Sequence[str],
+    assembly: solver.Assembly,
+    where: str,
+    counted: str,
+) -> Observations:
+    columns = _columns(header, where)
+    joints = initial_joints(assembly)
+    widths: list[tuple[np.ndarray, bool, float, float, str]] = []
+    points: list[tuple[np.ndarray, str, np.ndarray, float]] = []
+    for number, row in rows:
+        cells = _Cells(row, columns, f"{where}, {counted} {number}")
+        width = cells.width()
+        if width is not None:
+            place, named, label = _place(cells, assembly, joints)
+            _check_width(width, cells, assembly)
+            uncertainty = cells.number("uncertainty")
+            if uncertainty is not None and uncertainty <= 0.0:
+                raise cells.error("uncertainty", f"is {uncertainty:g} m; give a length above 0")
+            usual = max(WIDTH_UNCERTAINTY * width, LEAST_UNCERTAINTY)
+            widths.append((place, named, width, usual if uncertainty is None else uncertainty, label))
+        moved = _displacement(cells, assembly)
+        if moved is not None:
+            points.append(moved)
+        if width is None and moved is None:
+            raise cells.error("width", 'is missing; give a width, 0 or "closed", or a displacement')
+    if not widths and not points:
+        raise ValueError(f"{where}: has no observation; give a row for each crack or displaced point")
+    return _observations(widths, points, where)
+
+
+def _observations(
+    widths: Sequence[tuple[np.ndarray, bool, float, float, str]],
+    points: Sequence[tuple[np.ndarray, str, np.ndarray, float]],
+    where: str,
+) -> Observations:
+    found = Observations(
+        places=np.array([place for place, *_ in widths], dtype=float).reshape(-1, 2),
+        named=np.array([named for _, named, *_ in widths], dtype=bool),
+        widths=np.array([width for _, _, width, *_ in widths], dtype=float),
+        uncertainties=np.array([sigma for _, _, _, sigma, _ in widths], dtype=float),
+        labels=tuple(label for *_, label in widths),
+        points=np.array([point for point, *_ in points], dtype=float).reshape(-1, 2),
+        blocks=tuple(block for _, block, *_ in points),
+        displacements=np.array([moved for _, _, moved, _ in points], dtype=float).reshape(-1, 2),
+        point_uncertainties=np.array([sigma for *_, sigma in points], dtype=float),
+        source=where,
+    )
+    if found.largest == 0.0:
+        raise ValueError(f"{where}: nothing has opened or moved; there is nothing to explain")
+    return found
+
+
+class _Cells:
+    """The cells of a row, by the known columns."""
+
+    def __init__(self, row: Mapping[str, Any], columns: Mapping[str, _Column], where: str) -> None:
+        self.row, self.columns, self.where = row, columns, where
+
+    def text(self, key: str) -> str:
+        """Text of a cell; empty where there is none."""
+        if key not in self.columns:
+            return ""
+        value = self.row.get(self.columns[key].name)
+        return "" if value is None or (isinstance(value, float) and math.isnan(value)) else str(value).strip()
+
+    def number(self, key: str) -> float | None:
+        """Length [m] in a cell; None where it is empty."""
+        text = self.text(key)
+        if not text:
+            return None
+        try:
+            value = float(text)
+        except ValueError:
+            raise self.error(key, f"is '{text}'; give a number") from None
+        if not math.isfinite(value):
+            raise self.error(key, f"is {text}; give a finite number")
+        return value * self.columns[key].factor
+
+    def width(self) -> float | None:
+        """Width [m]; 0 for a closed joint, None where there is none."""
+        return 0.0 if self.text("width").lower() == "closed" else self.number("width")
+
+    def error(self, key: str, problem: str) -> ValueError:
+        """Make an error that names the file, the line and the column."""
+        name = self.columns[key].name if key in self.columns else key
+        return ValueError(f"{self.where}: {name} {problem}")
+
+
+def _check_width(width: float, cells: _Cells, assembly: solver.Assembly) -> None:
+    if width < 0.0:
+        raise cells.error("width", f'is {cells.text("width")}; give a width of at least 0, or "closed"')
+    if width > WIDEST * assembly.block_size:
+        raise cells.error(
+            "width",
+            f"is {width:g} m, more than a block is wide ({assembly.block_size:.3g} m); is it in mm? name the column "
+            "width [mm]",
+        )
+
+
+def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> tuple[np.ndarray, bool, str]:
+    """Find where a width was measured: the middle of the joint between two blocks, or x and y."""
+    if cells.text("joint"):
+        names = [name.strip() for name in re.split(r"\s*\|\s*", cells.text("joint"))]
+        if len(names) != 2:
+            raise cells.error("joint", f"is '{cells.text('joint')}'; name two blocks as \"A | B\"")
+        keys = ["joint", "joint"]
+    else:
+        names, keys = [cells.text("block_a"), cells.text("block_b")], ["block_a", "block_b"]
+    if names[0] or names[1]:
+        pair = [_block(name, key, cells, assembly) for name, key in zip(names, keys, strict=True)]
+        between = ((joints.block_a == pair[0]) & (joints.block_b == pair[1])) | (
+            (joints.block_a == pair[1]) & (joints.block_b == pair[0])
+        )
+        if not between.any():
+            beside = np.concatenate(
+                [joints.block_b[joints.block_a == pair[0]], joints.block_a[joints.block_b == pair[0]]]
+            )
+            others = ", ".join(f"'{assembly.names[k]}'" for k in np.unique(beside)) or "no block"
+            raise cells.error(
+                keys[1], f"names '{names[0]}' and '{names[1]}', which do not touch; '{names[0]}' touches {others}"
+            )
+        ends = joints.ends[between]
+        length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+        return length @ ends.mean(axis=1) / length.sum(), True, f"{names[0]} | {names[1]}"
+    x, y = cells.number("x"), cells.number("y")
+    if x is None or y is None:
+        raise cells.error("x" if x is None else "y", "is missing; give the place of the crack, or the joint")
+    place = np.array([x, y])
+    distance = shapely.distance(shapely.Point(place), shapely.linestrings(joints.ends))
+    if distance.min(initial=np.inf) > FARTHEST * assembly.block_size:
+        low, high = assembly.vertices.min(axis=0), assembly.vertices.max(axis=0)
+        raise cells.error(
+            "x",
+            f"and y are ({x:g}, {y:g}) m, {distance.min():.3g} m from any joint; the blocks lie between "
+            f"({low[0]:.4g}, {low[1]:.4g}) and ({high[0]:.4g}, {high[1]:.4g}) m: check the unit",
+        )
+    return place, False, f"({x:.4g}, {y:.4g})"
+
+
+def _block(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> int:
+    if name not in assembly.names:
+        problem = f"'{name}' is no block{nearest(name, assembly.names)}" if name else "names no block"
+        raise cells.error(key, f"{problem}; blockvis info lists the names")
+    return assembly.index(name)
+
+
+def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray, str, np.ndarray, float] | None:
+    """Read the displacement of a point."""
+    moved = [cells.number("dx"), cells.number("dy")]
+    there = [cells.number("displaced_x"), cells.number("displaced_y")]
+    if all(value is None for value in (*moved, *there)):
+        return None
+    x, y, name = cells.number("x"), cells.number("y"), cells.text("block")
+    if name:
+        block = _block(name, "block", cells, assembly)
+        point = assembly.centroids[block] if x is None or y is None else np.array([x, y])
+    elif x is not None and y is not None:
+        point = np.array([x, y])
+        block = block_at(assembly, point)
+    else:
+        raise cells.error("block", "is missing; give the block, or x and y, of the displaced point")
+    if None not in there:
+        displaced = np.array(there, dtype=float) - point
+    elif None not in moved:
+        displaced = np.array(moved, dtype=float)
+    else:
+        raise cells.error("dy" if moved[1] is None else "dx", "is missing; give both coordinates")
+    uncertainty = cells.number("uncertainty") or POINT_UNCERTAINTY
+    return point, assembly.names[block], displaced, uncertainty
+
+
+def block_at(assembly: solver.Assembly, point: np.ndarray) -> int:
+    """Find the block in which a point lies, or the nearest."""
+    outlines = [shapely.Polygon(assembly.outline(i)) for i in range(assembly.n_blocks)]
+    return int(np.argmin(shapely.distance(shapely.Point(point), outlines)))
+
+
+def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
+    """Compare a drawing of the damaged state with the undamaged one, block by block."""
+    layout = read_layout(path)
+    partner = _partners(layout.names, layout.outlines, assembly)
+    if not partner:
+        raise ValueError(f"{path}: none of its {layout.n_blocks} blocks is one of the case, by its name or its shape")
+    pose = solver.Pose.initial(assembly)
+    for block, drawn in partner.items():
+        pose.positions[block], pose.rotations[block] = _moved(assembly, block, np.asarray(layout.outlines[drawn]))
+    lost = [name for i, name in enumerate(assembly.names) if i not in partner and assembly.free[i]]
+    if lost:
+        shown = ", ".join(f"'{name}'" for name in lost[:6]) + (" ..." if len(lost) > 6 else "")
+        warnings.warn(f"{path}: {len(lost)} blocks of the case are not in it ({shown}) and say nothing", stacklevel=4)
+    joints = initial_joints(assembly)
+    opening = np.maximum(opening_and_slip(assembly, joints, pose)[:, 0], 0.0)
+    known = np.zeros(assembly.n_blocks, dtype=bool)
+    known[list(partner)] = True
+    sigma = POINT_UNCERTAINTY
+    widths = [
+        (
+            joints.ends[k].mean(axis=0),
+            True,
+            float(opening[k]),
+            float(np.hypot(sigma, WIDTH_UNCERTAINTY * opening[k])),
+            f"{assembly.names[joints.block_a[k]]} | {assembly.names[joints.block_b[k]]}",
+        )
+        for k in np.flatnonzero(known[joints.block_a] & known[joints.block_b]).tolist()
+    ]
+    points = [
+        (assembly.centroids[i], assembly.names[i], pose.positions[i] - assembly.centroids[i], sigma)
+        for i in sorted(partner)
+    ]
+    return _observations(widths, points, str(path))
+
+
+def _partners(names: Sequence[str], outlines: Sequence[np.ndarray], assembly: solver.Assembly) -> dict[int, int]:
+    """Pair the blocks of the case with those of a drawing, by their names where these fit, else by the nearest shape."""
+    numbers = {name: i for i, name in enumerate(assembly.names)}
+    if len(set(names)) == len(names) and sum(name in numbers for name in names) > 0.5 * len(names):
+        return {numbers[name]: k for k, name in enumerate(names) if name in numbers}
+    polygons = [shapely.Polygon(ring) for ring in outlines]
+    centres = np.array([polygon.centroid.coords[0] for polygon in polygons])
+    areas = np.array([polygon.area for polygon in polygons])
+    apart = np.hypot(*np.moveaxis(assembly.centroids[:, None] - centres[None], 2, 0)) / assembly.block_size
+    # Two blocks of unlike size are not the same stone, however near they lie.
+    cost = apart + np.abs(np.log(assembly.areas[:, None] / areas[None]))
+    rows, columns = linear_sum_assignment(cost)
+    return {int(i): int(k) for i, k in zip(rows, columns, strict=True) if cost[i, k] < FARTHEST_BLOCK}
+
+
+def _moved(assembly: solver.Assembly, block: int, ring: np.ndarray) -> tuple[np.ndarray, float]:
+    """Find the rigid motion of a block that brings its corners nearest to an outline; its centroid then, and angle."""
+    own = assembly.outline(block)
+    polygon = shapely.Polygon(ring)
+    centre = np.array(polygon.centroid.coords[0])
+    ring = ring if shapely.Polygon(ring).exterior.is_ccw else ring[::-1]
+    if len(ring) != len(own):
+        return centre, 0.0
+    arms, best = own - assembly.centroids[block], (np.inf, 0.0)
+    for shift in range(len(ring)):
+        there = np.roll(ring, shift, axis=0) - centre
+        cosine, sine = (arms * there).sum(), (arms[:, 0] * there[:, 1] - arms[:, 1] * there[:, 0]).sum()
+        angle = float(np.arctan2(sine, cosine))
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        # A brick fits upside down as well; stones that still stand have turned little.
+        misfit = float(np.hypot(*(arms @ turn.T - there).T).sum()) + 1e-3 * abs(angle)
+        best = min(best, (misfit, angle))
+    return centre, best[1]

@@ -1,0 +1,268 @@
+"""Causes in the order of their probability: their amounts, what none explains, what to measure next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from .likelihood import Comparison, Trial
+
+#: Causes less probable than the best by more than this factor are told apart from it.
+TOLD_APART = 10.0
+
+#: A width is explained where it is within so many standard deviations of what a cause makes.
+EXPLAINED = 3.0
+
+#: Shares of the probability below and above the range of an amount.
+TAILS = (0.05, 0.5, 0.95)
+
+#: A joint tells causes apart where their widths differ by so many standard deviations.
+DECISIVE = 2.0
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause, with what it leaves open weighed by the observations.
+
+    Attributes
+    ----------
+    name : str
+        In words.
+    also : tuple of str
+        Other movements that open the same cracks: the same but for a translation of everything.
+    probability : float
+        Among the causes that were looked at.
+    amount : (float, float, float) [m or rad]
+        5 %, median and 95 % of its amount: the largest displacement of a support.
+    unit : str
+        "m" or "rad".
+    friction : (float, float)
+        Range of the coefficients that agree.
+    detail : str
+        What the best of its candidates adds in words.
+    best : Trial
+        The likeliest candidate and friction.
+    at : int
+        Number of the likeliest amount.
+    trials : tuple of Trial
+    weights : tuple of float
+        Of the trials within the cause.
+    """
+
+    name: str
+    also: tuple[str, ...]
+    probability: float
+    amount: tuple[float, float, float]
+    unit: str
+    friction: tuple[float, float]
+    detail: str
+    best: Trial
+    at: int
+    trials: tuple[Trial, ...]
+    weights: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A joint at which the next measurement tells causes apart best.
+
+    Attributes
+    ----------
+    joint : int
+        Number of the joint of the layout.
+    name : str
+        Its two blocks.
+    place : (float, float) [m]
+    widths : tuple of (str, float) [m]
+        What the causes have there.
+    deviations : float
+        By how many standard deviations the two that differ most do.
+    """
+
+    joint: int
+    name: str
+    place: tuple[float, float]
+    widths: tuple[tuple[str, float], ...]
+    deviations: float
+
+
+def ranked(trials: Sequence[Trial], *, apart: bool) -> list[Cause]:
+    """Order causes by their probability.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        Of every candidate, some of them with several coefficients of friction.
+    apart : bool
+        Whether movements that differ by a translation of everything are told apart: displaced points do, cracks not.
+
+    Notes
+    -----
+    The prior weighs causes as their candidates say, usually alike; within a cause its candidates alike (a candidate
+    that refines another shares the weight of that one), coefficients of friction alike, and amounts evenly in their
+    logarithm. The probability of a cause is its prior times the mean likelihood over all it leaves open, by Bayes.
+    """
+    groups: dict[str, list[Trial]] = {}
+    also: dict[str, list[str]] = {}
+    for trial in trials:
+        name = trial.candidate.cause
+        owner = trial.shared.cause
+        if owner != name and not apart:
+            if name not in also.setdefault(owner, []):
+                also[owner].append(name)
+            continue
+        groups.setdefault(name, []).append(trial)
+    found = []
+    for name, own in groups.items():
+        weights = _weights(own)
+        log_terms = np.log(weights) + np.array([trial.log_evidence for trial in own])
+        evidence = float(logsumexp(log_terms)) + float(np.log(max(t.candidate.prior for t in own)))
+        found.append((evidence, name, own, log_terms))
+    if not any(np.isfinite(evidence) for evidence, *_ in found):
+        return []
+    total = float(logsumexp([evidence for evidence, *_ in found]))
+    causes = []
+    for evidence, name, own, log_terms in found:
+        if not np.isfinite(evidence):
+            continue
+        share = np.exp(log_terms - logsumexp(log_terms))
+        best = max(own, key=lambda trial: float(trial.log_likelihood.max()))
+        causes.append(
+            Cause(
+                name=name,
+                also=tuple(also.get(name, ())),
+                probability=float(np.exp(evidence - total)),
+                amount=_range_of(own, share),
+                unit=best.unit,
+                friction=_frictions(own, share),
+                detail=best.candidate.detail,
+                best=best,
+                at=best.best,
+                trials=tuple(own),
+                weights=tuple(share.tolist()),
+            )
+        )
+    return sorted(causes, key=lambda cause: -cause.probability)
+
+
+def _weights(own: Sequence[Trial]) -> np.ndarray:
+    """(n,) array: prior weights of the trials of a cause, with sum 1."""
+    parents: dict[str, list[Trial]] = {}
+    for trial in own:
+        parents.setdefault(trial.candidate.refines or trial.candidate.detail, []).append(trial)
+    weights = np.zeros(len(own))
+    for members in parents.values():
+        for trial in members:
+            weights[next(k for k, one in enumerate(own) if one is trial)] = 1.0 / (len(parents) * len(members))
+    return weights
+
+
+def _range_of(own: Sequence[Trial], share: np.ndarray) -> tuple[float, float, float]:
+    """Quantiles of the amount over the trials of a cause."""
+    amounts = np.concatenate([trial.amounts for trial in own])
+    mass = np.concatenate(
+        [s * np.exp(t.log_likelihood - logsumexp(t.log_likelihood)) for s, t in zip(share, own, strict=True) if s > 0.0]
+        or [np.ones(1)]
+    )
+    amounts = np.concatenate([t.amounts for s, t in zip(share, own, strict=True) if s > 0.0] or [amounts[:1]])
+    order = np.argsort(amounts)
+    below = np.cumsum(mass[order])
+    places = np.searchsorted(below, np.array(TAILS) * below[-1])
+    low, middle, high = amounts[order][np.minimum(places, len(amounts) - 1)].tolist()
+    return low, middle, high
+
+
+def _frictions(own: Sequence[Trial], share: np.ndarray) -> tuple[float, float]:
+    """Range of the coefficients of friction that are not ten times less likely than the best."""
+    by: dict[float, float] = {}
+    for trial, s in zip(own, share, strict=True):
+        by[trial.friction] = max(by.get(trial.friction, 0.0), float(s))
+    likely = [friction for friction, s in by.items() if s * TOLD_APART >= max(by.values())]
+    return min(likely), max(likely)
+
+
+def alike(causes: Sequence[Cause]) -> list[Cause]:
+    """List the causes that the observations cannot tell from the best, the best included."""
+    return [cause for cause in causes if cause.probability * TOLD_APART >= causes[0].probability]
+
+
+def unexplained(
+    comparison: Comparison, causes: Sequence[Cause], trials: Sequence[Trial]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find widths that the best cause does not make, and those that no candidate makes at any amount.
+
+    Returns
+    -------
+    by_best, by_any : (n_widths,) bool arrays
+    """
+    widths = comparison.observations.widths
+    best = causes[0].best
+    displaced = comparison.displacements(best.moved(causes[0].at)[None])
+    misfit, _ = comparison.misfits(best.widths[[causes[0].at]], displaced)
+    by_best = np.abs(misfit[0]) > EXPLAINED
+    reached = np.zeros(len(widths))
+    for trial in trials:
+        possible = np.isfinite(trial.log_likelihood)
+        if possible.any():
+            reached = np.maximum(reached, trial.widths[possible].max(axis=0, initial=0.0))
+    slack = EXPLAINED * np.hypot(comparison.sigma, comparison.trust.model * widths)
+    # What is within what is left of the model's own width is no sign of another cause.
+    by_any = (widths > 0.0) & (reached < np.maximum(widths - slack, 0.25 * widths))
+    return by_best & (widths > 0.0) | by_any, by_any
+
+
+def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measurement | None:
+    """Find the joint whose width tells the most probable causes apart best; None where none does.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    causes : sequence of Cause
+        In the order of their probability.
+    """
+    chosen = [cause for cause in causes if cause.probability > 1e-6][:4]
+    if len(chosen) < 2:
+        return None
+    table = np.array([_expected(cause) for cause in chosen])
+    mean, spread = table[:, 0], table[:, 1]
+    widest = comparison.observations.largest
+    sigma = np.sqrt(spread**2 + (comparison.trust.model * mean) ** 2 + (0.03 * widest) ** 2)
+    weights = np.array([cause.probability for cause in chosen])
+    n = len(comparison.joints.block_a)
+    gain, apart = np.zeros(n), np.zeros(n)
+    for a in range(len(chosen)):
+        for b in range(a):
+            difference = np.abs(mean[a] - mean[b]) / np.hypot(sigma[a], sigma[b])
+            gain += weights[a] * weights[b] * np.minimum(difference, 2.0 * EXPLAINED)
+            apart = np.maximum(apart, difference)
+    # Where somebody has measured already nothing new is to be found.
+    gain[(comparison.nearness > 0.99).any(axis=0)] = 0.0
+    best = int(np.argmax(gain))
+    if gain[best] <= 0.0:
+        return None
+    assembly, joints = comparison.assembly, comparison.joints
+    x, y = joints.ends[best].mean(axis=0)
+    return Measurement(
+        joint=best,
+        name=f"{assembly.names[joints.block_a[best]]} | {assembly.names[joints.block_b[best]]}",
+        place=(float(x), float(y)),
+        widths=tuple((cause.name, float(mean[k, best])) for k, cause in enumerate(chosen)),
+        deviations=float(apart[best]),
+    )
+
+
+def _expected(cause: Cause) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and standard deviation (n_joints,) [m] of the openings under a cause, over all it leaves open."""
+    mean = square = np.zeros(0)
+    for trial, share in zip(cause.trials, cause.weights, strict=True):
+        if share < 1e-3:
+            continue
+        mass = share * np.exp(trial.log_likelihood - logsumexp(trial.log_likelihood))
+        heavy = np.flatnonzero(mass > 1e-3 * mass.max())
+        openings = trial.run.at(trial.amounts[heavy] / trial.twin.scale, trial.run.openings)
+        first, second = mass[heavy] @ openings, mass[heavy] @ openings**2
+        mean, square = (first, second) if len(mean) == 0 else (mean + first, square + second)
+    return mean, np.sqrt(np.maximum(square - mean**2, 0.0))

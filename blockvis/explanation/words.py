@@ -1,0 +1,202 @@
+"""An explanation in words: for the command line, the page, and explain.json."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .explain import Explanation
+    from .ranking import Cause, Measurement
+
+#: Causes that the command line lists.
+LISTED = 6
+
+
+def amount_text(value: float, unit: str) -> str:
+    """Write an amount: a length in mm, an angle in mrad.
+
+    Examples
+    --------
+    >>> amount_text(0.0123, "m"), amount_text(0.0021, "rad")
+    ('12.3 mm', '2.1 mrad')
+    """
+    return f"{1e3 * value:.3g} {'mm' if unit == 'm' else 'mrad'}"
+
+
+def range_text(cause: Cause) -> str:
+    """Write the range of the amount of a cause."""
+    low, middle, high = cause.amount
+    ends = f"{1e3 * low:.3g} to {1e3 * high:.3g}"
+    return f"{amount_text(middle, cause.unit)} ({ends})"
+
+
+def percent(probability: float) -> str:
+    """Write a probability; none is certain.
+
+    Examples
+    --------
+    >>> percent(0.123), percent(0.99999), percent(0.00001)
+    ('12 %', '> 99.9 %', '< 0.1 %')
+    """
+    if probability > 0.999:
+        return "> 99.9 %"
+    return "< 0.1 %" if probability < 0.001 else f"{100.0 * probability:.2g} %"
+
+
+def cause_text(cause: Cause) -> str:
+    """Name a cause, with what its best candidate adds."""
+    return f"{cause.name}{f', {cause.detail}' if cause.detail else ''}"
+
+
+def measurement_text(measurement: Measurement) -> str:
+    """Say which joint to measure next, and what each cause has there."""
+    x, y = measurement.place
+    there = "; ".join(f"{1e3 * width:.3g} mm if {name}" for name, width in measurement.widths)
+    return f"the joint {measurement.name} at ({x:.3g}, {y:.3g}) m: {there}"
+
+
+def verdict(found: Explanation) -> str:
+    """Say what the observations point at, in one sentence."""
+    if not found.causes:
+        return "No candidate stands at any amount: the structure does not stand as drawn"
+    best, others = found.causes[0], found.alike[1:]
+    none = set(found.made_by_none)
+    if none and len(none) == int((found.observations.widths > 0.0).sum()) and not len(found.observations.points):
+        return "No candidate makes any of the observed cracks"
+    if others:
+        more = " or ".join(cause_text(cause) for cause in others)
+        return f"{_capital(cause_text(best))}, or else {more}: the observations cannot tell these apart"
+    return f"{_capital(cause_text(best))} by {amount_text(best.amount[1], best.unit)}"
+
+
+def in_words(found: Explanation) -> str:
+    """Sum up an explanation for the command line."""
+    n_open, n = int((found.observations.widths > 0.0).sum()), len(found.observations.widths)
+    about = [f"{n_open} open and {n - n_open} closed joints"] if n else []
+    about += [f"{len(found.observations.points)} displaced points"] if len(found.observations.points) else []
+    lines = [f"{' and '.join(about)}, {len(found.causes)} causes, {len(found.runs)} runs", verdict(found)]
+    for number, cause in enumerate(found.causes[:LISTED], start=1):
+        lines.append(f"{number}  {percent(cause.probability):>8}  {range_text(cause):<26}  {cause_text(cause)}")
+        if cause.also:
+            lines.append(f"{'':41}or, with the same cracks: {', '.join(cause.also)}")
+    if len(found.causes) > LISTED:
+        lines.append(f"and {len(found.causes) - LISTED} less probable causes")
+    lines += unexplained_texts(found)
+    if found.next_measurement is not None and len(found.causes) > 1:
+        lines.append(f"measure next: {measurement_text(found.next_measurement)}")
+    return "\n".join(lines)
+
+
+def unexplained_texts(found: Explanation) -> list[str]:
+    """Say which observations the best cause, or every candidate, leaves unexplained."""
+    lines = []
+    for k in found.unexplained:
+        width = f"{1e3 * found.observations.widths[k]:.3g} mm at {found.observations.labels[k]}"
+        whom = "no candidate makes it" if k in found.made_by_none else "the first cause does not make it"
+        lines.append(f"unexplained: {width}; {whom}")
+    return lines
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def values_of(found: Explanation) -> dict[str, Any]:
+    """Make what explain.json holds: lengths in m, angles in rad, widths in mm where the key says so."""
+    given = found.observations
+    best = found.causes[:2]
+    computed = [cause.best.widths[cause.at] for cause in best]
+    settings = found.case.explain
+    return {
+        "verdict": verdict(found),
+        "causes": [_cause_values(cause) for cause in found.causes],
+        "cannot_tell_apart": [cause.name for cause in found.alike] if len(found.alike) > 1 else [],
+        "unexplained": [
+            {
+                "place": given.labels[k],
+                "width_mm": _mm(given.widths[k]),
+                "made_by_no_candidate": k in found.made_by_none,
+            }
+            for k in found.unexplained
+        ],
+        "next_measurement": _measurement_values(found.next_measurement),
+        "observations": {
+            "source": given.source,
+            "widths": [
+                {
+                    "place": given.labels[k],
+                    "x": float(given.places[k, 0]),
+                    "y": float(given.places[k, 1]),
+                    "width_mm": _mm(given.widths[k]),
+                    "uncertainty_mm": _mm(given.uncertainties[k]),
+                    "computed_mm": [_mm(widths[k]) for widths in computed],
+                }
+                for k in range(len(given.widths))
+            ],
+            "points": [
+                {
+                    "block": given.blocks[k],
+                    "x": float(given.points[k, 0]),
+                    "y": float(given.points[k, 1]),
+                    "displacement_mm": [_mm(value) for value in given.displacements[k]],
+                    "computed_mm": [
+                        [_mm(value) for value in found.comparison.displacements(c.best.moved(c.at)[None])[0, k]]
+                        for c in best
+                    ],
+                }
+                for k in range(len(given.points))
+            ],
+        },
+        "assumed": {
+            "prior": "causes alike, amounts evenly in their logarithm, frictions and places of troughs alike",
+            "model_uncertainty": settings.model_uncertainty,
+            "place_uncertainty": found.comparison.trust.place,
+            "outliers": settings.outliers,
+            "frictions": sorted({trial.friction for cause in found.causes for trial in cause.trials}),
+        },
+        "runs": len(found.runs),
+        "notes": list(found.notes),
+        "case": found.case.text,
+    }
+
+
+def _cause_values(cause: Cause) -> dict[str, Any]:
+    low, middle, high = cause.amount
+    candidate = cause.best.candidate
+    values: dict[str, Any] = {
+        "cause": cause.name,
+        "detail": cause.detail,
+        "same_cracks": list(cause.also),
+        "probability": cause.probability,
+        "unit": cause.unit,
+        "amount": middle,
+        "amount_low": low,
+        "amount_high": high,
+        "best_amount": float(cause.best.amounts[cause.at]),
+        "friction": list(cause.friction),
+        "log_likelihood": float(cause.best.log_likelihood[cause.at]),
+        "motions": {name: list(motion) for name, motion in candidate.motions.items()},
+    }
+    if candidate.is_trough:
+        values |= {"centre": candidate.centre, "inflection": candidate.inflection}
+    return values
+
+
+def _measurement_values(measurement: Measurement | None) -> dict[str, Any] | None:
+    if measurement is None:
+        return None
+    return {
+        "joint": measurement.name,
+        "x": measurement.place[0],
+        "y": measurement.place[1],
+        "expected_mm": {name: _mm(width) for name, width in measurement.widths},
+        "deviations": round(measurement.deviations, 3),
+    }
+
+
+def _mm(length: float | np.floating[Any]) -> float:
+    value = float(length)
+    return round(1e3 * value, 4) + 0.0 if math.isfinite(value) else value

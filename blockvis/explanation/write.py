@@ -1,0 +1,6 @@
+def refuse_explanation(*a):
+    pass
+
+
+def write_explanation(*a, **k):
+    pass

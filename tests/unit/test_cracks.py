@@ -1,0 +1,87 @@
+"""Crack lines: which joints they hold, how wide, how steep and from where to where."""
+
+import json
+
+import numpy as np
+import pytest
+import structures
+
+import blockvis
+import solver
+from blockvis.report.page import report_html
+from blockvis.results.cracks import crack_rows, cracks_of
+
+
+def moved(assembly, **motions):
+    """The pose in which blocks, by their names with _ for a space, have moved and turned."""
+    pose = solver.Pose.initial(assembly)
+    for name, (dx, dy, turn) in motions.items():
+        block = assembly.index(name.replace("_", " ").replace("N", "-"))
+        pose.positions[block] += dx, dy
+        pose.rotations[block] += turn
+    return pose
+
+
+def squares(*corners, size=1.0):
+    outlines = [[[x, y], [x + size, y], [x + size, y + size], [x, y + size]] for x, y in corners]
+    return solver.Assembly.from_outlines(outlines)
+
+
+def test_nothing_that_has_not_moved_is_cracked():
+    wall = structures.wall(4, 3)
+    assert cracks_of(wall, solver.Pose.initial(wall)) == []
+
+
+def test_a_block_that_is_lifted_leaves_a_level_crack():
+    assembly = squares((0, 0), (0, 1), (1, 0))
+    (crack,) = cracks_of(assembly, moved(assembly, block_1=(0.0, 0.01, 0.0)))
+    assert crack.width == pytest.approx(0.01)
+    assert set(crack.widest.split(" | ")) == {"block 0", "block 1"}
+    assert crack.inclination == pytest.approx(0.0)
+    np.testing.assert_allclose(crack.ends, [[0, 1], [1, 1]], atol=1e-12)
+    assert crack.length == pytest.approx(1.0)
+
+
+def test_a_stepped_crack_is_one_line_through_joints_that_only_slide():
+    """Two courses in running bond; their right ends go: two head joints open, the bed joint between them slides."""
+    outlines = [
+        [[0, 0], [2, 0], [2, 1], [0, 1]],
+        [[2, 0], [4, 0], [4, 1], [2, 1]],
+        [[0, 1], [3, 1], [3, 2], [0, 2]],
+        [[3, 1], [4, 1], [4, 2], [3, 2]],
+    ]
+    assembly = solver.Assembly.from_outlines(outlines)
+    (crack,) = cracks_of(assembly, moved(assembly, block_1=(0.02, 0.0, 0.0), block_3=(0.02, 0.0, 0.0)))
+    assert crack.width == pytest.approx(0.02)
+    np.testing.assert_allclose(crack.ends, [[2, 0], [3, 2]], atol=1e-12)
+    assert crack.inclination == pytest.approx(np.degrees(np.arctan2(2, 1)))
+    assert len(crack.joints) == 3
+
+
+def test_cracks_apart_are_lines_of_their_own_the_widest_first():
+    assembly = squares((0, 0), (0, 1), (5, 0), (5, 1))
+    cracks = cracks_of(assembly, moved(assembly, block_1=(0, 0.01, 0), block_3=(0, 0.03, 0)))
+    assert [round(crack.width, 6) for crack in cracks] == [0.03, 0.01]
+    words = crack_rows(cracks, 1)
+    assert words[0][1].startswith("30 mm at block")
+    assert words[1] == ("and", "1 narrower ones")
+
+
+def test_the_cracks_of_an_arch_are_its_hinges(tmp_path):
+    arch = structures.arch_response()
+    cracks = cracks_of(arch.assembly, arch.path[-1].pose)
+    assert len(cracks) >= 3
+    assert all(crack.length == pytest.approx(0.15, rel=0.01) for crack in cracks)
+    blockvis.write(arch, tmp_path / "out")
+    stored = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["cracks"]
+    assert [c["width_mm"] for c in stored] == pytest.approx([1e3 * c.width for c in cracks], abs=1e-3)
+    assert stored[0]["widest_joint"] == cracks[0].widest
+    page = report_html(arch)
+    assert f"{1e3 * cracks[0].width:.3g} mm at {cracks[0].widest}" in page
+
+
+def test_every_key_of_a_crack_is_named_in_the_manual():
+    assembly = squares((0, 0), (0, 1))
+    (crack,) = cracks_of(assembly, moved(assembly, block_1=(0, 0.01, 0)))
+    manual = (structures.Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    assert [key for key in crack.values() if f"`{key}`" not in manual] == []

@@ -1,0 +1,193 @@
+"""Profiles of settlement: each support its own motion, troughs and tables of points, and the ground cut under them."""
+
+import json
+
+import numpy as np
+import pytest
+import structures
+
+import blockvis
+import solver
+from blockvis import cli
+from blockvis.cases.build import case_assembly, case_settlements
+from blockvis.cases.case import parse_case
+from blockvis.cases.profiles import Profile
+
+NO_FALL = solver.Controls(falling_frames=0)
+
+PORTAL = """
+[geometry]
+layout = "portal"
+[geometry.parameters]
+column_blocks = 2
+[settlement]
+increment = 0.005
+limit = 0.01
+"""
+
+WALL = """
+[geometry]
+layout = "wall"
+[geometry.parameters]
+bricks = 3
+courses = 2
+settling = [0.0, 0.75]
+depth = 0.3
+[settlement]
+increment = 0.002
+limit = 0.004
+"""
+
+
+def case_of(text, profile, *more):
+    text = text.replace("[settlement]", "\n".join(["[settlement]", f"profile = {profile}", *more]))
+    return parse_case(text, structures.Path("case.toml"))
+
+
+def openings(response):
+    from blockvis.results.joints import initial_joints, opening_and_slip
+
+    return opening_and_slip(response.assembly, initial_joints(response.assembly), response.path[-1].pose)[:, 0]
+
+
+def test_a_translation_by_a_profile_is_the_ordinary_settlement():
+    arch = structures.arch_response().assembly
+    steps = {"increment": 0.01, "limit": 0.03}
+    plain = solver.settle(arch, solver.Settlement(direction=(1, 0), **steps), controls=NO_FALL)
+    profile = {"right springer": (2.5, 0.0, 0.0)}
+    same = solver.settle(arch, solver.Settlement(profile=profile, **steps), controls=NO_FALL)
+    assert [i.parameter for i in same.path] == [i.parameter for i in plain.path]
+    np.testing.assert_allclose([i.reaction for i in same.path], [i.reaction for i in plain.path], rtol=1e-9)
+    np.testing.assert_allclose(same.path[-1].pose.positions, plain.path[-1].pose.positions, atol=1e-10)
+
+
+def test_two_springers_that_part_by_half_each_open_the_arch_like_one_that_goes_all_the_way():
+    arch = structures.arch_response().assembly
+    one = solver.settle(arch, solver.Settlement(direction=(1, 0), increment=0.01, limit=0.04), controls=NO_FALL)
+    both = arch.with_roles(["free" if role == "free" else "moving" for role in arch.roles])
+    parting = {"left springer": (-1.0, 0.0, 0.0), "right springer": (1.0, 0.0, 0.0)}
+    apart = solver.settle(both, solver.Settlement(profile=parting, increment=0.005, limit=0.02), controls=NO_FALL)
+    np.testing.assert_allclose(openings(apart), openings(one), atol=2e-6)
+
+
+def test_a_pure_rotation_is_measured_in_rad_and_turns_a_support_about_its_centroid():
+    motion = solver.Settlement(profile={"right springer": (0.0, 0.0, -0.5)})
+    assert motion.unit == "rad"
+    arch = structures.arch_response().assembly
+    start = solver.Pose.initial(arch)
+    moved = motion.displaced(arch, start, 0.1).displacements(arch)
+    springer = arch.index("right springer")
+    np.testing.assert_allclose(moved[springer], [0.0, 0.0, -0.1], atol=1e-15)
+    assert not np.delete(moved, springer, axis=0).any()
+
+
+def test_s_is_the_largest_displacement_of_a_support():
+    motion = solver.Settlement(profile={"a": (0.0, -0.5, 0.1), "b": (3.0, 4.0, 0.0)})
+    assert motion.profile["b"] == pytest.approx((0.6, 0.8, 0.0))
+    assert motion.profile["a"] == pytest.approx((0.0, -0.1, 0.02))
+    assert solver.Settlement(profile=motion.profile) == motion
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"profile": {"a": (0.0, 0.0, 0.0)}}, "moves no support"),
+        ({"profile": {}}, "moves no support"),
+        ({"profile": {"a": (1.0, 0.0)}}, r"profile of 'a' is \[1.0, 0.0\]; give \[dx, dy, rotation\]"),
+        ({"profile": {"a": (np.nan, 0.0, 0.0)}}, "profile of 'a'"),
+        ({"profile": {"a": (1.0, 0.0, 0.0)}, "direction": (1, 0)}, "give no direction"),
+    ],
+)
+def test_profiles_that_are_none_are_refused(keys, words):
+    with pytest.raises(ValueError, match=words):
+        solver.Settlement(**keys)
+
+
+def test_a_trough_goes_down_by_a_bell_and_tilts_by_its_slope():
+    trough = Profile("gaussian", centre=1.0, inflection=0.5)
+    x = np.linspace(-1.0, 3.0, 41)
+    assert trough.value(np.array([1.0, 1.5])) == pytest.approx([1.0, np.exp(-0.5)])
+    step = 1e-6
+    by_difference = (trough.value(x + step) - trough.value(x - step)) / (2 * step)
+    np.testing.assert_allclose(trough.slope(x), by_difference, atol=1e-8)
+
+
+def test_points_are_joined_by_straight_lines_and_level_beyond():
+    table = Profile("points", points=((0.0, 0.0), (2.0, 1.0)))
+    np.testing.assert_allclose(table.value(np.array([-1.0, 0.5, 3.0])), [0.0, 0.25, 1.0])
+    np.testing.assert_allclose(table.slope(np.array([-1.0, 1.0, 2.0])), [0.0, 0.5, 0.25], atol=1e-6)
+
+
+def test_each_support_of_a_case_goes_by_the_trough_at_its_centroid():
+    case = case_of(PORTAL, '{ kind = "gaussian", centre = 0.0, inflection = 1.0 }')
+    with pytest.warns(UserWarning, match="'ground right' into 3 pieces"):
+        assembly = case_assembly(case)
+    (settlement,) = case_settlements(case, assembly)
+    assert set(settlement.profile) == {assembly.names[i] for i in np.flatnonzero(assembly.moving)}
+
+
+def test_a_ground_of_one_block_is_cut_under_the_joints_of_the_first_course():
+    case = case_of(WALL, '{ kind = "gaussian", centre = 0.5, inflection = 0.2 }')
+    with pytest.warns(UserWarning, match="cut under the joints of the first course, 'ground' into 5 pieces"):
+        assembly = case_assembly(case)
+    pieces = [i for i in range(assembly.n_blocks) if not assembly.free[i]]
+    assert [assembly.names[i] for i in pieces] == [f"ground {k}" for k in range(1, 6)]
+    edges = [assembly.outline(i)[:, 0] for i in pieces]
+    assert [x.min() for x in edges[1:]] == pytest.approx([0.0, 0.25, 0.5, 0.75])
+    whole = case_assembly(case_of(WALL, "{ points = [[-9.0, 0.0], [9.0, 1.0]] }"))
+    assert "ground" in whole.names, "a straight profile tilts the ground as it is"
+    assert assembly.areas[pieces].sum() == pytest.approx(whole.areas[whole.index("ground")])
+
+
+def test_a_trough_and_its_mirror_open_the_wall_alike(tmp_path):
+    found = []
+    for centre in (0.15, 0.6):
+        run = blockvis.run_case(
+            case_of(WALL, f'{{ kind = "gaussian", centre = {centre}, inflection = 0.2 }}'), tmp_path / str(centre)
+        )
+        found.append(np.sort(openings(run.response)))
+    np.testing.assert_allclose(found[0], found[1], atol=2e-6)
+    stored = json.loads((tmp_path / "0.6" / "summary.json").read_text(encoding="utf-8"))
+    assert blockvis.open_results(tmp_path / "0.6").settlements[0].profile.keys() == {f"ground {k}" for k in range(1, 6)}
+    assert stored["settlements"][0]["profile"]["ground 4"][1] == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize(
+    ("profile", "words"),
+    [
+        ("3", r"\[settlement\] profile is 3; give \{ kind"),
+        ('{ kind = "gauss", centre = 1 }', "did you mean 'gaussian'"),
+        ('{ kind = "gaussian", inflection = 1 }', r"\[settlement.profile\] centre is missing"),
+        ('{ kind = "gaussian", centre = 1 }', r"\[settlement.profile\] inflection is missing"),
+        ('{ kind = "gaussian", centre = 1, inflection = -1 }', "inflection is -1; give a positive number"),
+        ("{ centre = 1, inflection = 1, points = [[0, 1], [1, 0]] }", "'?centre'? is not a key here"),
+        ("{ points = [[0, 1]] }", "give at least two pairs"),
+        ("{ points = [[0, 1], [0, 2]] }", "two values at x = 0"),
+        ("{ points = [[0, 0], [1, 0]] }", "are all 0"),
+        ("{ supports = { a = 1 } }", r'"a" is 1; give \[dx, dy\]'),
+        ("{ supports = {} }", "give {"),
+        ("{ points = [[0, 1], [1, 2]], supports = { a = [1, 0] } }", "one kind of profile"),
+    ],
+)
+def test_profiles_of_case_files_are_checked(profile, words):
+    with pytest.raises(ValueError, match=words):
+        case_of(PORTAL, profile)
+
+
+def test_a_profile_that_names_no_support_says_which_there_are(tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(
+        PORTAL.replace("[settlement]", '[settlement]\nprofile = { supports = { "grounds right" = [0, -1] } }')
+    )
+    assert cli.main(["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out")]) == cli.BAD_INPUT
+    said = capsys.readouterr().err
+    assert "'grounds right' is no block (did you mean" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_profile_that_moves_a_fixed_support_says_how_to_let_it_move():
+    case = case_of(PORTAL, '{ supports = { "left base" = [0, -1] } }')
+    assembly = case_assembly(case)
+    fixed = assembly.names[int(np.flatnonzero(assembly.roles == "fixed")[0])]
+    case = case_of(PORTAL, f'{{ supports = {{ "{fixed}" = [0, -1] }} }}')
+    with pytest.raises(ValueError, match=f"'{fixed}' is fixed; give it the role \"moving\""):
+        case_settlements(case, assembly)
