@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .broad_phase import box_pairs, boxes
+from .separations import edge_separations, face_separations
 from .solids import Solids
-from .spatial_contacts import edge_separations, face_separations
 
 
 def overlap_depths_in_space(
