@@ -494,7 +494,7 @@ def arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: float
 
 
 def joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points (n, d) [m], forces (n, d) [N] and blocks (n, 2) of the resultants, or of the contact points by "points"."""
+    """Find points (n, d) [m], forces (n, d) [N] and blocks (n, 2) of the resultants, or by "points" of all contacts."""
     if kind == "thrust":
         return resultants(increment)
     contacts = increment.contacts

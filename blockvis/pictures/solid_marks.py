@@ -177,7 +177,7 @@ def settlement_arrows_in_space(
         some = np.linspace(0, len(part) - 1, MOST_ARROWS).round().astype(int)
         part, speeds, sizes = part[some], speeds[some], sizes[some]
     directions = speeds / sizes[:, None]
-    corners, offsets = solver.moved_vertices(assembly, pose), assembly.shapes.offsets
+    corners, offsets = solver.moved_vertices(assembly, pose), assembly.polyhedra.offsets
     places = pose.positions[part].copy()
     for k, block in enumerate(part.tolist()):
         reach = (corners[offsets[block] : offsets[block + 1]] - places[k]) @ directions[k]

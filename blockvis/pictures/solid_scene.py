@@ -78,7 +78,7 @@ class SolidScene:
         self._plotter = _plotter((size[0] * finer, size[1] * finer))
         self._layers: dict[str, Any] = {}
         self._look_at()
-        triangles, self._block = triangles_of(assembly.shapes)
+        triangles, self._block = triangles_of(assembly.polyhedra)
         self._surface = pv.PolyData.from_regular_faces(np.array(assembly.vertices), triangles)
         self._surface.cell_data["colour"] = block_fill[self._block]
         self._plotter.add_mesh(
@@ -86,7 +86,7 @@ class SolidScene:
             interpolation="flat", opacity=opacity, reset_camera=False, render=False, show_scalar_bar=False,
         )  # fmt: skip
         #: (n, 2) int array: vertices at both ends of the edges that are drawn.
-        self.edges = sharp_edges(assembly.shapes)
+        self.edges = sharp_edges(assembly.polyhedra)
         self._edges = pv.PolyData(np.array(assembly.vertices), lines=_line_cells(self.edges))
         width = float(np.clip(assembly.block_size / self.pixel / 40.0, 0.6, size[1] / 700.0))
         self._add("edges", self._edges, palette.OUTLINE, width=width, forward=1.0)

@@ -81,7 +81,8 @@ def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) ->
     """(n_blocks,) array: speed of the fastest corner of each free block, zero for supports."""
     block = assembly.block_of_vertex
     velocity = solver.point_velocities(solver.moved_vertices(assembly, pose), block, pose, motion)
-    speeds = np.maximum.reduceat(np.linalg.norm(velocity, axis=1), assembly.shapes.offsets[:-1])
+    speeds = np.zeros(assembly.n_blocks)
+    np.maximum.at(speeds, block, np.linalg.norm(velocity, axis=1))
     return np.where(assembly.free, speeds, 0.0)
 
 

@@ -35,7 +35,7 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
     shown : list of solver.Increment
         What the page shows, frame after frame.
     """
-    assembly, shapes = response.assembly, response.assembly.shapes
+    assembly, shapes = response.assembly, response.assembly.polyhedra
     view = chosen_view(response, swing.displaced.positions - swing.increment.pose.positions)
     joints = joint_faces(assembly)
     frame, largest, widest = _surveyed(assembly, joints, shown)
@@ -184,10 +184,8 @@ class _Tables:
         }
 
 
-def _marks(
-    assembly: solver.Assembly, joints: JointFaces, increment: solver.Increment
-) -> tuple[np.ndarray, np.ndarray]:
-    """Ends (n, 2, 3) [m] of hinges and sliding joints, and (n, 2): 1 and -1, or 2 and the number of the joint."""
+def _marks(assembly: solver.Assembly, joints: JointFaces, increment: solver.Increment) -> tuple[np.ndarray, np.ndarray]:
+    """List ends (n, 2, 3) [m] of hinges and sliding joints, and (n, 2): 1 and -1, or 2 and the number of the joint."""
     mechanism, points = solver.mechanism_of(assembly, increment), increment.contacts.points
     lines = points[hinge_lines(assembly, increment, mechanism)]
     pairs = {pair: k for k, pair in enumerate(zip(joints.block_a.tolist(), joints.block_b.tolist(), strict=True))}

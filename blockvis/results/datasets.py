@@ -63,10 +63,10 @@ def block_dataset(
     pyvista.UnstructuredGrid
         Cell arrays ``block_id``, ``name``, ``role`` (number), ``role_name``, ``material_id``, ``material``,
         ``displacement`` (n_blocks, 3) of the centroids [m] and ``rotation`` [rad], in space a vector; point arrays
-        ``displacement`` (n_vertices, 3) [m], ``reference``, the coordinates in the layout [m], and of moved shapes ``to_reference``, the
-        vector back to them [m]; field arrays ``units`` as "displacement [m]", ``settlement`` (the parameter: of a
-        pushover the control displacement, of a load that moves its position), ``phase``, ``load_multiplier``,
-        ``reaction`` [N or N·m], ``status``, ``role_names`` and ``material_names``.
+        ``displacement`` (n_vertices, 3) [m], ``reference``, the coordinates in the layout [m], and of moved shapes
+        ``to_reference``, the vector back to them [m]; field arrays ``units`` as "displacement [m]", ``settlement`` (the
+        parameter: of a pushover the control displacement, of a load that moves its position), ``phase``,
+        ``load_multiplier``, ``reaction`` [N or N·m], ``status``, ``role_names`` and ``material_names``.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def block_grid(
     if assembly.dimension == 2:
         grid = _grid(corners, assembly.offsets, VTK_POLYGON)
     else:
-        grid = _polyhedra(assembly.shapes, corners)
+        grid = _polyhedra(assembly.polyhedra, corners)
     materials = sorted(set(assembly.materials))
     number = {material: k for k, material in enumerate(materials)}
     cells = {
@@ -232,8 +232,8 @@ def contact_dataset(
         ``normal_force`` (compression positive) and ``shear_force`` [N], ``gap`` [m], ``friction``, ``state``
         (number of :class:`solver.ContactState`), ``block_a`` and ``block_b``, ``displacement`` and ``reference`` as of
         :func:`block_dataset`; its field arrays, and ``state_names``. In frames of a fall, which are no
-        equilibrium, forces are 0. In space ``shear_force`` is the size of ``shear`` [N], its vector, and ``slip`` [m] is
-        how far block a has moved along block b there since the layout.
+        equilibrium, forces are 0. In space ``shear_force`` is the size of the vector ``shear`` [N], and ``slip`` [m]
+        is how far block a has moved along block b there since the layout.
     """
     return _as_dataset(contact_grid(assembly, increment, shape=shape))
 

@@ -157,9 +157,9 @@ def packed_increment(increment: solver.Increment) -> bytes:
 
 
 def _arrays_of(state: solver.State) -> dict[str, np.ndarray]:
-    """Name the arrays as the files do: in the plane contact points have a vertex, an edge and a corner, and slip along it.
+    """Name the arrays as the files do: in the plane a contact point has a vertex, an edge and a corner, and slips along.
 
-    In space they are as they are.
+    In space they have their own names.
     """
     arrays = flat(state)
     if state.pose.positions.shape[1] == 3:

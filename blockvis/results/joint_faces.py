@@ -173,7 +173,9 @@ def _grouped(contacts: solver.Contacts) -> tuple[np.ndarray, np.ndarray, np.ndar
     side = np.where(contacts.block_a == pairs[joint, 0], 1.0, -1.0) if len(contacts) else np.zeros(0)
     own = contacts.frames[:, 0] * side[:, None]
     group = np.full(len(contacts), -1)
-    found_pairs, found_normals = [], []
+    found_pairs: list[np.ndarray] = []
+    found_normals: list[np.ndarray] = []
+    count = 0
     left = np.arange(len(contacts))
     # Each round takes the first normal of each pair that is left; blocks that are convex have one face in common.
     while len(left):
@@ -181,7 +183,8 @@ def _grouped(contacts: solver.Contacts) -> tuple[np.ndarray, np.ndarray, np.ndar
         normal = own[left[first]]
         row = np.searchsorted(which, joint[left])
         here = (own[left] * normal[row]).sum(axis=1) > ALIKE
-        group[left[here]] = sum(map(len, found_pairs)) + row[here]
+        group[left[here]] = count + row[here]
+        count += len(which)
         found_pairs.append(pairs[which])
         found_normals.append(normal)
         left = left[~here]
@@ -244,7 +247,7 @@ def faces_in_space(assembly: solver.Assembly, joints: JointFaces, pose: solver.P
 
 
 def openings_and_slips(joints: JointFaces, faces: Faces) -> tuple[np.ndarray, np.ndarray]:
-    """Opening (n_joints,) and slip (n_joints, 3) [m] of the joints of the layout, as in :class:`FaceStates`."""
+    """Find opening (n_joints,) and slip (n_joints, 3) [m] of the joints of the layout, as in :class:`FaceStates`."""
     rings = joints.rings
     if not len(joints):
         return np.zeros(0), np.zeros((0, 3))
@@ -341,7 +344,7 @@ def face_states(assembly: solver.Assembly, joints: JointFaces, increment: solver
 
 
 def _joint_of(contacts: solver.Contacts, joints: JointFaces, normals: np.ndarray, middles: np.ndarray) -> np.ndarray:
-    """(n_contacts,) int array: the joint between the same blocks whose plane is nearest to each contact point, or -1."""
+    """(n_contacts,) int array: the joint between the same blocks whose plane is nearest to each point, or -1."""
     count = 1 + max(
         int(block.max(initial=0)) for block in (contacts.block_a, contacts.block_b, joints.block_a, joints.block_b)
     )
