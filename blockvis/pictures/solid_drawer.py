@@ -36,6 +36,7 @@ from .drawer import (
 )
 from .flat_scene import magnified
 from .frame import ColourBar, Key, Sheet, framed
+from .solid_inspection import role_colours
 from .solid_marks import SolidMarks, settlement_arrows_in_space, solid_marks
 from .solid_scene import IN_FRONT_OF_ALL, SolidScene
 from .solid_view import chosen_view
@@ -102,9 +103,7 @@ class SolidDrawer:
         beside = round(0.36 * size[0]) if curve else 0
         self.sheet = Sheet(size, bar, beside)
         self.panel = CurvePanel(response, size_of(self.sheet.beside), self.sheet.text) if curve else None
-        fill = palette.block_colours(assembly.materials, assembly.free)
-        fill[assembly.moving] = palette.MOVING
-        self.fill = fill
+        fill = self.fill = role_colours(assembly)
         self.tints = None
         if look.colour_by == "mechanism" and self._swing.moves:
             self.tints = mechanism_colours(assembly, fill, self._swing)

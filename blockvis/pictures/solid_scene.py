@@ -27,6 +27,9 @@ LAMP = (-0.45, 0.85, 1.2)
 #: Samples of a pixel.
 SAMPLES = 4
 
+#: What is seen lies nearer than this part of the picture's size to the point that is looked for.
+SAME_DEPTH = 0.005
+
 #: Layers by how far in front of what lies at the same place they are drawn; what is in front of all hides nothing.
 IN_FRONT_OF_ALL = 1_000_000.0
 
@@ -201,6 +204,17 @@ class SolidScene:
         """(n, 2) array: pixel (column, row) of points (n, 3) [m]."""
         place = (self.view.projected(np.asarray(points)) - self.frame.low) / self.pixel
         return np.column_stack([place[:, 0], self.size[1] - place[:, 1]])
+
+    def sees(self, points: np.ndarray) -> np.ndarray:
+        """(n,) bool array: which points (n, 3) [m] on the blocks nothing hides in the last picture."""
+        depth = np.nan_to_num(np.asarray(self._plotter.get_image_depth(reset_camera_clipping_range=False)), nan=-np.inf)
+        column, row = np.floor(self.at_pixel(points) * self.finer).astype(int).T
+        inside = (column >= 0) & (row >= 0) & (column < depth.shape[1]) & (row < depth.shape[0])
+        found = np.full(len(points), -np.inf)
+        found[inside] = depth[row[inside], column[inside]]
+        # VTK counts the depth from the eye backwards.
+        eye = self.view.depth(np.array(self._plotter.camera.position)[None])[0]
+        return np.asarray(np.abs(found - (self.view.depth(points) - eye)) < SAME_DEPTH * self.frame.size.max())
 
     def close(self) -> None:
         """Give the memory of the graphics card back."""

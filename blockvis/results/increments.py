@@ -157,7 +157,7 @@ def packed_increment(increment: solver.Increment) -> bytes:
 
 
 def _arrays_of(state: solver.State) -> dict[str, np.ndarray]:
-    """Name the arrays as the files do: in the plane a contact point has a vertex, an edge and a corner, and slips along.
+    """Name the arrays as the files do: in the plane a contact point has vertex, edge and corner, and one slip.
 
     In space they have their own names.
     """
