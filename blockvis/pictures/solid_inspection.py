@@ -14,7 +14,7 @@ from blockvis.atomic_files import whole_file
 from . import palette
 from .frame import Key, Sheet, framed, write_names
 from .solid_scene import SolidScene
-from .solid_view import ABOVE, AROUND, View
+from .solid_view import ABOVE, AROUND, View, showing_faces
 
 if TYPE_CHECKING:
     from blockvis.layout.inspect_solids import SolidInspection
@@ -133,17 +133,13 @@ def seen_faces(scene: SolidScene) -> tuple[np.ndarray, np.ndarray]:
         Across the face there; 0 where something hides it.
     """
     shapes = scene.assembly.polyhedra
-    faces = shapes.faces(shapes.vertices)
-    showing = shapes.face_areas * (faces.normals @ scene.view.axes[2])
-    order = np.lexsort((-showing, shapes.block_of_face))
-    best = order[np.searchsorted(shapes.block_of_face[order], np.arange(len(shapes)))]
-    places = faces.middles[best]
+    places, best, showing = showing_faces(shapes, scene.view.axes[2])
     pixels = scene.view.projected(shapes.vertices) / scene.pixel
     room = np.zeros(len(shapes))
     for block, face in enumerate(best.tolist()):
         ring = pixels[shapes.corners[shapes.face_offsets[face] : shapes.face_offsets[face + 1]]]
         room[block] = np.ptp(ring, axis=0)[0]
-    room[(showing[best] <= 0.0) | ~scene.sees(places)] = 0.0
+    room[(showing <= 0.0) | ~scene.sees(places)] = 0.0
     return places, room
 
 

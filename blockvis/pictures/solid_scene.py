@@ -19,7 +19,7 @@ from .solid_view import View
 from .surface import sharp_edges, triangles_of
 
 #: How much of the light comes from all sides, and from the lamp above the left shoulder.
-AMBIENT, DIFFUSE = 0.50, 0.58
+AMBIENT, DIFFUSE = 0.58, 0.50
 
 #: Where the lamp stands, to the right, up and to the eye.
 LAMP = (-0.45, 0.85, 1.2)

@@ -91,3 +91,27 @@ def chosen_view(response: solver.Response, motion: np.ndarray) -> View:
 
 def _scaled(motion: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return motion / weights.sum() if weights.any() else np.zeros_like(motion)
+
+
+def showing_faces(shapes: solver.Polyhedra, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find the face of each block that shows most of itself, hidden or not.
+
+    Parameters
+    ----------
+    shapes : solver.Polyhedra
+    eye : (3,) array
+        Unit vector to the eye.
+
+    Returns
+    -------
+    places : (n_blocks, 3) array [m]
+        Its middle.
+    faces : (n_blocks,) int array
+    showing : (n_blocks,) array [m²]
+        Its area as seen.
+    """
+    faces = shapes.faces(shapes.vertices)
+    showing = shapes.face_areas * (faces.normals @ eye)
+    order = np.lexsort((-showing, shapes.block_of_face))
+    best = order[np.searchsorted(shapes.block_of_face[order], np.arange(len(shapes)))]
+    return faces.middles[best], best, showing[best]

@@ -131,7 +131,7 @@
   const solid = gl && program(
     `${SEE} in vec3 at; in vec3 colour; out vec3 v; out vec3 c; void main() { v = seen(at); c = colour; gl_Position = clip(v); }`,
     "in vec3 v; in vec3 c; out vec4 o; uniform float lit; void main() { vec3 n = normalize(cross(dFdx(v), dFdy(v)));" +
-    " float light = mix(1.0, 0.5 + 0.58 * max(0.0, dot(n, normalize(vec3(-0.45, 0.85, 1.2)))), lit); o = vec4(c * light, 1.0); }");
+    " float light = mix(1.0, 0.58 + 0.5 * max(0.0, dot(n, normalize(vec3(-0.45, 0.85, 1.2)))), lit); o = vec4(c * light, 1.0); }");
   const thick = gl && program(
     `${SEE} in vec3 at; in vec3 to; in vec3 colour; in vec2 wide; uniform float ahead; out vec3 c; void main() { vec4 p = clip(seen(at)), r = clip(seen(to));` +
     " vec2 d = (r.xy - p.xy) * size; d = length(d) > 1e-6 ? normalize(d) : vec2(1.0, 0.0); gl_Position = p + vec4(vec2(-d.y, d.x) * wide.x * wide.y / size, -ahead, 0.0); c = colour; }",
