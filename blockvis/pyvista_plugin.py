@@ -31,6 +31,7 @@ from .layout.layout import AnyLayout
 from .layout.selection import sorted_out
 from .layout.solid_layout import SolidLayout
 from .pictures import palette
+from .pictures.solid_scene import drawn_forward
 from .pictures.solid_view import ABOVE, AROUND, View, showing_faces
 from .results.datasets import block_dataset
 
@@ -304,7 +305,8 @@ class BlockvisAccessor:
             plotter.add_mesh(blocks.triangulate(), scalars="colour", rgb=True, lighting=False)
         else:
             plotter.add_mesh(blocks, scalars="colour", rgb=True, ambient=0.4, diffuse=0.6)
-        plotter.add_mesh(blocks.extract_all_edges(), color=palette.OUTLINE, line_width=1.5, lighting=False)
+        edges = plotter.add_mesh(blocks.extract_all_edges(), color=palette.OUTLINE, line_width=1.5, lighting=False)
+        drawn_forward(edges, 1.0)
         flat = assembly.dimension == 2
         view = View(AROUND[0], ABOVE)
         if names:
@@ -326,7 +328,9 @@ class BlockvisAccessor:
             width, height = np.ptp(assembly.vertices, axis=0)
         else:
             plotter.view_vector(view.axes[2], viewup=(0.0, 0.0, 1.0))
-            width, height = np.ptp(view.projected(assembly.vertices), axis=0)
+            low, high = assembly.vertices.min(axis=0), assembly.vertices.max(axis=0)
+            # The camera looks at the middle of the box around the blocks.
+            width, height = 2.0 * np.abs(view.projected(assembly.vertices - (low + high) / 2.0)).max(axis=0)
         plotter.camera.parallel_scale = 0.55 * max(height, width * window_size[1] / window_size[0])
         return plotter.show(screenshot=False if screenshot is None else str(screenshot))
 

@@ -252,12 +252,23 @@ class SolidScene:
             mesh, **look, line_width=width * self.finer, opacity=opacity, lighting=lit, ambient=AMBIENT,
             diffuse=DIFFUSE, reset_camera=False, render=False,
         )  # fmt: skip
-        mapper = actor.mapper
-        mapper.SetResolveCoincidentTopologyToPolygonOffset()
-        # In units of the smallest difference of depth, which is some 1e-5 of the distance to the structure.
-        mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -6.0 * forward)
-        mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, -6.0 * forward)
+        drawn_forward(actor, forward)
         self._layers[layer] = actor
+
+
+def drawn_forward(actor: Any, by: float) -> None:
+    """Draw lines and polygons in front of what lies at their place, by so many hairs.
+
+    Parameters
+    ----------
+    actor : pyvista.Actor
+    by : float
+    """
+    mapper = actor.mapper
+    mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    # In units of the smallest difference of depth, which is some 1e-5 of the distance to the structure.
+    mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -6.0 * by)
+    mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, -6.0 * by)
 
 
 def _line_cells(ends: np.ndarray) -> np.ndarray:
