@@ -43,7 +43,7 @@ def write_vtu(
     -----
     The format is inline binary with zlib and 64-bit headers, which ParaView from 5.11 on, pyvista and meshio read.
     Appended raw data, VTK's default, fails in ParaView 5.11 above some 10 kB. Faces of polyhedra stand in the arrays
-    ``faces`` and ``faceoffsets``: those that VTK writes since 9.4 no ParaView before 5.13 knows, nor does meshio.
+    ``faces`` and ``faceoffsets`` of version 1.0: those that VTK writes since 9.4 older ParaViews do not know.
     """
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(dataset)
@@ -57,7 +57,7 @@ def write_vtu(
     text = writer.GetOutputString()
     if dataset.GetPolyhedronFaces() is not None:
         text = _FACES.sub(lambda _: _face_arrays(dataset), text, count=1)
-        text = text.replace('version="2.3"', 'version="2.2"', 1)
+        text = text.replace('version="2.3"', 'version="1.0"', 1)
     return write_whole(path, text, last=last, durable=durable)
 
 

@@ -12,7 +12,7 @@ from blockvis.results.joints import TOUCHING
 
 from .annotations import SMALLEST_OPENING, STEEPEST, WIDEST
 
-#: Contact points turn about a hinge where they open by less than this part of the fastest opening of their joint.
+#: Contact points turn about a hinge where they open slower than this part of the turning times the block size.
 ON_HINGE = 0.05
 
 #: Settlement arrows of at most so many supports; of more, evenly chosen ones stand for all.
@@ -119,10 +119,10 @@ def hinge_lines(assembly: solver.Assembly, increment: solver.Increment, mechanis
     pairs, joint = contacts.joints()
     count = assembly.n_blocks
     known = pairs[:, 0] * count + pairs[:, 1]
-    opening = np.abs(increment.displacements[:, 0])
-    fastest = np.zeros(len(pairs))
-    np.maximum.at(fastest, joint, opening)
-    stays = (opening <= ON_HINGE * fastest[joint]) & (contacts.gaps <= TOUCHING * assembly.block_size)
+    spins = increment.velocity[:, 3:]
+    turning = np.linalg.norm(spins[contacts.block_a] - spins[contacts.block_b], axis=1) * assembly.block_size
+    stays = np.abs(increment.displacements[:, 0]) <= ON_HINGE * turning
+    stays &= contacts.gaps <= TOUCHING * assembly.block_size
     ends = np.zeros((len(mechanism.hinges), 2), dtype=int)
     for k, ((a, b), point) in enumerate(zip(mechanism.hinges, mechanism.hinge_points, strict=True)):
         here = np.flatnonzero(stays & (joint == np.searchsorted(known, a * count + b)))
