@@ -5,7 +5,7 @@ from .catalogue import LAYOUTS, build, dimension_of, help_text, parameters_of
 from .corners import l_corner, t_corner, two_leaf_wall
 from .domes import dome
 from .frames import arch_on_piers, buttressed_arch, column, portal
-from .groins import cross_vault, pavilion_vault
+from .groins import church_bay, cross_vault, pavilion_vault
 from .vaults import barrel_vault, extruded_arch
 from .walls import facade, panel, wall
 
@@ -17,6 +17,7 @@ __all__ = [
     "basket_handle_arch",
     "build",
     "buttressed_arch",
+    "church_bay",
     "column",
     "cross_vault",
     "dimension_of",

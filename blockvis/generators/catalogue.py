@@ -15,7 +15,7 @@ from .arches import arch, basket_handle_arch, pointed_arch, segmental_arch
 from .corners import l_corner, t_corner, two_leaf_wall
 from .domes import dome
 from .frames import arch_on_piers, buttressed_arch, column, portal
-from .groins import cross_vault, pavilion_vault
+from .groins import church_bay, cross_vault, pavilion_vault
 from .vaults import barrel_vault, extruded_arch
 from .walls import facade, panel, wall
 
@@ -40,6 +40,7 @@ LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
     "dome": dome,
     "cross vault": cross_vault,
     "pavilion vault": pavilion_vault,
+    "church bay": church_bay,
     "L corner": l_corner,
     "T corner": t_corner,
     "two-leaf wall": two_leaf_wall,
@@ -53,6 +54,7 @@ IN_SPACE = (
     "dome",
     "cross vault",
     "pavilion vault",
+    "church bay",
     "L corner",
     "T corner",
     "two-leaf wall",

@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 
 import solver
-from blockvis.layout.solids import Solid, between, outward
+from blockvis.layout.solids import Solid, between, box, outward
 
 from .arches import segmental_joints
-from .dimensions import above_zero
+from .dimensions import above_zero, whole
 from .solids import assembled
 
 #: An arm of a stone on a diagonal is at least this fraction of a stone long.
@@ -60,6 +60,78 @@ def cross_vault(
     1
     """
     arc = _Arc.of(span, rise, thickness, voussoirs)
+    stones = _crossing(arc, width, stone, bonded)
+    corner = _corner(arc.bearing, width / 2.0)
+    springers = [
+        (f"springer {quarter + 1}", solver.MOVING if quarter == 0 else solver.FIXED, _turned(corner, quarter))
+        for quarter in range(4)
+    ]
+    return assembled(stones, springers, density=above_zero("density", density, "kg/m³"))
+
+
+def church_bay(
+    *,
+    span: float = 4.0,
+    rise: float = 1.5,
+    thickness: float = 0.3,
+    voussoirs: int = 9,
+    width: float = 5.2,
+    stone: float = 1.0,
+    pier: float = 1.5,
+    pier_height: float = 2.0,
+    pier_stones: int = 3,
+    density: float = 2000.0,
+) -> solver.Assembly:
+    """Build a bay of a church: a cross vault on four square piers, stout enough to bear its thrust.
+
+    Parameters
+    ----------
+    span, rise, thickness, voussoirs, width, stone
+        As in :func:`cross_vault`.
+    pier : float [m]
+        Side of a pier in plan, outwards from the inner corner of the vault's support.
+    pier_height : float [m]
+    pier_stones : int
+        Number of stones of a pier.
+    density : float [kg/m³]
+
+    Returns
+    -------
+    solver.Assembly
+        The stones of :func:`cross_vault`, its supports as stones "springer 1" to "springer 4", piers of "pier 1-1"
+        (pier, stone from below), and under them "ground 1" (moving) to "ground 4" (fixed).
+
+    Examples
+    --------
+    >>> church_bay(pier_stones=2).names[-6:-4]
+    ('pier 4-1', 'pier 4-2')
+    """
+    arc = _Arc.of(span, rise, thickness, voussoirs)
+    stones = _crossing(arc, width, stone, True)
+    side, height = above_zero("pier", pier), above_zero("pier_height", pier_height)
+    n = whole("pier_stones", pier_stones, 1)
+    inner, top = float(arc.bearing[:, 0].min()), float(arc.bearing[:, 1].min())
+    if inner + side < width / 2.0:
+        raise ValueError(
+            f"pier is {side:g} m; the vault's supports need {width / 2.0 - inner:.4g} m: give a wider pier"
+        )
+    corner = _corner(arc.bearing, width / 2.0)
+    stones += [(f"springer {quarter + 1}", _turned(corner, quarter)) for quarter in range(4)]
+    levels = top - height + height * np.arange(n + 1) / n
+    grounds = []
+    for quarter in range(4):
+        for k, (low, high) in enumerate(pairwise(levels.tolist())):
+            drum = box((inner, inner, low), (inner + side, inner + side, high))
+            stones.append((f"pier {quarter + 1}-{k + 1}", _turned(drum, quarter)))
+        wide = 0.2 * side
+        foot = box((inner - wide, inner - wide, levels[0] - wide), (*[inner + side + wide] * 2, float(levels[0])))
+        role = solver.MOVING if quarter == 0 else solver.FIXED
+        grounds.append((f"ground {quarter + 1}", role, _turned(foot, quarter)))
+    return assembled(stones, grounds, density=above_zero("density", density, "kg/m³"))
+
+
+def _crossing(arc: _Arc, width: float, stone: float, bonded: bool) -> list[tuple[str, Solid]]:
+    """Lay the stones of a cross vault."""
     edge, length = above_zero("width", width) / 2.0, above_zero("stone", stone)
     widest = float(arc.bearing[:, 0].max())
     if edge <= widest + 0.01 * length:
@@ -81,12 +153,7 @@ def cross_vault(
             for k, (start, end) in enumerate(zip([None, *cuts[:-1]], cuts, strict=True)):
                 solid = _across(arc.crown, start, end)
                 stones.append((f"web {quarter + 1}-{course}-{k + 1}", _turned(solid, quarter)))
-    springers = [
-        (f"springer {quarter + 1}", solver.MOVING if quarter == 0 else solver.FIXED, _turned(solid, quarter))
-        for quarter in range(4)
-        for solid in [_corner(arc.bearing, edge)]
-    ]
-    return assembled(stones, springers, density=above_zero("density", density, "kg/m³"))
+    return stones
 
 
 def pavilion_vault(
