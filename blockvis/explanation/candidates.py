@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -107,13 +108,11 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
     """
     supports = np.flatnonzero(~assembly.free).tolist()
     if not supports:
-        raise ValueError(f"{source}: no block is a support; give some the role \"fixed\" under [roles] or [[supports]]")
+        raise ValueError(f'{source}: no block is a support; give some the role "fixed" under [roles] or [[supports]]')
     fixed = assembly.with_roles(np.where(assembly.free, solver.FREE, solver.FIXED))
     whole = {assembly.names[i]: (assembly.names[i],) for i in supports}
     if settings.trough is False:
         return Ground(fixed, whole, troughs=False)
-    import warnings
-
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         cut = cut_ground(fixed, (), chosen=supports)
@@ -125,7 +124,9 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
     if feet < FEWEST_FEET and settings.trough is None:
         return Ground(fixed, whole, troughs=False)
     if feet < 2:
-        raise ValueError(f"{source}: [explain] trough: the structure stands on one place, which cannot bend; leave it out")
+        raise ValueError(
+            f"{source}: [explain] trough: the structure stands on one place, which cannot bend; leave it out"
+        )
     return Ground(cut, pieces, troughs=True, notes=tuple(str(warning.message) for warning in caught))
 
 
@@ -196,9 +197,7 @@ def _translation(pieces: Sequence[str], vector: tuple[float, float]) -> dict[str
     return {piece: (*vector, 0.0) for piece in pieces}
 
 
-def _rotation(
-    assembly: solver.Assembly, pieces: Sequence[str], sense: float
-) -> dict[str, tuple[float, float, float]]:
+def _rotation(assembly: solver.Assembly, pieces: Sequence[str], sense: float) -> dict[str, tuple[float, float, float]]:
     """Turn supports as one body about the middle of where they carry something."""
     blocks = [assembly.index(piece) for piece in pieces]
     contacts = _touching(assembly)
@@ -233,7 +232,7 @@ def _troughs(ground: Ground, settings: ExplainSettings) -> list[Candidate]:
 
 
 def _extent(ground: Ground) -> tuple[float, float]:
-    """The x between which the structure stands on its supports [m]."""
+    """Find the x between which the structure stands on its supports [m]."""
     bearing = _bearing(ground.assembly, [piece for pieces in ground.pieces.values() for piece in pieces])
     x = np.concatenate([ground.assembly.outline(i)[:, 0] for i in bearing])
     return float(x.min()), float(x.max())
@@ -274,7 +273,11 @@ def refined(ground: Ground, best: Sequence[Candidate], known: Sequence[Candidate
                         found.append(trough(ground, float(centre), float(inflection), one.detail))
             continue
         vectors = {motion for motion in one.motions.values()}
-        if len(vectors) != 1 or (only := next(iter(vectors)))[2] != 0.0 or " and " in one.cause.rpartition(" moves ")[2]:
+        if (
+            len(vectors) != 1
+            or (only := next(iter(vectors)))[2] != 0.0
+            or " and " in one.cause.rpartition(" moves ")[2]
+        ):
             continue
         head, _, way = one.cause.rpartition(" ")
         for other, vector in VECTORS.items():
@@ -285,7 +288,11 @@ def refined(ground: Ground, best: Sequence[Candidate], known: Sequence[Candidate
                 motions = _translation(list(one.motions), both)
                 found.append(Candidate(f"{head} {words[0]} and {words[1]}", motions, OBLIQUE))
     taken = {one.cause + one.detail for one in known}
-    return [one for k, one in enumerate(found) if one.cause + one.detail not in taken | {o.cause + o.detail for o in found[:k]}]
+    return [
+        one
+        for k, one in enumerate(found)
+        if one.cause + one.detail not in taken | {o.cause + o.detail for o in found[:k]}
+    ]
 
 
 @dataclass(frozen=True)
@@ -323,7 +330,8 @@ def twins_of(assembly: solver.Assembly, candidates: Sequence[Candidate]) -> list
     supports = np.flatnonzero(~assembly.free)
     bearing = _bearing(assembly, [assembly.names[i] for i in supports])
     size = float(np.ptp(assembly.vertices, axis=0).max())
-    shapes, found = [], []
+    shapes: list[tuple[np.ndarray, float, np.ndarray]] = []
+    found: list[Twin] = []
     for number, one in enumerate(candidates):
         full = scaled_motions(one)
         motion = np.array([full.get(assembly.names[i], (0.0, 0.0, 0.0)) for i in bearing])

@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from distributed import Client
 
 #: Increments up to the largest amount of a candidate.
-INCREMENTS = 20
+INCREMENTS = 12
 
 #: The first of them is divided, where hinges form: parts of it that have an increment of their own.
 STOPS = (0.125, 0.25, 0.5)
 
 #: A run stops where a joint is open by so many times the widest observed crack, rounded up to a power of two.
-ENOUGH = 1.6
+ENOUGH = 1.5
 
 #: The largest displacement of a support, in such cracks, where the case gives none.
 FARTHEST = 10.0
@@ -229,9 +229,7 @@ def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterat
         yield client
 
 
-def all_followed(
-    orders: Sequence[Order], client: Client | None, progress: StudyProgress | None = None
-) -> list[Run]:
+def all_followed(orders: Sequence[Order], client: Client | None, progress: StudyProgress | None = None) -> list[Run]:
     """Carry out runs, on the workers of a Dask client or here.
 
     Parameters

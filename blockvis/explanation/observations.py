@@ -307,7 +307,9 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
             (joints.block_a == pair[1]) & (joints.block_b == pair[0])
         )
         if not between.any():
-            beside = np.concatenate([joints.block_b[joints.block_a == pair[0]], joints.block_a[joints.block_b == pair[0]]])
+            beside = np.concatenate(
+                [joints.block_b[joints.block_a == pair[0]], joints.block_a[joints.block_b == pair[0]]]
+            )
             others = ", ".join(f"'{assembly.names[k]}'" for k in np.unique(beside)) or "no block"
             raise cells.error(
                 keys[1], f"names '{names[0]}' and '{names[1]}', which do not touch; '{names[0]}' touches {others}"
@@ -403,10 +405,8 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
     return _observations(widths, points, str(path))
 
 
-def _partners(
-    names: Sequence[str], outlines: Sequence[np.ndarray], assembly: solver.Assembly
-) -> dict[int, int]:
-    """Pair the blocks of the case with those of a drawing, by their names where these fit, else by the nearest shape."""
+def _partners(names: Sequence[str], outlines: Sequence[np.ndarray], assembly: solver.Assembly) -> dict[int, int]:
+    """Pair the blocks of the case with those of a drawing, by their names where these fit, else by their shapes."""
     numbers = {name: i for i, name in enumerate(assembly.names)}
     if len(set(names)) == len(names) and sum(name in numbers for name in names) > 0.5 * len(names):
         return {numbers[name]: k for k, name in enumerate(names) if name in numbers}
