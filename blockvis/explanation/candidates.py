@@ -26,6 +26,9 @@ FEWEST_FEET = 3
 #: Blocks touch within this fraction of the block size.
 TOUCHING = 2e-3
 
+#: Blocks stand on faces longer than this, in block sizes.
+SHORTEST_FOOT = 0.05
+
 #: Movements whose difference from a translation of everything is as alike as this open the same cracks.
 ALIKE = 1e-9
 
@@ -136,10 +139,15 @@ def _touching(assembly: solver.Assembly) -> solver.Contacts:
 
 
 def _bearing(assembly: solver.Assembly, names: Sequence[str]) -> list[int]:
-    """Supports of these names on which free blocks stand."""
+    """Find the supports of these names on which free blocks stand, with a face, not a corner alone."""
     contacts = _touching(assembly)
-    touching = set(contacts.block_a.tolist()) | set(contacts.block_b.tolist())
-    return [i for name in names if (i := assembly.index(name)) in touching]
+    found = []
+    for name in names:
+        block = assembly.index(name)
+        points = contacts.points[(contacts.block_a == block) | (contacts.block_b == block)]
+        if len(points) and np.ptp(points, axis=0).max() > SHORTEST_FOOT * assembly.block_size:
+            found.append(block)
+    return found
 
 
 def candidates_of(ground: Ground, settings: ExplainSettings, source: Path) -> list[Candidate]:

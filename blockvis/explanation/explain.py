@@ -86,7 +86,7 @@ def explain(
     Notes
     -----
     One run along s gives every amount of a movement. The probability of a cause is by Bayes' rule, with a prior that
-    weighs causes alike and amounts evenly in their logarithm; see `docs/explain.md`. Nothing is drawn at random: the
+    weighs causes alike and amounts evenly up to a largest; see `docs/explain.md`. Nothing is drawn at random: the
     same input gives the same answer.
     """
     if folder is not None:

@@ -62,6 +62,8 @@ class Observations:
         Of the widths, in the drawing.
     named : (n,) bool array
         Whether the joint itself is known, not only a place.
+    whole : (n,) bool array
+        Whether the width is the largest of a joint, not that at a place along it.
     widths, uncertainties : (n,) arrays [m]
         A width of 0 is a closed joint.
     labels : tuple of str
@@ -78,6 +80,7 @@ class Observations:
 
     places: np.ndarray
     named: np.ndarray
+    whole: np.ndarray
     widths: np.ndarray
     uncertainties: np.ndarray
     labels: tuple[str, ...]
@@ -200,19 +203,19 @@ def _of_rows(
 ) -> Observations:
     columns = _columns(header, where)
     joints = initial_joints(assembly)
-    widths: list[tuple[np.ndarray, bool, float, float, str]] = []
+    widths: list[tuple[np.ndarray, bool, bool, float, float, str]] = []
     points: list[tuple[np.ndarray, str, np.ndarray, float]] = []
     for number, row in rows:
         cells = _Cells(row, columns, f"{where}, {counted} {number}")
         width = cells.width()
         if width is not None:
-            place, named, label = _place(cells, assembly, joints)
+            place, named, whole, label = _place(cells, assembly, joints)
             _check_width(width, cells, assembly)
             uncertainty = cells.number("uncertainty")
             if uncertainty is not None and uncertainty <= 0.0:
                 raise cells.error("uncertainty", f"is {uncertainty:g} m; give a length above 0")
             usual = max(WIDTH_UNCERTAINTY * width, LEAST_UNCERTAINTY)
-            widths.append((place, named, width, usual if uncertainty is None else uncertainty, label))
+            widths.append((place, named, whole, width, usual if uncertainty is None else uncertainty, label))
         moved = _displacement(cells, assembly)
         if moved is not None:
             points.append(moved)
@@ -224,15 +227,16 @@ def _of_rows(
 
 
 def _observations(
-    widths: Sequence[tuple[np.ndarray, bool, float, float, str]],
+    widths: Sequence[tuple[np.ndarray, bool, bool, float, float, str]],
     points: Sequence[tuple[np.ndarray, str, np.ndarray, float]],
     where: str,
 ) -> Observations:
     found = Observations(
         places=np.array([place for place, *_ in widths], dtype=float).reshape(-1, 2),
         named=np.array([named for _, named, *_ in widths], dtype=bool),
-        widths=np.array([width for _, _, width, *_ in widths], dtype=float),
-        uncertainties=np.array([sigma for _, _, _, sigma, _ in widths], dtype=float),
+        whole=np.array([whole for _, _, whole, *_ in widths], dtype=bool),
+        widths=np.array([width for _, _, _, width, *_ in widths], dtype=float),
+        uncertainties=np.array([sigma for *_, sigma, _ in widths], dtype=float),
         labels=tuple(label for *_, label in widths),
         points=np.array([point for point, *_ in points], dtype=float).reshape(-1, 2),
         blocks=tuple(block for _, block, *_ in points),
@@ -292,8 +296,19 @@ def _check_width(width: float, cells: _Cells, assembly: solver.Assembly) -> None
         )
 
 
-def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> tuple[np.ndarray, bool, str]:
-    """Find where a width was measured: the middle of the joint between two blocks, or x and y."""
+def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> tuple[np.ndarray, bool, bool, str]:
+    """Find where a width was measured: somewhere in the joint between two blocks, or at x and y.
+
+    Returns
+    -------
+    place : (2,) array [m]
+    named : bool
+        Whether the joint is known.
+    whole : bool
+        Whether the place along the joint is not.
+    label : str
+    """
+    x, y = cells.number("x"), cells.number("y")
     if cells.text("joint"):
         names = [name.strip() for name in re.split(r"\s*\|\s*", cells.text("joint"))]
         if len(names) != 2:
@@ -314,10 +329,15 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
             raise cells.error(
                 keys[1], f"names '{names[0]}' and '{names[1]}', which do not touch; '{names[0]}' touches {others}"
             )
+        label = f"{names[0]} | {names[1]}"
         ends = joints.ends[between]
+        if x is not None and y is not None:
+            lines = shapely.linestrings(ends)
+            line = lines[int(np.argmin(shapely.distance(lines, shapely.Point(x, y))))]
+            place = line.interpolate(line.project(shapely.Point(x, y)))
+            return np.array(place.coords[0]), True, False, f"{label} at ({x:.4g}, {y:.4g})"
         length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
-        return length @ ends.mean(axis=1) / length.sum(), True, f"{names[0]} | {names[1]}"
-    x, y = cells.number("x"), cells.number("y")
+        return length @ ends.mean(axis=1) / length.sum(), True, True, label
     if x is None or y is None:
         raise cells.error("x" if x is None else "y", "is missing; give the place of the crack, or the joint")
     place = np.array([x, y])
@@ -329,7 +349,7 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
             f"and y are ({x:g}, {y:g}) m, {distance.min():.3g} m from any joint; the blocks lie between "
             f"({low[0]:.4g}, {low[1]:.4g}) and ({high[0]:.4g}, {high[1]:.4g}) m: check the unit",
         )
-    return place, False, f"({x:.4g}, {y:.4g})"
+    return place, False, False, f"({x:.4g}, {y:.4g})"
 
 
 def _block(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> int:
@@ -391,6 +411,7 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
     widths = [
         (
             joints.ends[k].mean(axis=0),
+            True,
             True,
             float(opening[k]),
             float(np.hypot(sigma, WIDTH_UNCERTAINTY * opening[k])),

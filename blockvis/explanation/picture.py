@@ -116,9 +116,8 @@ def _observed(panel: Axes, found: Explanation) -> None:
     pose = solver.Pose.initial(assembly)
     _blocks(panel, assembly, pose)
     joints = found.comparison.joints
-    nearest = found.comparison.nearness.argmax(axis=1) if len(given.widths) else np.zeros(0, dtype=int)
     opened = given.widths > 0.0
-    lines = joints.ends[nearest[opened]]
+    lines = joints.ends[found.comparison.own[opened]]
     thick = 1.5 + 4.0 * given.widths[opened] / max(given.largest, 1e-300)
     panel.add_collection(LineCollection(lines, colors=[_rgb(palette.OPEN)], linewidths=thick, zorder=3))
     closed = given.places[~opened]
@@ -147,7 +146,8 @@ def _computed(
 ) -> None:
     assembly, joints, given = found.assembly, found.comparison.joints, found.observations
     _blocks(panel, assembly, shown)
-    opening = cause.best.openings(cause.at)
+    ends = cause.best.openings(np.array([cause.at]))[0]
+    opening = ends.max(axis=1)
     on_a, on_b, _ = faces_at(assembly, joints, shown)
     is_open = opening > SMALLEST_OPENING * assembly.block_size
     filled = np.concatenate([on_a, on_b[:, ::-1]], axis=1)[is_open]
@@ -158,8 +158,13 @@ def _computed(
     )
     middles = (on_a + on_b).mean(axis=1) / 2.0
     if len(given.widths):
-        at = found.comparison.nearness * (opening[None, :] + 1e-6 * found.observations.largest)
-        places = middles[at.argmax(axis=1)]
+        compared = found.comparison
+        along = np.nan_to_num(compared.along, nan=0.5)
+        there = ends[None, :, 0] * (1.0 - along) + ends[None, :, 1] * along
+        joint = (compared.nearness * (there + 1e-6 * given.largest)).argmax(axis=1)
+        share = along[np.arange(len(joint)), joint][:, None]
+        faces = (on_a + on_b)[joint] / 2.0
+        places = faces[:, 0] * (1.0 - share) + faces[:, 1] * share
         _labels(panel, places, cause.best.widths[cause.at], found, given.places, sizes=given.widths)
     measurement = found.next_measurement
     if measurement is not None:

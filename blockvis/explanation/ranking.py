@@ -102,8 +102,9 @@ def ranked(trials: Sequence[Trial], *, apart: bool) -> list[Cause]:
     Notes
     -----
     The prior weighs causes as their candidates say, usually alike; within a cause its candidates alike (a candidate
-    that refines another shares the weight of that one), coefficients of friction alike, and amounts evenly in their
-    logarithm. The probability of a cause is its prior times the mean likelihood over all it leaves open, by Bayes.
+    that refines another shares the weight of that one), coefficients of friction alike, and amounts evenly up to the
+    largest that is looked at. The probability of a cause is its prior times the mean likelihood over all it leaves
+    open, by Bayes.
     """
     groups: dict[str, list[Trial]] = {}
     also: dict[str, list[str]] = {}
@@ -262,7 +263,7 @@ def _expected(cause: Cause) -> tuple[np.ndarray, np.ndarray]:
             continue
         mass = share * np.exp(trial.log_likelihood - logsumexp(trial.log_likelihood))
         heavy = np.flatnonzero(mass > 1e-3 * mass.max())
-        openings = trial.run.at(trial.amounts[heavy] / trial.twin.scale, trial.run.openings)
+        openings = trial.openings(heavy).max(axis=2)
         first, second = mass[heavy] @ openings, mass[heavy] @ openings**2
         mean, square = (first, second) if len(mean) == 0 else (mean + first, square + second)
     return mean, np.sqrt(np.maximum(square - mean**2, 0.0))

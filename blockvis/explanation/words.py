@@ -162,7 +162,7 @@ def values_of(found: Explanation) -> dict[str, Any]:
             ],
         },
         "assumed": {
-            "prior": "causes alike, amounts evenly in their logarithm, frictions and places of troughs alike",
+            "prior": "causes alike, amounts evenly up to the largest looked at, frictions and places of troughs alike",
             "model_uncertainty": settings.model_uncertainty,
             "place_uncertainty": found.comparison.trust.place,
             "outliers": settings.outliers,

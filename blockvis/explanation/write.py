@@ -182,13 +182,13 @@ def _vector(value: Sequence[float]) -> str:
 def _assumed(found: Explanation) -> list[str]:
     trust, runs = found.comparison.trust, found.runs
     frictions = sorted({trial.friction for cause in found.causes for trial in cause.trials})
-    least = min((float(c.best.amounts[0]) for c in found.causes), default=0.0)
+    largest = float(found.causes[0].best.amounts[-1]) if found.causes else 0.0
     return [
         "Blocks are rigid, joints dry: cracks in stones, mortar that hardened later and loads that changed are not in "
         "the model.",
         "Before anything was observed the causes are taken as equally probable (movements between two directions half "
-        "as much), their amounts as evenly spread in the logarithm "
-        + (f"from {amount_text(least, found.causes[0].unit)} up" if found.causes else "")
+        "as much), their amounts as evenly spread"
+        + (f" up to {amount_text(largest, found.causes[0].unit)} (first cause)" if found.causes else "")
         + ", frictions and places of troughs as equally probable.",
         f"Computed widths are trusted to {100.0 * trust.model:.3g} %, besides the uncertainty of each observation; a "
         f"crack at x, y may be another joint within {1e3 * trust.place:.3g} mm; an observation has another cause with "
