@@ -22,6 +22,10 @@ AMOUNTS = 480
 FLOOR = 0.03
 
 
+#: Observations of one structure share the errors of its model: more than this do not count as independent.
+INDEPENDENT = 12
+
+
 @dataclass(frozen=True)
 class Trust:
     """How far observations and model are trusted.
@@ -119,14 +123,16 @@ class Comparison:
         -----
         Each observation is normally distributed about what the model shows, with the variances of the measurement and
         of the model added, or, with the probability of an outlier, evenly over twice the largest observed width.
+        Observations beyond :data:`INDEPENDENT` sharpen nothing: all of them weigh less.
         """
         total = np.zeros(len(widths))
+        count = len(self.observations.widths) + 2 * len(self.observations.points)
         span = 2.0 * self.observations.largest
         for gap, sigma in self._residuals(widths, displacements):
             fits = -0.5 * (gap / sigma) ** 2 - np.log(sigma * np.sqrt(2.0 * np.pi)) + np.log1p(-self.trust.outliers)
             strays = np.log(self.trust.outliers / span)
             total += np.logaddexp(fits, strays).sum(axis=1)
-        return total
+        return total * min(1.0, INDEPENDENT / count)
 
     def misfits(self, widths: np.ndarray, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Differences from the observed widths and points, in standard deviations: (n, n_widths), (n, n_points)."""

@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 #: The largest displacement is drawn as this fraction of the structure.
 SHOWN = 0.07
 
-#: Height of text [points], and of a panel [inch].
-TEXT, PANEL = 12.0, 4.6
+#: Height of text [points], width of a panel and height of the words above it [inch].
+TEXT, PANEL, HEAD = 12.0, 5.4, 0.7
 
 #: Structures wider than this for their height have their panels below each other.
-WIDE = 2.2
+WIDE = 4.0
 
 #: Most widths that are written in a panel.
 MOST_LABELS = 24
@@ -66,9 +66,9 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     count = 1 + len(causes)
     aspect = float(frame.size[0] / frame.size[1])
     rows, columns = (count, 1) if aspect > WIDE else (1, count)
-    width = PANEL * min(aspect, WIDE) if rows == 1 else 2.0 * PANEL
-    height = PANEL if rows == 1 else width / aspect + 0.7
-    figure = Figure(figsize=(max(width, 3.6) * columns, (height + 0.6) * rows), layout="constrained")
+    width = PANEL * (2.0 if aspect > WIDE else 1.0)
+    height = min(width / aspect, 1.4 * PANEL) + HEAD
+    figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
     FigureCanvasAgg(figure)
     axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False).ravel())
     _observed(axes[0], found)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from blockvis.atomic_files import make_folder, write_whole
 from blockvis.results.folder import ResultsExist
 
+from .likelihood import INDEPENDENT
 from .picture import draw_explanation
 from .words import (
     amount_text,
@@ -193,6 +194,7 @@ def _assumed(found: Explanation) -> list[str]:
         f"Computed widths are trusted to {100.0 * trust.model:.3g} %, besides the uncertainty of each observation; a "
         f"crack at x, y may be another joint within {1e3 * trust.place:.3g} mm; an observation has another cause with "
         f"a probability of {100.0 * trust.outliers:.3g} %.",
+        f"Observations share the errors of the model: more than {INDEPENDENT} do not count as independent.",
         f"Coefficients of friction: {', '.join(f'{value:.3g}' for value in frictions) or 'none'}; {len(runs)} runs.",
         "Probabilities are among the causes that were looked at: a cause that is not in the list has none.",
     ]
