@@ -208,6 +208,12 @@ def _version() -> str:
 
 
 def _add_view(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "--dimension",
+        choices=("2", "3", "auto"),
+        default="auto",
+        help="read blocks in the plane or in space (default: in space where bodies are not prisms side by side)",
+    )
     verb.add_argument("--view", choices=tuple(VIEWS), help="coordinates to take, of a drawing in space")
 
 
@@ -348,7 +354,7 @@ def _new(options: argparse.Namespace) -> int:
     stem = drawing.parent.name if glob.has_magic(drawing.name) else drawing.resolve().stem
     target = _new_file(options.output or f"{stem}.toml", options.force)
     choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
-    found = inspect(drawing, unit=options.unit, **choice)
+    found = inspect(drawing, unit=options.unit, dimension=_dimension(options), **choice)
     text = case_text(found, relative_to(target.parent, drawing), **choice)
     write_whole(target, text)
     print(f"{target} written for {len(found.kept)} blocks; run it: blockvis run {target}")
@@ -408,7 +414,8 @@ def _info(options: argparse.Namespace) -> int:
     from .formats.read import inspect
     from .pictures.inspection import draw_inspection
 
-    found = inspect(options.file, unit=options.unit, view=options.view, ignore=options.ignore, only=options.only)
+    choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
+    found = inspect(options.file, unit=options.unit, dimension=_dimension(options), **choice)
     print(found)
     if options.picture:
         print(f"drawn in {draw_inspection(found, options.picture)}")
@@ -420,7 +427,8 @@ def _convert(options: argparse.Namespace) -> int:
     from .layout.assemble import assemble
 
     target = _new_file(options.target, options.force)
-    layout = read_layout(options.source, unit=options.unit, view=options.view, ignore=options.ignore, only=options.only)
+    choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
+    layout = read_layout(options.source, unit=options.unit, dimension=_dimension(options), **choice)
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)
     joint = options.joint_thickness
@@ -492,6 +500,10 @@ def _new_file(path: str, force: bool) -> Path:
     return target
 
 
+def _dimension(options: argparse.Namespace) -> int | str:
+    return "auto" if options.dimension == "auto" else int(options.dimension)
+
+
 def _number(text: str) -> float:
     try:
         return float(text)
@@ -514,16 +526,15 @@ def _in_words(response: solver.Response, folder: Path) -> str:
     from .runs.kinds import KINDS
 
     kind = KINDS[response.analysis]
-    width, height = np.ptp(
-        response.assembly.vertices[response.assembly.free[response.assembly.block_of_vertex]], axis=0
-    )
-    weight = response.total_weight
-    assembly = response.assembly
-    largest = assembly.outline(int(np.argmax(np.where(assembly.free, assembly.areas, 0.0))))
-    across = float(np.hypot(*(largest[:, None, :] - largest[None, :, :]).T).max())
+    assembly, weight = response.assembly, response.total_weight
+    size = np.ptp(assembly.vertices[assembly.free[assembly.block_of_vertex]], axis=0).tolist()
+    block = int(np.argmax(np.where(assembly.free, assembly.shapes.volumes, 0.0)))
+    largest = assembly.vertices[assembly.block_of_vertex == block]
+    across = float(np.linalg.norm(largest[:, None, :] - largest[None, :, :], axis=2).max())
+    deep = f"{size[1]:.4g} m deep, " if assembly.dimension == 3 else ""
     lines = [
-        f"{response.assembly.n_blocks} blocks ({int(response.assembly.free.sum())} free), "
-        f"{width:.4g} m wide, {height:.4g} m high, weight {weight:.6g} N, "
+        f"{assembly.n_blocks} blocks{' in space' if deep else ''} ({int(assembly.free.sum())} free), "
+        f"{size[0]:.4g} m wide, {deep}{size[-1]:.4g} m high, weight {weight:.6g} N, "
         f"largest block {across:.3g} m across",
         f"{kind.headline(response)}, {sum(i.programs for i in response.increments)} "
         f"programs, {sum(i.seconds for i in response.increments):.2f} s of solver time",

@@ -7,20 +7,21 @@ from collections.abc import Iterable
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-import pyvista as pv
+from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 from .atomic_files import write_whole
 
 
 def write_vtu(
-    dataset: pv.UnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True, durable: bool = True
+    dataset: vtkUnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True, durable: bool = True
 ) -> Path:
     """Write a dataset as VTU, whole or not at all.
 
     Parameters
     ----------
-    dataset : pyvista.UnstructuredGrid
+    dataset : vtkUnstructuredGrid
+        As those of pyvista are.
     path : path
         Its folder is made if it does not exist.
     last, durable : bool
@@ -48,7 +49,11 @@ def write_vtu(
 
 
 def write_pvd(
-    path: str | os.PathLike[str], entries: Iterable[tuple[float, str | os.PathLike[str]]], *, last: bool = True
+    path: str | os.PathLike[str],
+    entries: Iterable[tuple[float, str | os.PathLike[str]]],
+    *,
+    last: bool = True,
+    durable: bool = True,
 ) -> Path:
     """Write the list of files of a time series (PVD), whole or not at all.
 
@@ -57,7 +62,7 @@ def write_pvd(
     path : path
     entries : iterable of (time, file)
         Files as given, relative to the folder of ``path``.
-    last : bool
+    last, durable : bool
         As of :func:`blockvis.atomic_files.whole_file`.
 
     Returns
@@ -75,4 +80,13 @@ def write_pvd(
         "  </Collection>",
         "</VTKFile>",
     ]
-    return write_whole(path, "\n".join(lines) + "\n", last=last)
+    return write_whole(path, "\n".join(lines) + "\n", last=last, durable=durable)
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a VTK file is there to its last tag."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        file.seek(max(path.stat().st_size - 64, 0))
+        return file.read().rstrip().endswith(b"</VTKFile>")

@@ -24,6 +24,7 @@ from .geometry.contacts import Contacts
 from .geometry.outlines import overlap_depths
 from .geometry.planar_contacts import corners_and_edges, features_of
 from .geometry.polygons import Polygons
+from .geometry.polyhedra import Polyhedra
 from .geometry.shapes import Shapes
 from .interfaces import InterfaceLaw, Interfaces, JointScatter
 from .kinematics import Pose, carried, carried_between, motion_size, moved_vertices, point_velocities, swung, turned
@@ -78,6 +79,7 @@ __all__ = [
     "Loads",
     "Mechanism",
     "Polygons",
+    "Polyhedra",
     "Pose",
     "Quantity",
     "Response",

@@ -13,6 +13,7 @@ from .geometry.contacts import Contacts
 from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
 from .geometry.polygons import Polygons
 from .geometry.shapes import Shapes
+from .geometry.surfaces import polyhedra_of
 from .tolerances import DRAWN_GAP
 
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
@@ -26,12 +27,12 @@ SMALLEST_SHAPE_FACTOR = 1e-9
 class Assembly:
     """Rigid blocks of a masonry structure, supports included.
 
-    Use :meth:`from_outlines` unless the shapes are at hand: it checks its input.
+    Use :meth:`from_outlines` or :meth:`from_solids` unless the shapes are at hand: they check their input.
 
     Attributes
     ----------
     shapes : Shapes
-        Where the blocks are drawn, and how they touch: :class:`Polygons` in the plane.
+        Where the blocks are drawn, and how they touch: :class:`Polygons` in the plane, :class:`Polyhedra` in space.
     names : tuple of str
         One name per block, all different.
     roles : (n_blocks,) str array
@@ -84,21 +85,7 @@ class Assembly:
         >>> float(solver.Assembly.from_outlines([block]).areas[0])
         2.0
         """
-        n = len(outlines)
-        if n == 0:
-            raise ValueError("an assembly needs at least one block; none was given")
-        names = _unique_names([f"block {i}" for i in range(n)] if names is None else list(map(str, names)))
-        roles_array = np.array([FREE] * n if roles is None else list(roles), dtype="<U6")
-        materials = ("",) * n if materials is None else tuple(map(str, materials))
-        for what, given in (("names", len(names)), ("roles", len(roles_array)), ("materials", len(materials))):
-            if given != n:
-                raise ValueError(f"{n} outlines but {given} {what}; give one per block")
-        _refuse_half_characters(names, "name")
-        _refuse_half_characters(materials, "material")
-        if roles is not None:
-            for name, role in zip(names, roles, strict=True):
-                if role not in ROLES:
-                    raise ValueError(f"block '{name}' has role '{role}'; roles are {', '.join(ROLES)}")
+        names, roles_array, materials = _labels(len(outlines), "outlines", names, roles, materials)
         rings = [_checked_ring(outline, name) for outline, name in zip(outlines, names, strict=True)]
         offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
         vertices = np.concatenate(rings)
@@ -119,10 +106,58 @@ class Assembly:
                 f"({b[0]:.6g}, {b[1]:.6g}) meet; order its corners around the outline"
             )
         return cls(
-            shapes=Polygons(vertices, offsets, _positive(thickness, n, "thickness", "m", names)),
+            shapes=Polygons(vertices, offsets, _positive(thickness, len(names), "thickness", "m", names)),
             names=names,
             roles=roles_array,
-            density=_positive(density, n, "density", "kg/m³", names),
+            density=_positive(density, len(names), "density", "kg/m³", names),
+            materials=materials,
+        )
+
+    @classmethod
+    def from_solids(
+        cls,
+        solids: Sequence[tuple[ArrayLike, Sequence[Sequence[int]]]],
+        *,
+        names: Sequence[str] | None = None,
+        roles: Sequence[str] | None = None,
+        density: ArrayLike = 2000.0,
+        materials: Sequence[str] | None = None,
+    ) -> Assembly:
+        """Build an assembly in space from one closed surface per block.
+
+        Parameters
+        ----------
+        solids : sequence of (vertices, faces)
+            Corners (n, 3) [m] of each block, and around each of its faces the numbers of the corners there, in either
+            sense. Corners at the same place become one, and neighbouring faces in one plane, triangles for example,
+            one face.
+        names : sequence of str, optional
+            Defaults to ``"block 0"``, ``"block 1"`` ...; a name used twice gets a number.
+        roles : sequence of {"free", "fixed", "moving"}, optional
+        density : float or (n_blocks,) array [kg/m³]
+        materials : sequence of str, optional
+
+        Raises
+        ------
+        ValueError
+            For a surface that is not closed, in several pieces or without volume, a face that is not plane to a
+            thousandth of the width of its block, coordinates that are not finite, an unknown role, or a density that is
+            not positive.
+
+        Examples
+        --------
+        >>> import solver
+        >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 6]]
+        >>> tetrahedron = corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
+        >>> float(solver.Assembly.from_solids([tetrahedron]).shapes.volumes[0])
+        1.0
+        """
+        names, roles_array, materials = _labels(len(solids), "solids", names, roles, materials)
+        return cls(
+            shapes=polyhedra_of(solids, names),
+            names=names,
+            roles=roles_array,
+            density=_positive(density, len(names), "density", "kg/m³", names),
             materials=materials,
         )
 
@@ -130,6 +165,11 @@ class Assembly:
         """One line: how many blocks, and what they are."""
         kinds = ", ".join(f"{int((self.roles == role).sum())} {role}" for role in ROLES)
         return f"<Assembly of {self.n_blocks} blocks: {kinds}>"
+
+    @property
+    def dimension(self) -> int:
+        """2 in the plane, 3 in space."""
+        return int(self.vertices.shape[1])
 
     @property
     def n_blocks(self) -> int:
@@ -299,6 +339,31 @@ def measure_contacts(assembly: Assembly, vertices: np.ndarray, contacts: Contact
         Of which only the features count.
     """
     return assembly.shapes.measure(vertices, contacts)
+
+
+def _labels(
+    n: int,
+    what: str,
+    names: Sequence[str] | None,
+    roles: Sequence[str] | None,
+    materials: Sequence[str] | None,
+) -> tuple[tuple[str, ...], np.ndarray, tuple[str, ...]]:
+    """Names, roles and materials of n blocks, checked, with what is not given filled in."""
+    if n == 0:
+        raise ValueError("an assembly needs at least one block; none was given")
+    names = _unique_names([f"block {i}" for i in range(n)] if names is None else list(map(str, names)))
+    roles_array = np.array([FREE] * n if roles is None else list(roles), dtype="<U6")
+    materials = ("",) * n if materials is None else tuple(map(str, materials))
+    for kind, given in (("names", len(names)), ("roles", len(roles_array)), ("materials", len(materials))):
+        if given != n:
+            raise ValueError(f"{n} {what} but {given} {kind}; give one per block")
+    _refuse_half_characters(names, "name")
+    _refuse_half_characters(materials, "material")
+    if roles is not None:
+        for name, role in zip(names, roles, strict=True):
+            if role not in ROLES:
+                raise ValueError(f"block '{name}' has role '{role}'; roles are {', '.join(ROLES)}")
+    return names, roles_array, materials
 
 
 def _checked_ring(outline: ArrayLike, name: str) -> np.ndarray:

@@ -38,6 +38,11 @@ class Pose:
         """(n_blocks, n_dof) array: displacement of each centroid [m] and rotation [rad] since the drawing."""
         return np.concatenate([self.positions - assembly.centroids, self.rotations], axis=1)
 
+    def movement_to(self, other: Pose) -> np.ndarray:
+        """(n_blocks, n_dof) array: displacement of each centroid [m] and rotation [rad] from here to another pose."""
+        turn = composed_rotations(-self.rotations, other.rotations)
+        return np.concatenate([other.positions - self.positions, turn], axis=1)
+
 
 def rotation_count(d: int) -> int:
     """Numbers that a rotation has in d dimensions: 1 in the plane, 3 in space."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .assembly import Assembly
-from .kinematics import Pose, rotation_matrices
+from .kinematics import Pose, composed_rotations, cross_rows, rotation_count, turned
 
 #: Acceleration of gravity [m/s²], as structural codes round it.
 GRAVITY = 9.81
@@ -20,9 +20,10 @@ class Loads:
 
     Attributes
     ----------
-    dead : (n_blocks, 3) array [N, N, N·m]
-        Forces and counter-clockwise moment on each block, self-weight included.
-    live : (n_blocks, 3) array [N, N, N·m]
+    dead : (n_blocks, n_dof) array [N, N·m]
+        Forces and moments on each block, self-weight included: in the plane fx, fy and the counter-clockwise moment, in
+        space fx, fy, fz, mx, my, mz.
+    live : (n_blocks, n_dof) array [N, N·m]
         Loads that the load multiplier scales.
     """
 
@@ -30,12 +31,12 @@ class Loads:
     live: np.ndarray
 
     def total(self, multiplier: float = 0.0) -> np.ndarray:
-        """(n_blocks, 3) array: dead load + multiplier · live load."""
+        """(n_blocks, n_dof) array: dead load + multiplier · live load."""
         return self.dead + multiplier * self.live
 
 
 def self_weight(assembly: Assembly) -> Loads:
-    """Self-weight of all blocks as dead load; no live load.
+    """Self-weight of all blocks as dead load, along -y in the plane and -z in space; no live load.
 
     Examples
     --------
@@ -44,8 +45,8 @@ def self_weight(assembly: Assembly) -> Loads:
     >>> float(solver.self_weight(block).dead[0, 1])
     -19620.0
     """
-    dead = np.zeros((assembly.n_blocks, 3))
-    dead[:, 1] = -assembly.masses * GRAVITY
+    dead = _no_load(assembly)
+    dead[:, assembly.dimension - 1] = -assembly.masses * GRAVITY
     return Loads(dead, np.zeros_like(dead))
 
 
@@ -55,9 +56,9 @@ class Settlement:
 
     Attributes
     ----------
-    direction : (2,) sequence, optional
+    direction : (d,) sequence, optional
         Direction of the translation; only its direction counts, the parameter s is the distance [m].
-    rotation_centre : (2,) sequence [m], optional
+    rotation_centre : (d,) sequence [m], optional
         Point about which the supports turn; it travels with the translation.
     rotation : float
         Without a direction: 1 for counter-clockwise, -1 for clockwise, and s is the angle [rad].
@@ -72,9 +73,18 @@ class Settlement:
         Names of the moving supports that take part; all by default, the others stand still in this phase.
     stops : sequence of float [m or rad]
         Settlements that no step goes across: the path has an increment at each of them that it reaches.
+    rotation_axis : (3,) sequence, optional
+        In space, the axis about which the supports turn, counter-clockwise seen from its tip.
+    radial_from : (2,) sequence [m], optional
+        In space, instead of a direction: x and y of a vertical axis from which each support moves away, level.
     profile : mapping of str to (float, float, float), optional [m, m, rad]
         Instead of one motion for all: how each support, by its name, moves and turns about its own centroid. Only the
         proportions count: s is the largest displacement of a centroid, or the largest angle where none moves.
+
+    Raises
+    ------
+    ValueError
+        For what does not make up one motion, or has numbers that are not finite.
     """
 
     direction: Sequence[float] | None = None
@@ -85,22 +95,25 @@ class Settlement:
     tolerance: float | None = None
     blocks: tuple[str, ...] | None = None
     stops: tuple[float, ...] = ()
+    rotation_axis: Sequence[float] | None = None
+    radial_from: Sequence[float] | None = None
     profile: Mapping[str, Sequence[float]] | None = None
 
     def __post_init__(self) -> None:
         """Check the values; make the direction a unit vector, and the rotation without one a sign."""
         if self.profile is not None:
             self._check_profile()
-        elif self.direction is None and self.rotation_centre is None:
+        elif self.direction is None and self.rotation_centre is None and self.radial_from is None:
             raise ValueError("a settlement needs a direction, or a rotation_centre and rotation")
-        for name in ("direction", "rotation_centre"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, _pair(getattr(self, name), name))
-        if self.direction is not None:
-            length = float(np.hypot(self.direction[0], self.direction[1]))
-            if length == 0.0:
-                raise ValueError("settlement direction is [0, 0]; give the direction in which the support moves")
-            object.__setattr__(self, "direction", (self.direction[0] / length, self.direction[1] / length))
+        self._check_vectors()
+        if self.radial_from is not None and (self.direction is not None or self.rotation_centre is not None):
+            raise ValueError("a settlement with radial_from has neither direction nor rotation_centre; leave them out")
+        turns_in_space = self.rotation_centre is not None and len(self.rotation_centre) == 3
+        if turns_in_space != (self.rotation_axis is not None):
+            raise ValueError(
+                "in space a rotation needs rotation_centre = [x, y, z] and rotation_axis = [x, y, z], the axis about "
+                "which the supports turn; in the plane only rotation_centre = [x, y]"
+            )
         if self.rotation_centre is not None and not (np.isfinite(self.rotation) and self.rotation != 0.0):
             raise ValueError(f"settlement rotation is {self.rotation:g}; with a rotation_centre it must not be zero")
         if self.rotation_centre is None and self.rotation != 0.0:
@@ -109,9 +122,29 @@ class Settlement:
             object.__setattr__(self, "rotation", float(np.sign(self.rotation)))
         self._check_steps()
 
+    def _check_vectors(self) -> None:
+        """Make numbers of what is given, and unit vectors of directions."""
+        for name, counts in (
+            ("direction", (2, 3)),
+            ("rotation_centre", (2, 3)),
+            ("rotation_axis", (3,)),
+            ("radial_from", (2,)),
+        ):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, _numbers(getattr(self, name), name, counts))
+        for name in ("direction", "rotation_axis"):
+            vector = getattr(self, name)
+            if vector is None:
+                continue
+            length = float(np.hypot(*vector)) if len(vector) == 2 else float(np.linalg.norm(vector))
+            if length == 0.0:
+                what = "direction in which the support moves" if name == "direction" else "axis about which it turns"
+                raise ValueError(f"settlement {name} is {[0] * len(vector)}; give the {what}")
+            object.__setattr__(self, name, tuple(part / length for part in vector))
+
     def _check_profile(self) -> None:
         """Scale the profile so that its largest displacement, or angle where nothing is displaced, is 1."""
-        if self.direction is not None or self.rotation_centre is not None or self.blocks is not None:
+        if any(given is not None for given in (self.direction, self.rotation_centre, self.radial_from, self.blocks)):
             raise ValueError(
                 "a settlement with a profile has its supports and motions; give no direction, centre or blocks"
             )
@@ -151,7 +184,15 @@ class Settlement:
         """Unit of the parameter s: "m", or "rad" for a pure rotation."""
         if self.profile is not None:
             return "m" if any(motion[0] or motion[1] for motion in self.profile.values()) else "rad"
-        return "rad" if self.direction is None else "m"
+        return "rad" if self.direction is None and self.radial_from is None else "m"
+
+    @property
+    def dimension(self) -> int:
+        """2 in the plane, 3 in space."""
+        if self.profile is not None:
+            return 2
+        given = self.direction if self.direction is not None else self.rotation_centre
+        return 3 if given is None else len(given)
 
     def taking_part(self, assembly: Assembly) -> np.ndarray:
         """(n_blocks,) bool array: the supports that this settlement moves."""
@@ -172,43 +213,75 @@ class Settlement:
         if self.profile is not None:
             rate = self.rate(assembly, start, s)
             return Pose(positions + s * rate[:, :2], rotations + s * rate[:, 2:])
-        travel, angle, centre = self._motion(s)
-        turn = rotation_matrices(np.array([[angle]]))[0]
-        positions[part] = centre + travel + (start.positions[part] - centre) @ turn.T
-        rotations[part] += angle
+        travel, angle, centre = self._motion(assembly, start, part, s)
+        turn = np.broadcast_to(angle, rotations[part].shape)
+        positions[part] = centre + travel + turned(start.positions[part] - centre, turn)
+        rotations[part] = composed_rotations(start.rotations[part], turn)
         return Pose(positions, rotations)
 
     def rate(self, assembly: Assembly, start: Pose, s: float) -> np.ndarray:
-        """(n_blocks, 3) array: velocity of each support per unit of s, at s; zero for other blocks."""
-        part = self.taking_part(assembly)
-        rate = np.zeros((assembly.n_blocks, 3))
+        """(n_blocks, n_dof) array: velocity of each support per unit of s, at s; zero for other blocks."""
+        part, d = self.taking_part(assembly), assembly.dimension
+        rate = _no_load(assembly)
         if self.profile is not None:
             for name, motion in self.profile.items():
                 rate[assembly.index(name)] = motion
             return np.where(part[:, None], rate, 0.0)
-        _, angle, centre = self._motion(s)
-        direction = np.zeros(2) if self.direction is None else np.asarray(self.direction)
-        rate[part, :2] = direction
+        _, angle, centre = self._motion(assembly, start, part, s)
+        rate[part, :d] = self._motion(assembly, start, part, 1.0)[0]
         if self.rotation_centre is not None:
-            turn = rotation_matrices(np.array([[angle]]))[0]
-            arm = (start.positions[part] - centre) @ turn.T
-            rate[part, 0] -= self.rotation * arm[:, 1]
-            rate[part, 1] += self.rotation * arm[:, 0]
-            rate[part, 2] = self.rotation
+            spin = self._motion(assembly, start, part, 1.0)[1]
+            arm = turned(start.positions[part] - centre, np.broadcast_to(angle, (int(part.sum()), len(angle))))
+            rate[part, :d] += np.einsum("nrd,r->nd", cross_rows(arm), spin)
+            rate[part, d:] = spin
         return rate
 
-    def _motion(self, s: float) -> tuple[np.ndarray, float, np.ndarray]:
-        travel = np.zeros(2) if self.direction is None else s * np.asarray(self.direction)
+    def check_dimension(self, assembly: Assembly) -> None:
+        """Raise ``ValueError`` where the numbers are for the plane and the blocks in space, or the other way round."""
+        if self.dimension != assembly.dimension:
+            wanted, what = ("[x, y, z]", "in space") if assembly.dimension == 3 else ("[x, y]", "in the plane")
+            raise ValueError(
+                f"the blocks are {what}: give the settlement's direction and rotation_centre as {wanted}"
+                + ("" if self.radial_from is None else ", and leave out radial_from")
+            )
+
+    def _motion(
+        self, assembly: Assembly, start: Pose, part: np.ndarray, s: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Give the translation, one or (n_part, d), the rotation vector and its centre at s."""
+        d = assembly.dimension
+        travel, angle = np.zeros(d), np.zeros(rotation_count(d))
+        if self.direction is not None:
+            travel = s * np.asarray(self.direction)
+        if self.radial_from is not None:
+            away = start.positions[part].copy()
+            away[:, :2] -= self.radial_from
+            away[:, 2] = 0.0
+            far = np.linalg.norm(away, axis=1)
+            for block in np.flatnonzero(part)[far < 1e-9 * assembly.block_size]:
+                raise ValueError(
+                    f"support '{assembly.names[block]}' stands on the axis of radial_from, from which it is to move "
+                    "away; leave it out of the settlement's blocks"
+                )
+            travel = s * away / far[:, None]
         if self.rotation_centre is None:
-            return travel, 0.0, np.zeros(2)
-        return travel, self.rotation * s, np.asarray(self.rotation_centre)
+            return travel, angle, np.zeros(d)
+        axis = np.ones(1) if self.rotation_axis is None else np.asarray(self.rotation_axis)
+        return travel, self.rotation * s * axis, np.asarray(self.rotation_centre)
 
 
-def _pair(value: Sequence[float], name: str) -> tuple[float, float]:
-    pair = np.asarray(value, dtype=float)
-    if pair.shape != (2,) or not np.isfinite(pair).all():
-        raise ValueError(f"settlement {name} is {value!r}; give two finite numbers [x, y]")
-    return float(pair[0]), float(pair[1])
+def _numbers(value: Sequence[float], name: str, counts: tuple[int, ...]) -> tuple[float, ...]:
+    numbers = np.asarray(value, dtype=float)
+    if numbers.ndim != 1 or len(numbers) not in counts or not np.isfinite(numbers).all():
+        wanted = "two finite numbers [x, y]" if counts[0] == 2 else "three finite numbers [x, y, z]"
+        more = ", or in space three, [x, y, z]" if counts == (2, 3) else ""
+        raise ValueError(f"settlement {name} is {value!r}; give {wanted}{more}")
+    return tuple(numbers.tolist())
+
+
+def _no_load(assembly: Assembly) -> np.ndarray:
+    """(n_blocks, n_dof) array of zeros."""
+    return np.zeros((assembly.n_blocks, assembly.dimension + rotation_count(assembly.dimension)))
 
 
 def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.ndarray | None = None) -> np.ndarray:
@@ -217,28 +290,28 @@ def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.nd
     Parameters
     ----------
     assembly : Assembly
-    fraction : (2,) sequence
-        Of the weight, along x and y: (0.1, 0) pushes to the right with a tenth of the weight.
+    fraction : (d,) sequence
+        Of the weight, along x, y and in space z: (0.1, 0) pushes to the right with a tenth of the weight.
     blocks : (n,) int or (n_blocks,) bool array, optional
         The blocks it acts on; all by default.
 
     Returns
     -------
-    (n_blocks, 3) array [N, N, N·m]
+    (n_blocks, n_dof) array [N, N·m]
     """
-    load = np.zeros((assembly.n_blocks, 3))
+    load = _no_load(assembly)
     chosen = slice(None) if blocks is None else blocks
-    load[chosen, :2] = (assembly.masses * GRAVITY)[chosen, None] * np.asarray(fraction, dtype=float)
+    load[chosen, : assembly.dimension] = (assembly.masses * GRAVITY)[chosen, None] * np.asarray(fraction, dtype=float)
     return load
 
 
 def point_load(
     assembly: Assembly,
     block: int,
-    force: Sequence[float] = (0.0, 0.0),
+    force: Sequence[float] | None = None,
     *,
     point: Sequence[float] | None = None,
-    moment: float = 0.0,
+    moment: float | Sequence[float] = 0.0,
 ) -> np.ndarray:
     """Load one block with a force at a point, and a moment.
 
@@ -246,20 +319,21 @@ def point_load(
     ----------
     assembly : Assembly
     block : int
-    force : (2,) sequence [N]
-    point : (2,) sequence [m], optional
+    force : (d,) sequence [N], optional
+    point : (d,) sequence [m], optional
         Where the force acts in the drawing; the centroid by default.
-    moment : float [N·m]
+    moment : float or, in space, (3,) sequence [N·m]
         Counter-clockwise, besides that of the force.
 
     Returns
     -------
-    (n_blocks, 3) array [N, N, N·m]
+    (n_blocks, n_dof) array [N, N·m]
     """
-    load = np.zeros((assembly.n_blocks, 3))
-    arm = np.zeros(2) if point is None else np.asarray(point, dtype=float) - assembly.centroids[block]
-    fx, fy = (float(component) for component in force)
-    load[block] = fx, fy, moment + arm[0] * fy - arm[1] * fx
+    load, d = _no_load(assembly), assembly.dimension
+    given = np.zeros(d) if force is None else np.asarray(force, dtype=float)
+    arm = np.zeros(d) if point is None else np.asarray(point, dtype=float) - assembly.centroids[block]
+    load[block, :d] = given
+    load[block, d:] = np.asarray(moment, dtype=float) + cross_rows(arm[None])[0] @ given
     return load
 
 
@@ -267,10 +341,12 @@ def checked_loads(assembly: Assembly, loads: Loads | None) -> Loads:
     """Check loads for shape and finite numbers; self-weight where none are given."""
     if loads is None:
         return self_weight(assembly)
+    shape = _no_load(assembly).shape
+    components = "fx, fy, moment" if assembly.dimension == 2 else "fx, fy, fz, mx, my, mz"
     for name, given in (("dead", loads.dead), ("live", loads.live)):
         array = np.asarray(given)
-        if array.shape != (assembly.n_blocks, 3):
-            raise ValueError(f"{name} loads have shape {array.shape}; give ({assembly.n_blocks}, 3): fx, fy, moment")
+        if array.shape != shape:
+            raise ValueError(f"{name} loads have shape {array.shape}; give {shape}: {components}")
         if not np.isfinite(array).all():
             block = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
             raise ValueError(f"{name} load on block '{assembly.names[block]}' is {array[block].tolist()}; not finite")

@@ -31,6 +31,10 @@ ACCEPTED_VIOLATION = 1e-7
 #: Relative difference of the two objectives that our own check accepts.
 ACCEPTED_GAP = 1e-7
 
+#: A ray of a conic program, its largest number 1, proves something where its rows and cones are met to this: interior
+#: methods find no more.
+RAY_BALANCE = 1e-8
+
 # Of balance: fractions of the total load.
 
 #: A free block out of balance by less than this is in balance. Without it the program may move a block without friction

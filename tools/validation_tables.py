@@ -115,7 +115,7 @@ def run_tests() -> Comparisons:
     """Run the validation tests but the slow ones and return what they compared; raise if one failed."""
     found = Comparisons()
     # Numbers are shortened in the explanations of a less talkative run.
-    options = ["-vv", "-n", "0", "-p", "no:cacheprovider", "-o", "enable_assertion_pass_hook=true"]
+    options = ["-vv", "-n", "0", "-m", "not slow", "-p", "no:cacheprovider", "-o", "enable_assertion_pass_hook=true"]
     if pytest.main([*options, str(TESTS)], plugins=[found]) != 0:
         raise SystemExit("a validation test failed; its table is not written")
     return found

@@ -18,6 +18,7 @@ from blockvis.layout.units import doubt
 from blockvis.suggestions import nearest
 
 from .contents import Case
+from .coordinates import check_coordinates
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
 from .profiles import cut_ground, with_profiles
@@ -74,6 +75,7 @@ def case_assembly(case: Case) -> solver.Assembly:
             f'{case.source}: no block is a moving support; give one of these the role "moving" under [roles] or add '
             f"[[supports]]: {', '.join(groups)}"
         )
+    check_coordinates(case, assembly)
     _note_numbers(assembly, case.source)
     _note_units(case, assembly)
     assembly = cut_ground(assembly, case.profiles)
@@ -93,7 +95,7 @@ def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
         )
 
 
-def _note_density(case: Case, sketch: layout.Layout) -> None:
+def _note_density(case: Case, sketch: layout.AnyLayout) -> None:
     """Warn where the density of the case loses against the file's."""
     if case.density is None or case.file is None or sketch.density is None:
         return
@@ -109,7 +111,8 @@ def _note_density(case: Case, sketch: layout.Layout) -> None:
 
 def _note_units(case: Case, assembly: solver.Assembly) -> None:
     """Warn of numbers that are probably in another unit."""
-    sizes = np.sqrt(assembly.areas[assembly.free])
+    sizes = np.sqrt(assembly.areas) if assembly.dimension == 2 else np.cbrt(assembly.shapes.volumes)
+    sizes = sizes[assembly.free]
     notes = []
     if case.file is None and len(sizes):
         notes.append(doubt("m", float(np.median(sizes)), remedy="the parameters of layouts are in m"))
@@ -130,9 +133,7 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
             f"density {light:g} kg/m³ is lighter than masonry; if it is in {unit}, give {factor * light:.4g} kg/m³"
         )
     steps = [s.increment for s in case.settlements if s.unit == "m"]
-    free = np.flatnonzero(assembly.free).tolist()
-    across = [float(np.hypot(*np.ptp(assembly.outline(i), axis=0))) for i in free]
-    block = float(np.median(across)) if across else np.inf
+    block = float(np.median(across_blocks(assembly)[assembly.free])) if assembly.free.any() else np.inf
     if steps and max(steps) > LONGEST_STEP * block:
         notes.append(
             f"[settlement] increment = {max(steps):g} m is {max(steps) / block:.3g} of the median block, "
@@ -144,23 +145,41 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
             warnings.warn(f"{case.source}: {note}", stacklevel=3)
 
 
-def _case_layout(case: Case) -> layout.Layout:
+def across_blocks(assembly: solver.Assembly) -> np.ndarray:
+    """(n_blocks,) array [m]: diagonal of the box around each block."""
+    first = np.searchsorted(assembly.block_of_vertex, np.arange(assembly.n_blocks))
+    low, high = (pick.reduceat(assembly.vertices, first, axis=0) for pick in (np.minimum, np.maximum))
+    return np.asarray(np.linalg.norm(high - low, axis=1))
+
+
+def _case_layout(case: Case) -> layout.AnyLayout:
+    thickness = case.thickness or THICKNESS
     if case.file is not None:
-        return read_layout(case.file, unit=case.unit, view=case.view, ignore=case.ignore, only=case.only)
+        return read_layout(
+            case.file,
+            unit=case.unit,
+            view=case.view,
+            ignore=case.ignore,
+            only=case.only,
+            dimension=case.dimension,
+            thickness=thickness,
+        )
     assert case.layout is not None
     try:
         sketch = layout.layout_of(generators.build(case.layout, case.parameters))
     except (TypeError, ValueError) as error:
         raise ValueError(f"{case.source}: [geometry] layout: {error}") from None
     # A parametric layout has its own density and thickness; those of the case replace them.
-    return replace(
-        sketch,
-        density=sketch.density if case.density is None else None,
-        thickness=sketch.thickness if case.thickness is None else None,
-    )
+    sketch = replace(sketch, density=sketch.density if case.density is None else None)
+    if isinstance(sketch, layout.Layout):
+        sketch = replace(sketch, thickness=sketch.thickness if case.thickness is None else None)
+        return layout.standing(sketch, thickness) if case.dimension == 3 else sketch
+    if case.dimension == 2:
+        raise ValueError(f"{case.source}: [geometry] dimension is 2, but the layout '{case.layout}' is in space")
+    return sketch
 
 
-def _with_densities(case: Case, sketch: layout.Layout) -> layout.Layout:
+def _with_densities(case: Case, sketch: layout.AnyLayout) -> layout.AnyLayout:
     unknown = set(case.densities) - set(sketch.materials)
     if unknown:
         name = sorted(unknown)[0]

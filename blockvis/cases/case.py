@@ -132,6 +132,9 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     if file is not None and parameters:
         raise geometry.error("parameters", "belong to a layout, not to a file")
     view, ignore, only = _chosen(geometry, file)
+    dimension = geometry.take("dimension", "auto")
+    if isinstance(dimension, bool) or dimension not in (2, 3, "auto"):
+        raise geometry.error("dimension", f'is {shortened(dimension)}; give 2, 3 or "auto"')
     joint = geometry.take("joint_thickness", 0.0)
     if joint != "auto":
         joint = geometry.number("joint_thickness", 0.0)
@@ -171,6 +174,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         parameters=dict(parameters),
         unit=geometry.text("unit"),
         view=view,
+        dimension=dimension,
         ignore=ignore,
         only=only,
         thickness=geometry.number("thickness", positive=True),
@@ -254,6 +258,9 @@ def _support(table: Table) -> Mapping[str, Any]:
         "role": table.text("role", solver.FIXED, among=(solver.FIXED, solver.MOVING)),
         "outline": table.take("outline"),
     }
+    levels = table.pair("levels", words="[bottom, top]")
+    if levels is not None:
+        support["levels"] = list(levels)
     if not isinstance(support["outline"], list) or len(support["outline"]) < 3:
         raise table.error("outline", f"is {shortened(support['outline'])}; give at least three corners [[x, y], ...]")
     for corner in support["outline"]:
@@ -302,9 +309,11 @@ def _settlement(table: Table) -> tuple[solver.Settlement, Profile | None]:
         if not all(isinstance(name, str) for name in blocks):
             raise table.error("blocks", f"is {shortened(table.values['blocks'])}; give names of supports in quotes")
     keys = {
-        "direction": table.pair("direction"),
-        "rotation_centre": table.pair("rotation_centre"),
+        "direction": table.vector("direction"),
+        "rotation_centre": table.vector("rotation_centre"),
+        "rotation_axis": table.triple("rotation_axis"),
         "rotation": table.number("rotation"),
+        "radial_from": table.pair("radial_from"),
         "increment": table.number("increment", 0.01, positive=True),
         "limit": table.number("limit", 1.0, positive=True),
         "tolerance": table.number("tolerance", positive=True),
@@ -339,10 +348,10 @@ def _load(table: Table) -> LoadCase:
     load = LoadCase(
         kind=table.text("kind", "dead", among=("dead", "live")),
         blocks=table.text("blocks", "*"),
-        weight_fraction=table.pair("weight_fraction"),
-        force=table.pair("force", (0.0, 0.0)),
-        point=table.pair("point"),
-        moment=table.number("moment", 0.0),
+        weight_fraction=table.vector("weight_fraction"),
+        force=table.vector("force", (0.0, 0.0)),
+        point=table.vector("point"),
+        moment=_moment(table),
         pressure=table.number("pressure"),
         direction=table.pair("direction", (0.0, -1.0)),
         edge=table.whole("edge", 1),
@@ -357,14 +366,23 @@ def _load(table: Table) -> LoadCase:
     if load.edge is not None and "direction" in given:
         raise table.error("direction", "and edge are both given; pressure on an edge is perpendicular to it")
     if load.positions:
-        if load.kind != "live" or load.force == (0.0, 0.0):
+        if load.kind != "live" or not load.has_force:
             raise table.error("positions", 'are those of a live force; give kind = "live" and force = [fx, fy]')
         for key in ("blocks", "weight_fraction", "point", "moment", "pressure"):
             if key in given:
                 raise table.error(key, "does not go with positions: the force acts on the topmost block at each")
-    elif load.weight_fraction is None and load.pressure is None and load.force == (0.0, 0.0) and not load.moment:
+    elif load.weight_fraction is None and load.pressure is None and not (load.has_force or load.has_moment):
         raise table.error("force", "is missing or zero; give force, moment, weight_fraction or pressure")
     return load
+
+
+def _moment(table: Table) -> float | tuple[float, float, float]:
+    """Read a moment: a number, in space three."""
+    if isinstance(table.values.get("moment"), list | tuple):
+        found: tuple[float, float, float] = table.triple("moment")
+        return found
+    moment: float = table.number("moment", 0.0)
+    return moment
 
 
 def _positions(table: Table) -> tuple[float, ...]:

@@ -45,6 +45,7 @@ class Case:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     unit: str | None = None
     view: str | None = None
+    dimension: int | str = "auto"
     ignore: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
     thickness: float | None = None

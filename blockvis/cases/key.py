@@ -40,6 +40,8 @@ TEXTS = ValueKind(
     "text, or list of texts", {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
 )
 PAIR = ValueKind("two numbers", _list_of({"type": "number"}, 2, 2))
+VECTOR = ValueKind("two numbers, in space three", _list_of({"type": "number"}, 2, 3))
+TRIPLE = ValueKind("three numbers", _list_of({"type": "number"}, 3, 3))
 NUMBERS = ValueKind("list of numbers", _list_of({"type": "number"}, 1))
 OUTLINE = ValueKind("list of at least three corners", _list_of(_list_of({"type": "number"}, 2, 2), 3))
 

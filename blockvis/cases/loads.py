@@ -23,10 +23,10 @@ class LoadCase:
         "dead" or "live".
     blocks : str
         A name or pattern.
-    weight_fraction : (2,) tuple, optional
-    force : (2,) tuple [N]
-    point : (2,) tuple [m], optional
-    moment : float [N·m]
+    weight_fraction : (2,) tuple, in space (3,), optional
+    force : (2,) tuple, in space (3,) [N]
+    point : (2,) tuple, in space (3,) [m], optional
+    moment : float, in space (3,) tuple [N·m]
     pressure : float, optional [Pa]
         On the first faces in the way of ``direction``, or on ``edge``.
     direction : (2,) tuple
@@ -39,14 +39,24 @@ class LoadCase:
 
     kind: str = "dead"
     blocks: str = "*"
-    weight_fraction: tuple[float, float] | None = None
-    force: tuple[float, float] = (0.0, 0.0)
-    point: tuple[float, float] | None = None
-    moment: float = 0.0
+    weight_fraction: tuple[float, ...] | None = None
+    force: tuple[float, ...] = (0.0, 0.0)
+    point: tuple[float, ...] | None = None
+    moment: float | tuple[float, float, float] = 0.0
     pressure: float | None = None
     direction: tuple[float, float] = (0.0, -1.0)
     edge: int | None = None
     positions: tuple[float, ...] = ()
+
+    @property
+    def has_force(self) -> bool:
+        """Whether the force is not zero."""
+        return any(self.force)
+
+    @property
+    def has_moment(self) -> bool:
+        """Whether the moment is not zero."""
+        return bool(np.any(self.moment))
 
 
 def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Path) -> solver.Loads:
@@ -77,8 +87,9 @@ def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Pat
         chosen = _chosen(load, assembly, f"{source}: [loads {number + 1}] blocks")
         if load.weight_fraction is not None:
             parts[load.kind] += solver.weight_fraction(assembly, load.weight_fraction, chosen)
-        for block in chosen if (load.force != (0.0, 0.0) or load.moment) else ():
-            parts[load.kind] += solver.point_load(assembly, block, load.force, point=load.point, moment=load.moment)
+        for block in chosen if (load.has_force or load.has_moment) else ():
+            force = load.force if load.has_force else None
+            parts[load.kind] += solver.point_load(assembly, block, force, point=load.point, moment=load.moment)
         if load.pressure is not None and load.edge is None:
             parts[load.kind] += solver.surface_pressure(assembly, load.pressure, load.direction, blocks=chosen)
         if load.pressure is not None and load.edge is not None:

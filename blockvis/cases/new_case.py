@@ -13,6 +13,7 @@ import numpy as np
 
 import solver
 from blockvis.layout.inspect import Inspection
+from blockvis.layout.inspect_solids import SolidInspection
 from blockvis.numbers import rounded_length
 from blockvis.toml_text import as_key, as_toml
 
@@ -29,6 +30,12 @@ FRICTION = 0.6
 
 #: Parts of the names and layers of blocks that are supports, where the drawing says nothing of roles.
 SUPPORT_WORDS = ("springer", "support", "ground", "foundation", "footing", "abutment", "bearing")
+
+#: Keys of a drawing in the plane, which one in space does not have.
+_IN_THE_PLANE = ("thickness", "closing", "outline_tolerance")
+
+#: A drawing in the plane or in space.
+Found = Inspection | SolidInspection
 
 #: Characters of a line of comment.
 WIDTH = 100
@@ -57,7 +64,7 @@ class Ground:
 
 
 def case_text(
-    found: Inspection,
+    found: Found,
     file: str,
     *,
     view: str | None = None,
@@ -68,7 +75,7 @@ def case_text(
 
     Parameters
     ----------
-    found : Inspection
+    found : Inspection or SolidInspection
         Of the drawing.
     file : str
         The drawing, relative to the case file.
@@ -83,12 +90,15 @@ def case_text(
     """
     block = block_size(found)
     ground = ground_of(found)
+    in_space = found.layout.dimension == 3
+    down = [*[0.0] * (found.layout.dimension - 1), -1.0]
     geometry = {
         "file": file,
         "unit": found.layout.unit,
         "view": view,
         "ignore": list(ignore) or None,
         "only": list(only) or None,
+        "dimension": 3 if in_space else None,
         "joint_thickness": "auto" if found.joint_thickness > 0.0 else None,
     }
     known = found.layout.density is not None and bool(np.isfinite(found.layout.density[found.kept]).all())
@@ -97,9 +107,12 @@ def case_text(
         _comment(_counted(found)),
         *(_comment(f"Note: {note}") for note in found.layout.notes),
         "",
-        _table(case_keys.GEOMETRY, geometry, leaving=("layout", "parameters")),
+        _table(case_keys.GEOMETRY, geometry, leaving=("layout", "parameters", *(_IN_THE_PLANE if in_space else ()))),
         _roles(found, ground),
-        *(_table(case_keys.SUPPORTS, support, leaving=("material",)) for support in ground.supports),
+        *(
+            _table(case_keys.SUPPORTS, support, leaving=("material",) if in_space else ("material", "levels"))
+            for support in ground.supports
+        ),
         _table(
             case_keys.MATERIAL,
             {"density": None if known else DENSITY, "friction_coefficient": FRICTION},
@@ -108,14 +121,17 @@ def case_text(
     ]
     if ground.settles:
         increment = rounded_length(INCREMENT * block)
-        motion = {"direction": [0.0, -1.0], "increment": increment, "limit": rounded_length(LIMIT * block)}
+        motion = {"direction": down, "increment": increment, "limit": rounded_length(LIMIT * block)}
         says = f"The blocks are {block:.3g} m across in the middle; the increment and the limit suit that."
-        parts.append(_table(case_keys.SETTLEMENT, motion, says, leaving=("rotation",), single=True))
+        # Another motion than a translation has keys that exclude its direction.
+        leaving = ("rotation", "rotation_axis", "radial_from", *(("rotation_centre",) if in_space else ()))
+        parts.append(_table(case_keys.SETTLEMENT, motion, says, leaving=leaving, single=True))
     else:
         says = "Nothing can settle; this asks for the horizontal acceleration, as a fraction of gravity, at failure."
         parts.append(_table(case_keys.ANALYSIS, {"kind": "limit load"}, says, leaving=_all_but("kind", "flow")))
         leaving = _all_but("kind", "blocks", "weight_fraction", section=case_keys.LOADS)
-        parts.append(_table(case_keys.LOADS, {"kind": "live", "weight_fraction": [1.0, 0.0]}, leaving=leaving))
+        push = [1.0, *[0.0] * (found.layout.dimension - 1)]
+        parts.append(_table(case_keys.LOADS, {"kind": "live", "weight_fraction": push}, leaving=leaving))
     parts.append(_table(case_keys.OUTPUT, {"animation": "collapse.mp4"}))
     parts.append(_comment("There are more tables and keys: blockvis schema lists them."))
     return "\n".join(parts) + "\n"
@@ -133,18 +149,18 @@ def relative_to(folder: Path, drawing: str | Path) -> str:
     return Path(path).as_posix()
 
 
-def block_size(found: Inspection) -> float:
+def block_size(found: Found) -> float:
     """Find the distance across the median free block [m]."""
-    across = [float(np.hypot(*np.ptp(found.layout.outlines[i], axis=0))) for i in _with_role(found, solver.FREE)]
+    across = [float(np.linalg.norm(np.ptp(found.layout.corners(i), axis=0))) for i in _with_role(found, solver.FREE)]
     return float(np.median(across)) if across else 1.0
 
 
-def ground_of(found: Inspection) -> Ground:
+def ground_of(found: Found) -> Ground:
     """Say what stands and what settles, of what a drawing says.
 
     Parameters
     ----------
-    found : Inspection
+    found : Inspection or SolidInspection
     """
     fixed, moving = _with_role(found, solver.FIXED), _with_role(found, solver.MOVING)
     if moving:
@@ -162,7 +178,7 @@ def ground_of(found: Inspection) -> Ground:
             supports=_two_halves(found),
         )
     names = found.layout.names
-    right = max(fixed, key=lambda i: float(found.layout.outlines[i][:, 0].mean()))
+    right = max(fixed, key=lambda i: float(found.layout.corners(i)[:, 0].mean()))
     if len(fixed) > 1 and names[right] and names.count(names[right]) == 1:
         return Ground(
             f"The drawing says which blocks are supports, but of none that it moves: here '{names[right]}' does.",
@@ -171,7 +187,7 @@ def ground_of(found: Inspection) -> Ground:
     return Ground("The drawing has supports that stand, and none that moves.", settles=False)
 
 
-def _named_supports(found: Inspection) -> dict[str, float]:
+def _named_supports(found: Found) -> dict[str, float]:
     """Where blocks stand in the mean [m] whose layer, or else name, is that of a support; by that layer or name."""
     layout = found.layout
     places: dict[str, list[float]] = {}
@@ -179,24 +195,25 @@ def _named_supports(found: Inspection) -> dict[str, float]:
         labels = [layout.groups[i], layout.names[i]]
         label = next((one for one in labels if any(word in one.lower() for word in SUPPORT_WORDS)), None)
         if label is not None:
-            places.setdefault(label, []).append(float(layout.outlines[i][:, 0].mean()))
+            places.setdefault(label, []).append(float(layout.corners(i)[:, 0].mean()))
     # A role is no key of all blocks: something must be left that can fall.
     if sum(map(len, places.values())) == len(found.kept):
         return {}
     return {label: sum(x) / len(x) for label, x in places.items()}
 
 
-def _two_halves(found: Inspection) -> tuple[Mapping[str, Any], ...]:
+def _two_halves(found: Found) -> tuple[Mapping[str, Any], ...]:
     """Lay a ground under the lowest blocks, split where they leave a gap nearest to the middle, or in the middle."""
-    outlines = [found.layout.outlines[i] for i in found.kept]
-    low = min(float(ring[:, 1].min()) for ring in outlines)
+    corners = [found.layout.corners(i) for i in found.kept]
+    up = found.layout.dimension - 1
+    low = min(float(points[:, up].min()) for points in corners)
     depth = rounded_length(0.5 * block_size(found))
     near = 1e-3 * depth
     # Mortar between two stones is no opening.
     opening = near + 1.01 * found.joint_thickness
     feet = sorted(
         (float(foot.min()), float(foot.max()))
-        for foot in (ring[ring[:, 1] < low + near, 0] for ring in outlines)
+        for foot in (points[points[:, up] < low + near, 0] for points in corners)
         if len(foot)
     )
     left, right = feet[0][0], max(end for _, end in feet)
@@ -208,6 +225,10 @@ def _two_halves(found: Inspection) -> tuple[Mapping[str, Any], ...]:
     split = min(gaps, key=lambda x: abs(x - middle), default=middle)
 
     def half(name: str, role: str, start: float, end: float) -> Mapping[str, Any]:
+        if up == 2:
+            front, back = float(found.low[1]) - depth, float(found.high[1]) + depth
+            plan = [[start, front], [end, front], [end, back], [start, back]]
+            return {"name": name, "role": role, "outline": plan, "levels": [low - depth, low]}
         corners = [[start, low - depth], [end, low - depth], [end, low], [start, low]]
         return {"name": name, "role": role, "outline": corners}
 
@@ -217,17 +238,19 @@ def _two_halves(found: Inspection) -> tuple[Mapping[str, Any], ...]:
     )
 
 
-def _with_role(found: Inspection, role: str) -> list[int]:
+def _with_role(found: Found, role: str) -> list[int]:
     return [int(i) for i in found.kept if found.roles[i] == role]
 
 
-def _counted(found: Inspection) -> str:
-    width, height = found.high - found.low
+def _counted(found: Found) -> str:
+    size = (found.high - found.low).tolist()
     roles = [f"{len(_with_role(found, role))} {role}" for role in solver.ROLES if _with_role(found, role)]
-    return f"{len(found.kept)} blocks, {', '.join(roles)}; {width:.4g} m wide, {height:.4g} m high."
+    deep = f"{size[1]:.4g} m deep, " if len(size) == 3 else ""
+    where = " in space" if deep else ""
+    return f"{len(found.kept)} blocks{where}, {', '.join(roles)}; {size[0]:.4g} m wide, {deep}{size[-1]:.4g} m high."
 
 
-def _roles(found: Inspection, ground: Ground) -> str:
+def _roles(found: Found, ground: Ground) -> str:
     section = case_keys.ROLES
     lines = [_comment(f"{section.meaning}. {ground.says}")]
     as_drawn = [i for i in found.kept if found.roles[i] != solver.FREE and found.layout.names[i] not in ground.roles]

@@ -50,14 +50,32 @@ class Table:
             raise self.error(key, f"is {value:g}; give a positive number")
         return float(value)
 
-    def pair(self, key: str, default: tuple[float, float] | None = None) -> Any:
-        """Read two finite numbers."""
+    def pair(self, key: str, default: tuple[float, float] | None = None, words: str = "[x, y]") -> Any:
+        """Read two finite numbers; ``words`` says in the error what they are."""
         value = self.take(key, default)
         if value is None:
             return None
         if not isinstance(value, (list, tuple)) or len(value) != 2 or not all(map(is_number, value)):
-            raise self.error(key, f"is {shortened(value)}; give two numbers [x, y]")
+            raise self.error(key, f"is {shortened(value)}; give two numbers {words}")
         return float(value[0]), float(value[1])
+
+    def vector(self, key: str, default: tuple[float, ...] | None = None) -> Any:
+        """Read two finite numbers, or in space three."""
+        value = self.take(key, default)
+        if value is None:
+            return None
+        if not isinstance(value, (list, tuple)) or len(value) not in (2, 3) or not all(map(is_number, value)):
+            raise self.error(key, f"is {shortened(value)}; give two numbers [x, y], or in space three [x, y, z]")
+        return tuple(map(float, value))
+
+    def triple(self, key: str) -> Any:
+        """Read three finite numbers."""
+        value = self.take(key)
+        if value is None:
+            return None
+        if not isinstance(value, (list, tuple)) or len(value) != 3 or not all(map(is_number, value)):
+            raise self.error(key, f"is {shortened(value)}; give three numbers [x, y, z]")
+        return tuple(map(float, value))
 
     def text(self, key: str, default: str | None = None, *, among: Sequence[str] = ()) -> Any:
         """Read a text, one of ``among`` if there are any."""

@@ -97,6 +97,8 @@ def explain(
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
         drawn = case_assembly(case)
+        if drawn.dimension != 2:
+            raise ValueError(f"{case.source}: explain knows structures in the plane only; this one is in space")
         needs_dry_joints(case)
         solver.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)

@@ -19,6 +19,7 @@ from scipy.optimize import linear_sum_assignment
 import solver
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
+from blockvis.layout.layout import Layout
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
 from blockvis.suggestions import files_like, nearest
 
@@ -393,6 +394,8 @@ def block_at(assembly: solver.Assembly, point: np.ndarray) -> int:
 def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
     """Compare a drawing of the damaged state with the undamaged one, block by block."""
     layout = read_layout(path)
+    if not isinstance(layout, Layout):
+        raise ValueError(f"{path}: draws blocks in space; give a drawing in the plane, as the case is")
     partner = _partners(layout.names, layout.outlines, assembly)
     if not partner:
         raise ValueError(f"{path}: none of its {layout.n_blocks} blocks is one of the case, by its name or its shape")

@@ -1,8 +1,8 @@
-"""From closed bodies in space to a layout: prisms side by side become outlines with a thickness."""
+"""From closed bodies to a layout: prisms side by side become outlines with a thickness, others blocks in space."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.block_table import with_rows
+from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.outlines import outlines_of_cells, rectangle
+from blockvis.layout.solid_layout import SolidLayout
+from blockvis.layout.solids import volume
 from blockvis.layout.views import VIEWS, axis_across, view_along
 
 #: In a prism the sine of the angle between a face's normal and the axis, or the plane across it, is at most this.
@@ -30,6 +33,12 @@ LARGEST_SIZE = 1e50
 
 #: Bodies compared with all others at a time.
 AT_A_TIME = 20
+
+#: More faces are no stone, but a scan or a curved surface in small triangles.
+MOST_FACES = 400
+
+#: A body of less than this fraction of the cube around the drawing has no volume.
+NO_VOLUME = 1e-15
 
 #: Middle planes further apart than this fraction of the size of the drawing are noted.
 ECCENTRIC = 1e-3
@@ -76,12 +85,18 @@ class Bodies:
     unit : str
         Unit of length that the file states, "" for none.
     notes : tuple of str
+    up : {"z", "y"}
+        The coordinate that points up.
+    up_says : str
+        Why, for a note.
     """
 
     bodies: tuple[Body, ...]
     rows: tuple[dict[str, Any], ...]
     unit: str = ""
     notes: tuple[str, ...] = field(default=())
+    up: str = "z"
+    up_says: str = ""
 
 
 @dataclass(frozen=True)
@@ -125,22 +140,8 @@ def layout_of_bodies(
     ValueError
         If the bodies are not prisms side by side.
     """
-    if not found.bodies:
-        raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
-    labels = [[str(row.get(key, "")) for key in ("name", "group", "material")] for row in found.rows]
-    wanted = [not matches(words, ignore) and (not only or matches(words, only)) for words in labels]
-    dropped = [k for k, keep in enumerate(wanted) if not keep]
-    kept = [k for k, keep in enumerate(wanted) if keep]
-    if not kept:
-        raise ValueError(f"'{path}' draws no block: all that it draws is left out as asked (ignore, only)")
-    bodies, rows = [found.bodies[k] for k in kept], [found.rows[k] for k in kept]
-    every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
-    if not np.isfinite(every).all():
-        bad = every[~np.isfinite(every).all(axis=1)][0]
-        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
-    size = float(np.ptp(every, axis=0).max())
-    if not 0.0 < size < LARGEST_SIZE:
-        raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
+    asked = _asked(found, path, ignore, only)
+    bodies, rows, size = asked.bodies, asked.rows, asked.size
     axes = (2, 1, 0) if view is None else (axis_across(view),)
     seen = [_seen_along(axis, bodies, size) for axis in axes]
     fitting = [one for one in seen if not one.refused]
@@ -166,13 +167,111 @@ def layout_of_bodies(
         notes=(*notes, *found.notes),
     )
     layout = replace(with_rows(layout, rows), thickness=best.high - best.low)
-    left_out = []
-    for k in dropped:
-        points = found.bodies[k].points[:, VIEWS[name]]
-        layer = next((word for word in labels[k][1:] if matches([word], ignore)), labels[k][1])
-        box = rectangle(*points.min(axis=0), *points.max(axis=0))
-        left_out.append(LeftOut("asked", box, "", layer, labels[k][0]))
-    return replace(layout, left_out=tuple(left_out))
+    return replace(layout, left_out=asked.left_out(found, name, ignore))
+
+
+def solids_of_bodies(
+    found: Bodies,
+    path: Path | str,
+    view: str | None = None,
+    ignore: Sequence[str] = (),
+    only: Sequence[str] = (),
+) -> SolidLayout:
+    """Make a layout in space of bodies of any shape.
+
+    Parameters
+    ----------
+    found, path, ignore, only
+        As of :func:`layout_of_bodies`.
+    view : {"xy", "xz", "yz"}, optional
+        The last of its coordinates is up: y of "xy", else z; by default what the format has as up.
+
+    Raises
+    ------
+    ValueError
+        For bodies without a volume, or with more faces than a block may have.
+    """
+    asked = _asked(found, path, ignore, only)
+    lying = found.up == "y" if view is None else view == "xy"
+    solids, warped = [], []
+    for body in asked.bodies:
+        plane = with_plane_faces(body.points, body.faces)
+        points, faces = plane.solid
+        if len(faces) > MOST_FACES:
+            raise ValueError(
+                f"'{path}': body '{body.name}' has {len(faces)} faces, more than {MOST_FACES}; simplify it to the "
+                "plane faces of a stone"
+            )
+        if not volume(points, faces) > NO_VOLUME * asked.size**3:
+            x, y, z = points.mean(axis=0)
+            raise ValueError(
+                f"'{path}': body '{body.name}' around ({x:.6g}, {y:.6g}, {z:.6g}) has no volume; remove or redraw it"
+            )
+        if plane.warp:
+            warped.append((plane.warp, body.name, plane.place))
+        solids.append((points[:, [0, 2, 1]] * [1.0, -1.0, 1.0] if lying else points, faces))
+    notes = []
+    if warped:
+        most, name, place = max(warped, key=lambda one: one[0])
+        notes.append(
+            f"planes were fitted to warped faces of {len(warped)} of {len(solids)} blocks: up to {most:.3g} in the "
+            f"file's unit, of '{name}' at ({', '.join(f'{x:.6g}' for x in place)})"
+        )
+    if lying and view is None:
+        notes.append(f'{found.up_says}: its (x, y, z) were read as (x, -z, y); give view = "xz" if z is up')
+    layout = SolidLayout(
+        solids=tuple(solids),
+        names=tuple(body.name for body in asked.bodies),
+        unit=found.unit,
+        notes=(*notes, *found.notes),
+    )
+    return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", ignore))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """The bodies that are asked for, with their rows, the size of the drawing, and the numbers of the others."""
+
+    bodies: list[Body]
+    rows: list[dict[str, Any]]
+    size: float
+    dropped: list[int]
+
+    def left_out(self, found: Bodies, view: str, ignore: Sequence[str]) -> tuple[LeftOut, ...]:
+        """Say what is left out as asked, by its box in a view."""
+        items = []
+        for k in self.dropped:
+            points = found.bodies[k].points[:, VIEWS[view]]
+            labels = _labels(found.rows[k])
+            layer = next((word for word in labels[1:] if matches([word], ignore)), labels[1])
+            box = rectangle(*points.min(axis=0), *points.max(axis=0))
+            items.append(LeftOut("asked", box, "", layer, labels[0]))
+        return tuple(items)
+
+
+def _labels(row: Mapping[str, Any]) -> list[str]:
+    return [str(row.get(key, "")) for key in ("name", "group", "material")]
+
+
+def _asked(found: Bodies, path: Path | str, ignore: Sequence[str], only: Sequence[str]) -> _Asked:
+    """Choose the bodies that are asked for, and check their coordinates."""
+    if not found.bodies:
+        raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
+    labels = [_labels(row) for row in found.rows]
+    wanted = [not matches(words, ignore) and (not only or matches(words, only)) for words in labels]
+    kept = [k for k, keep in enumerate(wanted) if keep]
+    if not kept:
+        raise ValueError(f"'{path}' draws no block: all that it draws is left out as asked (ignore, only)")
+    bodies = [found.bodies[k] for k in kept]
+    every = np.concatenate([body.points[np.unique(body.faces)] for body in bodies])
+    if not np.isfinite(every).all():
+        bad = every[~np.isfinite(every).all(axis=1)][0]
+        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+    size = float(np.ptp(every, axis=0).max())
+    if not 0.0 < size < LARGEST_SIZE:
+        raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
+    dropped = [k for k, keep in enumerate(wanted) if not keep]
+    return _Asked(bodies, [found.rows[k] for k in kept], size, dropped)
 
 
 def _seen_along(axis: int, bodies: Sequence[Body], size: float) -> _Seen:
@@ -231,27 +330,36 @@ def _hidden(
     return ""
 
 
-def _not_flat(seen: Sequence[_Seen], bodies: Sequence[Body], path: Path | str, view: str | None) -> ValueError:
+class NotFlat(ValueError):
+    """Bodies that are not prisms side by side; ``reason`` says why in a clause."""
+
+    def __init__(self, message: str, reason: str) -> None:
+        super().__init__(message)
+        self.reason = reason
+
+
+def _not_flat(seen: Sequence[_Seen], bodies: Sequence[Body], path: Path | str, view: str | None) -> NotFlat:
     """Make the error for bodies that are not prisms side by side, with the reason in every view that was tried."""
-    remedy = (
-        "blocks in space cannot be analysed yet: leave out all but one leaf (ignore), or draw its outlines in the plane"
-    )
+    remedy = "dimension = 3 reads them in space; in the plane leave out all but one leaf (ignore), or draw its outlines"
     if view is None and not any(len(one.outlines) for one in seen):
         holed = [one.refused for one in seen if "no extrusion" not in one.refused]
         if holed:
-            return ValueError(f"'{path}': {holed[0]}")
+            return NotFlat(f"'{path}': {holed[0]}; dimension = 3 reads the blocks in space", holed[0])
         name = seen[0].refused.split("'")[1]
-        return ValueError(
-            f"'{path}' is not prismatic: body '{name}' is no extrusion along x, y or z, and blocks in space cannot be "
-            "analysed yet; export extrusions of the blocks' outlines along an axis, or draw them in the plane"
+        reason = f"body '{name}' is no extrusion along x, y or z"
+        return NotFlat(
+            f"'{path}' is not prismatic: {reason}; dimension = 3 reads the blocks in space, in the plane export "
+            "extrusions of their outlines along an axis",
+            reason,
         )
     if view is None:
         # Views in which every body is a prism come first: they are what the model may have been meant for.
-        reasons = "; ".join(one.refused for one in sorted(seen, key=lambda one: not len(one.outlines)))
-        return ValueError(f"'{path}' is three-dimensional: {reasons}; {remedy}")
+        ordered = sorted(seen, key=lambda one: not len(one.outlines))
+        reasons = "; ".join(one.refused for one in ordered)
+        return NotFlat(f"'{path}' is three-dimensional: {reasons}; {remedy}", ordered[0].refused)
     other = next((v for v in VIEWS if v != view and not _seen_along(axis_across(v), bodies, _size(bodies)).refused), "")
     remedy = f'view = "{other}" shows them side by side' if other else remedy
-    return ValueError(f"'{path}' cannot be seen as {view}: {seen[0].refused}; {remedy}")
+    return NotFlat(f"'{path}' cannot be seen as {view}: {seen[0].refused}; {remedy}", seen[0].refused)
 
 
 def _size(bodies: Sequence[Body]) -> float:

@@ -2,7 +2,7 @@
 
 A geometry script can loop for ever, fill the memory or crash the library; in its own process it harms nothing else.
 OUT is a mesh (.msh) if the file has surfaces only, or bodies of triangles (.json) if it has volumes; the last line on
-standard output says which. CHORDS is the number of chords of a full circle, MEMORY the most bytes that may be taken.
+standard output says which. CHORDS is the number of chords of a full circle, MEMORY the most bytes for the file.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ MOST_CHORDS = 4096
 
 def main(source: str, target: str, chords: str, memory: str) -> int:
     """Mesh a geometry file and write its surfaces or bodies; return the exit code, 0 on success."""
-    _limit_memory(int(memory))
     try:
         import gmsh
     except (ImportError, OSError) as error:
         sys.stderr.write(str(error))
         return NO_LIBRARY
     gmsh.initialize(["gmsh", "-nopopup"], readConfigFiles=False, interruptible=False)
+    _limit_memory(int(memory))
     try:
         options = {
             "General.Terminal": 0,
@@ -65,11 +65,20 @@ def main(source: str, target: str, chords: str, memory: str) -> int:
 
 
 def _limit_memory(most: int) -> None:
-    """Limit the memory of this process, where the platform can."""
+    """Limit the memory [bytes] that this process may take from now on, where the platform can.
+
+    What it has mapped already is not counted: libraries, and the stacks and arenas of threads, of which the linear
+    algebra starts one per processor, so that the same file would need more of the limit on a larger machine.
+    """
     try:
         import resource
     except ImportError:  # Windows has no such limits
         return
+    try:
+        with open("/proc/self/statm", encoding="ascii") as pages:
+            most += int(pages.read().split()[0]) * resource.getpagesize()
+    except OSError:  # only Linux has it
+        pass
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     most = most if hard == resource.RLIM_INFINITY else min(most, hard)
     try:

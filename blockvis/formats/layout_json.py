@@ -3,6 +3,9 @@
 {"format": "blockvis layout", "version": 1, "unit": "m",
  "blocks": [{"name": ..., "outline": [[x, y], ...], "group": ..., "role": ..., "material": ..., "thickness": ...,
              "density": ...}, ...]}
+
+A block in space has, instead of an outline and a thickness, "points": [[x, y, z], ...] and "faces": [[0, 1, 2], ...],
+the points around each face, counter-clockwise seen from outside; z is up.
 """
 
 from __future__ import annotations
@@ -14,7 +17,9 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
-from blockvis.layout.layout import Layout
+from blockvis.layout.layout import AnyLayout, Layout
+from blockvis.layout.solid_layout import SolidLayout
+from blockvis.layout.solids import Solid
 
 from . import compas_json
 from .bodies import Bodies
@@ -23,7 +28,7 @@ from .reading import Reading
 FORMAT = "blockvis layout"
 
 
-def read(path: Path, reading: Reading) -> Layout | Bodies:
+def read(path: Path, reading: Reading) -> AnyLayout | Bodies:
     """Read a .json layout, or the blocks of a file of COMPAS."""
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
@@ -42,6 +47,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     version = content.get("version", 1)
     if version != 1:
         raise ValueError(f"'{path}' is a layout of version {version!r}; version 1 is read: update blockvis")
+    if any(isinstance(block, dict) and "points" in block for block in content["blocks"]):
+        return _read_solids(content, path)
     outlines, names = [], []
     for k, block in enumerate(content["blocks"]):
         name = str(block.get("name", f"block {k}")) if isinstance(block, dict) else f"block {k}"
@@ -62,12 +69,44 @@ def _is_own(content: Any) -> bool:
     if not isinstance(content, dict) or not isinstance(content.get("blocks"), list):
         return False
     blocks = content["blocks"]
-    return content.get("format") == FORMAT or any(isinstance(block, dict) and "outline" in block for block in blocks)
+    return content.get("format") == FORMAT or any(
+        isinstance(block, dict) and ("outline" in block or "points" in block) for block in blocks
+    )
 
 
-def write(layout: Layout, path: Path) -> None:
+def _read_solids(content: dict[str, Any], path: Path) -> SolidLayout:
+    """Read blocks in space."""
+    solids: list[Solid] = []
+    names = []
+    for k, block in enumerate(content["blocks"]):
+        name = str(block.get("name", f"block {k}")) if isinstance(block, dict) else f"block {k}"
+        try:
+            points = np.array(block["points"], dtype=float).reshape(-1, 3)
+            faces = [[int(corner) for corner in face] for face in block["faces"]]
+        except (KeyError, TypeError, ValueError):
+            raise ValueError(
+                f"'{path}': block '{name}' has no points [[x, y, z], ...] and faces [[0, 1, 2], ...]; repair it"
+            ) from None
+        outside = [corner for face in faces for corner in face if not 0 <= corner < len(points)]
+        if outside or len(faces) < 4 or any(len(face) < 3 for face in faces):
+            what = f"a face uses point {outside[0]} of {len(points)}" if outside else f"it has {len(faces)} faces"
+            raise ValueError(f"'{path}': block '{name}' is no closed block: {what}; repair it")
+        if not np.isfinite(points).all():
+            raise ValueError(f"'{path}': block '{name}' has a point that is not finite; repair it")
+        solids.append((points, faces))
+        names.append(name)
+    layout = SolidLayout(solids=tuple(solids), names=tuple(names), unit=str(content.get("unit", "")))
+    return with_rows(layout, content["blocks"])
+
+
+def write(layout: AnyLayout, path: Path) -> None:
     """Write a .json layout."""
-    blocks = [{**row, "outline": ring.tolist()} for row, ring in zip(rows_of(layout), layout.outlines, strict=True)]
+    shapes: list[dict[str, Any]]
+    if isinstance(layout, SolidLayout):
+        shapes = [{"points": points.tolist(), "faces": faces} for points, faces in layout.solids]
+    else:
+        shapes = [{"outline": ring.tolist()} for ring in layout.outlines]
+    blocks = [{**row, **shape} for row, shape in zip(rows_of(layout), shapes, strict=True)]
     lines = ",\n  ".join(json.dumps(block, ensure_ascii=False) for block in blocks)
     head = f'"format": "{FORMAT}", "version": 1, "unit": "m"'
     path.write_text(f'{{{head},\n "blocks": [\n  {lines}\n]}}\n', encoding="utf-8")

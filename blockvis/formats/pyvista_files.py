@@ -15,7 +15,8 @@ from xml.sax.saxutils import unescape
 import numpy as np
 
 from blockvis.layout.block_table import rows_of
-from blockvis.layout.layout import Layout
+from blockvis.layout.layout import AnyLayout, Layout
+from blockvis.layout.solid_layout import SolidLayout
 
 from .bodies import Bodies, Body, body_of_polygons, layout_of_bodies
 from .cells import block_array, layout_of_cells, merged, row_of
@@ -409,17 +410,10 @@ def _within(numbers: np.ndarray, end: int) -> bool:
     return len(numbers) == 0 or bool(numbers.min() >= 0 and numbers.max() < end)
 
 
-def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:
-    """Make a dataset of a polygon cell per block, with the cell arrays that the reader understands."""
-    import pyvista
-
-    counts = [len(ring) for ring in layout.outlines]
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    cells = np.concatenate([[n, *range(s, s + n)] for n, s in zip(counts, starts[:-1], strict=True)])
-    flat = np.concatenate(layout.outlines)
-    points = np.column_stack([flat, np.zeros(len(flat))])
-    grid = pyvista.UnstructuredGrid(cells, np.full(len(counts), 7, dtype=np.uint8), points)
-    grid.cell_data["block_id"] = np.arange(len(counts), dtype=np.int32)
+def dataset_of(layout: AnyLayout) -> pyvista.UnstructuredGrid:
+    """Make a dataset of a cell per block, polygon or polyhedron, with the cell arrays that the reader understands."""
+    grid = _polyhedra(layout) if isinstance(layout, SolidLayout) else _polygons(layout)
+    grid.cell_data["block_id"] = np.arange(layout.n_blocks, dtype=np.int32)
     rows = rows_of(layout)
     for key in ("name", "group", "role", "material"):
         words = [str(row.get(key, "")) for row in rows]
@@ -429,6 +423,32 @@ def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:
         if any(key in row for row in rows):
             grid.cell_data[key] = np.array([float(row.get(key, np.nan)) for row in rows])
     return grid
+
+
+def _polygons(layout: Layout) -> pyvista.UnstructuredGrid:
+    import pyvista
+
+    counts = [len(ring) for ring in layout.outlines]
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    cells = np.concatenate([[n, *range(s, s + n)] for n, s in zip(counts, starts[:-1], strict=True)])
+    flat = np.concatenate(layout.outlines)
+    points = np.column_stack([flat, np.zeros(len(flat))])
+    return pyvista.UnstructuredGrid(cells, np.full(len(counts), 7, dtype=np.uint8), points)
+
+
+def _polyhedra(layout: SolidLayout) -> pyvista.UnstructuredGrid:
+    import pyvista
+
+    cells: list[int] = []
+    start = 0
+    for points, faces in layout.solids:
+        stream = [len(faces)]
+        for face in faces:
+            stream += [len(face), *(start + corner for corner in face)]
+        cells += [len(stream), *stream]
+        start += len(points)
+    types = np.full(layout.n_blocks, POLYHEDRON, dtype=np.uint8)
+    return pyvista.UnstructuredGrid(np.array(cells), types, layout.points)
 
 
 def _add_words(attributes: Any, name: str, words: list[str]) -> None:
@@ -443,8 +463,10 @@ def _add_words(attributes: Any, name: str, words: list[str]) -> None:
     attributes.AddArray(array)
 
 
-def write(layout: Layout, path: Path) -> None:
-    """Write .vtu, .vtp or .vtk: a polygon cell per block, double precision, lengths in m."""
+def write(layout: AnyLayout, path: Path) -> None:
+    """Write .vtu, .vtp or .vtk: a cell per block, polygon or polyhedron, double precision, lengths in m."""
+    if path.suffix.lower() == ".vtp" and isinstance(layout, SolidLayout):
+        raise ValueError(f"'{path}': .vtp holds surfaces; write blocks in space to .vtu, .obj, .stl, .ply or .json")
     grid = dataset_of(layout)
     if path.suffix.lower() == ".vtp":
         surface = _surface(grid)

@@ -15,13 +15,16 @@ from blockvis.atomic_files import whole_file
 from blockvis.formats import FORMATS, Format
 from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
-from blockvis.layout.layout import Layout, layout_of
+from blockvis.layout.inspect_solids import SolidInspection, inspected_solids
+from blockvis.layout.layout import AnyLayout, Layout, layout_of, standing
+from blockvis.layout.left_out import in_words
 from blockvis.layout.outlines import ring_area, without_collinear
 from blockvis.layout.selection import sorted_out
-from blockvis.layout.units import chosen_unit, metres_per
-from blockvis.layout.views import checked_view
+from blockvis.layout.solid_layout import SolidLayout
+from blockvis.layout.units import chosen_unit, doubt, metres_per
+from blockvis.layout.views import checked_dimension, checked_view
 
-from .bodies import Bodies, layout_of_bodies
+from .bodies import Bodies, NotFlat, layout_of_bodies, solids_of_bodies
 from .cells import of_files
 from .files import MissingFile as MissingFile
 from .files import files_of
@@ -42,7 +45,9 @@ def read_layout(
     view: str | None = None,
     ignore: str | Sequence[str] = (),
     only: str | Sequence[str] = (),
-) -> Layout:
+    dimension: int | str = "auto",
+    thickness: float = 1.0,
+) -> AnyLayout:
     """Read the blocks of a layout file.
 
     Parameters
@@ -59,12 +64,17 @@ def read_layout(
     ignore, only : str or sequence of str, optional
         Layers, groups, materials and names, or patterns of them (``"dim*"``), that are left out, and beside which all
         others are left out. What ``only`` names is not left out for looking like a frame, a title block or mortar.
+    dimension : {"auto", 2, 3}
+        Whether blocks are read in the plane or in space; "auto" takes space where bodies are not prisms side by side.
+        In space a drawing in the plane stands upright, extruded along y by its thickness.
+    thickness : float [m]
+        For that, of blocks for which the file has none.
 
     Returns
     -------
-    Layout
-        Lengths in m, outlines without collinear points. What the drawing holds beside its blocks is in ``left_out``,
-        and in a note per kind and layer.
+    Layout, or SolidLayout of blocks in space
+        Lengths in m, outlines without collinear points, plane faces. What the drawing holds beside its blocks is in
+        ``left_out``, and in a note per kind and layer.
 
     Raises
     ------
@@ -78,9 +88,11 @@ def read_layout(
     reading = Reading(unit=unit, chord_tolerance=chord_tolerance, view=checked_view(view), ignore=ignore, only=only)
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
-    content = found[0] if files == [path] else of_files(found, files, path)
-    layout = layout_of_bodies(content, path, view, ignore, only) if isinstance(content, Bodies) else content
+    content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)
+    layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
     layout = replace(layout, source=str(path))
+    if isinstance(layout, SolidLayout):
+        return _in_metres(layout, unit)
     if layout.n_blocks == 0 and not layout.left_out:
         raise ValueError(f"'{path}' draws no block; draw each block as one closed outline or meshed surface")
     for i, ring in enumerate(layout.outlines):
@@ -102,22 +114,75 @@ def read_layout(
         notes=layout.notes + ((note,) if note else ()),
         left_out=tuple(item.mapped(factor) for item in layout.left_out),
     )
-    largest = max((float(np.abs(ring).max()) for ring in layout.outlines), default=0.0)
-    if largest > LARGEST_COORDINATE:
-        raise ValueError(
-            f"'{path}' has a coordinate of {largest:.3g} m; corners must lie within {LARGEST_COORDINATE:.0e} m of the "
-            "origin: check the unit or repair the file"
-        )
+    _check_coordinates(layout.source, max((float(np.abs(ring).max()) for ring in layout.outlines), default=0.0))
     layout = sorted_out(layout, ignore, only)
     for name, ring in zip(layout.names, layout.outlines, strict=True):
         if len(ring) > MOST_CORNERS:
             raise ValueError(
                 f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
             )
-    return layout
+    return standing(layout, thickness) if dimension == 3 else layout
 
 
-def write_layout(layout: Layout, path: str | Path) -> None:
+def _in_dimension(
+    content: Layout | Bodies | SolidLayout,
+    path: Path,
+    dimension: int | None,
+    view: str | None,
+    ignore: Sequence[str],
+    only: Sequence[str],
+) -> AnyLayout:
+    """Make a layout of what a file holds, in the plane or in space."""
+    if isinstance(content, Layout):
+        return content
+    if isinstance(content, SolidLayout):
+        if dimension == 2:
+            raise ValueError(f"'{path}' draws its blocks in space; leave out dimension = 2")
+        return content
+    if dimension == 3:
+        return solids_of_bodies(content, path, view, ignore, only)
+    try:
+        return layout_of_bodies(content, path, view, ignore, only)
+    except NotFlat as error:
+        if dimension == 2 or view is not None:
+            raise
+        layout = solids_of_bodies(content, path, None, ignore, only)
+        return replace(layout, notes=(f"blocks in space: {error.reason}", *layout.notes))
+
+
+def _apart(content: AnyLayout | Bodies, path: Path) -> Layout | Bodies:
+    """Refuse layouts in space as files of one stone each: they hold all blocks."""
+    if isinstance(content, SolidLayout):
+        raise ValueError(f"'{path}' stands for layouts of blocks in space; give one of them")
+    return content
+
+
+def _in_metres(layout: SolidLayout, unit: str | None) -> SolidLayout:
+    """Choose the unit of a layout in space, and check its coordinates."""
+    chosen, note = chosen_unit(unit, layout.unit, np.cbrt(layout.volumes))
+    factor = metres_per(chosen)
+    layout = replace(
+        layout,
+        solids=tuple((points * factor, faces) for points, faces in layout.solids),
+        unit=chosen,
+        notes=layout.notes + ((note,) if note else ()),
+        left_out=tuple(item.mapped(factor) for item in layout.left_out),
+    )
+    _check_coordinates(layout.source, float(np.abs(layout.points).max()))
+    doubted = doubt(chosen, float(np.median(np.cbrt(layout.volumes))))
+    notes = (*layout.notes, *in_words(layout.left_out), *((doubted,) if doubted else ()))
+    return replace(layout, notes=notes)
+
+
+def _check_coordinates(source: str, largest: float) -> None:
+    if largest > LARGEST_COORDINATE:
+        raise ValueError(
+            f"'{source}' has a coordinate of {largest:.3g} m; corners must lie within {LARGEST_COORDINATE:.0e} m of "
+            "the origin: check the unit or repair the file"
+        )
+
+
+def write_layout(layout: AnyLayout, path: str | Path) -> None:
     """Write a layout to a file; the suffix chooses the format, lengths in m."""
     if layout.n_blocks == 0:
         raise ValueError(f"there is no block to write to '{path}'")
@@ -140,6 +205,7 @@ def read(
     only: str | Sequence[str] = (),
     closing: str = "auto",
     outline_tolerance: float | None = None,
+    dimension: int | str = "auto",
 ) -> solver.Assembly:
     """Read a layout file into an assembly.
 
@@ -148,14 +214,23 @@ def read(
     path : str or Path
     roles, supports, density, thickness, joint_thickness, overlap_tolerance, closing, outline_tolerance
         As of :func:`blockvis.layout.assemble.assemble`.
-    unit, chord_tolerance, view, ignore, only
+    unit, chord_tolerance, view, ignore, only, dimension
         As of :func:`read_layout`.
 
     Returns
     -------
     solver.Assembly
     """
-    layout = read_layout(path, unit=unit, chord_tolerance=chord_tolerance, view=view, ignore=ignore, only=only)
+    layout = read_layout(
+        path,
+        unit=unit,
+        chord_tolerance=chord_tolerance,
+        view=view,
+        ignore=ignore,
+        only=only,
+        dimension=dimension,
+        thickness=thickness,
+    )
     if chord_tolerance is not None and outline_tolerance is None:
         # Who says how fine arcs are wants their chords.
         outline_tolerance = 0.0
@@ -184,7 +259,8 @@ def inspect(
     view: str | None = None,
     ignore: str | Sequence[str] = (),
     only: str | Sequence[str] = (),
-) -> Inspection:
+    dimension: int | str = "auto",
+) -> Inspection | SolidInspection:
     """Read a layout file and measure it.
 
     Parameters
@@ -194,20 +270,22 @@ def inspect(
         Unit of the file's lengths; it replaces the one that the file states.
     view : {"xy", "xz", "yz"}, optional
     ignore, only : str or sequence of str, optional
+    dimension : {"auto", 2, 3}
         As of :func:`read_layout`.
     """
-    return inspected(read_layout(path, unit=unit, view=view, ignore=ignore, only=only))
+    layout = read_layout(path, unit=unit, view=view, ignore=ignore, only=only, dimension=dimension)
+    return inspected_solids(layout) if isinstance(layout, SolidLayout) else inspected(layout)
 
 
-def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
+def _read_by_suffix(path: Path, reading: Reading) -> AnyLayout | Bodies:
     """Read a file with the module of its suffix."""
     if path.stat().st_size == 0:
         raise ValueError(f"'{path}' is empty (0 bytes); export it again")
-    found: Layout | Bodies = _module_of(path, "read").read(path, reading)
+    found: AnyLayout | Bodies = _module_of(path, "read").read(path, reading)
     return found
 
 
-def _write_by_suffix(layout: Layout, path: Path) -> None:
+def _write_by_suffix(layout: AnyLayout, path: Path) -> None:
     """Write a file, whole or not at all, with the module of its suffix."""
     module = _module_of(path, "write")
     with whole_file(path) as partial:

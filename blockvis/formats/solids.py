@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
-from blockvis.layout.layout import Layout
+from blockvis.layout.layout import AnyLayout, Layout
 from blockvis.layout.outlines import FLAT
-from blockvis.layout.triangulation import triangles_of_ring
+from blockvis.layout.solid_layout import SolidLayout
+from blockvis.layout.solids import Solid, area_vector, prism, triangles_of
 
 from .bodies import Bodies
 from .cells import layout_of_cells, merged
@@ -126,34 +127,23 @@ def _own_rows(path: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def _prism(ring: np.ndarray, thickness: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points and triangles of an outline extruded along z, half of the thickness to each side."""
-    n = len(ring)
-    points = np.vstack([np.column_stack([ring, np.full(n, z)]) for z in (-thickness / 2.0, thickness / 2.0)])
-    cap = triangles_of_ring(ring)
-    k = np.arange(n)
-    following = (k + 1) % n
-    sides = np.concatenate([np.stack([k, following, following + n], 1), np.stack([k, following + n, k + n], 1)])
-    return points, np.concatenate([cap[:, ::-1], cap + n, sides])
+def write(layout: AnyLayout, path: Path) -> None:
+    """Write .stl, .obj or .ply as text: blocks in space, or outlines extruded along z by their thickness, else 1 m."""
+    if isinstance(layout, SolidLayout):
+        solids, what = list(layout.solids), "blocks in space, z is up, lengths in m"
+    else:
+        depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
+        solids = [prism(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)]
+        what = "blocks extruded by their thickness, lengths in m"
+    lines = {".stl": _stl_lines, ".obj": _obj_lines, ".ply": _ply_lines}[path.suffix.lower()]
+    path.write_text("\n".join([*lines(solids, rows_of(layout), what), ""]), encoding="utf-8")
 
 
-def write(layout: Layout, path: Path) -> None:
-    """Write .stl, .obj or .ply as text: each block extruded along z by its thickness, 1 m if it has none."""
-    depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
-    prisms = [_prism(ring, float(t)) for ring, t in zip(layout.outlines, depth, strict=True)]
-    rows = rows_of(layout)
-    lines = {".stl": _stl_lines, ".obj": _obj_lines, ".ply": _ply_lines}[path.suffix.lower()](prisms, rows)
-    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
-
-
-_Prisms = list[tuple[np.ndarray, np.ndarray]]
-
-
-def _stl_lines(prisms: _Prisms, rows: list[dict[str, Any]]) -> list[str]:
+def _stl_lines(solids: list[Solid], rows: list[dict[str, Any]], _: str) -> list[str]:
     lines = []
-    for (points, faces), row in zip(prisms, rows, strict=True):
+    for (points, faces), row in zip(solids, rows, strict=True):
         lines.append(f"solid {row['name']}")
-        for a, b, c in points[faces]:
+        for a, b, c in points[triangles_of(points, faces)]:
             normal = np.cross(b - a, c - a)
             normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
             lines.append("facet normal " + " ".join(f"{x:.9g}" for x in normal))
@@ -164,30 +154,43 @@ def _stl_lines(prisms: _Prisms, rows: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _obj_lines(prisms: _Prisms, rows: list[dict[str, Any]]) -> list[str]:
-    lines, start = ["# blocks extruded by their thickness, lengths in m"], 1
-    for (points, faces), row in zip(prisms, rows, strict=True):
+def _obj_lines(solids: list[Solid], rows: list[dict[str, Any]], what: str) -> list[str]:
+    lines, start = [f"# {what}"], 1
+    for (points, faces), row in zip(solids, rows, strict=True):
         lines += [f"# blockvis {json.dumps(row)}", f"o {row['name']}"]
         lines += ["v " + " ".join(repr(float(x)) for x in p) for p in points]
-        lines += ["f " + " ".join(str(int(k) + start) for k in face) for face in faces]
+        lines += ["f " + " ".join(str(int(k) + start) for k in face) for face in _whole_faces(points, faces)]
         start += len(points)
     return lines
 
 
-def _ply_lines(prisms: _Prisms, rows: list[dict[str, Any]]) -> list[str]:
-    n_points, n_faces = (sum(len(part[k]) for part in prisms) for k in (0, 1))
-    lines = ["ply", "format ascii 1.0", "comment blocks extruded by their thickness, lengths in m"]
+def _ply_lines(solids: list[Solid], rows: list[dict[str, Any]], what: str) -> list[str]:
+    # Triangles: polygons of several lengths keep their block_id in few readers.
+    found = [triangles_of(points, faces).tolist() for points, faces in solids]
+    lines = ["ply", "format ascii 1.0", f"comment {what}"]
     lines += [f"comment blockvis {json.dumps(row)}" for row in rows]
-    lines += [f"element vertex {n_points}", *(f"property double {axis}" for axis in "xyz")]
+    lines += [f"element vertex {sum(len(points) for points, _ in solids)}"]
+    lines += [f"property double {axis}" for axis in "xyz"]
     lines += [
-        f"element face {n_faces}",
+        f"element face {sum(map(len, found))}",
         "property list uchar int vertex_indices",
         "property int block_id",
         "end_header",
     ]
-    lines += [" ".join(repr(float(x)) for x in p) for points, _ in prisms for p in points]
+    lines += [" ".join(repr(float(x)) for x in p) for points, _ in solids for p in points]
     start = 0
-    for number, (points, faces) in enumerate(prisms):
-        lines += ["3 " + " ".join(str(int(k) + start) for k in face) + f" {number}" for face in faces]
+    for number, ((points, _), faces) in enumerate(zip(solids, found, strict=True)):
+        lines += [f"{len(face)} " + " ".join(str(int(k) + start) for k in face) + f" {number}" for face in faces]
         start += len(points)
     return lines
+
+
+def _whole_faces(points: np.ndarray, faces: list[list[int]]) -> list[list[int]]:
+    """Faces as they are; those with re-entrant corners, which many programs cut in fans, as triangles."""
+    whole: list[list[int]] = []
+    for face in faces:
+        ring = points[face]
+        turns = np.cross(np.roll(ring, -1, axis=0) - ring, np.roll(ring, -2, axis=0) - np.roll(ring, -1, axis=0))
+        convex = bool((turns @ area_vector(ring) >= 0.0).all())
+        whole += [face] if convex else triangles_of(points, [face]).tolist()
+    return whole

@@ -12,7 +12,9 @@ import solver
 from blockvis.suggestions import nearest, refuse_unknown
 
 from .arches import arch, basket_handle_arch, pointed_arch, segmental_arch
+from .domes import dome
 from .frames import arch_on_piers, buttressed_arch, column, portal
+from .vaults import barrel_vault, extruded_arch
 from .walls import facade, panel, wall
 
 #: A link of a docstring, and the last part of what it names.
@@ -31,11 +33,29 @@ LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
     "panel": panel,
     "wall": wall,
     "facade": facade,
+    "extruded arch": extruded_arch,
+    "barrel vault": barrel_vault,
+    "dome": dome,
 }
 
 
+#: Those of blocks in space.
+IN_SPACE = ("extruded arch", "barrel vault", "dome")
+
+
 #: Kinds of parameters without a unit, in plain words.
-_KINDS = {"float": "", "int": "whole number", "int, optional": "whole number, optional"}
+_KINDS = {"float": "", "int": "whole number", "int, optional": "whole number, optional", "bool": "true or false"}
+
+
+def dimension_of(name: str) -> int:
+    """Say whether a layout lies in the plane, 2, or in space, 3.
+
+    Examples
+    --------
+    >>> dimension_of("dome")
+    3
+    """
+    return 3 if _plain(name) in IN_SPACE else 2
 
 
 def parameters_of(name: str) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fnmatch
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,19 +10,21 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.suggestions import by_similarity
 
-from .layout import Layout
+from .assemble_solids import assemble_solids
+from .layout import AnyLayout, Layout
 from .repair import duplicates, repaired
+from .roles import checked_role, roles_of
 from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
+from .solid_layout import SolidLayout
 
 #: Beginnings of the notes of a layout that change what is analysed.
 TOLD = ("unit", "left out", "ignore", "cut", "joined", "the middle planes", "elevations were ignored")
 
 
 def assemble(
-    layout: Layout,
+    layout: AnyLayout,
     *,
     roles: Mapping[str, str] | None = None,
     supports: Sequence[Mapping[str, Any]] = (),
@@ -38,7 +39,9 @@ def assemble(
 
     Parameters
     ----------
-    layout : Layout
+    layout : Layout or SolidLayout
+        Of blocks in space; thickness, closing and outline_tolerance belong to the plane, see
+        :func:`blockvis.layout.assemble_solids.assemble_solids` for the others.
     roles : mapping of str to {"free", "fixed", "moving"}, optional
         Keys are names of blocks, groups (layers) or materials, or patterns of them (``"springer *"``). A block's
         own name holds over its group, a name over a pattern, a later key over an earlier one.
@@ -70,6 +73,19 @@ def assemble(
     ValueError
         For an unknown role, a key of ``roles`` that matches no block, and an overlap deeper than the tolerance.
     """
+    if isinstance(layout, SolidLayout):
+        if isinstance(joint_thickness, str):
+            raise ValueError(
+                f'joint_thickness is "{joint_thickness}", which measures joints in the plane; give it in m'
+            )
+        return assemble_solids(
+            layout,
+            roles=roles,
+            supports=supports,
+            density=density,
+            joint_thickness=joint_thickness,
+            overlap_tolerance=overlap_tolerance,
+        )
     for note in layout.notes:
         if note.startswith(TOLD):
             warnings.warn(f"{layout.source}: {note}", stacklevel=2)
@@ -151,7 +167,7 @@ def _with_supports(layout: Layout, supports: Sequence[Mapping[str, Any]]) -> Lay
             raise ValueError(f"support '{name}' needs at least three corners [x, y]; its shape is {outline.shape}")
         added["name"].append(name)
         added["outline"].append(outline)
-        added["role"].append(_checked_role(str(support.get("role", solver.FIXED)), f"support '{name}'"))
+        added["role"].append(checked_role(str(support.get("role", solver.FIXED)), f"support '{name}'"))
         added["material"].append(str(support.get("material", "")))
         added["density"].append(float(support.get("density", np.nan)))
         added["thickness"].append(float(support.get("thickness", np.nan)))
@@ -166,49 +182,3 @@ def _with_supports(layout: Layout, supports: Sequence[Mapping[str, Any]]) -> Lay
         density=np.append(nothing if layout.density is None else layout.density, added["density"]),
         thickness=np.append(nothing if layout.thickness is None else layout.thickness, added["thickness"]),
     )
-
-
-def _checked_role(role: str, whose: str) -> str:
-    if role not in solver.ROLES:
-        raise ValueError(f"{whose} has role '{role}'; roles are {', '.join(solver.ROLES)}")
-    return role
-
-
-def roles_of(layout: Layout, roles: Mapping[str, str]) -> list[str]:
-    """Role of every block: the caller's, else the file's, else its group or name if that is a role, else free."""
-    found = []
-    for name, group, role in zip(layout.names, layout.groups, layout.roles, strict=True):
-        said = (role, group.strip().lower(), name.strip().lower())
-        found.append(next((word for word in said if word in solver.ROLES), solver.FREE))
-    labels = {"name": layout.names, "group": layout.groups, "material": layout.materials}
-    by_name: list[tuple[list[int], str]] = []
-    by_group: list[tuple[list[int], str]] = []
-    by_pattern: list[tuple[list[int], str]] = []
-    for key, role in roles.items():
-        _checked_role(role, f"roles: '{key}'")
-        for kind, values in labels.items():
-            hits = [i for i, value in enumerate(values) if value == key]
-            if hits:
-                (by_name if kind == "name" else by_group).append((hits, role))
-                break
-        else:
-            hits = [
-                i
-                for i in range(layout.n_blocks)
-                if any(values[i] and fnmatch.fnmatchcase(values[i], key) for values in labels.values())
-            ]
-            if not hits:
-                raise ValueError(_unmatched(key, layout))
-            by_pattern.append((hits, role))
-    for hits, role in by_pattern + by_group + by_name:
-        for i in hits:
-            found[i] = role
-    return found
-
-
-def _unmatched(key: str, layout: Layout) -> str:
-    labels = [*dict.fromkeys(label for label in (*layout.groups, *layout.materials, *layout.names) if label)]
-    listed = ", ".join(f"'{label}'" for label in by_similarity(key, labels[:2000])[:12])
-    more = f" and {len(labels) - 12} more" if len(labels) > 12 else ""
-    where = layout.source or "the drawing"
-    return f"roles: '{key}' matches no block, group or layer of {where}; it has {listed}{more}; correct the name"

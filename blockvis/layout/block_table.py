@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 import solver
 
-from .layout import Layout
+from .layout import AnyLayout, Layout
+from .solid_layout import SolidLayout
+
+Drawn = TypeVar("Drawn", Layout, SolidLayout)
 
 
-def rows_of(layout: Layout) -> list[dict[str, Any]]:
+def rows_of(layout: AnyLayout) -> list[dict[str, Any]]:
     """Write the block table of a layout.
 
     Returns
@@ -36,7 +39,7 @@ def rows_of(layout: Layout) -> list[dict[str, Any]]:
     return rows
 
 
-def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
+def with_rows(layout: Drawn, rows: Sequence[Any]) -> Drawn:
     """Put the values of a block table, one row per block, into a layout.
 
     Raises
@@ -62,18 +65,20 @@ def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
     for name, role in zip(words("name", layout.names), roles, strict=True):
         if role and role not in solver.ROLES:
             raise ValueError(f"block '{name}' has role '{role}' in the file; roles are {', '.join(solver.ROLES)}")
+    if isinstance(layout, Layout):
+        # Blocks in space have no thickness out of a plane.
+        layout = replace(layout, thickness=numbers("thickness"))
     return replace(
         layout,
         names=words("name", layout.names),
         groups=words("group", [""] * layout.n_blocks),
         roles=roles,
         materials=words("material", [""] * layout.n_blocks),
-        thickness=numbers("thickness"),
         density=numbers("density"),
     )
 
 
-def layers_of(layout: Layout, default: str) -> list[str]:
+def layers_of(layout: AnyLayout, default: str) -> list[str]:
     """Name the layer of each block: its group, else its role as a support, else its material, else the default."""
     return [
         group or (role if role in (solver.FIXED, solver.MOVING) else "") or material or default

@@ -9,11 +9,11 @@ import numpy as np
 
 import solver
 
-from .assemble import roles_of
 from .joints.close import Proposal, proposed
 from .joints.facing_edges import Facing
 from .layout import Layout
 from .repair import DEFAULT_OVERLAP, ROUNDING, duplicates, overlaps
+from .roles import roles_of
 from .simplify import default_tolerance, simplified
 
 #: Classes of joint thickness in the report.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -10,10 +9,10 @@ import numpy as np
 
 import solver
 
+from .labels import check_labels
 from .left_out import LeftOut
-
-#: Surrogate halves of characters, which escaped JSON and bytes that are no text leave behind.
-_HALVES = re.compile("[\ud800-\udfff]")
+from .solid_layout import SolidLayout
+from .solids import extruded
 
 
 @dataclass(frozen=True)
@@ -59,26 +58,21 @@ class Layout:
 
     def __post_init__(self) -> None:
         """Check that there is one entry per block, and replace broken characters."""
-        n = len(self.outlines)
-        for what in ("groups", "roles", "materials"):
-            if not getattr(self, what):
-                object.__setattr__(self, what, ("",) * n)
-        for what in ("names", "groups", "roles", "materials"):
-            if len(getattr(self, what)) != n:
-                raise ValueError(f"{n} outlines but {len(getattr(self, what))} {what}; give one per block")
-        # A file in another encoding than it states leaves halves of characters, which cannot be written to a file.
-        note = "characters that the file's encoding does not have are shown as \ufffd"
-        for what in ("names", "groups", "roles", "materials"):
-            words = getattr(self, what)
-            whole = tuple(_HALVES.sub("\ufffd", word) for word in words)
-            if whole != tuple(words) and note not in self.notes:
-                object.__setattr__(self, "notes", (*self.notes, note))
-            object.__setattr__(self, what, whole)
+        check_labels(self, len(self.outlines), "outlines")
 
     @property
     def n_blocks(self) -> int:
         """Number of outlines."""
         return len(self.outlines)
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates: 2."""
+        return 2
+
+    def corners(self, block: int) -> np.ndarray:
+        """(n, 2) array [m]: the corners of a block."""
+        return self.outlines[block]
 
     def chosen(self, blocks: Sequence[int] | np.ndarray) -> Layout:
         """Take only these blocks, in this order."""
@@ -105,14 +99,59 @@ class Layout:
         return replace(others, left_out=(*self.left_out, *named))
 
 
-def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> Layout:
+#: A layout in the plane, or in space.
+AnyLayout = Layout | SolidLayout
+
+
+def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> AnyLayout:
     """Make a layout of an assembly, with its blocks as drawn or as displaced in a pose."""
     vertices = assembly.vertices if pose is None else solver.moved_vertices(assembly, pose)
+    roles = tuple(map(str, assembly.roles))
+    if isinstance(assembly.shapes, solver.Polyhedra):
+        shapes = assembly.shapes
+        faces: list[list[list[int]]] = [[] for _ in assembly.names]
+        rings = np.split(shapes.corners, shapes.face_offsets[1:-1])
+        for block, ring in zip(shapes.block_of_face.tolist(), rings, strict=True):
+            faces[block].append((ring - shapes.offsets[block]).tolist())
+        return SolidLayout(
+            solids=tuple(zip(np.split(vertices, shapes.offsets[1:-1]), faces, strict=True)),
+            names=assembly.names,
+            roles=roles,
+            materials=assembly.materials,
+            density=assembly.density,
+        )
     return Layout(
         outlines=tuple(np.split(vertices, assembly.offsets[1:-1])),
         names=assembly.names,
-        roles=tuple(map(str, assembly.roles)),
+        roles=roles,
         materials=assembly.materials,
         thickness=assembly.thickness,
         density=assembly.density,
+    )
+
+
+def standing(layout: Layout, thickness: float) -> SolidLayout:
+    """Put a layout of the plane into space: upright, extruded along y by half of its thickness to each side.
+
+    Parameters
+    ----------
+    layout : Layout
+    thickness : float [m]
+        Of blocks for which the layout has none.
+    """
+    depth = np.full(layout.n_blocks, np.nan) if layout.thickness is None else layout.thickness
+    depth = np.where(np.isnan(depth), thickness, depth)
+    return SolidLayout(
+        solids=tuple(
+            extruded(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)
+        ),
+        names=layout.names,
+        groups=layout.groups,
+        roles=layout.roles,
+        materials=layout.materials,
+        density=layout.density,
+        unit=layout.unit,
+        notes=(*layout.notes, "the drawing in the plane was extruded along y by its thickness"),
+        source=layout.source,
+        left_out=layout.left_out,
     )

@@ -19,6 +19,21 @@ def checked_view(view: str | None) -> str | None:
     return view
 
 
+def checked_dimension(dimension: int | str | None) -> int | None:
+    """Return the dimension, None for "auto".
+
+    Raises
+    ------
+    ValueError
+        For anything but 2, 3 and "auto".
+    """
+    if dimension in (None, "auto"):
+        return None
+    if dimension not in (2, 3) or isinstance(dimension, bool):
+        raise ValueError(f'dimension is {dimension!r}; give 2, 3 or "auto"')
+    return int(dimension)
+
+
 def axis_across(view: str) -> int:
     """Give the number of the coordinate along which a view looks.
 

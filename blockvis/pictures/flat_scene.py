@@ -59,6 +59,7 @@ class Scene:
         self.pixel = float(self.frame.size[0]) / size[0]
         self._layers: dict[str, _Layer] = {}
         self._fills: list[_Layer] = []
+        self._renderer: RendererAgg | None = None
         self._outlines = _rings(np.diff(assembly.offsets))
         self._paint(block_fill)
         self._layers["outline"] = _Layer(palette.OUTLINE, *self._outlines, width=self._outline_width())
@@ -122,6 +123,8 @@ class Scene:
         """Draw the picture."""
         width, height = self.size
         rows = max(1, min(height, BAND // width))
+        if rows == height:
+            return self._band(0, height)
         picture = Image.new("RGB", self.size, palette.PAPER)
         for top in range(0, height, rows):
             picture.paste(self._band(top, min(rows, height - top)), (0, top))
@@ -133,7 +136,9 @@ class Scene:
         return np.column_stack([place[:, 0], self.size[1] - place[:, 1]])
 
     def _band(self, top: int, rows: int) -> Image.Image:
-        renderer = RendererAgg(self.size[0], rows, 72.0)
+        if self._renderer is None or self._renderer.height != rows:
+            self._renderer = RendererAgg(self.size[0], rows, 72.0)
+        renderer = self._renderer
         pixels = renderer.buffer_rgba()
         np.asarray(pixels).view(np.uint32)[...] = np.array([*palette.PAPER, 255], np.uint8).view(np.uint32)
         below = self.size[1] - top - rows
@@ -147,7 +152,8 @@ class Scene:
             rgb = tuple(c / 255.0 for c in colour)
             pen.set_foreground(rgb)
             renderer.draw_path(pen, path, place, None if width else rgb)
-        return Image.frombuffer("RGBA", (self.size[0], rows), pixels, "raw", "RGBA", 0, 1).convert("RGB")
+        # Nothing is transparent: the fourth byte of a pixel says nothing.
+        return Image.frombytes("RGB", (self.size[0], rows), pixels, "raw", "RGBX")
 
     def _paths(self) -> Iterator[tuple[Colour, float, Path]]:
         """Colour, width of the line (0 where it is filled) and outlines, back to front.
@@ -155,7 +161,8 @@ class Scene:
         What is filled alike, layer upon layer, is one path: between two that share an edge the background would shine
         through.
         """
-        names = sorted(self._layers.keys() | {"fill"}, key=lambda name: ORDER.index(name.split("/")[0]))
+        # Parts of one layer come in the order in which they were first drawn: a set's order would change with the run.
+        names = sorted([*self._layers, "fill"], key=lambda name: ORDER.index(name.split("/")[0]))
         layers = [layer for name in names for layer in (self._fills if name == "fill" else [self._layers[name]])]
         for (colour, width), alike in groupby(layers, key=lambda layer: (layer.colour, layer.width)):
             drawn = [layer.path for layer in alike if len(layer.corners)]

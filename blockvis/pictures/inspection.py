@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.inspect import Inspection
+from blockvis.layout.inspect_solids import SolidInspection
 
 #: Names are written where they fit into their block at this size [points]; smaller ones cannot be read.
 SMALLEST_TEXT, LARGEST_TEXT = 4.0, 9.0
@@ -22,7 +23,7 @@ GAPS = ("#2166ac", "#1b9e77", "#e6a100", "#d95f02", "#a50026")
 LEFT_OUT = "#b05ac8"
 
 
-def draw_inspection(inspection: Inspection, path: str | Path) -> Path:
+def draw_inspection(inspection: Inspection | SolidInspection, path: str | Path) -> Path:
     """Draw what was found: outlines with their names and roles, joints by their thickness, what was left out.
 
     Parameters
@@ -37,6 +38,11 @@ def draw_inspection(inspection: Inspection, path: str | Path) -> Path:
     """
     from matplotlib.figure import Figure
 
+    if isinstance(inspection, SolidInspection):
+        raise ValueError(
+            f"'{inspection.layout.source}' has its blocks in space; blockvis convert writes them to .vtu for a "
+            "viewer such as ParaView, or one view of them by --dimension 2 --view xz"
+        )
     layout = inspection.layout
     found = f", joint_thickness {inspection.joint_thickness * 1e3:g} mm found" if len(inspection.joints) else ""
     low, high = _box(inspection)

@@ -1,18 +1,25 @@
-"""Assemblies and increments as pyvista datasets: blocks as polygons, joints as lines, contact points as vertices."""
+"""Assemblies and increments as VTK grids: blocks as polygons, joints as lines, contact points as vertices.
+
+A run writes them without pyvista, whose import takes longer than the files of a small structure; who asks for a dataset
+is given one of pyvista's.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyvista as pv
-from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonCore import vtkDataArray, vtkStringArray
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints, vtkStringArray
+from vtkmodules.vtkCommonDataModel import VTK_LINE, VTK_POLYGON, VTK_VERTEX, vtkCellArray, vtkUnstructuredGrid
 
 import solver
 
 from .joints import InitialJoints, initial_joints, joint_states
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 #: Numbers of the roles in the cell array ``role``; their names are in the field array ``role_names``.
 ROLE_NUMBERS = {role: number for number, role in enumerate(solver.ROLES)}
@@ -59,9 +66,15 @@ def block_dataset(
     >>> str(block_dataset(one).cell_data["name"][0])
     'lintel'
     """
+    return _as_dataset(block_grid(assembly, increment, shape=shape))
+
+
+def block_grid(
+    assembly: solver.Assembly, increment: solver.Increment | None = None, *, shape: str = "moved"
+) -> vtkUnstructuredGrid:
+    """Make what :func:`block_dataset` wraps."""
     pose = solver.Pose.initial(assembly) if increment is None else increment.pose
-    corners = solver.moved_vertices(assembly, pose)
-    grid = pv.UnstructuredGrid(_polygon_cells(assembly.offsets), _cell_types(assembly), _in_space(corners))
+    grid = _grid(solver.moved_vertices(assembly, pose), assembly.offsets, VTK_POLYGON)
     materials = sorted(set(assembly.materials))
     number = {material: k for k, material in enumerate(materials)}
     moved = pose.displacements(assembly)
@@ -72,8 +85,8 @@ def block_dataset(
         "displacement": _in_space(moved[:, :2]),
         "rotation": moved[:, 2].copy(),
     }
-    for name, array in cells.items():
-        grid.cell_data[name] = array
+    add_arrays(grid.GetCellData(), cells)
+    grid.GetCellData().SetActiveScalars("block_id")
     for name, words in (("name", assembly.names), ("role_name", assembly.roles), ("material", assembly.materials)):
         grid.GetCellData().AddArray(_strings(name, words))
     _give_shape(grid, assembly.vertices, shape)
@@ -111,15 +124,21 @@ def joint_dataset(
         ``initial``: 1 for joints of the layout, 0 for blocks that have come to touch since, whose opening and slip are
         0. In frames of a fall there are no forces. Point and field arrays as those of :func:`block_dataset`.
     """
+    return _as_dataset(joint_grid(assembly, increment, shape=shape, joints=joints))
+
+
+def joint_grid(
+    assembly: solver.Assembly,
+    increment: solver.Increment,
+    *,
+    shape: str = "moved",
+    joints: InitialJoints | None = None,
+) -> vtkUnstructuredGrid:
+    """Make what :func:`joint_dataset` wraps."""
     states = joint_states(assembly, initial_joints(assembly) if joints is None else joints, increment)
-    n = len(states.ends)
-    points = states.ends.reshape(-1, 2)
-    cells = np.column_stack([np.full(n, 2), np.arange(2 * n).reshape(n, 2)]).ravel()
-    grid = pv.UnstructuredGrid(cells, np.full(n, int(pv.CellType.LINE), np.uint8), _in_space(points))
     blocks = (np.repeat(states.block_a, 2), np.repeat(states.block_b, 2))
-    initial = solver.Pose.initial(assembly)
-    _give_shape(grid, solver.carried_between(points, *blocks, increment.pose, initial), shape)
-    _add(
+    grid = _grid_between(assembly, increment, states.ends.reshape(-1, 2), blocks, VTK_LINE, shape)
+    add_arrays(
         grid.GetCellData(),
         {
             "opening": states.opening,
@@ -161,13 +180,16 @@ def contact_dataset(
         :func:`block_dataset`; its field arrays, and ``state_names``. In frames of a fall, which are no
         equilibrium, forces are 0.
     """
+    return _as_dataset(contact_grid(assembly, increment, shape=shape))
+
+
+def contact_grid(
+    assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
+) -> vtkUnstructuredGrid:
+    """Make what :func:`contact_dataset` wraps."""
     contacts = increment.contacts
-    n = len(contacts.points)
-    vertices = np.column_stack([np.ones(n, dtype=np.int64), np.arange(n)]).ravel()
-    grid = pv.UnstructuredGrid(vertices, np.full(n, int(pv.CellType.VERTEX), np.uint8), _in_space(contacts.points))
-    initial = solver.Pose.initial(assembly)
-    drawn = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, initial)
-    _give_shape(grid, drawn, shape)
+    blocks = (contacts.block_a, contacts.block_b)
+    grid = _grid_between(assembly, increment, contacts.points, blocks, VTK_VERTEX, shape)
     normal, tangent = contacts.frames[:, 0], contacts.frames[:, 1]
     balanced = increment.forces * (increment.status != solver.Status.FALLING)
     force = balanced[:, :1] * normal + balanced[:, 1:] * tangent
@@ -183,7 +205,7 @@ def contact_dataset(
         "block_a": contacts.block_a.astype(np.int32),
         "block_b": contacts.block_b.astype(np.int32),
     }
-    _add(grid.GetPointData(), points)
+    add_arrays(grid.GetPointData(), points)
     grid.GetFieldData().AddArray(_strings("state_names", [state.name.lower() for state in solver.ContactState]))
     _describe(grid, increment)
     _state_units(grid)
@@ -217,23 +239,65 @@ def output_times(increments: Sequence[solver.Increment]) -> list[float]:
     return times
 
 
-def _describe(grid: pv.UnstructuredGrid, increment: solver.Increment) -> None:
-    grid.field_data["settlement"] = np.array([increment.parameter])
-    grid.field_data["phase"] = np.array([increment.phase])
-    grid.field_data["load_multiplier"] = np.array([increment.load_multiplier])
-    grid.field_data["reaction"] = np.array([increment.reaction])
+def _as_dataset(grid: vtkUnstructuredGrid) -> pv.UnstructuredGrid:
+    import pyvista as pv
+
+    return pv.UnstructuredGrid(grid)
+
+
+def _grid(points: np.ndarray, offsets: np.ndarray, kind: int) -> vtkUnstructuredGrid:
+    """Make a grid of cells of one kind, each of its own points, (n, 2) [m]: cell i of offsets[i] to offsets[i + 1]."""
+    grid, nodes, cells = vtkUnstructuredGrid(), vtkPoints(), vtkCellArray()
+    nodes.SetData(numpy_to_vtk(_in_space(points), deep=True))
+    grid.SetPoints(nodes)
+    cells.SetData(
+        *(numpy_to_vtk(np.asarray(ids, dtype=np.int64), deep=True) for ids in (offsets, np.arange(len(points))))
+    )
+    grid.SetCells(numpy_to_vtk(np.full(len(offsets) - 1, kind, dtype=np.uint8), deep=True), cells)
+    return grid
+
+
+def _grid_between(
+    assembly: solver.Assembly,
+    increment: solver.Increment,
+    points: np.ndarray,
+    blocks: tuple[np.ndarray, np.ndarray],
+    kind: int,
+    shape: str,
+) -> vtkUnstructuredGrid:
+    """Make a grid of vertices or lines, whose points, (n, 2) [m], lie between two blocks each."""
+    grid = _grid(points, np.arange(0, len(points) + 1, 2 if kind == VTK_LINE else 1), kind)
+    initial = solver.Pose.initial(assembly)
+    _give_shape(grid, solver.carried_between(points, *blocks, increment.pose, initial), shape)
+    return grid
+
+
+def _describe(grid: vtkUnstructuredGrid, increment: solver.Increment) -> None:
+    numbers = {
+        "settlement": increment.parameter,
+        "phase": increment.phase,
+        "load_multiplier": increment.load_multiplier,
+        "reaction": increment.reaction,
+    }
+    add_arrays(grid.GetFieldData(), {name: np.array([number]) for name, number in numbers.items()})
     grid.GetFieldData().AddArray(_strings("status", [str(increment.status)]))
 
 
-def _add(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
-    """Add arrays that may be empty: blocks in the air have no contact point, and pyvista refuses empty arrays."""
+def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
+    """Add arrays to the point, cell or field data of a VTK grid.
+
+    Parameters
+    ----------
+    attributes : vtkFieldData
+    arrays : mapping from name to array
+    """
     for name, array in arrays.items():
         values = numpy_to_vtk(np.ascontiguousarray(array), deep=True)
         values.SetName(name)
         attributes.AddArray(values)
 
 
-def _give_shape(grid: pv.UnstructuredGrid, reference: np.ndarray, shape: str) -> None:
+def _give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str) -> None:
     """Let the points of a moved grid stay or go where the layout has them, (n, 2) [m], and say how far they move.
 
     The active vectors are what Warp By Vector takes first: of moved shapes those that do not move them a second time.
@@ -241,15 +305,15 @@ def _give_shape(grid: pv.UnstructuredGrid, reference: np.ndarray, shape: str) ->
     if shape not in SHAPES:
         raise ValueError(f"shape is '{shape}'; choose from {', '.join(SHAPES)}")
     drawn = _in_space(reference)
-    moved = np.asarray(grid.points).reshape(-1, 3) - drawn
+    moved = vtk_to_numpy(grid.GetPoints().GetData()) - drawn
     vectors = {"to_reference": -moved} if shape == "moved" else {}
-    _add(grid.GetPointData(), vectors | {"displacement": moved, "reference": drawn})
+    add_arrays(grid.GetPointData(), vectors | {"displacement": moved, "reference": drawn})
     grid.GetPointData().SetActiveVectors("to_reference" if shape == "moved" else "displacement")
     if shape == "undeformed":
-        grid.points = drawn
+        grid.GetPoints().SetData(numpy_to_vtk(drawn, deep=True))
 
 
-def _state_units(grid: pv.UnstructuredGrid) -> None:
+def _state_units(grid: vtkUnstructuredGrid) -> None:
     """Write the unit of each array into its metadata and into the field array ``units``."""
     listed = []
     for attributes in (grid.GetPointData(), grid.GetCellData()):
@@ -268,15 +332,6 @@ def _strings(name: str, words: Iterable[str]) -> vtkStringArray:
     for word in words:
         array.InsertNextValue(str(word))
     return array
-
-
-def _polygon_cells(offsets: np.ndarray) -> np.ndarray:
-    counts = np.diff(offsets)
-    return np.insert(np.arange(offsets[-1]), offsets[:-1], counts)
-
-
-def _cell_types(assembly: solver.Assembly) -> np.ndarray:
-    return np.full(assembly.n_blocks, int(pv.CellType.POLYGON), dtype=np.uint8)
 
 
 def _in_space(vectors: np.ndarray) -> np.ndarray:

@@ -29,17 +29,16 @@ def write_fall(fall: Fall, response: solver.Response, folder: Path) -> None:
     """
     from blockvis.vtk_files import write_pvd, write_vtu
 
-    from .datasets import block_dataset
+    from .datasets import add_arrays, block_grid
 
     make_folder(folder / "fall")
     entries = []
     for k, time in enumerate(fall.times):
-        grid = block_dataset(response.assembly, falling_increment(response, fall.pose(k)))
+        grid = block_grid(response.assembly, falling_increment(response, fall.pose(k)))
         # There is no equilibrium here: numbers of the static path would mislead.
         for name in ("settlement", "load_multiplier", "reaction"):
-            if name in grid.field_data:
-                grid.field_data.remove(name)
-        grid.field_data["time"] = np.array([time])
+            grid.GetFieldData().RemoveArray(name)
+        add_arrays(grid.GetFieldData(), {"time": np.array([time])})
         entries.append((float(time), f"fall/blocks_{k:05d}.vtu"))
         write_vtu(grid, folder / entries[-1][1], durable=False)
     write_pvd(folder / FALL_LIST, entries, last=False)

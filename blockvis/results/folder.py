@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 import solver
-from blockvis.atomic_files import PARTIAL, WINDOWS, make_folder, remove, write_whole
+from blockvis.atomic_files import PARTIAL, WINDOWS, flush, make_folder, remove, write_whole
 from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .cracks import MOST_LISTED, cracks_of
@@ -28,6 +28,9 @@ from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summar
 
 #: Where a run can go on from, beside the increments it belongs to.
 CHECKPOINT = "checkpoint.npz"
+
+#: The VTU files of an increment.
+GRIDS = ("blocks", "contacts", "joints")
 
 #: What a run holds locked on Windows.
 LOCK = ".lock"
@@ -86,7 +89,8 @@ class ResultsFolder:
     Notes
     -----
     The checkpoint is the last file of an increment to be written: files of later increments, which a killed run may
-    have left, are removed when the run goes on.
+    have left, are removed when the run goes on. Each increment waits for the disk with its state and the checkpoint;
+    VTU files and lists, which can be made again from the states, are flushed all at once at the end.
     """
 
     def __init__(
@@ -141,6 +145,8 @@ class ResultsFolder:
         ValueError
             If the folder holds no run.
         """
+        from blockvis.vtk_files import is_whole
+
         results = cls.__new__(cls)
         results.path, results.parameter, results.shape = Path(path), parameter, shape
         results.record = read_record(results.path)
@@ -160,6 +166,9 @@ class ResultsFolder:
         results._start_table()
         for number, increment in enumerate(results.increments):
             results._add_row(number, increment)
+            # A power cut may have left them empty: only the states are waited for.
+            if not all(is_whole(results._grid_file(kind, number)) for kind in GRIDS):
+                results._write_grids(number, increment)
         results._write_lists()
         results._remove_from(count)
         return results, checkpoint
@@ -170,18 +179,8 @@ class ResultsFolder:
         Afterwards the folder keeps the numbers of the increment, not its arrays; see
         :mod:`blockvis.results.increments`.
         """
-        from blockvis.vtk_files import write_vtu
-
-        from .datasets import block_dataset, contact_dataset, joint_dataset
-
         number = len(self.increments)
-        folder = self.path / "increments"
-        for part, dataset in (
-            ("blocks", block_dataset(self.assembly, increment, shape=self.shape)),
-            ("contacts", contact_dataset(self.assembly, increment, shape=self.shape)),
-            ("joints", joint_dataset(self.assembly, increment, shape=self.shape, joints=self._movements.joints)),
-        ):
-            write_vtu(dataset, folder / f"{part}_{number:05d}.vtu", last=False)
+        self._write_grids(number, increment)
         write_whole(self._files.file(number), packed_increment(increment))
         self.increments.append(self._files.without_arrays(number, increment))
         self._add_row(number, increment)
@@ -209,11 +208,19 @@ class ResultsFolder:
         tables : mapping from file name to text, optional
             Tables of the kind of analysis.
         """
-        self._write_lists()
+        self._write_lists(durable=True)
+        # No increment waited for the disk with these: all at once takes a fraction of that.
+        for file in sorted((self.path / "increments").glob("*.vtu")):
+            flush(file)
+        flush(self.path / "increments")
         write_whole(self.path / "joints.csv", self._movements.table())
         for name, text in (tables or {}).items():
             write_whole(self.path / name, text)
-        cracks = cracks_of(self.assembly, response.path[-1].pose, self._movements.joints) if response.path else []
+        cracks = (
+            cracks_of(self.assembly, response.path[-1].pose, self._movements.joints)
+            if response.path and self.assembly.dimension == 2
+            else []
+        )
         listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_whole(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
@@ -231,17 +238,33 @@ class ResultsFolder:
             self._table.writerow(row_of_increment(number, increment, self.assembly, self.parameter))
             self._movements.add(increment)
 
-    def _write_lists(self) -> None:
+    def _write_grids(self, number: int, increment: solver.Increment) -> None:
+        """Write the VTU files of an increment."""
+        from blockvis.vtk_files import write_vtu
+
+        from .datasets import block_grid, contact_grid, joint_grid
+
+        for kind, grid in (
+            ("blocks", block_grid(self.assembly, increment, shape=self.shape)),
+            ("contacts", contact_grid(self.assembly, increment, shape=self.shape)),
+            ("joints", joint_grid(self.assembly, increment, shape=self.shape, joints=self._movements.joints)),
+        ):
+            write_vtu(grid, self._grid_file(kind, number), durable=False)
+
+    def _grid_file(self, kind: str, number: int) -> Path:
+        return self.path / "increments" / f"{kind}_{number:05d}.vtu"
+
+    def _write_lists(self, *, durable: bool = False) -> None:
         """Write the table and the lists of files, of everything so far."""
         from blockvis.vtk_files import write_pvd
 
         from .datasets import output_times
 
-        write_whole(self.path / "response.csv", self._rows.getvalue(), last=False)
+        write_whole(self.path / "response.csv", self._rows.getvalue(), last=False, durable=durable)
         times = output_times(self.increments)
-        for kind in ("blocks", "contacts", "joints"):
+        for kind in GRIDS:
             entries = [(t, f"increments/{kind}_{i:05d}.vtu") for i, t in enumerate(times)]
-            write_pvd(self.path / f"{kind}.pvd", entries, last=False)
+            write_pvd(self.path / f"{kind}.pvd", entries, last=False, durable=durable)
 
     def _remove_from(self, count: int) -> None:
         """Remove the files of increments from a number on, and files that a killed run has left half written."""

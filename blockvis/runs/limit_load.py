@@ -168,6 +168,8 @@ class LimitLoadKind(AnalysisKind):
                 for number, (limit, _) in enumerate(states)
             ],
         }
+        if limit is not None and limit.caveat:
+            summary["limit_load_caveat"] = limit.caveat
         if chosen is not None and response.collapse is None:
             moves = chosen.velocity.any()
             summary["mechanism"] = str(solver.mechanism_of(response.assembly, chosen)) if moves else None
@@ -224,6 +226,8 @@ class LimitLoadKind(AnalysisKind):
         ]
         if said["limit_load_status"] != solver.LimitStatus.FOUND:
             lines.append(f"status: {said['limit_load_status']}")
+        if "limit_load_caveat" in said:
+            lines.append(f"note: {said['limit_load_caveat']}")
         if not response.parameter.is_path and len(path) > 1:
             lines.append(f"the lowest of {len(path)} positions: load at x = {state.parameter:.6g} m")
         elif response.settlements:
@@ -258,6 +262,8 @@ class LimitLoadKind(AnalysisKind):
         if limit is not None:
             rows.append(("static, kinematic value", f"{limit.bounds[0]:.7g}, {limit.bounds[1]:.7g}"))
             rows.append(("friction", limit.flow))
+            if limit.caveat:
+                rows.append(("note", limit.caveat))
             rows.append(("live load at α = 1", force_text(limit.live_force)))
         if not response.parameter.is_path and len(path) > 1:
             rows.append(("lowest of", f"{len(path)} positions, at x = {state.parameter:.5g} m"))

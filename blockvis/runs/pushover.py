@@ -11,7 +11,7 @@ import numpy as np
 
 import solver
 from blockvis.cases.contents import Case
-from blockvis.cases.key import PAIR, POSITIVE, TEXT, Key, Section
+from blockvis.cases.key import POSITIVE, TEXT, VECTOR, Key, Section
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import mechanism_text
 from blockvis.suggestions import nearest
@@ -24,9 +24,9 @@ CONTROL = Section(
     "The displacement that grows in a pushover",
     (
         Key("block", TEXT, "Name of the free block whose displacement grows", "brick 6-4", required=True),
-        Key("direction", PAIR, "Direction in which the displacement counts; its length does not count", [1.0, 0.0],
-            default=(1.0, 0.0)),
-        Key("point", PAIR, "Point of the block, in the drawing", [1.0, 2.0], "m", otherwise="its centroid"),
+        Key("direction", VECTOR, "Direction in which the displacement counts; its length does not count", [1.0, 0.0],
+            otherwise="along x"),
+        Key("point", VECTOR, "Point of the block, in the drawing", [1.0, 2.0], "m", otherwise="its centroid"),
         Key("increment", POSITIVE, "Largest step", 0.01, "m", 0.01),
         Key("limit", POSITIVE, "Displacement at which to stop if capacity is left", 0.5, "m", 1.0),
         Key("tolerance", POSITIVE, "Width of the bracket of the displacement at zero capacity", 1e-4, "m",
@@ -51,12 +51,14 @@ class PushoverKind(AnalysisKind):
         if not table.values:
             return None
         keys = {
-            "direction": table.pair("direction", (1.0, 0.0)),
-            "point": table.pair("point"),
+            "direction": table.vector("direction"),
+            "point": table.vector("point"),
             "increment": table.number("increment", 0.01, positive=True),
             "limit": table.number("limit", 1.0, positive=True),
             "tolerance": table.number("tolerance", positive=True),
         }
+        if keys["direction"] is None:
+            keys["direction"] = (1.0, 0.0) if keys["point"] is None else (1.0, *[0.0] * (len(keys["point"]) - 1))
         block = table.text("block")
         table.finish()
         if block is None:

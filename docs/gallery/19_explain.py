@@ -2,8 +2,8 @@
 From cracks to their cause
 ==========================
 
-Two cracks and nine closed joints were noted on an arch. Which movement of its springers has opened them, and how far has it
-gone? ``blockvis explain CASE.toml --observed cracks.csv`` does the same and writes a page.
+Two cracks and nine closed joints were noted on an arch. Which movement of its springers has opened them, and how far
+has it gone? ``blockvis explain CASE.toml --observed cracks.csv`` does the same and writes a page.
 """
 
 import shutil

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from solver.assembly import Assembly
-from solver.kinematics import Pose, moved_vertices, point_velocities, rotation_matrices
+from solver.kinematics import Pose, cross_rows, moved_vertices, point_velocities, rotation_count, rotation_matrices
 from solver.loads import Settlement
 
 
@@ -54,7 +54,7 @@ class Driver(Protocol):
         ...
 
     def rate(self, s: float) -> np.ndarray:
-        """(n_blocks, 3) array: velocity of the supports per unit of the parameter."""
+        """(n_blocks, n_dof) array: velocity of the supports per unit of the parameter."""
         ...
 
     def gone(self, pose: Pose) -> float:
@@ -62,7 +62,7 @@ class Driver(Protocol):
         ...
 
     def control(self, pose: Pose) -> np.ndarray | None:
-        """(n_blocks, 3) array whose product with a movement is its control displacement; None where supports drive."""
+        """(n_blocks, n_dof) array: times a movement the control displacement in it; None where supports drive."""
         ...
 
     def misdirected(self) -> str:
@@ -83,7 +83,7 @@ class SupportMotion:
     def lever(self) -> float:
         """1 for a translation, the largest radius for a rotation."""
         points, block = moved_vertices(self.assembly, self.start), self.assembly.block_of_vertex
-        return float(np.hypot(*point_velocities(points, block, self.start, self.rate(0.0)).T).max())
+        return float(np.linalg.norm(point_velocities(points, block, self.start, self.rate(0.0)), axis=1).max())
 
     def stops(self) -> tuple[float, ...]:
         """The settlement's own."""
@@ -118,9 +118,9 @@ class ControlDisplacement:
     ----------
     block : str
         Name of a free block.
-    direction : (2,) sequence
+    direction : (d,) sequence
         Direction in which the displacement counts; only its direction matters.
-    point : (2,) sequence, optional [m]
+    point : (d,) sequence, optional [m]
         A point of the block, in the drawing; its centroid by default.
     increment : float [m]
         Largest step.
@@ -143,14 +143,14 @@ class ControlDisplacement:
             value = getattr(self, name)
             if value is None:
                 continue
-            pair = np.asarray(value, dtype=float)
-            if pair.shape != (2,) or not np.isfinite(pair).all():
-                raise ValueError(f"control {name} is {value!r}; give two finite numbers [x, y]")
-            object.__setattr__(self, name, (float(pair[0]), float(pair[1])))
-        length = float(np.hypot(self.direction[0], self.direction[1]))
+            numbers = np.asarray(value, dtype=float)
+            if numbers.shape not in ((2,), (3,)) or not np.isfinite(numbers).all():
+                raise ValueError(f"control {name} is {value!r}; give two finite numbers [x, y], or in space three")
+            object.__setattr__(self, name, tuple(numbers.tolist()))
+        length = float(np.linalg.norm(self.direction))
         if length == 0.0:
             raise ValueError("control direction is [0, 0]; give the direction in which the displacement counts")
-        object.__setattr__(self, "direction", (self.direction[0] / length, self.direction[1] / length))
+        object.__setattr__(self, "direction", tuple(part / length for part in self.direction))
         if self.tolerance is None:
             object.__setattr__(self, "tolerance", self.increment / 100.0)
         for name in ("increment", "limit", "tolerance"):
@@ -171,24 +171,34 @@ class ControlDisplacement:
         return float(moved_by @ np.asarray(self.direction))
 
     def speed(self, assembly: Assembly, pose: Pose, velocity: np.ndarray) -> float:
-        """Rate of the control displacement in a velocity (n_blocks, 3) of the blocks."""
+        """Rate of the control displacement in a velocity (n_blocks, n_dof) of the blocks."""
         block, arm = self._place(assembly)
         point = pose.positions[[block]] + arm @ rotation_matrices(pose.rotations[[block]])[0].T
         return float((point_velocities(point, np.array([block]), pose, velocity) @ np.asarray(self.direction))[0])
 
     def weights(self, assembly: Assembly, pose: Pose) -> np.ndarray:
-        """(n_blocks, 3) array whose product with a movement of the blocks is that of the control point."""
+        """(n_blocks, n_dof) array whose product with a movement of the blocks is that of the control point."""
         block, arm = self._place(assembly)
         turned = rotation_matrices(pose.rotations[[block]])[0] @ arm
-        weights = np.zeros((assembly.n_blocks, 3))
-        x, y = self.direction
-        weights[block] = x, y, turned[0] * y - turned[1] * x
+        along = np.asarray(self.direction)
+        weights = np.zeros((assembly.n_blocks, len(along) + rotation_count(len(along))))
+        weights[block] = np.concatenate([along, cross_rows(turned[None])[0] @ along])
         return weights
 
     def _place(self, assembly: Assembly) -> tuple[int, np.ndarray]:
         block = assembly.index(self.block)
-        arm = np.zeros(2) if self.point is None else np.asarray(self.point) - assembly.centroids[block]
+        arm = (
+            np.zeros(len(self.direction)) if self.point is None else np.asarray(self.point) - assembly.centroids[block]
+        )
         return block, arm
+
+    def check_dimension(self, assembly: Assembly) -> None:
+        """Raise ``ValueError`` where the numbers are for the plane and the blocks in space, or the other way round."""
+        for name in ("direction", "point"):
+            given = getattr(self, name)
+            if given is not None and len(given) != assembly.dimension:
+                what = "in space: give three numbers [x, y, z]" if assembly.dimension == 3 else "in the plane: give two"
+                raise ValueError(f"control {name} is {list(given)}, and the blocks are {what}")
 
 
 class ControlledLoad:
@@ -216,7 +226,7 @@ class ControlledLoad:
 
     def rate(self, s: float) -> np.ndarray:
         """Nothing moves."""
-        return np.zeros((self.assembly.n_blocks, 3))
+        return np.zeros((self.assembly.n_blocks, self.start.positions.shape[1] + self.start.rotations.shape[1]))
 
     def gone(self, pose: Pose) -> float:
         """Since the start [m]."""

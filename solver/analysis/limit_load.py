@@ -9,14 +9,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from solver.assembly import Assembly, check_blocks, find_contacts
+from solver.cones.solve import solve_between
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.interfaces import InterfaceLaw, Interfaces
-from solver.kinematics import Pose, moved_vertices, unit_lengths
+from solver.kinematics import Pose, dimension_of, moved_vertices, unit_lengths
 from solver.loads import Loads, checked_loads
-from solver.lp.problem import LinearProgram, Unbounded
-from solver.lp.solve import solve_lp
+from solver.lp.problem import Unbounded
 from solver.program.strength import Admissible, point_strength
+from solver.program.without_dilatancy import solve_without_dilatancy
 from solver.results.certificate import Certificate
 from solver.results.limit import Envelope, LimitLoad, LimitStatus, limit_state
 from solver.tolerances import COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
@@ -30,19 +31,19 @@ RELAXATION, SETTLING_RELAXATION = 0.5, 0.9
 DILATANCY_KEPT = 0.5
 
 #: Non-associative flow has converged when the multiplier changes by less than the first and shear forces exceed
-#: friction by less than the second, relative to the multiplier and to the largest normal force.
+#: friction by less than the second, relative to the multiplier and to the largest normal force; the third in space,
+#: where the multiplier is off by as much.
 MULTIPLIER_CHANGE = 1e-7
-FRICTION_EXCESS = 1e-6
+FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE = 1e-6, 1e-7
 
 #: Programs of the non-associative sequence: without preference among equal forces, which wanders to low multipliers,
 #: and then at most, near the forces of the lowest, to convergence.
 WANDERING, SETTLING = 40, 100
 
 #: Cost of a change of a normal force in the non-associative programs, in multipliers: it only decides between equals.
-CHANGE_COST = 1e-8
-
-#: Cost of unbalanced force in the non-associative programs, in multipliers: far above that of any real mechanism.
-UNBALANCED_COST = 1e3
+#: The second in space, where solutions are interior ones and a smaller cost is lost in their rounding; it is seen in
+#: the motion, which a last program without it gives.
+CHANGE_COST, CHANGE_COST_IN_SPACE = 1e-8, 1e-5
 
 
 def limit_load(
@@ -101,7 +102,8 @@ def limit_load(
 
     Its dual is the kinematic program: minimise - dead · q over mechanisms q with N(q) ≥ μ |T(q)| at every closed
     contact point and live · q = 1. Livesley (1978), https://doi.org/10.1002/nme.1620121207, for the static form; both
-    bounds are recomputed from the forces and from the mechanism. The multiplier is the exact limit load of the model
+    bounds are recomputed from the forces and from the mechanism. In space the forces of a point are in its round cone
+    |T| ≤ μ N, and the program is a conic one. The multiplier is the exact limit load of the model
     with associative flow, and an upper bound for every other flow rule with the same friction.
 
     Cohesion c and compressive strength σ of the interfaces, off by default, give each contact point its part A of the
@@ -119,13 +121,13 @@ def limit_load(
     https://doi.org/10.1016/j.compstruc.2006.02.005: the friction cone of each point is replaced by
     |T| ≤ μ N⁰ + ψ (N - N⁰), with N⁰ out of the normal forces of the programs before and a dilatancy ψ that falls from
     μ to zero. Ours first wanders among equal solutions, which leads to low multipliers, and then settles near the
-    lowest. Where it converges (N = N⁰) the forces obey Coulomb friction and balance the loads, the mechanism does not
-    lift where it slides, and the power of the loads is what friction takes: a complete solution for friction without
-    dilatancy, never above the associative value. It is not proved to be the least: such a structure may have several
-    limit loads, depending on how it was loaded, and may fall below this one. Its two values agree where it has
-    converged, but are no bounds. Convergence is not proved either; "not converged" says so and gives the last
-    program. Where the associative limit load is unbounded, so is what is given here, although friction without
-    dilatancy might slide.
+    lowest; solutions in space are interior ones, which wander less. Where it converges (N = N⁰) the forces obey Coulomb
+    friction and balance the loads, the mechanism does not lift where it slides, and the power of the loads is what
+    friction takes: a complete solution for friction without dilatancy, never above the associative value. It is not
+    proved to be the least: such a structure may have several limit loads, depending on how it was loaded, and may fall
+    below this one. Its two values agree where it has converged, but are no bounds. Convergence is not proved either;
+    "not converged" says so and gives the last program. Where the associative limit load is unbounded, so is what is
+    given here, although friction without dilatancy might slide.
     """
     if flow not in ("associative", "non-associative"):
         raise ValueError(f"flow is '{flow}'; it is 'associative' or 'non-associative'")
@@ -155,7 +157,7 @@ def limit_load(
 
 @dataclass(frozen=True)
 class _State:
-    """Forces (n_contacts, 2), multiplier and velocity of one program, in its units.
+    """Forces (n_contacts, d), multiplier and velocity of one program, in its units.
 
     ``unbalanced`` is what the dead load alone leaves, per row; ``drag`` (n_contacts,) the friction force that slip
     works against without being in the normal forces' power.
@@ -205,7 +207,9 @@ class _Problem:
         contacts = find_contacts(assembly, vertices, reach)
         around = contacts if interfaces.dry else find_contacts(assembly, vertices, max(reach, REACH * length))
         cohesion, crushing = point_strength(assembly, interfaces, contacts, around)
-        units = unit_lengths(3, length)
+        n_dof = loads.dead.shape[1]
+        d = dimension_of(n_dof)
+        units = unit_lengths(n_dof, length)
         weights = np.abs(loads.dead[free] / units)
         live = loads.live[free] / units
         force = float(weights.sum() / len(weights)) or float(np.abs(live).max())
@@ -213,7 +217,7 @@ class _Problem:
         # What a unit of normal force costs in multipliers of the scaled live load.
         price = np.zeros(len(contacts))
         if displacement > 0.0:
-            total = float(np.hypot(*live[:, :2].T).sum() + np.abs(live[:, 2]).sum())
+            total = float(_lengths(live[:, :d]).sum() + _lengths(live[:, d:]).sum())
             price = np.where(contacts.gaps > closed_gap, contacts.gaps, 0.0) / displacement * (size / total)
         return cls(
             assembly=assembly,
@@ -222,11 +226,11 @@ class _Problem:
             friction=interfaces.friction(assembly, contacts.block_a, contacts.block_b),
             length=length,
             force=force,
-            matrix=sp.csr_array(wrench_matrix(contacts, pose, length))[np.repeat(free, 3)],
+            matrix=sp.csr_array(wrench_matrix(contacts, pose, length))[np.repeat(free, n_dof)],
             dead=(loads.dead[free] / units / force).ravel(),
             live=(live / size).ravel(),
             live_size=size / force,
-            live_force=float(np.hypot(*loads.live[free, :2].sum(axis=0))),
+            live_force=float(np.hypot.reduce(loads.live[free, :d].sum(axis=0))),
             price=price,
             cohesion=cohesion / force,
             crushing=crushing / force,
@@ -235,7 +239,12 @@ class _Problem:
     @property
     def admissible(self) -> Admissible:
         """What the contact points can carry, associative."""
-        return Admissible.of(self.friction, self.cohesion, self.crushing)
+        return Admissible.of(self.friction, self.cohesion, self.crushing, self.size)
+
+    @property
+    def size(self) -> int:
+        """Numbers of the force of a contact point: 2 in the plane, 3 in space."""
+        return self.contacts.points.shape[1]
 
     def balanced(self, *, with_live: bool) -> _State:
         """The least unbalanced force that the dead load leaves, and how the blocks move where it is not nothing."""
@@ -245,50 +254,63 @@ class _Problem:
         identity = sp.identity(rows, format="csc")
         live = sp.csc_array(self.live[:, None] * float(with_live))
         balance = [self.matrix @ columns, live, identity, -identity]
-        program = LinearProgram(
+        solution = solve_between(
             cost=np.concatenate([np.zeros(n + 1), np.ones(2 * rows)]),
             matrix=sp.csc_array(sp.block_array([balance, [carried.limits, None, None, None]], format="csc")),
             lower=np.append(-self.dead, np.zeros(len(carried.most))),
             upper=np.append(-self.dead, carried.most),
+            friction=carried.friction,
+            size=self.size,
         )
-        solution = solve_lp(program)
         forces, multiplier = columns @ solution.x[:n], float(solution.x[n]) * with_live
         unbalanced = np.abs(self.matrix @ forces + self.dead + multiplier * self.live)
         falls = float(unbalanced.max(initial=0.0)) > FALLING_FRACTION * float(np.abs(self.dead).sum())
-        return _State(forces.reshape(-1, 2), multiplier, -solution.row_dual[:rows], unbalanced, solution.gap, falls)
+        motion = -solution.row_dual[:rows]
+        return _State(forces.reshape(-1, self.size), multiplier, motion, unbalanced, solution.gap, falls)
 
     def associative(self, balanced: _State) -> _State:
-        """The program of the limit load; what the dead load leaves unbalanced by rounding it may leave too."""
+        """The program of the limit load; what the dead load leaves unbalanced by rounding it may leave too.
+
+        In space it balances everything: round cones have no vertices that rounding could take away.
+        """
         carried, rows = self.admissible, len(self.dead)
         columns = carried.columns
         balance = [self.matrix @ columns, sp.csc_array(self.live[:, None])]
-        program = LinearProgram(
-            cost=np.append(columns.T @ np.stack([self.price, np.zeros_like(self.price)], axis=1).ravel(), -1.0),
+        left = balanced.unbalanced if self.size == 2 else np.zeros(rows)
+        price = np.zeros((len(self.price), self.size))
+        price[:, 0] = self.price
+        solution = solve_between(
+            cost=np.append(columns.T @ price.ravel(), -1.0),
             matrix=sp.csc_array(sp.block_array([balance, [carried.limits, None]], format="csc")),
-            lower=np.append(-self.dead - balanced.unbalanced, np.zeros(len(carried.most))),
-            upper=np.append(-self.dead + balanced.unbalanced, carried.most),
+            lower=np.append(-self.dead - left, np.zeros(len(carried.most))),
+            upper=np.append(-self.dead + left, carried.most),
+            friction=carried.friction,
+            size=self.size,
         )
-        solution = solve_lp(program)
-        forces = (columns @ solution.x[:-1]).reshape(-1, 2)
-        return _State(forces, float(solution.x[-1]), -solution.row_dual[:rows], balanced.unbalanced, solution.gap)
+        n = columns.shape[1]
+        forces = (columns @ solution.x[:n]).reshape(-1, self.size)
+        return _State(forces, float(solution.x[n]), -solution.row_dual[:rows], balanced.unbalanced, solution.gap)
 
     def non_associative(self, start: _State, found: LimitStatus) -> LimitLoad:
         """The sequence of programs with normal forces carried over and dilatancy taken away."""
         normal, dilatancy, before = start.forces[:, 0], self.friction.copy(), start
         state, converged = start, False
+        plane = self.size == 2
+        change_cost = CHANGE_COST if plane else CHANGE_COST_IN_SPACE
+        most_excess = FRICTION_EXCESS if plane else FRICTION_EXCESS_IN_SPACE
         lowest = (np.inf, normal)
         for number in range(WANDERING + SETTLING):
             wandering = number < WANDERING
             dilatancy = np.where(dilatancy > 1e-3, DILATANCY_KEPT * dilatancy, 0.0)
             if number == WANDERING:
                 normal = lowest[1]
-            state = self._without_dilatancy(normal, dilatancy, start.unbalanced, 0.0 if wandering else CHANGE_COST)
+            state = self._without_dilatancy(normal, dilatancy, start.unbalanced, 0.0 if wandering else change_cost)
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
-            excess = np.abs(state.forces[:, 1]) - self.friction * state.forces[:, 0] - self.cohesion
+            excess = _lengths(state.forces[:, 1:]) - self.friction * state.forces[:, 0] - self.cohesion
             change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
             if (
                 not (wandering or state.falls)
-                and float(excess.max(initial=0.0)) <= FRICTION_EXCESS * largest
+                and float(excess.max(initial=0.0)) <= most_excess * largest
                 and change <= MULTIPLIER_CHANGE
             ):
                 converged = True
@@ -298,47 +320,38 @@ class _Problem:
             if wandering and not state.falls and not dilatancy.any() and state.multiplier < lowest[0]:
                 lowest = (state.multiplier, normal)
             before = state
+        programs = 3 + number
+        if converged and not plane:
+            last = self._without_dilatancy(normal, dilatancy, start.unbalanced, 0.0)
+            state, programs = replace(state, velocity=last.velocity, gap=last.gap), programs + 1
         status = found if converged else LimitStatus.NOT_CONVERGED
-        return self.result(state, status, "non-associative", 3 + number)
+        return self.result(state, status, "non-associative", programs)
 
     def _without_dilatancy(
         self, normal: np.ndarray, dilatancy: np.ndarray, unbalanced: np.ndarray, change_cost: float
     ) -> _State:
-        """Maximises α with |T| ≤ c + μ N⁰ + ψ (N - N⁰); where changes cost, takes of equal α the forces nearest to N⁰.
-
-        Columns N, u, v, then p, m, α and unbalanced forces: T = (u - v) / 2, u + v = 2 (k + ψ N) with the constant
-        k = c + (μ - ψ) N⁰, N - N⁰ = p - m, and a row N for each point that may crush.
-        """
-        n, rows = len(normal), len(self.dead)
-        a_normal, a_shear = self.matrix[:, 0::2], self.matrix[:, 1::2]
-        constant = self.cohesion + (self.friction - dilatancy) * normal
-        brittle = np.flatnonzero(np.isfinite(self.crushing))
-        identity, eye = sp.identity(rows, format="csr"), sp.identity(n, format="csr")
-        live = sp.csr_array(self.live[:, None])
-        balance = [a_normal, a_shear / 2.0, -a_shear / 2.0, None, None, live, identity, -identity]
-        cone = [sp.diags_array(-2.0 * dilatancy), eye, eye, None, None, None, None, None]
-        change = [eye, None, None, -eye, eye, None, None, None]
-        crush = [sp.csr_array(eye)[brittle], None, None, None, None, None, None, None]
-        program = LinearProgram(
-            cost=np.concatenate(
-                [self.price, np.zeros(2 * n), np.full(2 * n, change_cost), [-1.0], np.full(2 * rows, UNBALANCED_COST)]
-            ),
-            matrix=sp.csc_array(sp.block_array([balance, cone, change, crush], format="csc")),
-            lower=np.concatenate([-self.dead - unbalanced, 2.0 * constant, normal, np.zeros(len(brittle))]),
-            upper=np.concatenate([-self.dead + unbalanced, 2.0 * constant, normal, self.crushing[brittle]]),
-        )
-        solution = solve_lp(program)
-        x = solution.x
-        forces = np.stack([x[:n], (x[n : 2 * n] - x[2 * n : 3 * n]) / 2.0], axis=1)
-        left = float(x[5 * n + 1 :].max(initial=0.0))
-        return _State(
-            forces,
-            float(x[5 * n]),
-            -solution.row_dual[:rows],
+        """One program of the sequence."""
+        found = solve_without_dilatancy(
+            self.matrix,
+            self.dead,
+            self.live,
             unbalanced,
-            solution.gap,
-            left > FALLING_FRACTION * float(np.abs(self.dead).sum()),
-            constant,
+            self.friction,
+            self.cohesion,
+            self.crushing,
+            self.price,
+            normal,
+            dilatancy,
+            change_cost,
+        )
+        return _State(
+            found.forces,
+            found.multiplier,
+            -found.solution.row_dual[: len(self.dead)],
+            unbalanced,
+            found.solution.gap,
+            found.unbalanced > FALLING_FRACTION * float(np.abs(self.dead).sum()),
+            found.constant,
         )
 
     def result(self, state: _State, status: LimitStatus, flow: str, programs: int) -> LimitLoad:
@@ -346,13 +359,13 @@ class _Problem:
         velocity, multiplier = state.velocity, state.multiplier
         if status is LimitStatus.UNBOUNDED:
             velocity = np.zeros_like(velocity)
-        relative = (self.matrix.T @ velocity).reshape(-1, 2)
+        relative = (self.matrix.T @ velocity).reshape(-1, self.size)
         live_power = float(self.live @ velocity)
         # Points that are open may close by their gap in a motion whose live power is 1.
         relative[:, 0] += self.price * max(live_power, 0.0)
         drag = self.cohesion if state.drag is None else state.drag
         slope = self.friction if state.drag is None else np.zeros(len(relative))
-        slip, brittle = np.abs(relative[:, 1]), np.isfinite(self.crushing)
+        slip, brittle = _lengths(relative[:, 1:]), np.isfinite(self.crushing)
         # What crushes may come closer than what is rigid, at the price of its strength.
         closer = np.where(brittle, np.maximum(slope * slip - relative[:, 0], 0.0), 0.0)
         crushed = np.where(brittle, self.crushing, 0.0) * closer
@@ -360,13 +373,13 @@ class _Problem:
         kinematic = (taken - float(self.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
         kinematic += float(self.price @ state.forces[:, 0])
         room = relative[:, 0] + closer - slope * slip
-        normal, shear = state.forces.T
-        lost = normal * relative[:, 0] + shear * relative[:, 1] + drag * slip + crushed
+        lost = (state.forces * relative).sum(axis=1) + drag * slip + crushed
         balance = self.matrix @ state.forces.ravel() + self.dead + multiplier * self.live
         total = float(np.abs(self.dead).sum()) or 1.0
-        mechanism = np.zeros((self.assembly.n_blocks, 3))
+        units = 1.0 / unit_lengths(self.pose.positions.shape[1] + self.pose.rotations.shape[1], self.length)
+        mechanism = np.zeros((self.assembly.n_blocks, len(units)))
         size = float(np.abs(velocity).max(initial=0.0)) or 1.0
-        mechanism[self.assembly.free] = velocity.reshape(-1, 3) / size * [1.0, 1.0, 1.0 / self.length]
+        mechanism[self.assembly.free] = velocity.reshape(-1, len(units)) / size * units
         found = status not in (LimitStatus.UNBOUNDED, LimitStatus.NO_EQUILIBRIUM)
         static = multiplier / self.live_size
         nothing = np.inf if status is LimitStatus.UNBOUNDED else np.nan
@@ -406,8 +419,8 @@ def limit_load_envelope(
     assembly : Assembly
     positions : (n,) sequence
     live : callable
-        From a position to the live loads there, an (n_blocks, 3) array [N, N, N·m].
-    dead : (n_blocks, 3) array [N, N, N·m]
+        From a position to the live loads there, an (n_blocks, n_dof) array [N, N·m].
+    dead : (n_blocks, n_dof) array [N, N·m]
     friction_coefficient, interfaces, pose, flow
         As in :func:`limit_load`.
     """
@@ -426,6 +439,11 @@ def limit_load_envelope(
         for x in positions
     )
     return Envelope(positions, limits)
+
+
+def _lengths(vectors: np.ndarray) -> np.ndarray:
+    """(n,) array: lengths of vectors, of a single number its absolute value."""
+    return np.hypot.reduce(np.abs(vectors), axis=1)
 
 
 def checked_live(assembly: Assembly, loads: Loads) -> Loads:

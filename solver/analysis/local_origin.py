@@ -21,14 +21,14 @@ FAR = 1e3
 
 
 def at_origin(assembly: Assembly) -> np.ndarray:
-    """(2,) array [m]: what to take off the coordinates; zero where the structure is near the origin.
+    """(d,) array [m]: what to take off the coordinates; zero where the structure is near the origin.
 
     A multiple of a power of two that is large against the structure, so that taking it off rounds nothing.
     """
     low, high = assembly.vertices.min(axis=0), assembly.vertices.max(axis=0)
     middle = (low + high) / 2.0
     if float(np.abs(middle).max()) <= FAR * assembly.block_size:
-        return np.zeros(2)
+        return np.zeros(assembly.dimension)
     unit = 2.0 ** np.ceil(np.log2(max(float((high - low).max()), assembly.block_size)))
     return np.asarray(np.round(middle / unit) * unit)
 
@@ -37,14 +37,17 @@ def without_origin(
     origin: np.ndarray, assembly: Assembly, settlements: Sequence[Settlement]
 ) -> tuple[Assembly, tuple[Settlement, ...]]:
     """The blocks and what moves their supports in coordinates that count from a local origin."""
-    local = tuple(
-        phase
-        if phase.rotation_centre is None
-        else replace(phase, rotation_centre=tuple((np.asarray(phase.rotation_centre) - origin).tolist()))
-        for phase in settlements
+    local = tuple(_nearer(phase, origin) for phase in settlements)
+    return replace(assembly, shapes=assembly.shapes.shifted(-origin)), local
+
+
+def _nearer(phase: Settlement, origin: np.ndarray) -> Settlement:
+    """The settlement with the points it is given by in coordinates that count from the origin."""
+    centre, axis = (
+        None if point is None else tuple((np.asarray(point) - origin[: len(point)]).tolist())
+        for point in (phase.rotation_centre, phase.radial_from)
     )
-    shapes = replace(assembly.polygons, vertices=assembly.vertices - origin)
-    return replace(assembly, shapes=shapes), local
+    return replace(phase, rotation_centre=centre, radial_from=axis)
 
 
 def told_from(steps: Generator[Increment, None, Ended], origin: np.ndarray) -> Generator[Increment, None, Ended]:

@@ -9,15 +9,16 @@ from itertools import count, islice
 import numpy as np
 
 from solver.assembly import find_contacts, measure_contacts
-from solver.equilibrium import wrench_matrix
+from solver.equilibrium import block_forces, wrench_matrix
 from solver.geometry.contacts import Contacts, matched_contacts
-from solver.kinematics import Pose, moved, moved_vertices, relative_velocities, unit_lengths
+from solver.kinematics import Pose, motion_size, moved, moved_vertices, relative_velocities
 from solver.lp.problem import SolveError
 from solver.program.admissible import Admissible, admissible
-from solver.program.coulomb import NotSolved, Step, solve_step
+from solver.program.coulomb import solve_step
 from solver.program.increment import Locked, solve_program
 from solver.program.light_blocks import light_blocks
 from solver.program.model import Model
+from solver.program.step import NotSolved, Step
 from solver.results.certificate import Certificate
 from solver.results.increment import Increment, State, Status
 from solver.results.mechanism import mechanism_of
@@ -124,11 +125,11 @@ class Place:
     pose : Pose
     contacts : Contacts, optional
         The contact points that carry forces; None where none are remembered.
-    forces : (n_contacts, 2) array
+    forces : (n_contacts, d) array
         Their normal and shear forces, in units of the program.
     multiplier : float
         Of the live load.
-    velocity : (n_blocks, 3) array, optional
+    velocity : (n_blocks, n_dof) array, optional
         In the step that led here, per unit of the parameter; None where nothing moved with it.
     """
 
@@ -201,17 +202,12 @@ class Proved:
 
 
 def drag_of(model: Model) -> np.ndarray:
-    """(n_blocks, 3) array: weights, and weights times the square of the polar radius, in units of the program."""
-    assembly = model.assembly
-    weight = np.hypot(*model.load[:, :2].T) / model.force
+    """(n_blocks, n_dof) array: weights, and weights times a radius of gyration squared, in units of the program."""
+    assembly, d = model.assembly, model.dimension
+    weight = np.linalg.norm(model.load[:, :d], axis=1) / model.force
     weight = np.maximum(weight, 1e-3 * assembly.masses / max(float(assembly.masses[assembly.free].mean()), 1e-300))
-    corner = assembly.vertices - assembly.centroids[assembly.block_of_vertex]
-    following = corner[assembly.next_vertex]
-    cross = corner[:, 0] * following[:, 1] - following[:, 0] * corner[:, 1]
-    squares = (corner**2).sum(axis=1) + (corner * following).sum(axis=1) + (following**2).sum(axis=1)
-    first = assembly.offsets[:-1]
-    radius = np.add.reduceat(cross * squares, first) / (6.0 * np.add.reduceat(cross, first))
-    return np.stack([weight, weight, weight * radius / model.length**2], axis=1)
+    turning = weight * assembly.shapes.gyration / model.length**2
+    return np.column_stack([weight] * d + [turning] * (len(model.lengths) - d))
 
 
 class Path:
@@ -242,17 +238,18 @@ class Path:
         self.sunk: tuple[Place, list[tuple[Place, np.ndarray, float]], Iterator[tuple[Place, np.ndarray, float]]] | None
         self.sunk = None
         rate = driver.rate(0.0)
-        sideways = rate[model.assembly.moving, :2].sum(axis=0) if model.assembly.moving.any() else np.zeros(2)
-        size = float(np.hypot(*sideways))
-        self.imperfection = np.zeros((model.assembly.n_blocks, 3))
+        d = model.dimension
+        sideways = rate[model.assembly.moving, :d].sum(axis=0)
+        size = float(np.linalg.norm(sideways))
+        self.imperfection = np.zeros_like(model.load)
         if size > 0.0:
-            self.imperfection[:, :2] = IMPERFECTION * self.drag[:, :1] * sideways / size
+            self.imperfection[:, :d] = IMPERFECTION * self.drag[:, :1] * sideways / size
 
     # Steps ----------------------------------------------------------------------------------------------------------
 
     def at_start(self, pose: Pose) -> Place:
         """The place of a pose that remembers no forces."""
-        return Place(0.0, pose, None, np.zeros((0, 2)))
+        return Place(0.0, pose, None, np.zeros((0, self.model.dimension)))
 
     def rested(self, pose: Pose) -> Place:
         """The place in which a pose comes to rest from no forces at all.
@@ -272,9 +269,9 @@ class Path:
         return unmoved if self.proved(unmoved).bounds.exists else place
 
     def _remembered(self, place: Place, contacts: Contacts) -> np.ndarray:
-        """(n_contacts, 2) array: forces of the place at these contact points; zero at new ones."""
+        """(n_contacts, d) array: forces of the place at these contact points; zero at new ones."""
         if place.contacts is None or len(place.contacts) == 0 or len(contacts) == 0:
-            return np.zeros((len(contacts), 2))
+            return np.zeros((len(contacts), self.model.dimension))
         number, same = matched_contacts(contacts, place.contacts)
         return np.where(same[:, None], place.forces[number], 0.0)
 
@@ -291,7 +288,7 @@ class Path:
         Returns
         -------
         place : Place
-        motion : (n_blocks, 3) array
+        motion : (n_blocks, n_dof) array
             In units of the program; supports included.
 
         Raises
@@ -305,9 +302,10 @@ class Path:
         supports, size = driver.supports(s), length * self.lever / model.length
         start = self._around(place.pose)
         memory = self._remembered(place, start)
-        normal, shear = memory.T
+        normal, shear = memory[:, 0], memory[:, 1:]
         friction = model.interfaces.friction(assembly, start.block_a, start.block_b)
-        rows = np.repeat(free, 3)
+        n_dof = len(scales)
+        rows = np.repeat(free, n_dof)
         load = (model.scaled_load + self.imperfection)[free].ravel()
         drag = DRAG * self.care / size * self.drag[free].ravel()
         if place.velocity is not None and not still:
@@ -328,7 +326,7 @@ class Path:
                 load=load,
                 drag=drag,
                 gap=contacts.gaps / model.length,
-                slip=(contacts.slip - start.slip)[:, 0] / model.length,
+                slip=(contacts.slip - start.slip) / model.length,
                 normal=normal,
                 shear=shear,
                 friction=friction,
@@ -344,8 +342,8 @@ class Path:
             # The give is taken back: the next linearisation starts from the forces it has reached.
             normal, shear, multiplier = found.normal, found.shear, found.multiplier
             gone = gone + found.motion
-            full = np.zeros((assembly.n_blocks, 3))
-            full[free] = gone.reshape(-1, 3) * scales
+            full = np.zeros((assembly.n_blocks, n_dof))
+            full[free] = gone.reshape(-1, n_dof) * scales
             pose = self._with_supports(moved(place.pose, full), supports)
             way = float(np.abs(found.motion).max(initial=0.0))
             if np.abs(gone).max(initial=0.0) > FARTHEST_FALL:
@@ -356,12 +354,12 @@ class Path:
             raise NotSolved(f"the geometry still moves by {way:.1e} block sizes")
         if pressed > PRESSED:
             raise Pressed(f"blocks are pressed into each other by {pressed:.1e} block sizes")
-        motion = full + np.where(free[:, None], 0.0, 1.0) * self._between(place.pose, pose)
+        motion = np.where(free[:, None], full, place.pose.movement_to(pose))
         if not still and np.abs(gone).max(initial=0.0) > max(FALLING_FORCE / (DRAG * self.care) * size, 1e3 * GIVE):
             raise Falls
         if size > (SHORTEST_FALL if still else SLIP_OFF) and np.abs(gone).max(initial=0.0) > SLIP_OFF:
             self._refuse_beyond(contacts, normal, pose)
-        forces = np.stack([normal, shear], axis=1)
+        forces = np.column_stack([normal, shear])
         return (
             Place(s, pose, contacts, forces, multiplier / (live_size or 1.0), None if still else motion / length),
             motion / scales,
@@ -406,9 +404,6 @@ class Path:
             np.where(free[:, None], pose.positions, supports.positions),
             np.where(free[:, None], pose.rotations, supports.rotations),
         )
-
-    def _between(self, before: Pose, after: Pose) -> np.ndarray:
-        return np.column_stack([after.positions - before.positions, after.rotations - before.rotations])
 
     def advanced(self, place: Place, target: float, step: float) -> tuple[Place, float]:
         """Goes towards a parameter in steps that suit the path, and stops early where a place is worth a proof.
@@ -484,6 +479,9 @@ class Path:
         """Whether no movement whatever lets the supports go on: proved by a linear program without end."""
         if self.model.live is not None:
             return False
+        if self.model.dimension == 3:
+            # What nothing can balance but the supports: forces that press on them without limit.
+            return bool(np.isinf(self.proved(place).bounds.low))
         self.programs += 1
         try:
             solve_program(self.model, place.pose, self.driver.rate(place.s) * length)
@@ -519,13 +517,13 @@ class Path:
         live, live_size = model.scaled_live
         free = model.assembly.free[:, None]
         load = (model.scaled_load + after.multiplier * live_size * live) * free
-        resultant = (wrench_matrix(contacts, after.pose, model.length) @ after.forces.ravel()).reshape(-1, 3)
+        resultant = (wrench_matrix(contacts, after.pose, model.length) @ after.forces.ravel()).reshape(motion.shape)
         started = measure_contacts(model.assembly, moved_vertices(model.assembly, before.pose), contacts)
-        slipped = (contacts.slip - started.slip)[:, 0] / model.length
+        slipped = (contacts.slip - started.slip) / model.length
         done = (
             float((load * motion).sum()),
             float((np.where(free, 0.0, resultant) * motion).sum()),
-            -float((after.forces[:, 1] * slipped).sum()),
+            -float((after.forces[:, 1:] * slipped).sum()),
         )
         return tuple(np.add(self.works, done).tolist())
 
@@ -552,9 +550,9 @@ class Path:
         return Proved(place, contacts, friction, bounds, forces, multiplier)
 
     def _on_supports(self, contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarray:
-        """(n_blocks, 3) array [N, N, N·m]: what the structure does to each support; zero for free blocks."""
+        """(n_blocks, n_dof) array [N, N, N·m]: what the structure does to each support; zero for free blocks."""
         model = self.model
-        resultant = (wrench_matrix(contacts, pose) @ forces.ravel()).reshape(-1, 3) * model.force
+        resultant = block_forces(contacts, pose, forces) * model.force
         return np.where(model.assembly.free[:, None], 0.0, resultant)
 
     def _balanced(
@@ -563,17 +561,20 @@ class Path:
         """Forces in equilibrium without the drag, near those remembered; open points carry none."""
         model, free = self.model, self.model.assembly.free
         closed = np.flatnonzero(contacts.gaps <= COMPUTED_GAP * model.length)
-        columns = np.stack([2 * closed, 2 * closed + 1], axis=1).ravel()
+        d = model.dimension
+        columns = (d * closed[:, None] + np.arange(d)).ravel()
         live, live_size = model.scaled_live
         load = model.scaled_load[free].ravel()
         none = np.zeros(len(closed))
         # What has used up its friction goes on doing so: where it slides, forces are no matter of choice.
-        mu, (normal, shear) = friction[closed], remembered[closed].T
-        used_up = (normal > 0.0) & (np.abs(shear) >= mu * normal * (1.0 - USED_UP))
-        on = np.where(used_up, -np.sign(shear) * 1e2 * (1.0 + normal), 0.0)
+        mu, normal, shear = friction[closed], remembered[closed, 0], remembered[closed, 1:]
+        size = np.linalg.norm(shear, axis=1)
+        used_up = (normal > 0.0) & (size >= mu * normal * (1.0 - USED_UP))
+        far = np.where(used_up, -1e2 * (1.0 + normal), 0.0)
+        on = far[:, None] * np.divide(shear, size[:, None], out=np.zeros_like(shear), where=size[:, None] > 0.0)
         still = Step(
             matrix=wrench_matrix(contacts, place.pose, model.length)[:, columns],
-            free=np.repeat(free, 3),
+            free=np.repeat(free, len(model.lengths)),
             load=load,
             drag=np.full(len(load), 1e-12),
             gap=none,
@@ -587,7 +588,7 @@ class Path:
             control=live[free].ravel() if model.live is not None else None,
         )
         forces = remembered.copy()
-        for step in (still, replace(still, slip=none)):
+        for step in (still, replace(still, slip=np.zeros_like(on))):
             try:
                 found = solve_step(step, np.zeros(len(load)), place.multiplier * live_size)
                 break
@@ -596,7 +597,7 @@ class Path:
         else:
             return forces, place.multiplier
         forces[:] = 0.0
-        forces[closed] = np.stack([found.normal, found.shear], axis=1)
+        forces[closed] = np.column_stack([found.normal, found.shear])
         return forces, found.multiplier / (live_size or 1.0)
 
     # The loop -------------------------------------------------------------------------------------------------------
@@ -624,7 +625,7 @@ class Path:
                 return Ending(
                     Status.LOCKED, "at a control displacement of 0 m no live load of this pattern moves the structure"
                 )
-            yield self._falling(start, np.zeros((self.model.assembly.n_blocks, 3)), start.s)
+            yield self._falling(start, np.zeros_like(self.model.load), start.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
         if resume is None and self.model.live is None and np.isinf(proved.bounds.low):
             length = GIVE * self.model.length / self.lever
@@ -709,7 +710,7 @@ class Path:
 
     def _light_blocks_stand(self, pose: Pose) -> bool:
         """Whether blocks too light for the others' programs stand where the others do."""
-        if self.model.live is not None or not light_blocks(self.model).any():
+        if self.model.live is not None or self.model.dimension == 3 or not light_blocks(self.model).any():
             return True
         self.programs += 1
         return not solve_program(self.model, pose).falling
@@ -759,7 +760,7 @@ class Path:
         return proved is not None and proved.bounds.exists and (self.model.live is None or proved.measured > 0.0)
 
     def _next_motion(self, place: Place) -> np.ndarray:
-        """(n_blocks, 3) array: velocity in the movement that follows, per unit of the parameter."""
+        """(n_blocks, n_dof) array: velocity in the movement that follows, per unit of the parameter."""
         length = MECHANISM * self.model.length / self.lever
         try:
             _, motion = self.step(place, length)
@@ -768,14 +769,14 @@ class Path:
         return motion * self.model.lengths / length
 
     def _motion_at_last(self, place: Place) -> np.ndarray:
-        """(n_blocks, 3) array: velocity at the last equilibrium, beyond which a step would be one of the fall.
+        """(n_blocks, n_dof) array: velocity at the last equilibrium, beyond which a step would be one of the fall.
 
         The motion of the paper's linear program there; under a live load that a little before.
         """
         length = MECHANISM * self.model.length / self.lever
         before = next((one for one in self.marks if place.s - one.s >= length), None)
         try:
-            if self.model.live is None:
+            if self.model.live is None and self.model.dimension == 2:
                 found = solve_program(self.model, place.pose, self.driver.rate(place.s) * length)
                 if not found.falling:
                     return found.motion / length
@@ -789,7 +790,7 @@ class Path:
         """The equilibrium in which a structure that falls comes to rest, where it does so soon and near."""
         model, start = self.model, place.pose
         for number, (sunk, motion, length) in enumerate(islice(self._sinking(place), steps), start=1):
-            way = float(np.abs(self._between(start, sunk.pose)[:, :2]).max())
+            way = float(np.abs(sunk.pose.positions - start.positions).max())
             if way > farthest * model.length:
                 return None
             # As slow as what creeps under a small part of its weight.
@@ -848,9 +849,9 @@ class Path:
         )
         frames = list(alone._fall(without))
         if not frames:
-            frames = [self._falling(without, np.zeros((model.assembly.n_blocks, 3)), without.s)]
+            frames = [self._falling(without, np.zeros_like(model.load), without.s)]
         # The first movement that is large against the give of the joints, and small enough to be one of velocities.
-        sizes = [float(np.abs(frame.velocity * unit_lengths(3, model.length)).max()) for frame in frames]
+        sizes = [float(motion_size(frame.velocity, model.length).max()) for frame in frames]
         chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))
         velocity, largest = frames[chosen].velocity, max(sizes[chosen], 1e-300)
         standing = self._reported(
@@ -860,7 +861,7 @@ class Path:
             last.friction,
             velocity / largest,
             last.measured,
-            np.zeros((model.assembly.n_blocks, 3)),
+            np.zeros_like(model.load),
             frames[chosen].certificate,
             Status.EQUILIBRIUM,
             (),
@@ -869,7 +870,7 @@ class Path:
         part = 0.5 if spent is None else last.measured / (last.measured - spent)
         reaction = last.measured
         if model.live is not None:
-            reaction *= float(np.hypot(*model.live[:, :2].sum(axis=0)))
+            reaction *= model.live_force
         collapse = Collapse(
             displacement=last.place.s + part * (first_without - last.place.s),
             bracket=(last.place.s, first_without),
@@ -889,7 +890,7 @@ class Path:
 
     def _fall(self, place: Place) -> Generator[Increment, None, None]:
         """Pseudo-time frames: what falls sinks against the drag until it rests."""
-        frames, start, total = 0, place, np.zeros((self.model.assembly.n_blocks, 3))
+        frames, start, total = 0, place, np.zeros_like(self.model.load)
         for new, motion, length in islice(self._sinking(place), 4 * max(self.falling_frames, 4)):
             total = total + motion
             moved_by = float(np.abs(total).max())
@@ -904,7 +905,9 @@ class Path:
 
     def _increment(self, proved: Proved, velocity: np.ndarray) -> Increment:
         model, place, contacts = self.model, proved.place, proved.contacts
-        resultant = (wrench_matrix(contacts, place.pose, model.length) @ proved.forces.ravel()).reshape(-1, 3)
+        resultant = (wrench_matrix(contacts, place.pose, model.length) @ proved.forces.ravel()).reshape(
+            model.load.shape
+        )
         live, live_size = model.scaled_live
         measured = proved.measured
         balance = (
@@ -949,7 +952,7 @@ class Path:
             friction,
             velocity,
             0.0,
-            np.zeros((assembly.n_blocks, 3)),
+            np.zeros_like(model.load),
             none,
             Status.FALLING,
             (),
@@ -970,14 +973,13 @@ class Path:
         bounds: tuple[float, float] = (np.nan, np.nan),
     ) -> Increment:
         pushed = self.model.live is not None
-        resultant = float(np.hypot(*self.model.live[:, :2].sum(axis=0))) if self.model.live is not None else 1.0
         programs, self.programs = self.programs, 0
         return Increment(
             parameter=place.s,
             measured=measured,
             phase=self.number,
             load_multiplier=measured if pushed else 0.0,
-            reaction=measured * resultant if pushed else measured,
+            reaction=measured * self.model.live_force if pushed else measured,
             certificate=certificate,
             status=status,
             programs=programs,
@@ -1010,7 +1012,7 @@ class Path:
 
     def _no_equilibrium(self, motion: np.ndarray) -> str:
         assembly = self.model.assembly
-        size = np.abs(motion[:, :2]).max(axis=1)
+        size = np.abs(motion[:, : self.model.dimension]).max(axis=1)
         falling = np.flatnonzero(assembly.free & (size > 0.5 * size.max()))
         shown = ", ".join(f"'{assembly.names[i]}'" for i in falling[:8])
         more = f" and {len(falling) - 8} more" if len(falling) > 8 else ""
@@ -1027,8 +1029,9 @@ class Path:
 
     def _jump(self, start: Pose, end: Pose) -> str:
         assembly = self.model.assembly
-        way = np.hypot(*(moved_vertices(assembly, end) - moved_vertices(assembly, start)).T)
-        way = np.where(assembly.free, np.maximum.reduceat(way, assembly.offsets[:-1]), 0.0)
+        far = np.linalg.norm(moved_vertices(assembly, end) - moved_vertices(assembly, start), axis=1)
+        way = np.zeros(assembly.n_blocks)
+        np.maximum.at(way, assembly.block_of_vertex, np.where(assembly.free[assembly.block_of_vertex], far, 0.0))
         fell = np.flatnonzero(way > 0.1 * way.max())
         return f"{self._named(fell)} moved by up to {way.max():.2g} m at once to the next equilibrium"
 

@@ -9,7 +9,7 @@ from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose
 from solver.loads import Loads
 from solver.lp.problem import SolveError
-from solver.program.coulomb import NotSolved
+from solver.program.step import NotSolved
 from solver.results.increment import Increment, Status
 from solver.results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER
 from solver.results.response import Response
@@ -109,6 +109,7 @@ def pushover_increments(
     controls = controls or Controls()
     if controls.increments == LINEAR_PROGRAM:
         raise ValueError("increments = 'linear program' is for settlements; leave it out for a pushover")
+    control.check_dimension(assembly)
     check_blocks(assembly, controls.overlap_tolerance)
     interfaces.refuse_strength("a pushover")
     loads = checked_live(assembly, loads)

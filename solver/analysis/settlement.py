@@ -13,8 +13,8 @@ from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose
 from solver.loads import Loads, Settlement, checked_loads
 from solver.lp.problem import SolveError
-from solver.program.coulomb import NotSolved
 from solver.program.model import Model
+from solver.program.step import NotSolved
 from solver.results.increment import Increment, Status
 from solver.results.quantities import reaction_to, settlement_in
 from solver.results.response import Response
@@ -128,8 +128,10 @@ def settlement_increments(
     check_settlement(assembly, phases, controls)
     interfaces.refuse_strength("a settlement")
     by_program = controls.increments == LINEAR_PROGRAM or (
-        controls.increments is None and int(assembly.free.sum()) > LARGEST_FOLLOWED
+        controls.increments is None and assembly.dimension == 2 and int(assembly.free.sum()) > LARGEST_FOLLOWED
     )
+    if by_program and assembly.dimension == 3:
+        raise ValueError("increments = 'linear program' is for blocks in the plane; leave it out for blocks in space")
     if resume is not None and (
         resume.phase > len(phases) - (resume.program is None) or len(resume.start.rotations) != assembly.n_blocks
     ):
@@ -167,7 +169,7 @@ def _by_program(
             return ending
         found = increment.checkpoint
         if found is not None:
-            place = Place(found.here.s, found.here.pose, None, np.zeros((0, 2)))
+            place = Place(found.here.s, found.here.pose, None, np.zeros((0, assembly.dimension)))
             found = Checkpoint(found.phase, found.start, place, found.step, found.first_without, program=found)
         yield replace(increment, checkpoint=found)
 
@@ -214,7 +216,7 @@ def _increments(
 
 def model_of(assembly: Assembly, loads: Loads, interfaces: Interfaces, live: np.ndarray | None = None) -> Model:
     """The units and loads of a path."""
-    force = float(np.hypot(*loads.dead[assembly.free, :2].T).mean())
+    force = float(np.linalg.norm(loads.dead[assembly.free, : assembly.dimension], axis=1).mean())
     if force == 0.0:
         raise ValueError("no load acts on any free block; give them a weight")
     length = assembly.block_size
@@ -245,6 +247,7 @@ def check_settlement(assembly: Assembly, phases: Sequence[Settlement], controls:
     if not phases:
         raise ValueError("no settlement was given; give one Settlement, or several phases")
     for number, phase in enumerate(phases):
+        phase.check_dimension(assembly)
         if not phase.taking_part(assembly).any():
             which = f"settlement phase {number + 1}" if len(phases) > 1 else "the settlement"
             raise ValueError(f"{which} moves no support: give at least one block the role 'moving'")

@@ -17,7 +17,7 @@ def box_pairs(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
     Parameters
     ----------
-    low, high : (n, 2) arrays [m]
+    low, high : (n, d) arrays [m]
         Corners of the boxes.
 
     Returns
@@ -29,21 +29,23 @@ def box_pairs(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray
     Sort and sweep along the axis on which fewer pairs survive; one long block (the ground) costs n pairs, not n².
     """
     best = None
-    for axis in (0, 1):
+    for axis in range(low.shape[1]):
         order = np.argsort(low[:, axis], kind="stable")
         ends = np.searchsorted(low[order, axis], high[order, axis], side="right")
         counts = np.maximum(ends - np.arange(1, len(order) + 1), 0)
         if best is None or counts.sum() < best[1].sum():
-            best = (order, counts, 1 - axis)
+            best = (order, counts, axis)
     assert best is not None
-    order, counts, other = best
+    order, counts, swept = best
     owner, position = expand_ranges(counts)
     i, j = order[owner], order[owner + 1 + position]
-    touching = (low[i, other] <= high[j, other]) & (low[j, other] <= high[i, other])
-    i, j = i[touching], j[touching]
+    for axis in range(low.shape[1]):
+        if axis != swept:
+            touching = (low[i, axis] <= high[j, axis]) & (low[j, axis] <= high[i, axis])
+            i, j = i[touching], j[touching]
     return np.minimum(i, j), np.maximum(i, j)
 
 
 def boxes(vertices: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest coordinates of each polygon, two (n, 2) arrays."""
+    """Lowest and highest coordinates of each polygon or solid, two (n, d) arrays."""
     return np.minimum.reduceat(vertices, offsets[:-1]), np.maximum.reduceat(vertices, offsets[:-1])

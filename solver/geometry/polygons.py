@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,9 +20,23 @@ class Polygons(Outlines):
         """(n_blocks,) array [m]: edge of the square as large as each block."""
         return np.sqrt(self.areas)
 
+    @property
+    def gyration(self) -> np.ndarray:
+        """(n_blocks,) array [m²]: square of the radius of gyration of each block about its centroid, as drawn."""
+        corner = self.vertices - self.centroids[self.block_of_vertex]
+        following = corner[self.next_vertex]
+        cross = corner[:, 0] * following[:, 1] - following[:, 0] * corner[:, 1]
+        squares = (corner**2).sum(axis=1) + (corner * following).sum(axis=1) + (following**2).sum(axis=1)
+        first = self.offsets[:-1]
+        return np.asarray(np.add.reduceat(cross * squares, first) / (6.0 * np.add.reduceat(cross, first)))
+
     def size(self, chosen: np.ndarray) -> float:
         """Edge of the square as large as the mean of the chosen blocks, (n_blocks,) bool, [m]."""
         return float(np.sqrt(self.areas[chosen].mean()))
+
+    def shifted(self, by: np.ndarray) -> Polygons:
+        """Move the drawing by (2,) [m]."""
+        return replace(self, vertices=self.vertices + by)
 
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
         """Find contact points with a gap up to ``reach`` [m], one of their blocks of the useful, (n_blocks,) bool."""

@@ -40,8 +40,15 @@ class Shapes(Protocol):
     def sizes(self) -> np.ndarray:
         """(n_blocks,) array [m]: edge of the square or cube as large as each block."""
 
+    @property
+    def gyration(self) -> np.ndarray:
+        """(n_blocks,) array [m²]: square of the radius of gyration of each block; in space the mean about all axes."""
+
     def size(self, chosen: np.ndarray) -> float:
         """Edge of the square or cube as large as the mean of the chosen blocks, (n_blocks,) bool, [m]."""
+
+    def shifted(self, by: np.ndarray) -> Shapes:
+        """Move the drawing by (d,) [m]."""
 
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
         """Find contact points with a gap up to ``reach`` [m], one of their blocks of the useful, (n_blocks,) bool."""

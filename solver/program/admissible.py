@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from solver.cones.problem import ConicProgram, ConicSolution
+from solver.cones.solve import solve_cones
 from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
@@ -35,7 +37,7 @@ class Admissible:
     gap : float
         Largest relative difference of the two objectives of the programs.
     programs : int
-    forces : (n_contacts, 2) array
+    forces : (n_contacts, d) array
         Normal and shear forces of the least reaction or largest multiplier, in units of the program.
     """
 
@@ -71,10 +73,11 @@ def admissible(
     contacts : Contacts
         At the pose; points that are open carry nothing.
     friction : (n_contacts,) array
-    rate : (n_blocks, 3) array, optional
+    rate : (n_blocks, n_dof) array, optional
         Movement of the supports along which the reaction is bounded.
     vertex : bool
-        Forces at a vertex of the program, as few as there are; otherwise, in larger models, those found fastest.
+        In the plane: forces at a vertex of the program, as few as there are; otherwise, in larger models, those found
+        fastest. Round cones have no such vertices.
 
     Raises
     ------
@@ -82,14 +85,17 @@ def admissible(
 
     Notes
     -----
-    Two linear programs over the multipliers of the friction cones' rays: the least and the largest reaction (or
-    multiplier). The least is that of Portioli & Cascini (2017) at this geometry. What neither program can balance, at
-    a cost above that of any mechanism, is what is out of balance.
+    Two linear programs over the multipliers of the friction cones' rays, in space two conic programs over the forces in
+    round cones: the least and the largest reaction (or multiplier). The least is that of Portioli & Cascini (2017) at
+    this geometry. What neither program can balance, at a cost above that of any mechanism, is what is out of balance.
     """
-    free = np.repeat(model.assembly.free, 3)
+    d = model.dimension
+    free = np.repeat(model.assembly.free, model.n_dof)
     closed = np.flatnonzero(contacts.gaps <= COMPUTED_GAP * model.length)
     matrix = sp.csr_array(wrench_matrix(contacts, pose, model.length))
-    rays = friction_rays(friction)[:, np.repeat(2 * closed, 2) + np.tile([0, 1], len(closed))]
+    # In the plane the two rays of a cone are its forces; in space its three numbers are.
+    forces_of = friction_rays(friction) if d == 2 else sp.eye_array(3 * len(contacts), format="csc")
+    rays = forces_of[:, np.repeat(d * closed, d) + np.tile(np.arange(d), len(closed))]
     balance = sp.csc_array(matrix[free] @ rays)
     rows, n = balance.shape
     load, tolerance = model.scaled_load.ravel()[free], BALANCE_TOLERANCE * model.total_load
@@ -101,14 +107,19 @@ def admissible(
         columns += [column, -column]
         objective, unit = np.concatenate([objective, np.zeros(2 * rows), [1.0, -1.0]]), 1.0 / live_size
     else:
-        along = np.zeros(3 * model.assembly.n_blocks) if rate is None else (rate / model.lengths).ravel()
+        along = np.zeros(len(free)) if rate is None else (rate / model.lengths).ravel()
         objective = np.concatenate([rays.T @ (matrix.T @ np.where(free, 0.0, along)), np.zeros(2 * rows)])
         unit = model.force * model.length
     lower, upper = -load - tolerance, -load + tolerance
     along_rows = along_structure(free_blocks(model.assembly), pose)
     routes = None if vertex or rows <= SIMPLEX_ROWS else INTERIOR_ROUTES
 
-    def extreme(sign: float, *, slack: bool) -> LPSolution | None:
+    def solved(cost: np.ndarray, matrix: sp.csc_array) -> LPSolution | ConicSolution:
+        if d == 3:
+            return solve_cones(ConicProgram(cost, matrix, -load, friction[closed], along=along_rows))
+        return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, along=along_rows), routes)
+
+    def extreme(sign: float, *, slack: bool) -> LPSolution | ConicSolution | None:
         """Least or, by sign, largest value, with or without unbalanced forces; None where it has no bound."""
         cost = sign * objective
         cost[n : n + 2 * rows] = UNBALANCED_COST
@@ -117,7 +128,7 @@ def admissible(
             kept = np.concatenate([np.arange(n), np.arange(n + 2 * rows, matrix.shape[1])])
             cost, matrix = cost[kept], matrix[:, kept]
         try:
-            return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, along=along_rows), routes)
+            return solved(cost, matrix)
         except Unbounded:
             return None
 
@@ -125,7 +136,7 @@ def admissible(
     out = {k: float(s.x[n : n + 2 * rows].sum()) / model.total_load for k, s in found.items() if s is not None}
     unbalanced = min(out.values(), default=np.inf)
     programs, values, gaps = 2, [], [0.0]
-    forces = np.zeros(2 * len(contacts))
+    forces = np.zeros(d * len(contacts))
     for sign, solution in found.items():
         balanced = objective
         if solution is not None and out[sign] > FALLING_FRACTION >= unbalanced:
@@ -141,5 +152,5 @@ def admissible(
             forces = rays @ solution.x[:n]
     # Where both run away, forces without limit balance everything.
     return Admissible(
-        0.0 if np.isinf(unbalanced) else unbalanced, values[0], values[1], max(gaps), programs, forces.reshape(-1, 2)
+        0.0 if np.isinf(unbalanced) else unbalanced, values[0], values[1], max(gaps), programs, forces.reshape(-1, d)
     )

@@ -21,111 +21,37 @@ https://doi.org/10.1023/A:1008292328909, here for quasi-static steps.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg as sla
-import scipy.sparse as sp
-import scipy.sparse.linalg as spl
 
-#: Iterations, and part of the way to the nearest bound that is gone.
-ITERATIONS, FRACTION = 60, 0.99
-
-#: The solution counts when balance, the linear equations in parts of a step and an elastic give, and the largest
-#: product in elastic gives across are below these. A point that neither carries nor is open keeps a force of the last
-#: one's root.
-BALANCE, EQUATIONS, PRODUCT = 1e-9, 1e-8, 1e-9
-
-#: Mean product of force and distance, in block weights and sizes, at which a solution that converges no further counts.
-PRODUCT_LEFT = 1e-9
-
-#: Start: distances in parts of a step and an elastic give, forces in mean block weights.
-FIRST_DISTANCE, FIRST_FORCE = 0.1, 0.05
-
-#: Start near a known solution: least forces, and least distances in parts of a step and an elastic give.
-NEAR = 1e-3
+from .coulomb_in_space import solve_in_space
+from .factors import factorised
+from .step import (
+    BALANCE,
+    CAREFUL,
+    CORRECTION,
+    EQUATIONS,
+    FIRST_DISTANCE,
+    FIRST_FORCE,
+    FRACTION,
+    ITERATIONS,
+    LOOK_BACK,
+    LOST,
+    NEAR,
+    PRODUCT,
+    PRODUCT_LEFT,
+    SHORT,
+    Moved,
+    NotSolved,
+    Pattern,
+    Step,
+    paired,
+)
 
 #: Newton's method on the points' states: part of a force that counts as none, and changes of states after which it is
 #: given up.
 STATES, STATE_CHANGES = 1e-9, 12
-
-#: Up to so many freedoms a dense factorisation is the faster.
-DENSE = 150
-
-#: A step this short calls for centring; so many of them within the last few, twice over, and the path is lost.
-SHORT, LOST, LOOK_BACK = 0.2, 4, 8
-
-#: Corrections of second order are cut off at so many times the mean product.
-CORRECTION = 10.0
-
-#: Centring at least of the second try, which also leaves corrections of second order out.
-CAREFUL = 0.5
-
-
-class NotSolved(Exception):
-    """The interior method did not come to a solution: the step is to be made smaller."""
-
-
-@dataclass(frozen=True)
-class Step:
-    """What a step is made of, in units of the program: lengths in block sizes, forces in mean block weights.
-
-    Attributes
-    ----------
-    matrix : (n_blocks * dof, 2 n_contacts) sparse array, by columns
-        Forces and moments on all blocks from normal and shear forces, as :func:`equilibrium_matrix` has them.
-    free : (n_blocks * dof,) bool array
-        Rows of free blocks; ``n_dof`` of them.
-    load : (n_dof,) array
-    drag : (n_dof,) array
-        Resisting force per movement in this step.
-    gap, slip : (n_contacts,) arrays
-        Of each contact point where the free blocks now are, with the supports at the end of the step; slip counts from
-        the start of the step.
-    normal, shear : (n_contacts,) arrays
-        Remembered forces N⁰, T⁰.
-    friction : (n_contacts,) array
-    give : (float, float)
-        Elastic give of a contact point across the joint and along it: movement per force.
-    size : float
-        Movement of the supports in the step.
-    live : (n_dof,) array, optional
-        Load whose multiplier is unknown.
-    control : (n_dof,) array, optional
-        Weights of the movements that make up the control displacement.
-    wanted : float
-        Control displacement still to be gone.
-    """
-
-    matrix: sp.csc_array
-    free: np.ndarray
-    load: np.ndarray
-    drag: np.ndarray
-    gap: np.ndarray
-    slip: np.ndarray
-    normal: np.ndarray
-    shear: np.ndarray
-    friction: np.ndarray
-    give: tuple[float, float]
-    size: float
-    live: np.ndarray | None = None
-    control: np.ndarray | None = None
-    wanted: float = 0.0
-
-
-@dataclass(frozen=True)
-class Moved:
-    """The solution of a :class:`Step`: further movement of the free blocks, forces, and the live load's multiplier."""
-
-    motion: np.ndarray
-    normal: np.ndarray
-    shear: np.ndarray
-    multiplier: float
-    iterations: int
-    forces: np.ndarray
-    distances: np.ndarray
-    pattern: _Pattern | None = None
 
 
 def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Moved | None = None) -> Moved:
@@ -148,8 +74,17 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
     if len(step.gap) == 0:
         # Nothing touches anything: the drag alone holds.
         none = np.zeros((3, 0))
-        return Moved(step.load / step.drag - gone, none[0], none[0], multiplier, 0, none, none)
-    pattern = _Pattern(step) if near is None or near.pattern is None else near.pattern.fill(step)
+        return Moved(step.load / step.drag - gone, none[0], step.shear, multiplier, 0, none, none)
+    pattern = Pattern(step) if near is None or near.pattern is None else near.pattern.fill(step)
+    if step.shear.shape[1] > 1:
+        return solve_in_space(step, pattern, gone, multiplier, near)
+    flat = replace(step, slip=step.slip[:, 0], shear=step.shear[:, 0])
+    found = _solve_in_plane(flat, pattern, gone, multiplier, near and replace(near, shear=near.shear[:, 0]))
+    return replace(found, shear=found.shear[:, None])
+
+
+def _solve_in_plane(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float, near: Moved | None) -> Moved:
+    """Solve a step whose slips and shear forces are (n_contacts,) arrays."""
     scale = step.size + step.give[1]
     if near is not None:
         found = _in_states(step, pattern, gone, multiplier, near)
@@ -182,49 +117,7 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
         return found
 
 
-class _Pattern:
-    """Where the contact points' stiffness goes in the matrix of a step: worked out once, filled at every iteration."""
-
-    def __init__(self, step: Step) -> None:
-        n, n_dof = len(step.gap), len(step.load)
-        number = np.full(len(step.free), -1)
-        number[step.free] = np.arange(n_dof)
-        # A column holds the rows of the two blocks, the same for a point's normal and shear force.
-        dof = number[step.matrix.indices.reshape(n, 2, -1)[:, 0]]
-        self.both = (dof[:, :, None] >= 0) & (dof[:, None, :] >= 0)
-        row, column = (
-            np.broadcast_to(dof[:, :, None], self.both.shape),
-            np.broadcast_to(dof[:, None, :], self.both.shape),
-        )
-        diagonal = np.arange(n_dof)
-        place = np.concatenate([column[self.both] * n_dof + row[self.both], diagonal * n_dof + diagonal])
-        filled, self.place = np.unique(place, return_inverse=True)
-        self.dense = n_dof <= DENSE
-        self.raw = place
-        self.indices, counts = filled % n_dof, np.bincount(filled // n_dof, minlength=n_dof)
-        self.pointers = np.concatenate([[0], np.cumsum(counts)])
-        self.drag = step.drag
-        self.fill(step)
-
-    def fill(self, step: Step) -> _Pattern:
-        """Take the numbers of a step with the same contact points; gives itself."""
-        self.blocks = step.matrix.data.reshape(len(step.gap), 2, -1)
-        to_blocks = sp.csr_array(sp.csr_array(step.matrix)[step.free])
-        self.to_blocks = to_blocks.toarray() if self.dense else to_blocks
-        self.to_contacts = np.ascontiguousarray(self.to_blocks.T) if self.dense else sp.csr_array(to_blocks.T)
-        return self
-
-    def stiffness(self, local: np.ndarray) -> np.ndarray | sp.csc_array:
-        """The matrix with the drag, for (n_contacts, 2, 2) answers of the contact points."""
-        each = np.matmul(self.blocks.transpose(0, 2, 1), np.matmul(local, self.blocks))
-        n = len(self.drag)
-        if self.dense:
-            return np.bincount(self.raw, np.concatenate([each[self.both], self.drag]), n * n).reshape(n, n).T
-        data = np.bincount(self.place, np.concatenate([each[self.both], self.drag]), len(self.indices))
-        return sp.csc_array((data, self.indices, self.pointers), shape=(n, n))
-
-
-def _in_states(step: Step, pattern: _Pattern, gone: np.ndarray, multiplier: float, near: Moved) -> Moved | None:
+def _in_states(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float, near: Moved) -> Moved | None:
     """Newton's method on which points are open, stick or slide, from a solution near; None where that goes round."""
     mu, (across, along) = step.friction, step.give
     steep = (1.0 - STATES) * mu * near.normal
@@ -240,8 +133,8 @@ def _in_states(step: Step, pattern: _Pattern, gone: np.ndarray, multiplier: floa
         local[:, 1, 1] = sticks / along
         first = np.where(closed, step.normal - step.gap / across, 0.0)
         second = np.where(sticks, step.shear - step.slip / along, way * mu * first)
-        solve = _factorised(pattern.stiffness(local))
-        motion = solve(step.load + pattern.to_blocks @ _paired(first, second) - step.drag * gone)
+        solve = factorised(pattern.stiffness(local))
+        motion = solve(step.load + pattern.to_blocks @ paired(first, second) - step.drag * gone)
         found_multiplier = multiplier
         if step.live is not None and step.control is not None:
             by_live = solve(step.live)
@@ -271,7 +164,7 @@ def _in_states(step: Step, pattern: _Pattern, gone: np.ndarray, multiplier: floa
 
 def _followed(
     step: Step,
-    pattern: _Pattern,
+    pattern: Pattern,
     gone: np.ndarray,
     multiplier: float,
     forces: np.ndarray,
@@ -286,7 +179,7 @@ def _followed(
         normal, shear = forces[0], mu * (forces[1] - forces[2])
         gap_error = distances[0] - (gap + across * (normal - step.normal))
         slip_error = distances[1] - distances[2] - (slip + along * (shear - step.shear))
-        unbalanced = step.load + pattern.to_blocks @ _paired(normal, shear) - step.drag * (gone + motion)
+        unbalanced = step.load + pattern.to_blocks @ paired(normal, shear) - step.drag * (gone + motion)
         behind = 0.0
         if step.live is not None and step.control is not None:
             unbalanced = unbalanced + multiplier * step.live
@@ -332,28 +225,6 @@ def _longest(forces: np.ndarray, distances: np.ndarray, change: _Direction) -> f
     return 1.0 / max(steepest, 1.0)
 
 
-def _paired(normal: np.ndarray, shear: np.ndarray) -> np.ndarray:
-    """(2 n_contacts,) array: normal and shear force of each contact point, one behind the other."""
-    both = np.empty((len(normal), 2))
-    both[:, 0], both[:, 1] = normal, shear
-    return both.ravel()
-
-
-def _factorised(matrix: np.ndarray | sp.csc_array) -> Callable[[np.ndarray], np.ndarray]:
-    """What solves with a matrix; a sparse one's pattern is symmetric, its values are not."""
-    if isinstance(matrix, np.ndarray):
-        factors, pivots, _ = sla.lapack.dgetrf(matrix, overwrite_a=True)
-        return lambda right: np.asarray(sla.lapack.dgetrs(factors, pivots, right)[0])
-    try:
-        # Minimum degree of the pattern, pivots near the diagonal.
-        solve: Callable[[np.ndarray], np.ndarray] = spl.splu(
-            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options={"SymmetricMode": True}
-        ).solve
-    except RuntimeError as error:
-        raise NotSolved(str(error)) from None
-    return solve
-
-
 @dataclass(frozen=True)
 class _Direction:
     """A change of everything: (3, n_contacts) arrays of forces and distances, (n_contacts, 2) of relative movement."""
@@ -368,7 +239,7 @@ class _Direction:
 class _Newton:
     """Newton's equations at one point of the central path, factorised once for several right-hand sides."""
 
-    def __init__(self, step: Step, pattern: _Pattern, forces: np.ndarray, distances: np.ndarray) -> None:
+    def __init__(self, step: Step, pattern: Pattern, forces: np.ndarray, distances: np.ndarray) -> None:
         self.step, self.pattern, self.forces, self.distances = step, pattern, forces, distances
         mu, n = step.friction, len(step.friction)
         self.k_normal = distances[0] / forces[0] + step.give[0]
@@ -378,7 +249,7 @@ class _Newton:
         through = mu * (self.k_minus - self.k_plus) / (self.k_shear * self.k_normal)
         local = np.zeros((n, 2, 2))
         local[:, 0, 0], local[:, 1, 0], local[:, 1, 1] = 1.0 / self.k_normal, through, 2.0 * mu / self.k_shear
-        self.solve = _factorised(pattern.stiffness(local))
+        self.solve = factorised(pattern.stiffness(local))
         self.by_live = None if step.live is None else self.solve(step.live)
 
     def direction(
@@ -390,7 +261,7 @@ class _Newton:
         for_shear = aims[1] / plus - aims[2] / minus + slip_error
         at_once = for_normal / self.k_normal
         shear = step.friction * ((self.k_minus - self.k_plus) * at_once + 2.0 * for_shear) / self.k_shear
-        motion = self.solve(unbalanced + self.pattern.to_blocks @ _paired(at_once, shear))
+        motion = self.solve(unbalanced + self.pattern.to_blocks @ paired(at_once, shear))
         multiplier = 0.0
         if self.by_live is not None and step.control is not None:
             moved = float(step.control @ self.by_live)

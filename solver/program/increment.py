@@ -200,12 +200,12 @@ def solve_program(
 
 
 def along_structure(parts: MacroBlocks, pose: Pose) -> np.ndarray:
-    """(3 n_parts,) array [m]: where each part lies along the longer side of the structure, for each of its freedoms."""
+    """(n_dof n_parts,) array [m]: where each part lies along the longest side of the structure, for each freedom."""
     moving = parts.part >= 0
     part, places = parts.part[moving], pose.positions[moving]
     axis = int(np.argmax(np.ptp(places, axis=0))) if len(places) else 0
     mean = np.bincount(part, places[:, axis], parts.n_parts) / np.maximum(np.bincount(part, minlength=parts.n_parts), 1)
-    return np.repeat(mean, 3)
+    return np.repeat(mean, places.shape[1] + pose.rotations.shape[1])
 
 
 def solved_or_left_wedged(

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from solver.assembly import Assembly
 from solver.geometry.contacts import Contacts
-from solver.kinematics import Pose, moving_together
+from solver.kinematics import Pose, moving_together, rotation_count
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class MacroBlocks:
     ----------
     part : (n_blocks,) int array
         Number of the group each free block belongs to; -1 for supports and what moves with them.
-    motions : (3 n_blocks, 3 n_parts) sparse array
+    motions : (n_dof n_blocks, n_dof n_parts) sparse array
         From the movements of the groups to those of all blocks, in units of the program.
     """
 
@@ -30,14 +30,15 @@ class MacroBlocks:
     @property
     def n_parts(self) -> int:
         """Number of groups that are free to move."""
-        return self.motions.shape[1] // 3
+        return int(self.part.max(initial=-1)) + 1
 
 
 def free_blocks(assembly: Assembly) -> MacroBlocks:
     """Every free block for itself."""
-    free = assembly.free
-    freedoms = np.flatnonzero(np.repeat(free, 3))
-    shape = (3 * assembly.n_blocks, len(freedoms))
+    free, d = assembly.free, assembly.centroids.shape[1]
+    n_dof = d + rotation_count(d)
+    freedoms = np.flatnonzero(np.repeat(free, n_dof))
+    shape = (n_dof * assembly.n_blocks, len(freedoms))
     entries = (np.ones(len(freedoms)), (freedoms, np.arange(len(freedoms))))
     return MacroBlocks(np.where(free, np.cumsum(free) - 1, -1), sp.csr_array(entries, shape=shape))
 

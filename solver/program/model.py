@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.assembly import Assembly
 from solver.interfaces import Interfaces
-from solver.kinematics import motion_size, unit_lengths
+from solver.kinematics import dimension_of, motion_size, unit_lengths
 from solver.lp.solve import CROSSOVER_ROWS
 
 
@@ -32,7 +32,8 @@ class Model:
     ----------
     assembly : Assembly
     interfaces : Interfaces
-    load : (n_blocks, 3) array [N, N, N·m]
+    load : (n_blocks, n_dof) array [N, N·m]
+        Forces and moments, n_dof = 3 in the plane and 6 in space.
     length : float [m]
     force : float [N]
         Block size and mean load of a free block: the program is written in these units.
@@ -41,7 +42,7 @@ class Model:
     reach : float [m]
         Largest gap of a contact point that is kept.
     tally : Tally
-    live : (n_blocks, 3) array [N, N, N·m], optional
+    live : (n_blocks, n_dof) array [N, N·m], optional
         Where given, loads whose multiplier is an unknown of every program: it takes the value that lets the program
         do its work.
     """
@@ -57,34 +58,49 @@ class Model:
     live: np.ndarray | None = None
 
     @property
+    def n_dof(self) -> int:
+        """Degrees of freedom of a block: 3 in the plane, 6 in space."""
+        return self.load.shape[1]
+
+    @property
+    def dimension(self) -> int:
+        """2 in the plane, 3 in space."""
+        return dimension_of(self.n_dof)
+
+    @property
     def large(self) -> bool:
         """Whether programs are too large for vertex solutions, and corrections therefore stop before they are exact."""
-        return 3 * int(self.assembly.free.sum()) > CROSSOVER_ROWS
+        return self.n_dof * int(self.assembly.free.sum()) > CROSSOVER_ROWS
 
     @property
     def lengths(self) -> np.ndarray:
-        """(3,) array: divide movements by it, multiply moments' rows by it, to get to the units of the program."""
-        return np.array([self.length, self.length, 1.0])
+        """(n_dof,) array: divide movements by it, multiply moments' rows by it, to get to the units of the program."""
+        return np.where(np.arange(self.n_dof) < self.dimension, self.length, 1.0)
 
     @property
     def scaled_load(self) -> np.ndarray:
-        """(n_blocks, 3) array: the load in units of the program."""
-        return self.load / (self.force * unit_lengths(self.load.shape[1], self.length))
+        """(n_blocks, n_dof) array: the load in units of the program."""
+        return self.load / (self.force * unit_lengths(self.n_dof, self.length))
 
     @property
     def scaled_live(self) -> tuple[np.ndarray, float]:
-        """(n_blocks, 3) array: the live load on the free blocks, its largest component 1; what it was divided by."""
+        """(n_blocks, n_dof) array: live load on the free blocks, its largest component 1; what it was divided by."""
         free = self.assembly.free
-        live = np.zeros((len(free), 3))
+        live = np.zeros((len(free), self.n_dof))
         if self.live is not None:
-            live[free] = self.live[free] / (self.force * unit_lengths(self.load.shape[1], self.length))
+            live[free] = self.live[free] / (self.force * unit_lengths(self.n_dof, self.length))
         size = float(np.abs(live).max(initial=0.0))
         return live / (size or 1.0), size
 
     @property
     def total_load(self) -> float:
         """Sum of the loads on the free blocks in units of the program."""
-        return float(np.abs(self.scaled_load[self.assembly.free, :2]).sum())
+        return float(np.abs(self.scaled_load[self.assembly.free, : self.dimension]).sum())
+
+    @property
+    def live_force(self) -> float:
+        """Resultant of the live loads at a multiplier of 1 [N]; zero without."""
+        return 0.0 if self.live is None else float(np.linalg.norm(self.live[:, : self.dimension].sum(axis=0)))
 
 
 def largest_movement(model: Model, motion: np.ndarray) -> float:

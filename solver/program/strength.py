@@ -47,26 +47,33 @@ class Admissible:
 
     Attributes
     ----------
-    columns : (2 n, m) sparse array
+    columns : (size n, m) sparse array
         Normal and shear forces of all contact points from the coefficients.
     limits : (k, m) sparse array
     most : (k,) array
         The limits on the coefficients: 0 ≤ limits · coefficients ≤ most.
+    friction : (j,) array
+        Slopes of the round cones, of as many numbers as a force, that the first coefficients are in; none in the plane.
     """
 
     columns: sp.csc_array
     limits: sp.csc_array
     most: np.ndarray
+    friction: np.ndarray
 
     @classmethod
-    def of(cls, friction: np.ndarray, cohesion: np.ndarray, crushing: np.ndarray) -> Admissible:
+    def of(cls, friction: np.ndarray, cohesion: np.ndarray, crushing: np.ndarray, size: int = 2) -> Admissible:
         """All (N, T) with 0 ≤ N ≤ crushing and |T| ≤ friction · N + cohesion, (n,) arrays each.
 
-        The cone of dry friction is spanned by its two rays; cohesion adds a shear force of either sign.
+        In the plane the cone of dry friction is spanned by its two rays; cohesion adds a shear force of either sign. In
+        space forces of ``size`` numbers are in a round cone; cohesion adds one of slope 1 whose first number has no
+        effect but to be limited.
         """
         n = len(friction)
-        rays = friction_rays(friction)
         sticky, brittle = np.flatnonzero(cohesion > 0.0), np.flatnonzero(np.isfinite(crushing))
+        if size > 2:
+            return cls._round(friction, cohesion[sticky], crushing[brittle], sticky, brittle, size)
+        rays = friction_rays(friction)
         p, q = len(sticky), len(brittle)
         values = np.tile([1.0, -1.0], p)
         shear = sp.csc_array((values, (np.repeat(2 * sticky + 1, 2), np.arange(2 * p))), shape=(2 * n, 2 * p))
@@ -75,4 +82,23 @@ class Admissible:
         ahead = sp.csc_array((p, 2 * n))
         normal = sp.csc_array(sp.csr_array(columns)[2 * brittle]) if q else sp.csc_array((0, columns.shape[1]))
         limits = sp.csc_array(sp.vstack([sp.hstack([ahead, both]), normal], format="csc"))
-        return cls(columns, limits, np.concatenate([cohesion[sticky], crushing[brittle]]))
+        return cls(columns, limits, np.concatenate([cohesion[sticky], crushing[brittle]]), np.zeros(0))
+
+    @classmethod
+    def _round(
+        cls,
+        friction: np.ndarray,
+        cohesion: np.ndarray,
+        crushing: np.ndarray,
+        sticky: np.ndarray,
+        brittle: np.ndarray,
+        size: int,
+    ) -> Admissible:
+        n, p, q = len(friction), len(sticky), len(brittle)
+        shear, of_added = ((size * which[:, None] + np.arange(1, size)).ravel() for which in (sticky, np.arange(p)))
+        added = sp.csc_array((np.ones(len(shear)), (shear, of_added)), shape=(size * n, size * p))
+        columns = sp.csc_array(sp.hstack([sp.eye_array(size * n, format="csc"), added], format="csc"))
+        limited = np.concatenate([size * (n + np.arange(p)), size * brittle])
+        limits = sp.csc_array((np.ones(p + q), (np.arange(p + q), limited)), shape=(p + q, columns.shape[1]))
+        slopes = np.concatenate([friction, np.ones(p)])
+        return cls(columns, limits, np.concatenate([cohesion, crushing]), slopes)

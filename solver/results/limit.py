@@ -13,6 +13,12 @@ from solver.kinematics import Pose, relative_velocities
 from .certificate import Certificate
 from .increment import Increment, State, Status, StoredState
 
+#: What is said with a limit load in space whose joints lift where they slide.
+CAVEAT = (
+    "associative friction lifts what slides: in grooves and wedges of blocks in space the multiplier may be too high; "
+    'flow = "non-associative" slides without lift'
+)
+
 
 class LimitStatus(StrEnum):
     """What a limit load is.
@@ -82,7 +88,7 @@ class LimitLoad:
 
     @property
     def forces(self) -> np.ndarray:
-        """(n_contacts, 2) array [N]: normal (compression positive) and shear force on ``block_a`` at the limit."""
+        """(n_contacts, d) array [N]: normal (compression positive) and shear force on ``block_a`` at the limit."""
         return self.state.forces
 
     @property
@@ -92,11 +98,20 @@ class LimitLoad:
 
     @property
     def mechanism(self) -> np.ndarray:
-        """(n_blocks, 3) array: how the blocks begin to move, largest movement 1 (rotations times block size).
+        """(n_blocks, n_dof) array: how the blocks begin to move, largest movement 1 (rotations times block size).
 
         Where there is no equilibrium, how they fall; where the multiplier is unbounded, zero.
         """
         return self.state.velocity
+
+    @property
+    def caveat(self) -> str:
+        """What is to be kept in mind with this limit load; empty where there is nothing.
+
+        Friction without dilatancy may carry less than associative friction, in space more often than in the plane: what
+        is pushed along a groove of half-angle 45° with μ = 0.5 slides at 0.707 of its weight, associative at 0.816.
+        """
+        return CAVEAT if self.flow == "associative" and self.mechanism.shape[1] == 6 else ""
 
     @property
     def gap(self) -> float:
@@ -130,7 +145,8 @@ class LimitLoad:
         if self.status is LimitStatus.UNBOUNDED:
             return "unbounded: no live load of this pattern brings the structure down"
         text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction, bounds differ by {self.gap:.1e})"
-        return f"{text}, {moving} blocks moving" + ("" if self.status is LimitStatus.FOUND else f", {self.status}")
+        text += f", {moving} blocks moving" + ("" if self.status is LimitStatus.FOUND else f", {self.status}")
+        return f"{text}; {self.caveat}" if self.caveat else text
 
 
 def limit_state(

@@ -65,7 +65,7 @@ class Mechanism:
 def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     """(n_blocks,) int array: the part each block moves with in the motion that follows an increment.
 
-    Part -1 stands still. The others are numbered from 0, the largest area first.
+    Part -1 stands still. The others are numbered from 0, the largest volume first.
     """
     contacts, n = increment.contacts, assembly.n_blocks
     d = contacts.points.shape[1]
@@ -77,9 +77,9 @@ def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     # Corners, not centroids: a block may turn about its own centroid.
     moves = motion_size(increment.velocity, assembly.block_size) > NOTICEABLE * fastest
     moves &= assembly.free
-    area = np.bincount(part, weights=assembly.areas * moves, minlength=int(part.max()) + 1)
-    rank = np.empty(len(area), dtype=int)
-    rank[np.argsort(-area, kind="stable")] = np.arange(len(area))
+    volume = np.bincount(part, weights=assembly.shapes.volumes * moves, minlength=int(part.max()) + 1)
+    rank = np.empty(len(volume), dtype=int)
+    rank[np.argsort(-volume, kind="stable")] = np.arange(len(volume))
     return np.where(moves, rank[part], -1)
 
 

@@ -33,6 +33,7 @@ def test_a_sliver_that_tips_does_not_end_the_run():
     assert finding.outcome == "limit reached"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("kind", "seed"), [("arch", 100004), ("cuts", 100127), ("courses", 100125), ("courses", 100231)]
 )

@@ -45,7 +45,9 @@ def test_changed_bytes_are_read_or_refused(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["assembly.npz", "increments/state_00000.npz"])
-@pytest.mark.parametrize("content", [npz_absurd, npz_bomb, lambda: b"", lambda: bytes(5000)])
+@pytest.mark.parametrize(
+    "content", [npz_absurd, pytest.param(npz_bomb, marks=pytest.mark.thorough), lambda: b"", lambda: bytes(5000)]
+)
 def test_hostile_results_are_refused(arch_results, capsys, name, content):
     (arch_results / name).write_bytes(content())
     assert main(["render", str(arch_results)]) == 2
@@ -64,6 +66,7 @@ def test_what_the_limits_of_stored_arrays_are(tmp_path):
         checked_arrays(tmp_path / "c.npz")
 
 
+@pytest.mark.thorough
 def test_the_limits_bind(tmp_path):
     """The bounds above are real: more memory or time than allowed is seen."""
     assert MEMORY == 2 << 30

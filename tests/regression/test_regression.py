@@ -23,19 +23,18 @@ EXACT = os.environ.get("BLOCKVIS_EXACT", "") not in ("", "0")
 #: Haswell, SkylakeX, Sandybridge and Prescott of OpenBLAS 2e-11 were measured.
 TIGHT = 1e-9
 
-#: Where many joints slide; the façade, by linear programs, whose solutions rounding chooses: 8e-3 between the kernels.
+#: Where many joints slide. A collapse is enclosed to a tolerance, and rounding may choose among the places within it:
+#: 8e-4 between two computers. The façade is followed by linear programs, whose solutions rounding chooses: 8e-3.
 LOOSER = dict.fromkeys(
     (
         "panel_with_opening",
         "wall_horizontal_after_settlement",
         "wall_loaded",
         "wall_self_weight",
-        "wall_with_arch",
         "wall_pushed",
-        "panel_settlement_friction",
     ),
     1e-5,
-) | {"facade": 0.03}
+) | {"wall_with_arch": 2e-3, "panel_settlement_friction": 2e-3, "facade": 0.03}
 
 #: Before anything has moved there is nothing to choose but where an interior solution stops: 1.5e-9 was measured.
 START = 1e-8
@@ -57,9 +56,21 @@ ENDS = {
 }
 
 
+#: Three to twelve seconds each: walls that slide on settling supports, a study, and what others show too.
+THOROUGH = {
+    "arch_friction",
+    "arch_pushed_after_settlement",
+    "panel_with_opening",
+    "portal_frame",
+    "wall_horizontal_after_settlement",
+    "wall_loaded",
+    "wall_self_weight",
+}
+
+
 def marks_of(name):
     """What an example is marked with."""
-    return [pytest.mark.slow] if name in SLOW else []
+    return [pytest.mark.slow] if name in SLOW else [pytest.mark.thorough] if name in THOROUGH else []
 
 
 @pytest.fixture(scope="module")

@@ -219,7 +219,7 @@ kind = "pushover"
 block = "block 1"
 direction = [1.0, 0.0]
 point = [0.1, 1.0]
-increment = 0.01
+increment = 0.03
 """
 )
 
@@ -242,7 +242,7 @@ def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
     assert response.settlements == ()
     assert response.control == solver.ControlDisplacement(**summary["control"])
     assert response.load_multiplier == pytest.approx(alpha)
-    assert state_text(response.path[2], response).startswith("Control displacement 0.0200 m   ·   Load multiplier α =")
+    assert state_text(response.path[2], response).startswith("Control displacement 0.0600 m   ·   Load multiplier α =")
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "No capacity left at a control displacement of 0.1961" in page
     assert "control displacement [m]" in page

@@ -40,6 +40,7 @@ def key_sinks(assembly, pose, arch):
     return sinks
 
 
+@pytest.mark.thorough
 def test_the_key_of_a_small_facade_with_the_friction_of_the_large_one_sinks():
     """One window over the edge of the settling ground: the jambs part, and the key slips down between the haunches."""
     case = read_case(FACADE)

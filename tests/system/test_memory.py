@@ -76,7 +76,9 @@ def folder(tmp_path_factory):
     return run.folder
 
 
-@pytest.mark.parametrize("kind", ANALYSES)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=() if kind == "settlement" else pytest.mark.thorough) for kind in ANALYSES]
+)
 def test_a_run_forgets_what_it_has_written(kind, tmp_path, monkeypatch):
     seen, most = [], []
     add = ResultsFolder.add
@@ -187,6 +189,7 @@ def test_results_are_not_written_over_what_they_are_read_from(folder):
     assert len(blockvis.open_results(folder).increments) == len(response.increments)
 
 
+@pytest.mark.thorough
 def test_limit_loads_of_a_run_have_the_arrays_of_their_increments(tmp_path):
     run = ran(ANALYSES["capacity"], tmp_path)
     assert len(run.response.limits) == run.summary["n_increments"] > 4

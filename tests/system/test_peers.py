@@ -17,6 +17,7 @@ def _printed(*options):
     return done.stdout, [cells for cells in table if cells[0] == "blockvis"]
 
 
+@pytest.mark.thorough
 def test_our_rows_agree_with_the_references():
     _, rows = _printed("--quick")
     numbers = [(float(cells[3]), float(cells[4])) for cells in rows if cells[2] != "equilibrium"]

@@ -1,17 +1,21 @@
 """Files are written whole or not at all, and flushed to the disk before they count."""
 
+import gc
+import itertools
 import os
 import re
 import threading
 from pathlib import Path
 
 import pytest
+from structures import arch_response
 
 import blockvis
 import solver
 from blockvis import generators
 from blockvis.atomic_files import PARTIAL, whole_file, write_whole
 from blockvis.results.folder import ResultsFolder
+from blockvis.results.record import Record
 from blockvis.vtk_files import write_pvd
 
 ROOT = Path(__file__).parents[2]
@@ -81,29 +85,57 @@ def test_a_layout_that_cannot_be_written_leaves_the_file_before(tmp_path, monkey
     assert list(tmp_path.iterdir()) == [target]
 
 
-@on_linux
-def test_all_of_an_increment_is_on_the_disk_before_the_checkpoint_that_counts_it(tmp_path, done):
-    arch = generators.arch()
-    steps = solver.settlement_increments(
+def _steps(arch):
+    return solver.settlement_increments(
         arch,
         [solver.Settlement(direction=(1, 0), increment=0.02, limit=0.1)],
         interfaces=solver.Interfaces(),
         loads=solver.self_weight(arch),
     )
+
+
+@on_linux
+def test_what_a_run_goes_on_from_is_on_the_disk_before_the_checkpoint_and_all_of_it_before_the_summary(tmp_path, done):
+    arch = generators.arch()
     results = ResultsFolder(tmp_path / "out", arch)
     del done[:]
-    results.add(next(steps))
+    results.add(next(_steps(arch)))
     placed = [path.name for what, path in done if what == "replace"]
     files = [f"{kind}_00000.vtu" for kind in ("blocks", "contacts", "joints")]
     lists = ["response.csv", "blocks.pvd", "contacts.pvd", "joints.pvd"]
     assert placed == [*files, "state_00000.npz", *lists, "checkpoint.npz"]
     flushed = [path.name for what, path in done if what == "flush"]
-    for name in placed:
-        stem, _, suffix = name.rpartition(".")
-        assert flushed.count(f".{stem}.part.{suffix}") == 1, name
+    assert flushed == [".state_00000.part.npz", "increments", ".checkpoint.part.npz", "out"]
     last = done.index(("replace", tmp_path / "out" / "checkpoint.npz"))
     assert ("flush", tmp_path / "out" / "increments") in done[:last]
     assert done[last + 1 :] == [("flush", tmp_path / "out")]
+    del done[:]
+    results.finish(arch_response(), 0.0)
+    before = done[: done.index(("replace", tmp_path / "out" / "summary.json"))]
+    flushed = [path.name for what, path in before if what == "flush"]
+    assert [name for name in flushed if name.endswith(".vtu")] == files
+    assert "increments" in flushed[flushed.index(files[-1]) :]
+    assert {f".{name.rpartition('.')[0]}.part.{name.rpartition('.')[2]}" for name in lists} <= set(flushed)
+
+
+def test_what_a_power_cut_has_left_of_the_files_of_increments_is_made_again(tmp_path):
+    arch, folder = generators.arch(), tmp_path / "out" / "increments"
+    results = ResultsFolder(tmp_path / "out", arch, record=Record(case="x"))
+    for increment in itertools.islice(_steps(arch), 3):
+        results.add(increment)
+    del results, increment
+    gc.collect()
+    whole = {file.name: file.read_bytes() for file in (*folder.glob("*.vtu"), tmp_path / "out" / "blocks.pvd")}
+    assert len(whole) == 10
+    (folder / "blocks_00000.vtu").write_bytes(b"")
+    (folder / "joints_00001.vtu").write_bytes(whole["joints_00001.vtu"][:-40] + bytes(40))
+    (folder / "contacts_00001.vtu").unlink()
+    (tmp_path / "out" / "blocks.pvd").write_bytes(b"")
+    untouched = (folder / "contacts_00002.vtu").stat().st_mtime_ns
+    again, _ = ResultsFolder.reopened(tmp_path / "out", solver.SETTLEMENT, solver.Checkpoint)
+    assert len(again.increments) == 3
+    assert {file.name: file.read_bytes() for file in (*folder.glob("*.vtu"), tmp_path / "out" / "blocks.pvd")} == whole
+    assert (folder / "contacts_00002.vtu").stat().st_mtime_ns == untouched
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes among its files")

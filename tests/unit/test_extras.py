@@ -67,7 +67,7 @@ def test_sweep_without_its_packages_names_the_command(study, tmp_path):
 
 
 def test_all_but_studies_runs_without_their_packages(study, tmp_path):
-    done = without(EXTRAS["studies"], "run", tmp_path / "case.toml", "-o", tmp_path / "out")
+    done = without(EXTRAS["studies"], "run", tmp_path / "case.toml", "-o", tmp_path / "out", "--no-film")
     assert done.returncode in (0, 4), done.stderr
     assert {"summary.json", "curve.png", "report.html"} <= {p.name for p in (tmp_path / "out").iterdir()}
 

@@ -55,7 +55,10 @@ def outlines(assembly, pose):
     return np.array([shapely.Polygon(ring) for ring in np.split(corners, assembly.offsets[1:-1])])
 
 
-@pytest.mark.parametrize("structure", [shipped_arch, panel])
+EACH = pytest.mark.parametrize("structure", [shipped_arch, pytest.param(panel, marks=pytest.mark.thorough)])
+
+
+@EACH
 def test_blocks_never_overlap_by_a_hundredth(structure):
     response, fall = structure(), fallen(structure)
     assembly = response.assembly
@@ -69,7 +72,7 @@ def test_blocks_never_overlap_by_a_hundredth(structure):
         assert (deep < 0.01 * assembly.block_size).all(), fall.times[k]
 
 
-@pytest.mark.parametrize("structure", [shipped_arch, panel])
+@EACH
 def test_blocks_come_to_rest_on_something(structure):
     response, fall = structure(), fallen(structure)
     assembly = response.assembly

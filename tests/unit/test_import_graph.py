@@ -51,6 +51,7 @@ ORDER = (
     "solver",
     "solver.analysis",
     "solver.program",
+    "solver.cones",
     "solver.lp",
     "solver.results",
     "solver.surface_loads",
@@ -74,6 +75,8 @@ APART = (
     ("blockvis.report", "blockvis.cases"),
     ("solver.lp", "solver.results"),
     ("solver.lp", "solver.assembly"),
+    ("solver.cones", "solver.results"),
+    ("solver.cones", "solver.assembly"),
 )
 
 
@@ -145,9 +148,10 @@ def test_rooms_that_must_not_know_each_other(room, other):
     assert links == []
 
 
-def test_one_module_imports_highspy():
-    users = [module for module in FILES if any(name.split(".")[0] == "highspy" for name in _imported(module))]
-    assert users == ["solver.lp.highs"]
+@pytest.mark.parametrize(("package", "user"), [("highspy", "solver.lp.highs"), ("clarabel", "solver.cones.clarabel")])
+def test_one_module_imports_each_solver(package, user):
+    users = [module for module in FILES if any(name.split(".")[0] == package for name in _imported(module))]
+    assert users == [user]
 
 
 def test_solver_never_imports_blockvis_and_blockvis_takes_public_names_of_solver():

@@ -41,9 +41,8 @@ def facade():
 RESPONSES = {"portal frame": portal, "semicircular arch": arch_response, "small façade": facade}
 
 #: The façade takes as long as all others together.
-EACH = pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "small façade" else name for name in RESPONSES]
-)
+MARKS = {"portal frame": pytest.mark.thorough, "small façade": pytest.mark.slow}
+EACH = pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in RESPONSES])
 
 
 def counted(response, increment):

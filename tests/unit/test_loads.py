@@ -94,7 +94,7 @@ def test_direction_counts_as_a_direction_only():
         ({}, "needs a direction"),
         ({"direction": (0, 0)}, "direction"),
         ({"direction": (1, np.nan)}, "two finite numbers"),
-        ({"direction": (1, 0, 0)}, "two finite numbers"),
+        ({"direction": (1, 0, 0, 0)}, "two finite numbers"),
         ({"rotation_centre": (0, 0)}, "must not be zero"),
         ({"rotation_centre": (0, np.inf), "rotation": 1}, "two finite numbers"),
         ({"direction": (1, 0), "rotation": 1}, "no rotation_centre"),

@@ -40,7 +40,11 @@ def _bench(*, wall=True, density=2000.0):
 
 TILT = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.05, limit=0.6)
 PAPER = solver.Controls(increments="linear program")
-BOTH = pytest.mark.parametrize("controls", [solver.Controls(), PAPER], ids=lambda controls: controls.increments)
+BOTH = pytest.mark.parametrize(
+    "controls",
+    [solver.Controls(), pytest.param(PAPER, marks=pytest.mark.thorough)],
+    ids=lambda controls: controls.increments,
+)
 
 
 def test_a_pebble_that_tips_over_a_corner_is_caught_by_the_wall_beside():
@@ -96,6 +100,7 @@ def test_much_of_the_weight_does_not_snap():
     assert "not followed" in note
 
 
+@pytest.mark.thorough
 @BOTH
 def test_an_arch_collapses_though_its_fall_would_jam(controls):
     """The mechanism of an arch is no light piece, and a pebble on a bench beside it changes nothing about it."""

@@ -66,6 +66,7 @@ def first_increment(assembly, friction=0.6):
     return increment.status, increment.reaction / solver.total_weight(assembly)
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("seed", [3])
 def test_rubble_closes_and_carries_as_the_cells_that_it_was_made_of(seed):
@@ -161,7 +162,14 @@ def blunted(ring, style):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize(("style", "joint"), [("bevelled", "auto"), ("rounded", 0.011), ("roughened", "auto")])
+@pytest.mark.parametrize(
+    ("style", "joint"),
+    [
+        ("bevelled", "auto"),
+        pytest.param("rounded", 0.011, marks=pytest.mark.thorough),
+        pytest.param("roughened", "auto", marks=pytest.mark.thorough),
+    ],
+)
 def test_blunt_and_rough_bricks_carry_like_sharp_ones(style, joint):
     sharp = first_increment(assemble(layout(bricks()), supports=GROUND, joint_thickness=joint))
     wall = layout([blunted(ring, style) for ring in bricks()])

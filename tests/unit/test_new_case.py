@@ -57,6 +57,7 @@ def test_a_dxf_with_mortar_and_no_supports_gets_a_ground_of_two_halves(tmp_path,
     assert summary["n_blocks"] == 10
 
 
+@pytest.mark.thorough
 def test_an_svg_with_layers_of_roles(tmp_path, capsys):
     path = tmp_path / "portal.svg"
     rectangle = '<rect x="{}" y="{}" width="{}" height="{}"/>'

@@ -79,6 +79,16 @@ CASES = {
 }
 
 
+def all_but(*names):
+    """Each case, these among what is thorough: the default set has one case or another for each property."""
+    marks = {name: [pytest.mark.thorough] for name in names}
+    return pytest.mark.parametrize("name", [pytest.param(name, marks=marks.get(name, ())) for name in CASES])
+
+
+HINGING_THOROUGHLY, SLIDING_THOROUGHLY = all_but("hinging arch"), all_but("sliding arch")
+ARCHES_THOROUGHLY = all_but("hinging arch", "sliding arch")
+
+
 @cache
 def original(name):
     return CASES[name].settle()
@@ -113,20 +123,20 @@ def test_cases_are_worth_it():
     assert 0.05 < wall.reaction[0] / wall.total_weight < 0.6
 
 
-@pytest.mark.parametrize("name", CASES)
+@ARCHES_THOROUGHLY
 @few
 @given(angle=st.floats(-np.pi, np.pi))
 def test_frame(name, angle):
     assert_same(name, CASES[name].mapped(rotation(angle)).settle())
 
 
-@pytest.mark.parametrize("name", CASES)
+@HINGING_THOROUGHLY
 def test_quarter_turns(name):
     for angle in (np.pi / 2, np.pi):
         assert_same(name, CASES[name].mapped(rotation(angle)).settle())
 
 
-@pytest.mark.parametrize("name", CASES)
+@ARCHES_THOROUGHLY
 @few
 @given(exponent=st.floats(-3, 3), heavier=st.floats(-3, 3))
 def test_units(name, exponent, heavier):
@@ -147,7 +157,7 @@ def test_mirror_image(name):
     assert_same(name, CASES[name].mapped(np.diag([-1.0, 1.0])).settle())
 
 
-@pytest.mark.parametrize("name", CASES)
+@ARCHES_THOROUGHLY
 @few
 @given(random=st.randoms(use_true_random=False))
 def test_order_of_the_blocks(name, random):
@@ -160,7 +170,7 @@ def test_order_of_the_blocks(name, random):
     assert_same(name, shuffled.settle())
 
 
-@pytest.mark.parametrize("name", CASES)
+@SLIDING_THOROUGHLY
 @pytest.mark.parametrize("shift", [(5e5, 5e6), (-3e3, 1e4)])
 def test_far_from_the_origin(name, shift):
     """In map coordinates, UTM, metres are left with nine digits after the point."""

@@ -72,7 +72,7 @@ def test_what_the_reader_accepts_is_valid(right):
         {"geometry": {"file": "a.dxf", "joint_thickness": "automatic"}},
         {"roles": {"ground": "fix"}},
         {"material": {"density": 0}},
-        {"settlement": {"direction": [1, 0, 0]}},
+        {"settlement": {"direction": [1, 0, 0, 0]}},
         {"imperfections": {"kind": "friction", "distribution": "uniform", "lower": 0.5, "upper": 1, "mean": 1}},
         {"output": {"animation": True}},
         {"loads": [{"kind": "alive"}]},

@@ -12,21 +12,23 @@ from blockvis import generators
 
 pytestmark = pytest.mark.path
 
+THOROUGH = {"marks": pytest.mark.thorough}
+
 #: embrace [degrees], t/R, n, d_c/R, H/W at the start, H/W at collapse.
 SPREADING = [
     (180, 0.15, 12, 0.14104982, 0.1771150, 0.2420193),
     (180, 0.15, 13, 0.15910759, 0.1741342, 0.2459914),
-    (180, 0.15, 24, 0.14034471, 0.175998, 0.240540),
-    (180, 0.20, 16, 0.23555602, 0.153952, 0.278566),
-    (120, 0.10, 12, 0.15286859, 0.302630, 0.556513),
-    (120, 0.10, 13, 0.14352524, 0.301427, 0.596130),
-    (140, 0.10, 12, 0.11619552, 0.259409, 0.418360),
+    pytest.param(180, 0.15, 24, 0.14034471, 0.175998, 0.240540, **THOROUGH),
+    pytest.param(180, 0.20, 16, 0.23555602, 0.153952, 0.278566, **THOROUGH),
+    pytest.param(120, 0.10, 12, 0.15286859, 0.302630, 0.556513, **THOROUGH),
+    pytest.param(120, 0.10, 13, 0.14352524, 0.301427, 0.596130, **THOROUGH),
+    pytest.param(140, 0.10, 12, 0.11619552, 0.259409, 0.418360, **THOROUGH),
 ]
 
 #: embrace, t/R, n, v_c/R, VR/W start, VR/W collapse, H/W start, H/W collapse.
 SINKING = [
     (180, 0.15, 12, 0.33003942, 0.487901, 0.559286, 0.192939, 0.201949),
-    (140, 0.10, 12, 0.35254631, 0.478934, 0.580438, 0.297661, 0.337135),
+    pytest.param(140, 0.10, 12, 0.35254631, 0.478934, 0.580438, 0.297661, 0.337135, **THOROUGH),
 ]
 
 
@@ -63,7 +65,9 @@ def test_sinking(embrace, ratio, n, collapse, first, last, h_first, h_last):
         assert increment.support_forces[springer, 0] / weight == pytest.approx(h, abs=tolerance)
 
 
-@pytest.mark.parametrize("increment", [0.02, 0.01, pytest.param(0.0025, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "increment", [0.02, pytest.param(0.01, **THOROUGH), pytest.param(0.0025, marks=pytest.mark.slow)]
+)
 def test_collapse_does_not_depend_on_the_increment(increment):
     """Correctors and the collapse bracket leave no error of the increment: the bracket's width is what remains."""
     reference = 0.14104982
@@ -71,7 +75,9 @@ def test_collapse_does_not_depend_on_the_increment(increment):
     assert abs(response.collapse.displacement - reference) < increment / 1000 + 2e-6
 
 
-@pytest.mark.parametrize("increment", [0.02, 0.01, pytest.param(0.0025, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "increment", [0.01, pytest.param(0.02, **THOROUGH), pytest.param(0.0025, marks=pytest.mark.slow)]
+)
 def test_relocating_hinge_is_met_at_every_increment(increment):
     """A hinge jumps to the next joint at d = 0.12885; the structure finds its new equilibrium and goes on."""
     response = _settle(120, 0.10, 13, (1, 0), increment)

@@ -1,0 +1,68 @@
+"""Numbers of a case against its blocks: two in the plane, three in space."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import solver
+
+from .contents import Case
+
+
+def check_coordinates(case: Case, assembly: solver.Assembly) -> None:
+    """Refuse directions, points and forces of two numbers for blocks in space, and of three in the plane.
+
+    Raises
+    ------
+    ValueError
+        Names the key, and how many numbers it needs.
+    """
+    d = assembly.dimension
+    where = "in space" if d == 3 else "in the plane"
+    given: list[tuple[str, str, Any]] = []
+    for k, settlement in enumerate(case.settlements, start=1):
+        table = f"settlement {k}" if len(case.settlements) > 1 else "settlement"
+        given += [(table, key, getattr(settlement, key)) for key in ("direction", "rotation_centre")]
+        for key in ("rotation_axis", "radial_from"):
+            if d == 2 and getattr(settlement, key) is not None:
+                raise ValueError(f"{case.source}: [{table}] {key} belongs to blocks in space; these are {where}")
+    for k, load in enumerate(case.loads, start=1):
+        table = f"loads {k}" if len(case.loads) > 1 else "loads"
+        force = load.force if load.has_force else None
+        moment = load.moment if load.has_moment else None
+        given += [
+            (table, "weight_fraction", load.weight_fraction),
+            (table, "force", force),
+            (table, "point", load.point),
+        ]
+        if moment is not None and (d == 3) != isinstance(moment, tuple):
+            wanted = "three numbers [mx, my, mz]" if d == 3 else "one number"
+            raise ValueError(f"{case.source}: [{table}] moment: the blocks are {where}; give {wanted}")
+        if d == 3 and (load.pressure is not None or load.positions):
+            key = "positions" if load.positions else "pressure"
+            raise ValueError(f"{case.source}: [{table}] {key} belongs to blocks in the plane; in space give forces")
+    control = case.settings if isinstance(case.settings, solver.ControlDisplacement) else None
+    given += [("control", key, getattr(control, key, None)) for key in ("direction", "point")]
+    for table, key, numbers in given:
+        if numbers is not None and len(numbers) != d:
+            wanted = "three numbers [x, y, z]" if d == 3 else "two numbers [x, y]"
+            raise ValueError(
+                f"{case.source}: [{table}] {key} has {len(numbers)} numbers, but the blocks are {where}; give {wanted}"
+            )
+    if d == 3:
+        _refuse_plane_keys(case)
+
+
+def _refuse_plane_keys(case: Case) -> None:
+    """Refuse keys that belong to blocks in the plane."""
+    for key, is_given in (
+        ("closing", case.closing != "auto"),
+        ("outline_tolerance", case.outline_tolerance is not None),
+    ):
+        if is_given:
+            raise ValueError(f"{case.source}: [geometry] {key} belongs to outlines in the plane; leave it out in space")
+    if any(one.kind == "vertices" for one in case.imperfections):
+        raise ValueError(
+            f"{case.source}: [imperfections] kind 'vertices' belongs to blocks in the plane; in space friction and "
+            "density can scatter"
+        )

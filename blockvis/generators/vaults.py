@@ -1,0 +1,138 @@
+"""Barrel vaults and arches in space."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import solver
+from blockvis.layout.solids import Solid, extruded
+
+from .arches import arch
+from .dimensions import above_zero, whole
+from .solids import assembled
+
+
+def extruded_arch(
+    *,
+    radius: float = 1.0,
+    thickness_ratio: float = 0.15,
+    embrace: float = 180.0,
+    voussoirs: int = 12,
+    depth: float = 0.5,
+    density: float = 2000.0,
+) -> solver.Assembly:
+    """Build a circular arch of equal voussoirs between two springers, in space.
+
+    Parameters
+    ----------
+    radius, thickness_ratio, embrace, voussoirs
+        As in :func:`arch`.
+    depth : float [m]
+        Along y, half to each side of y = 0.
+    density : float [kg/m³]
+
+    Returns
+    -------
+    solver.Assembly
+        The blocks of :func:`arch`, its plane upright: x to the right, z up.
+
+    Examples
+    --------
+    >>> extruded_arch(voussoirs=12).dimension
+    3
+    """
+    return _vault(radius, thickness_ratio, embrace, voussoirs, depth, density, 1, 1, "voussoir {0}")
+
+
+def barrel_vault(
+    *,
+    radius: float = 1.0,
+    thickness_ratio: float = 0.15,
+    embrace: float = 180.0,
+    voussoirs: int = 12,
+    length: float = 1.5,
+    stones: int = 3,
+    springers: int = 1,
+    density: float = 2000.0,
+) -> solver.Assembly:
+    """Build a barrel vault along y, the joints of each course half a stone from those of the next.
+
+    Parameters
+    ----------
+    radius : float [m]
+        Of the middle of the shell.
+    thickness_ratio : float
+        Thickness over radius.
+    embrace : float [degrees]
+        Angle between the springing joints, at most 180.
+    voussoirs : int
+        Number of courses from springer to springer.
+    length : float [m]
+        Along y, half to each side of y = 0.
+    stones : int
+        Number of stones along a course; every second course begins and ends with half a stone.
+    springers : int
+        Number of supports along each side: more than one can settle by halves.
+    density : float [kg/m³]
+
+    Returns
+    -------
+    solver.Assembly
+        Stones "stone 1-1" (course from the left, stone along y), then "left springer" (fixed) and "right springer"
+        (moving), with numbers along y where there are several.
+
+    Examples
+    --------
+    >>> barrel_vault(voussoirs=12, stones=3).n_blocks
+    44
+    """
+    along = whole("stones", stones, 1)
+    return _vault(
+        radius,
+        thickness_ratio,
+        embrace,
+        voussoirs,
+        above_zero("length", length),
+        density,
+        along,
+        whole("springers", springers, 1),
+        "stone {0}-{1}",
+    )
+
+
+def _vault(
+    radius: float,
+    thickness_ratio: float,
+    embrace: float,
+    voussoirs: int,
+    length: float,
+    density: float,
+    stones: int,
+    springers: int,
+    name: str,
+) -> solver.Assembly:
+    """Extrude the circular arch of these dimensions, cut along y in stones and springers."""
+    plane = arch(
+        radius=above_zero("radius", radius),
+        thickness_ratio=thickness_ratio,
+        embrace=embrace,
+        voussoirs=voussoirs,
+        density=above_zero("density", density, "kg/m³"),
+        depth=above_zero("depth", length),
+    )
+    straight = length * np.linspace(-0.5, 0.5, stones + 1)
+    broken = np.unique(np.concatenate([straight[[0, -1]], (straight[1:] + straight[:-1]) / 2.0]))
+    free: list[tuple[str, Solid]] = []
+    for course in np.flatnonzero(plane.free).tolist():
+        cuts = straight if course % 2 == 0 or stones == 1 else broken
+        for k in range(len(cuts) - 1):
+            solid = extruded(plane.outline(course), float(cuts[k]), float(cuts[k + 1]))
+            free.append((name.format(course + 1, k + 1), solid))
+    cuts = length * np.linspace(-0.5, 0.5, springers + 1)
+    supports = []
+    for side in np.flatnonzero(~plane.free).tolist():
+        for k in range(springers):
+            called = plane.names[side] + (f" {k + 1}" if springers > 1 else "")
+            solid = extruded(plane.outline(side), float(cuts[k]), float(cuts[k + 1]))
+            supports.append((called, str(plane.roles[side]), solid))
+    return assembled(free, supports, density=density)

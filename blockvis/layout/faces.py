@@ -1,0 +1,262 @@
+"""Plane faces of blocks in space: joined from the triangles around a body, and fitted where they are warped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .solids import Solid, area_vector, outward, volume
+
+#: Triangles that lie within this fraction of the width of a block of one plane are one face: modellers warp the faces
+#: of stones by a tenth of it.
+WARPED = 0.01
+
+#: Warps below this fraction of the width of a block are the rounding of a file of single precision.
+ROUNDING = 2e-6
+
+#: Neighbouring triangles whose normals differ by more than this angle (15 degrees) are different faces.
+SAME_FACE = np.cos(np.radians(15.0))
+
+#: Directions in which the planes around a corner say less than this of where it lies are left as drawn.
+UNDETERMINED = 0.05
+
+
+@dataclass(frozen=True)
+class PlaneSolid:
+    """A block with plane faces.
+
+    Attributes
+    ----------
+    solid : Solid
+    warp : float
+        How far a corner was from the plane of a face, in the unit of the corners.
+    place : (3,) array
+        The corner that was farthest.
+    """
+
+    solid: Solid
+    warp: float
+    place: np.ndarray
+
+
+def width_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> float:
+    """Six volumes over the surface: the edge of a cube, three times the thickness of a slab."""
+    surface = sum(float(np.linalg.norm(area_vector(points[list(face)]))) for face in faces)
+    return 6.0 * abs(volume(points, faces)) / surface if surface else 0.0
+
+
+def with_plane_faces(points: np.ndarray, triangles: np.ndarray, tolerance: float = WARPED) -> PlaneSolid:
+    """Join the triangles around a body to plane faces, and fit planes to those that are warped.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    triangles : (m, 3) int array
+        All seen in the same sense from outside.
+    tolerance : float
+        Largest warp of a face, as a fraction of the width of the body; what is farther from a plane stays triangles.
+
+    Returns
+    -------
+    PlaneSolid
+    """
+    used, index = np.unique(triangles, return_inverse=True)
+    points, triangles = points[used], index.reshape(-1, 3)
+    if volume(points, triangles.tolist()) < 0.0:
+        triangles = triangles[:, ::-1]
+    near = tolerance * width_of(points, triangles.tolist())
+    faces = [ring for region in _regions(points, triangles, near) for ring in _rings_of(triangles[region])]
+    return fitted(*_without_straight(points, faces, near), near)
+
+
+def fitted(points: np.ndarray, faces: list[list[int]], near: float) -> PlaneSolid:
+    """Fit a plane to each face and move the corners to where planes meet; what is warped by more is cut in triangles.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    faces : list of lists of int
+    near : float
+        Largest warp, in the unit of the points.
+    """
+    rings: list[list[int]] = []
+    for ring in faces:
+        plane = plane_of(points[ring])
+        flat = len(ring) == 3 or float(np.abs(points[ring] @ plane[:3] - plane[3]).max()) <= near
+        rings += [ring] if flat else [[ring[0], ring[k], ring[k + 1]] for k in range(1, len(ring) - 1)]
+    planes = np.array([plane_of(points[ring]) for ring in rings])
+    away = [np.abs(points[ring] @ plane[:3] - plane[3]) for ring, plane in zip(rings, planes, strict=True)]
+    warp = np.array([distance.max() for distance in away])
+    worst = int(warp.argmax())
+    place = points[rings[worst][int(away[worst].argmax())]]
+    if warp[worst] <= ROUNDING * width_of(points, rings):
+        return PlaneSolid(outward(points, rings), 0.0, place)
+    return PlaneSolid(outward(moved_to_planes(points, rings, planes), rings), float(warp[worst]), place)
+
+
+def plane_of(ring: np.ndarray) -> np.ndarray:
+    """(4,) array: unit normal of a (n, 3) ring seen counter-clockwise, and its distance from the origin."""
+    normal = area_vector(ring)
+    normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
+    return np.append(normal, float(ring.mean(axis=0) @ normal))
+
+
+def moved_to_planes(points: np.ndarray, faces: Sequence[Sequence[int]], planes: np.ndarray) -> np.ndarray:
+    """Move the corners of a block to where the planes of their faces meet, as little as that takes.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    faces : sequence of sequences of int
+    planes : (n_faces, 4) array
+        Unit normals and distances from the origin.
+
+    Returns
+    -------
+    (n, 3) array
+        Where more than three planes meet nearly in a point, the point nearest to them.
+    """
+    around: list[list[int]] = [[] for _ in points]
+    for number, face in enumerate(faces):
+        for corner in face:
+            around[corner].append(number)
+    moved = points.copy()
+    for corner, met in enumerate(around):
+        if met:
+            normals = planes[met, :3]
+            missing = planes[met, 3] - normals @ points[corner]
+            moved[corner] += np.linalg.lstsq(normals, missing, rcond=UNDETERMINED)[0]
+    return moved
+
+
+def _regions(points: np.ndarray, triangles: np.ndarray, near: float) -> list[np.ndarray]:
+    """Group the triangles of a body by the planes in which they lie: numbers of the triangles of each face."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    corners = points[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    double = np.linalg.norm(normal, axis=1)
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    normal = normal / np.maximum(double, 1e-300)[:, None]
+    sliver = double <= near * longest
+    one, other = _neighbours(triangles)
+    large, small = np.where(double[one] >= double[other], (one, other), (other, one))
+    apart = np.abs(np.einsum("ijk,ik->ij", corners[small] - corners[large][:, :1], normal[large])).max(axis=1)
+    along = np.einsum("ij,ij->i", normal[one], normal[other]) >= SAME_FACE
+    # Polygons with re-entrant corners that were cut in fans have triangles that lie the other way round.
+    same = (apart <= near) & (along | sliver[small] | (apart <= ROUNDING * longest[large]))
+    n = len(triangles)
+    graph = coo_matrix((np.ones(int(same.sum())), (one[same], other[same])), shape=(n, n))
+    label = connected_components(graph, directed=False)[1]
+    found = []
+    for region in np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label))[:-1]):
+        if len(region) == 1 or _warp(points, triangles[region]) <= near:
+            found.append(region)
+        else:
+            found += _grown(points, triangles, region, normal, double, near, (one[same], other[same]))
+    return found
+
+
+def _grown(
+    points: np.ndarray,
+    triangles: np.ndarray,
+    region: np.ndarray,
+    normal: np.ndarray,
+    area: np.ndarray,
+    near: float,
+    pairs: tuple[np.ndarray, np.ndarray],
+) -> list[np.ndarray]:
+    """Cut a region that bends, as a curved face of many triangles does, into faces that grow from the largest on."""
+    neighbours: dict[int, list[int]] = {int(k): [] for k in region}
+    for a, b in zip(pairs[0].tolist(), pairs[1].tolist(), strict=True):
+        if a in neighbours and b in neighbours:
+            neighbours[a].append(b)
+            neighbours[b].append(a)
+    waiting = dict.fromkeys(region[np.argsort(-area[region], kind="stable")].tolist())
+    found = []
+    while waiting:
+        seed = next(iter(waiting))
+        del waiting[seed]
+        members, front = [seed], [seed]
+        level = float(points[triangles[seed]].mean(axis=0) @ normal[seed])
+        while front:
+            for k in neighbours[front.pop()]:
+                flat = k in waiting and np.abs(points[triangles[k]] @ normal[seed] - level).max() <= near
+                if flat and (normal[k] @ normal[seed] >= SAME_FACE):
+                    del waiting[k]
+                    members.append(k)
+                    front.append(k)
+        found.append(np.array(members))
+    return found
+
+
+def _neighbours(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of triangles that share an edge."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    order = np.lexsort(edges.T[::-1])
+    same = (edges[order][1:] == edges[order][:-1]).all(axis=1)
+    return order[:-1][same] // 3, order[1:][same] // 3
+
+
+def _warp(points: np.ndarray, triangles: np.ndarray) -> float:
+    """How far the corners of triangles are from their mean plane."""
+    corners = points[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
+    length = float(np.linalg.norm(normal))
+    if length == 0.0:
+        return np.inf
+    level = points[np.unique(triangles)] @ (normal / length)
+    return float(np.ptp(level)) / 2.0
+
+
+def _rings_of(triangles: np.ndarray) -> list[list[int]]:
+    """Find the ring around the triangles of a face; those around a hole, or that touch themselves, stay triangles."""
+    directed = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).tolist()
+    inner = {(b, a) for a, b in directed}
+    border = [(a, b) for a, b in directed if (a, b) not in inner]
+    following = dict(border)
+    if len(following) == len(border) and border:
+        ring = [border[0][0]]
+        while following[ring[-1]] != ring[0] and len(ring) <= len(border):
+            ring.append(following[ring[-1]])
+        if len(ring) == len(border):
+            return [ring]
+    return [list(map(int, triangle)) for triangle in triangles]
+
+
+def _without_straight(points: np.ndarray, faces: list[list[int]], near: float) -> tuple[np.ndarray, list[list[int]]]:
+    """Drop the corners at which only two faces meet, which lie on the edge between them, and points of no face."""
+    met: dict[int, set[int]] = {}
+    for number, ring in enumerate(faces):
+        for corner in ring:
+            met.setdefault(corner, set()).add(number)
+    drop = {corner for corner, numbers in met.items() if len(numbers) < 3}
+    for ring in faces:
+        n = len(ring)
+        kept = [k for k in range(n) if ring[k] not in drop]
+        if len(kept) < 2:
+            drop -= set(ring)
+            continue
+        for k in range(n):
+            if ring[k] in drop:
+                before = max((j for j in kept if j < k), default=kept[-1])
+                after = min((j for j in kept if j > k), default=kept[0])
+                if _beside(points[ring[k]], points[ring[before]], points[ring[after]]) > near:
+                    drop.discard(ring[k])
+    rings = [[corner for corner in ring if corner not in drop] for ring in faces]
+    rings = [ring for ring in rings if len(ring) > 2]
+    used = np.unique(np.concatenate([np.array(ring) for ring in rings]))
+    place = {int(old): new for new, old in enumerate(used)}
+    return points[used], [[place[corner] for corner in ring] for ring in rings]
+
+
+def _beside(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
+    """Distance of a point from the line through two others."""
+    along = end - start
+    length = float(np.linalg.norm(along))
+    if length == 0.0:
+        return float(np.linalg.norm(point - start))
+    return float(np.linalg.norm(np.cross(point - start, along))) / length

@@ -1,0 +1,134 @@
+"""Inspection of a layout in space before any analysis: sizes, weights, joints, duplicates."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+import solver
+
+from .assemble_solids import solid_duplicates
+from .facing import Facing, faced
+from .roles import roles_of
+from .solid_layout import SolidLayout
+from .solids import size_of
+
+#: Density of blocks for which the layout has none [kg/m³], as of a run.
+DENSITY = 2000.0
+
+
+@dataclass(frozen=True)
+class SolidInspection:
+    """Measurements of a layout in space.
+
+    Attributes
+    ----------
+    layout : SolidLayout
+        As read, duplicates included.
+    kept : (n_kept,) int array
+        Numbers of the blocks that are no duplicates.
+    twins : tuple of (int, int)
+        Blocks drawn twice: the first and the later copy.
+    roles : tuple of str
+        Role of each block, as a run takes it from roles, groups and names.
+    facing : Facing
+        Joints whose faces do not lie in one plane, as a run closes them; block numbers count the kept blocks.
+    """
+
+    layout: SolidLayout
+    kept: np.ndarray
+    twins: tuple[tuple[int, int], ...]
+    roles: tuple[str, ...]
+    facing: Facing
+
+    @cached_property
+    def volumes(self) -> np.ndarray:
+        """(n_kept,) array [m³]."""
+        return self.layout.volumes[self.kept]
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """(n_kept,) array [N]: with the density of the file, else 2000 kg/m³."""
+        density = np.full(self.layout.n_blocks, np.nan) if self.layout.density is None else self.layout.density
+        return self.volumes * np.where(np.isnan(density), DENSITY, density)[self.kept] * solver.GRAVITY
+
+    @property
+    def joint_thickness(self) -> float:
+        """Joint thickness that closes the joints [m]: 0, as joints in space are not measured."""
+        return 0.0
+
+    @property
+    def low(self) -> np.ndarray:
+        """(3,) array [m]: the corner of the box around all blocks with the smallest coordinates."""
+        return np.asarray(self.layout.points.min(axis=0))
+
+    @property
+    def high(self) -> np.ndarray:
+        """(3,) array [m]: the opposite corner."""
+        return np.asarray(self.layout.points.max(axis=0))
+
+    @property
+    def unit_clash(self) -> str:
+        """The note on a unit that cannot be right, or ""."""
+        return next((note for note in self.layout.notes if note.startswith("unit clash")), "")
+
+    def __str__(self) -> str:
+        """Write the measurements as lines of a table."""
+        layout, kept = self.layout, self.kept
+        size = " × ".join(f"{length:.4g}" for length in self.high - self.low)
+        across = np.array([size_of(layout.solids[i][0]) for i in kept])
+        largest = int(across.argmax())
+        free = np.array([self.roles[i] == "free" for i in kept])
+        known = layout.density is not None and bool(np.isfinite(layout.density[kept]).all())
+        supports = f", supports {self.weights[~free].sum():.6g} N" if (~free).any() else ""
+        lines = [
+            f"{layout.source}",
+            f"blocks in space {layout.n_blocks}"
+            + (f", {len(self.twins)} of them duplicates: {len(kept)} blocks" if self.twins else ""),
+            f"size            {size} m, from ({', '.join(f'{x:.6g}' for x in self.low)}) m; z is up",
+            f"unit            {layout.unit}",
+            f"volumes         {self.volumes.min():.4g} to {self.volumes.max():.4g} m³, median "
+            f"{np.median(self.volumes):.4g}, sum {self.volumes.sum():.6g} m³",
+            f"weight          {self.weights[free].sum():.6g} N{supports}"
+            + ("" if known else f", at {DENSITY:g} kg/m³ where the file has no density"),
+            f"largest block   '{layout.names[kept[largest]]}', {across[largest]:.4g} m across",
+            f"corners, faces  {sum(len(layout.solids[i][0]) for i in kept)}, "
+            f"{sum(len(layout.solids[i][1]) for i in kept)}",
+        ]
+        for title, words in (("groups", layout.groups), ("materials", layout.materials), ("roles", self.roles)):
+            counted = Counter(words[i] for i in kept)
+            listed = [f"'{word}' {n}" if word else f"none {n}" for word, n in counted.most_common(12)]
+            more = f", {len(counted) - 12} more" if len(counted) > 12 else ""
+            lines.append(f"{title:15} {', '.join(listed)}{more}")
+        names = [layout.names[i] for i in kept]
+        lines.append(f"{'names':15} {', '.join(names[:4])}{' ...' if len(names) > 4 else ''}")
+        lines.append(f"joints          {self.facing.note or 'faces in contact lie in one plane'}")
+        if self.twins:
+            shown = ", ".join(f"{layout.names[b]} = {layout.names[a]}" for a, b in self.twins[:8])
+            lines.append(f"duplicates      {shown}{' ...' if len(self.twins) > 8 else ''}")
+        lines += [f"note            {note}" for note in layout.notes]
+        return "\n".join(lines)
+
+
+def inspected_solids(layout: SolidLayout) -> SolidInspection:
+    """Measure a layout in space.
+
+    Parameters
+    ----------
+    layout : SolidLayout
+        As read, duplicates included.
+    """
+    twins = solid_duplicates(layout.solids)
+    later = {copy for _, copy in twins}
+    kept = np.array([i for i in range(layout.n_blocks) if i not in later])
+    some = layout.chosen(kept)
+    return SolidInspection(
+        layout=layout,
+        kept=kept,
+        twins=tuple(twins),
+        roles=tuple(roles_of(layout, {})),
+        facing=faced(some.solids, some.names),
+    )

@@ -1,0 +1,58 @@
+"""Roles of the blocks of a layout: what the caller says, else what the file says."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Mapping
+
+import solver
+from blockvis.suggestions import by_similarity
+
+from .layout import AnyLayout
+
+
+def checked_role(role: str, whose: str) -> str:
+    """Return the role if it is one; ``whose`` is named in the error."""
+    if role not in solver.ROLES:
+        raise ValueError(f"{whose} has role '{role}'; roles are {', '.join(solver.ROLES)}")
+    return role
+
+
+def roles_of(layout: AnyLayout, roles: Mapping[str, str]) -> list[str]:
+    """Role of every block: the caller's, else the file's, else its group or name if that is a role, else free."""
+    found = []
+    for name, group, role in zip(layout.names, layout.groups, layout.roles, strict=True):
+        said = (role, group.strip().lower(), name.strip().lower())
+        found.append(next((word for word in said if word in solver.ROLES), solver.FREE))
+    labels = {"name": layout.names, "group": layout.groups, "material": layout.materials}
+    by_name: list[tuple[list[int], str]] = []
+    by_group: list[tuple[list[int], str]] = []
+    by_pattern: list[tuple[list[int], str]] = []
+    for key, role in roles.items():
+        checked_role(role, f"roles: '{key}'")
+        for kind, values in labels.items():
+            hits = [i for i, value in enumerate(values) if value == key]
+            if hits:
+                (by_name if kind == "name" else by_group).append((hits, role))
+                break
+        else:
+            hits = [
+                i
+                for i in range(layout.n_blocks)
+                if any(values[i] and fnmatch.fnmatchcase(values[i], key) for values in labels.values())
+            ]
+            if not hits:
+                raise ValueError(_unmatched(key, layout))
+            by_pattern.append((hits, role))
+    for hits, role in by_pattern + by_group + by_name:
+        for i in hits:
+            found[i] = role
+    return found
+
+
+def _unmatched(key: str, layout: AnyLayout) -> str:
+    labels = [*dict.fromkeys(label for label in (*layout.groups, *layout.materials, *layout.names) if label)]
+    listed = ", ".join(f"'{label}'" for label in by_similarity(key, labels[:2000])[:12])
+    more = f" and {len(labels) - 12} more" if len(labels) > 12 else ""
+    where = layout.source or "the drawing"
+    return f"roles: '{key}' matches no block, group or layer of {where}; it has {listed}{more}; correct the name"

@@ -1,0 +1,59 @@
+"""Polyhedra: the shapes of blocks in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from .contacts import Contacts
+from .convex_parts import ConvexParts, convex_parts
+from .solids import Solids
+from .spatial_contacts import find_points, measured_points
+from .spatial_overlaps import overlap_depths_in_space
+
+
+@dataclass(frozen=True)
+class Polyhedra(Solids):
+    """Blocks in space: :class:`Shapes` whose corners have three coordinates."""
+
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """(n_blocks,) array [m]: edge of the cube as large as each block."""
+        return np.cbrt(self.volumes)
+
+    def size(self, chosen: np.ndarray) -> float:
+        """Edge of the cube as large as the mean of the chosen blocks, (n_blocks,) bool, [m]."""
+        return float(np.cbrt(self.volumes[chosen].mean()))
+
+    @cached_property
+    def parts(self) -> ConvexParts:
+        """Convex parts of the blocks: the blocks themselves where all are convex."""
+        return convex_parts(self)
+
+    @cached_property
+    def gyration(self) -> np.ndarray:
+        """(n_blocks,) array [m²]: square of the radius of gyration of each block, the mean about all axes."""
+        return np.asarray(np.trace(self.inertia, axis1=1, axis2=2) / (3.0 * self.volumes))
+
+    def shifted(self, by: np.ndarray) -> Polyhedra:
+        """Move the drawing by (3,) [m]."""
+        return replace(self, vertices=self.vertices + by)
+
+    def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
+        """Find contact points with a gap up to ``reach`` [m], one of their blocks of the useful, (n_blocks,) bool."""
+        parts = self.parts
+        return find_points(parts.solids, parts.block_of_part, parts.placed(vertices), reach, useful, self.widths)
+
+    def measure(self, vertices: np.ndarray, contacts: Contacts) -> Contacts:
+        """Measure the contact points between the same features, with the corners (n_vertices, 3) [m] elsewhere."""
+        parts = self.parts
+        return measured_points(
+            parts.solids, parts.block_of_part, parts.placed(vertices), contacts.features, contacts.areas
+        )
+
+    def overlaps(self, vertices: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Pairs of blocks that overlap by more than ``tolerance`` [m]; see :func:`overlap_depths_in_space`."""
+        parts = self.parts
+        return overlap_depths_in_space(parts.solids, parts.block_of_part, parts.placed(vertices), tolerance)

@@ -1,0 +1,215 @@
+"""Solids as flat arrays: their faces, edges, volumes, centroids and inertia; every loop runs in numpy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .broad_phase import expand_ranges
+from .outlines import next_vertices
+
+
+def cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(..., 3) array: cross products, a coordinate at a time, which is faster than ``np.cross``."""
+    a, b = first, second
+    return np.stack(
+        [
+            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
+            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
+            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
+        ],
+        axis=-1,
+    )
+
+
+def dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(...) array: dot products along the last axis of three, coordinate by coordinate."""
+    return first[..., 0] * second[..., 0] + first[..., 1] * second[..., 1] + first[..., 2] * second[..., 2]
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """(..., 3) array: vectors of length one; those of length zero stay so."""
+    return vectors / np.maximum(np.sqrt(dot(vectors, vectors)), 1e-300)[..., None]
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Planes of faces, with a direction along each.
+
+    Attributes
+    ----------
+    normals : (n_faces, 3) array
+        Unit vectors that point out of the solid.
+    tangents : (n_faces, 3) array
+        Unit vectors along the longest edge of each face.
+    middles : (n_faces, 3) array [m]
+        Means of the corners.
+    """
+
+    normals: np.ndarray
+    tangents: np.ndarray
+    middles: np.ndarray
+
+
+@dataclass(frozen=True)
+class Solids:
+    """Closed surfaces of plane faces as flat arrays, and what follows from their drawing.
+
+    Attributes
+    ----------
+    vertices : (n_vertices, 3) array [m]
+        Corners of all solids, one after another.
+    offsets : (n + 1,) int array
+        Solid ``i`` owns ``vertices[offsets[i]:offsets[i + 1]]``.
+    corners : (n_corners,) int array
+        Vertices around all faces, face after face, counter-clockwise seen from outside. A corner also names the edge
+        that starts there.
+    face_offsets : (n_faces + 1,) int array
+        Face ``k`` owns ``corners[face_offsets[k]:face_offsets[k + 1]]``.
+    block_of_face : (n_faces,) int array
+        The solid each face belongs to, ascending.
+    """
+
+    vertices: np.ndarray
+    offsets: np.ndarray
+    corners: np.ndarray
+    face_offsets: np.ndarray
+    block_of_face: np.ndarray
+
+    def __len__(self) -> int:
+        """Count the solids."""
+        return len(self.offsets) - 1
+
+    @cached_property
+    def block_of_vertex(self) -> np.ndarray:
+        """(n_vertices,) int array: the solid each vertex belongs to."""
+        return np.repeat(np.arange(len(self)), np.diff(self.offsets))
+
+    @cached_property
+    def faces_of_block(self) -> np.ndarray:
+        """(n + 1,) int array: solid ``i`` owns the faces from entry ``i`` to entry ``i + 1``."""
+        return np.searchsorted(self.block_of_face, np.arange(len(self) + 1))
+
+    @cached_property
+    def face_of_corner(self) -> np.ndarray:
+        """(n_corners,) int array: the face each corner belongs to."""
+        return np.repeat(np.arange(len(self.face_offsets) - 1), np.diff(self.face_offsets))
+
+    @cached_property
+    def next_corner(self) -> np.ndarray:
+        """(n_corners,) int array: the corner that follows around the face; edge k runs from corner k to it."""
+        return next_vertices(self.face_offsets)
+
+    @cached_property
+    def previous_corner(self) -> np.ndarray:
+        """(n_corners,) int array: the corner before."""
+        previous = np.empty_like(self.next_corner)
+        previous[self.next_corner] = np.arange(len(self.next_corner))
+        return previous
+
+    @cached_property
+    def twins(self) -> np.ndarray:
+        """(n_corners,) int array: the same edge, run through the other way around the face beyond it."""
+        n = np.int64(len(self.vertices))
+        start, end = self.corners.astype(np.int64), self.corners[self.next_corner].astype(np.int64)
+        order = np.argsort(start * n + end)
+        return order[np.searchsorted((start * n + end)[order], end * n + start)]
+
+    @cached_property
+    def edge_lengths(self) -> np.ndarray:
+        """(n_corners,) array [m]: length of the edge that starts at each corner."""
+        along = self.vertices[self.corners[self.next_corner]] - self.vertices[self.corners]
+        return np.sqrt(dot(along, along))
+
+    @cached_property
+    def longest_edges(self) -> np.ndarray:
+        """(n_faces,) int array: the longest edge of each face, the first of several."""
+        order = np.lexsort((-np.arange(len(self.corners)), self.edge_lengths, self.face_of_corner))
+        return order[self.face_offsets[1:] - 1]
+
+    @cached_property
+    def shortest_edges(self) -> np.ndarray:
+        """(n_faces,) array [m]: length of the shortest edge of each face."""
+        return np.minimum.reduceat(self.edge_lengths, self.face_offsets[:-1])
+
+    def faces(self, vertices: np.ndarray) -> Faces:
+        """Planes of the faces where the corners now are, (n_vertices, 3) [m]."""
+        starts, counts = self.face_offsets[:-1], np.diff(self.face_offsets)
+        points = vertices[self.corners]
+        arms = points - np.repeat(points[starts], counts, axis=0)
+        areas = np.add.reduceat(cross(arms, arms[self.next_corner]), starts)
+        longest = self.longest_edges
+        normals = unit(areas)
+        along = points[self.next_corner[longest]] - points[longest]
+        along = along - dot(along, normals)[:, None] * normals
+        return Faces(normals, unit(along), points[starts] + np.add.reduceat(arms, starts) / counts[:, None])
+
+    @cached_property
+    def _triangles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners of the triangles that fan out from the first corner of each face, and the solid of each."""
+        counts = np.diff(self.face_offsets) - 2
+        face, position = expand_ranges(counts)
+        first = self.face_offsets[face]
+        which = np.stack([first, first + position + 1, first + position + 2], axis=1)
+        return self.corners[which], self.block_of_face[face]
+
+    @cached_property
+    def face_areas(self) -> np.ndarray:
+        """(n_faces,) array [m²]."""
+        starts, counts = self.face_offsets[:-1], np.diff(self.face_offsets)
+        points = self.vertices[self.corners]
+        arms = points - np.repeat(points[starts], counts, axis=0)
+        area = np.add.reduceat(cross(arms, arms[self.next_corner]), starts) / 2.0
+        return np.sqrt(dot(area, area))
+
+    @cached_property
+    def surfaces(self) -> np.ndarray:
+        """(n,) array [m²]: area of all faces of each solid."""
+        return np.add.reduceat(self.face_areas, self.faces_of_block[:-1])
+
+    @cached_property
+    def _integrals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Volumes, centroids, and the second moments about them.
+
+        Sums over tetrahedra between the triangles of the surface and the first vertex of each solid, so that
+        coordinates far from the origin (UTM) lose no digits.
+        """
+        triangles, solid = self._triangles
+        first = np.searchsorted(solid, np.arange(len(self)))
+        origin = self.vertices[self.offsets[:-1]]
+        a, b, c = np.moveaxis(self.vertices[triangles] - origin[solid][:, None], 1, 0)
+        six = dot(a, cross(b, c))
+        volumes = np.add.reduceat(six, first) / 6.0
+        total = a + b + c
+        with np.errstate(divide="ignore", invalid="ignore"):
+            centroids = np.add.reduceat(total * six[:, None], first) / (24.0 * volumes[:, None])
+        # Of a tetrahedron with one corner at the origin: V/20 (sum of corners ⊗ itself + sum of each corner ⊗ itself).
+        squares = total[:, :, None] * total[:, None, :]
+        for corner in (a, b, c):
+            squares = squares + corner[:, :, None] * corner[:, None, :]
+        moments = np.add.reduceat(squares * (six / 120.0)[:, None, None], first)
+        moments = moments - volumes[:, None, None] * centroids[:, :, None] * centroids[:, None, :]
+        return volumes, origin + centroids, moments
+
+    @property
+    def volumes(self) -> np.ndarray:
+        """(n,) array [m³]: positive where the faces run counter-clockwise seen from outside."""
+        return self._integrals[0]
+
+    @property
+    def centroids(self) -> np.ndarray:
+        """(n, 3) array [m], before any movement."""
+        return self._integrals[1]
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(n, 3, 3) array [m⁵]: moments of inertia of unit density about the centroids, axes of the drawing."""
+        moments = self._integrals[2]
+        return np.trace(moments, axis1=1, axis2=2)[:, None, None] * np.eye(3) - moments
+
+    @cached_property
+    def widths(self) -> np.ndarray:
+        """(n,) array [m]: twice the volume over the surface of each solid, near c for a flat a × b × c."""
+        return 2.0 * self.volumes / self.surfaces

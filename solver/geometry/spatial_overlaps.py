@@ -1,0 +1,55 @@
+"""Overlaps in space: which blocks share volume, and how deep."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .broad_phase import box_pairs, boxes
+from .solids import Solids
+from .spatial_contacts import edge_separations, face_separations
+
+
+def overlap_depths_in_space(
+    solids: Solids, block_of_part: np.ndarray, vertices: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs of blocks that overlap by more than a tolerance, and by how much.
+
+    Parameters
+    ----------
+    solids : Solids
+        Convex parts.
+    block_of_part : (n_parts,) int array
+    vertices : (n_vertices, 3) array [m]
+        Current corners of all parts.
+    tolerance : float [m]
+
+    Returns
+    -------
+    i, j : (n_pairs,) int arrays
+        Blocks, the lower number first.
+    depth : (n_pairs,) array [m]
+        How far the deepest two parts of them have to be moved to come out of each other.
+
+    Notes
+    -----
+    Convex parts are separated by a face of one of them or by two edges across each other: the largest separation of
+    these, negative, is the depth.
+    """
+    low, high = boxes(vertices, solids.offsets)
+    i, j = box_pairs(low + tolerance / 2.0, high - tolerance / 2.0)
+    other = block_of_part[i] != block_of_part[j]
+    i, j = i[other], j[other]
+    faces = solids.faces(vertices)
+    apart, _ = face_separations(solids, faces, vertices, i, j)
+    deep = np.flatnonzero(apart < -tolerance)
+    i, j, apart = i[deep], j[deep], apart[deep]
+    apart = np.maximum(apart, face_separations(solids, faces, vertices, j, i)[0])
+    deep = np.flatnonzero(apart < -tolerance)
+    i, j, apart = i[deep], j[deep], apart[deep]
+    apart = np.maximum(apart, edge_separations(solids, faces, vertices, i, j)[0])
+    deep = apart < -tolerance
+    blocks = np.sort(np.stack([block_of_part[i[deep]], block_of_part[j[deep]]], axis=1), axis=1)
+    pairs, which = np.unique(blocks, axis=0, return_inverse=True)
+    depth = np.zeros(len(pairs))
+    np.maximum.at(depth, which.ravel(), -apart[deep])
+    return pairs[:, 0], pairs[:, 1], depth

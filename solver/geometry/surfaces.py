@@ -1,0 +1,245 @@
+"""Surfaces of blocks in space: checked, cleaned of what drawings add, and made into polyhedra."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from solver.tolerances import DRAWN_GAP
+
+from .convex_parts import NoParts
+from .flat_faces import ONE_WAY, SLIVER, edges_of, merged_faces, renumbered
+from .polyhedra import Polyhedra
+from .solids import Solids, dot
+
+#: Corners of a block nearer to each other than this fraction of its diagonal are one: files of triangles repeat them,
+#: in single precision.
+WELDED = 1e-6
+
+#: A block with less volume than this fraction of its surface to the power 3/2 is a sheet: double precision leaves about
+#: six digits of its centroid.
+SMALLEST_SHAPE_FACTOR = 1e-9
+
+#: What a block is in a file: its corners, and the corners around each of its faces.
+Surface = tuple[ArrayLike, Sequence[Sequence[int]]]
+
+
+def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
+    """Make polyhedra of closed surfaces: corners welded, right side out, with one face in each plane.
+
+    Parameters
+    ----------
+    solids : sequence of (vertices, faces)
+        Corners (n, 3) [m] of each block, and the numbers of the corners around each face.
+    names : sequence of str
+        Of the blocks, for messages.
+
+    Raises
+    ------
+    ValueError
+        Names the block and the place: coordinates that are not finite, a surface that is not closed, in several pieces
+        or without volume, a face that is not plane to a thousandth of the width of its block, a surface that crosses
+        itself.
+    """
+    surfaces = [_welded(*_checked(solid, name)) for solid, name in zip(solids, names, strict=True)]
+    for name, (vertices, faces) in zip(names, surfaces, strict=True):
+        if len(faces) < 4:
+            raise ValueError(
+                f"block '{name}' has {len(vertices)} different corners and {len(faces)} faces between them; "
+                "a block needs at least four of either"
+            )
+    joined = _joined(surfaces)
+    faulty = _blocks_of_open_edges(joined)
+    for block in faulty:
+        surfaces[block] = surfaces[block][0], _oriented(*surfaces[block], names[block])
+    if len(faulty):
+        joined = _joined(surfaces)
+    _refuse_pieces(joined, names)
+    volumes = joined.volumes
+    for i in np.flatnonzero(np.abs(volumes) <= SMALLEST_SHAPE_FACTOR * joined.surfaces**1.5).tolist():
+        raise ValueError(
+            f"block {i} ('{names[i]}') has a volume of {abs(volumes[i]):.3g} m³ for a surface of "
+            f"{joined.surfaces[i]:.3g} m²; it is a sheet, not a block: remove it or redraw it"
+        )
+    inside_out = np.flatnonzero(volumes < 0.0).tolist()
+    for block in inside_out:
+        vertices, faces = surfaces[block]
+        surfaces[block] = vertices, [face[::-1] for face in faces]
+    if inside_out:
+        joined = _joined(surfaces)
+    _refuse_warped(joined, names)
+    flatness = DRAWN_GAP * joined.widths
+    in_an_edge = np.flatnonzero(np.bincount(joined.corners) == 2)
+    split = np.union1d(joined.block_of_face[_coplanar_faces(joined, flatness)], joined.block_of_vertex[in_an_edge])
+    for block in split.tolist():
+        surfaces[block] = merged_faces(surfaces[block], float(flatness[block]))
+    shapes = _joined(surfaces) if len(split) else joined
+    try:
+        _ = shapes.parts
+    except NoParts as error:
+        raise ValueError(f"block {error.block} ('{names[error.block]}') {error.why}") from None
+    return shapes
+
+
+def _checked(solid: Surface, name: str) -> tuple[np.ndarray, list[list[int]]]:
+    try:
+        corners, loops = solid
+        vertices = np.asarray(corners, dtype=float)
+        faces = [[int(corner) for corner in loop] for loop in loops]
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            f"block '{name}' needs (x, y, z) corners and the numbers of the corners around each face: {error}"
+        ) from None
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or len(vertices) < 4 or len(faces) < 4:
+        raise ValueError(
+            f"block '{name}' needs at least four (x, y, z) corners and four faces; the shape of its corners is "
+            f"{vertices.shape}, and it has {len(faces)} faces"
+        )
+    finite = np.isfinite(vertices).all(axis=1)
+    if not finite.all():
+        corner = int(np.flatnonzero(~finite)[0])
+        raise ValueError(
+            f"block '{name}': corner {corner} is {vertices[corner].tolist()}; coordinates must be finite numbers"
+        )
+    for k, face in enumerate(faces):
+        if len(face) > 1 and face[0] == face[-1]:
+            face.pop()
+        wrong = [corner for corner in face if not 0 <= corner < len(vertices)]
+        if wrong:
+            raise ValueError(
+                f"block '{name}': face {k} has the corner {wrong[0]}; there are corners 0 to {len(vertices) - 1}"
+            )
+        if len(face) < 3:
+            raise ValueError(f"block '{name}': face {k} has {len(face)} corners; a face needs at least three")
+    return vertices, faces
+
+
+def _welded(vertices: np.ndarray, faces: list[list[int]]) -> tuple[np.ndarray, list[list[int]]]:
+    """Make one corner of those at the same place, and drop corners of no face and faces that have shrunk to a line."""
+    near = WELDED * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    pairs = cKDTree(vertices).query_pairs(near, output_type="ndarray")
+    if len(pairs):
+        n = len(vertices)
+        links = coo_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
+        count, which = connected_components(links, directed=False)
+        first = np.full(count, n)
+        np.minimum.at(first, which, np.arange(n))
+        same = first[which].tolist()
+        faces = [_without_repeats([same[corner] for corner in face]) for face in faces]
+        faces = [face for face in faces if len(face) > 2]
+    return renumbered(vertices, faces)
+
+
+def _without_repeats(face: list[int]) -> list[int]:
+    return [corner for k, corner in enumerate(face) if corner != face[k - 1]]
+
+
+def _joined(surfaces: Sequence[tuple[np.ndarray, list[list[int]]]]) -> Polyhedra:
+    offsets = np.concatenate([[0], np.cumsum([len(vertices) for vertices, _ in surfaces])])
+    sizes = [len(face) for _, faces in surfaces for face in faces]
+    counts = [sum(map(len, faces)) for _, faces in surfaces]
+    corners = np.array([corner for _, faces in surfaces for face in faces for corner in face], dtype=np.int64)
+    return Polyhedra(
+        vertices=np.concatenate([vertices for vertices, _ in surfaces]),
+        offsets=offsets,
+        corners=corners + np.repeat(offsets[:-1], counts),
+        face_offsets=np.concatenate([[0], np.cumsum(sizes)]),
+        block_of_face=np.repeat(np.arange(len(surfaces)), [len(faces) for _, faces in surfaces]),
+    )
+
+
+def _blocks_of_open_edges(solids: Solids) -> list[int]:
+    """Blocks with an edge that is not run through once in each sense."""
+    n = np.int64(len(solids.vertices))
+    start, end = solids.corners, solids.corners[solids.next_corner]
+    keys, counts = np.unique(start * n + end, return_counts=True)
+    there = np.searchsorted(keys, end * n + start)
+    closed = keys[np.minimum(there, len(keys) - 1)] == end * n + start
+    closed &= counts[np.searchsorted(keys, start * n + end)] == 1
+    return np.unique(solids.block_of_face[solids.face_of_corner[~closed]]).tolist()
+
+
+def _oriented(vertices: np.ndarray, faces: list[list[int]], name: str) -> list[list[int]]:
+    """Turn faces so that each edge is run through once in each sense; refuse a surface that is not closed."""
+    owners: dict[tuple[int, int], list[int]] = {}
+    for k, face in enumerate(faces):
+        if len(set(face)) < len(face):
+            twice = next(corner for corner in face if face.count(corner) > 1)
+            raise ValueError(
+                f"block '{name}': face {k} passes {_place(vertices[twice])} twice; split it into faces without holes"
+            )
+        for a, b in edges_of(face):
+            owners.setdefault((min(a, b), max(a, b)), []).append(k)
+    for (a, b), those in owners.items():
+        if len(those) != 2:
+            many = "only one face meets" if len(those) == 1 else f"{len(those)} faces meet"
+            raise ValueError(
+                f"block '{name}': the surface is not closed; {many} the edge from {_place(vertices[a])} to "
+                f"{_place(vertices[b])}, where two should"
+            )
+    turned: dict[int, bool] = {}
+    for seed in range(len(faces)):
+        queue = [seed] if seed not in turned else []
+        turned.setdefault(seed, False)
+        while queue:
+            k = queue.pop()
+            for a, b in edges_of(faces[k]):
+                first, second = owners[min(a, b), max(a, b)]
+                other = second if first == k else first
+                if other not in turned:
+                    turned[other] = turned[k] != ((a, b) in edges_of(faces[other]))
+                    queue.append(other)
+    return [face[::-1] if turned[k] else face for k, face in enumerate(faces)]
+
+
+def _place(point: np.ndarray) -> str:
+    return "({:.6g}, {:.6g}, {:.6g})".format(*point)
+
+
+def _refuse_pieces(solids: Solids, names: Sequence[str]) -> None:
+    n = len(solids.vertices)
+    links = coo_array(
+        (np.ones(len(solids.corners)), (solids.corners, solids.corners[solids.next_corner])), shape=(n, n)
+    )
+    count, which = connected_components(links, directed=False)
+    if count == len(solids):
+        return
+    pieces = np.bincount(solids.block_of_vertex[np.unique(which, return_index=True)[1]], minlength=len(solids))
+    i = int(pieces.argmax())
+    raise ValueError(
+        f"block {i} ('{names[i]}') consists of {pieces[i]} separate surfaces; give each its own "
+        "block, and fill cavities"
+    )
+
+
+def _refuse_warped(solids: Solids, names: Sequence[str]) -> None:
+    faces, face = solids.faces(solids.vertices), solids.face_of_corner
+    out = np.abs(dot(solids.vertices[solids.corners] - faces.middles[face], faces.normals[face]))
+    block = solids.block_of_face[face]
+    allowed = DRAWN_GAP * solids.widths[block]
+    if (out > allowed).any():
+        k = int((out / allowed).argmax())
+        number = int(face[k] - solids.faces_of_block[block[k]])
+        raise ValueError(
+            f"block {block[k]} ('{names[block[k]]}'): face {number} is not plane: its corner "
+            f"{_place(solids.vertices[solids.corners[k]])} is {out[k]:.3g} m out of it, more than {allowed[k]:.3g} m, "
+            "a thousandth of the width of the block; flatten the face or split it into triangles"
+        )
+
+
+def _coplanar_faces(solids: Solids, flatness: np.ndarray) -> np.ndarray:
+    """Faces that lie in the plane of a neighbour, as far as their corners at the ends of the common edge tell."""
+    faces, face = solids.faces(solids.vertices), solids.face_of_corner
+    beyond = solids.vertices[solids.corners[solids.next_corner[solids.next_corner[solids.twins]]]]
+    out = np.abs(dot(beyond - faces.middles[face], faces.normals[face]))
+    same = (out <= flatness[solids.block_of_face[face]]) & (
+        dot(faces.normals[face], faces.normals[face[solids.twins]]) > ONE_WAY
+    )
+    areas = solids.face_areas
+    largest = np.maximum.reduceat(areas, solids.faces_of_block[:-1])
+    return np.unique(np.append(face[same], np.flatnonzero(areas <= SLIVER * largest[solids.block_of_face])))

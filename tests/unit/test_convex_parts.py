@@ -1,0 +1,105 @@
+"""Stones that are not convex, cut into convex parts that fill them exactly."""
+
+import numpy as np
+import pytest
+
+import solver
+from solver.kinematics import rotation_matrices
+
+ANGLES = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+TURN = rotation_matrices(np.array([[0.3, -0.7, 0.4]]))[0]
+
+OUTLINES = {
+    "L": ([(0, 0), (2, 0), (2, 1), (1, 1), (1, 3), (0, 3)], 2),
+    "U": ([(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)], 3),
+    "Z": ([(0, 0), (2, 0), (2, 1), (4, 1), (4, 2), (1, 2), (1, 1), (0, 1)], 2),
+    "T": ([(0, 0), (3, 0), (3, 1), (2, 1), (2, 3), (1, 3), (1, 1), (0, 1)], 3),
+    "star": ([(r * np.cos(a), r * np.sin(a)) for a, r in zip(ANGLES, [2.0, 1.0] * 6, strict=True)], 7),
+    "arc": (
+        [(r * np.cos(a), r * np.sin(a)) for r, way in ((1.0, 1), (1.3, -1)) for a in ANGLES[:4][::way]],
+        3,
+    ),
+}
+
+
+def prism(outline, height=1.0):
+    outline = np.asarray(outline, dtype=float)
+    n = len(outline)
+    low, high = (np.column_stack([outline, np.full(n, z)]) for z in (0.0, height))
+    sides = [[k, (k + 1) % n, (k + 1) % n + n, k + n] for k in range(n)]
+    return np.concatenate([low, high]), [list(range(n))[::-1], list(range(n, 2 * n)), *sides]
+
+
+def ring():
+    """A square with a square hole through it, its faces with the hole cut in two each."""
+    outer, inner = ([(-r, -r), (r, -r), (r, r), (-r, r)] for r in (2.0, 1.0))
+    plan = np.array(outer + inner)
+    low, high = (np.column_stack([plan, np.full(8, z)]) for z in (0.0, 1.0))
+    halves = [[0, 1, 2, 6, 5, 4], [2, 3, 0, 4, 7, 6]]
+    faces = [face[::-1] for face in halves] + [[8 + c for c in face] for face in halves]
+    faces += [[k, (k + 1) % 4, (k + 1) % 4 + 8, k + 8] for k in range(4)]
+    faces += [[4 + (k + 1) % 4, 4 + k, 12 + k, 12 + (k + 1) % 4] for k in range(4)]
+    return np.concatenate([low, high]), faces
+
+
+def parts_of(solid):
+    corners, faces = solid
+    assembly = solver.Assembly.from_solids([(np.asarray(corners) @ TURN.T + [100.0, 200.0, 0.0], faces)])
+    return assembly.shapes, assembly.shapes.parts
+
+
+def out_of_faces(solids, part):
+    """How far a corner of a part is in front of one of its own faces."""
+    faces = solids.faces(solids.vertices)
+    own = solids.vertices[solids.offsets[part] : solids.offsets[part + 1]]
+    which = np.flatnonzero(solids.block_of_face == part)
+    return max(((own - faces.middles[k]) @ faces.normals[k]).max() for k in which)
+
+
+def shared_volume(solids, first, second):
+    manifold = pytest.importorskip("manifold3d")
+
+    def body(part):
+        own = solids.vertices[solids.offsets[part] : solids.offsets[part + 1]]
+        return manifold.Manifold.hull_points(own - solids.vertices[0])
+
+    return (body(first) ^ body(second)).volume()
+
+
+@pytest.mark.parametrize("name", [*OUTLINES, "ring"])
+def test_parts_are_convex_and_fill_the_stone(name):
+    outline, most = OUTLINES.get(name, (None, 4))
+    shapes, parts = parts_of(ring() if outline is None else prism(outline))
+    n = len(parts.block_of_part)
+    assert 1 < n <= most
+    assert parts.solids.volumes.sum() == pytest.approx(shapes.volumes[0], rel=1e-9)
+    assert max(out_of_faces(parts.solids, k) for k in range(n)) < 1e-6
+    assert max(shared_volume(parts.solids, i, j) for i in range(n) for j in range(i)) < 1e-6
+    moved = shapes.vertices @ TURN + [1.0, 2.0, 3.0]
+    np.testing.assert_allclose(parts.placed(moved), parts.solids.vertices @ TURN + [1.0, 2.0, 3.0], atol=1e-9)
+
+
+def test_a_stone_that_is_convex_to_a_thousandth_of_its_width_is_left_whole():
+    shapes, parts = parts_of(prism([(0, 0), (1, 0), (1, 1), (0.5, 0.9999), (0, 1)]))
+    assert parts.whole
+    assert parts.solids is shapes
+
+
+def test_a_surface_that_crosses_itself_is_refused():
+    corners, faces = prism([(0, 0), (4, 0), (4, 4), (1, 4), (1, 3), (5, 3), (5, 5), (0, 5)])
+    with pytest.raises(ValueError, match=r"block 0 \('block 0'\) .* its surface crosses itself: redraw it"):
+        parts_of((corners, faces))
+
+
+def test_only_whole_stones_touch_each_other():
+    """A key in a notch: points on the floor and both walls of the notch, none between the parts of one stone."""
+    stone = prism(OUTLINES["U"][0])
+    key = prism([(1, 1), (2, 1), (2, 2), (1, 2)])
+    assembly = solver.Assembly.from_solids([stone, key])
+    contacts = solver.find_contacts(assembly, assembly.vertices, 0.1)
+    assert (contacts.block_a != contacts.block_b).all()
+    normals, counts = np.unique(np.round(contacts.frames[:, 0], 9) + 0.0, axis=0, return_counts=True)
+    assert len(normals) == 3
+    np.testing.assert_allclose(contacts.gaps, 0.0, atol=1e-12)
+    assert contacts.areas.sum() == pytest.approx(3.0)
+    assert counts.tolist() == [4, 4, 4]

@@ -1,0 +1,81 @@
+"""Layouts in space: dimensions, no overlaps, faces that meet, and the blocks of the references."""
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis import generators
+from blockvis.layout.layout import layout_of
+from blockvis.layout.solids import volume
+
+IN_SPACE = [name for name in generators.LAYOUTS if generators.dimension_of(name) == 3]
+
+
+@pytest.mark.parametrize("name", IN_SPACE)
+def test_no_block_overlaps_another_and_each_touches_others(name):
+    assembly = generators.build(name)
+    assert assembly.dimension == 3
+    assert not len(assembly.shapes.overlaps(assembly.vertices, 1e-9)[0])
+    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-9)
+    touched = np.bincount(np.concatenate([contacts.block_a, contacts.block_b]), minlength=assembly.n_blocks)
+    assert (touched[assembly.free] >= 6).all(), [assembly.names[i] for i in np.flatnonzero(touched < 6)]
+    assert np.abs(contacts.gaps).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", IN_SPACE)
+def test_every_layout_has_named_blocks_a_material_and_a_ground(name):
+    assembly = generators.build(name)
+    assert assembly.moving.any()
+    for kind, role in zip(assembly.materials, assembly.roles, strict=True):
+        assert (kind == "ground") == (role != "free")
+        assert kind in ("brick", "stone", "ground")
+    assert not any(label.startswith("block ") for label in assembly.names)
+    assert len(set(assembly.names)) == assembly.n_blocks
+
+
+@pytest.mark.parametrize("name", IN_SPACE)
+def test_faces_are_plane_and_seen_counter_clockwise(name):
+    for points, faces in layout_of(generators.build(name)).solids:
+        assert volume(points, faces) > 0
+        for face in faces:
+            ring = points[face] - points[face].mean(axis=0)
+            assert np.linalg.svd(ring)[1][-1] < 1e-12
+
+
+def test_the_extruded_arch_is_the_arch_of_the_plane():
+    flat, deep = generators.arch(voussoirs=9), generators.extruded_arch(voussoirs=9, depth=0.4)
+    assert deep.names == flat.names
+    assert deep.roles.tolist() == flat.roles.tolist()
+    assert deep.shapes.volumes == pytest.approx(0.4 * flat.areas)
+    assert deep.centroids == pytest.approx(np.insert(flat.centroids, 1, 0.0, axis=1))
+
+
+def test_the_joints_of_a_barrel_vault_are_staggered():
+    vault = generators.barrel_vault(voussoirs=5, stones=3, length=1.5, springers=2)
+    assert vault.n_blocks == 3 * 3 + 2 * 4 + 4
+    assert vault.names[:4] == ("stone 1-1", "stone 1-2", "stone 1-3", "stone 2-1")
+    assert vault.names[-4:] == ("left springer 1", "left springer 2", "right springer 1", "right springer 2")
+    assert vault.roles[-4:].tolist() == ["fixed", "fixed", "moving", "moving"]
+
+
+def test_the_dome_is_what_the_reference_values_are_for():
+    dome = generators.dome(lunes=8, courses=6, thickness_ratio=0.12)
+    stones = np.linalg.norm(dome.vertices[dome.free[dome.block_of_vertex]], axis=1)
+    assert np.unique(np.round(stones, 12)).tolist() == [0.94, 1.06]
+    assert dome.n_blocks == 6 * 8 + 1 + 8
+    assert generators.dome(oculus=True).n_blocks == dome.n_blocks - 1
+    assert dome.vertices[dome.moving[dome.block_of_vertex]][:, 2].max() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("parameters", "reason"),
+    [
+        ({"lunes": 2}, "lunes is 2; give a whole number of at least 3"),
+        ({"cap": 95.0}, "cap is 95 and springing 90 degrees"),
+        ({"thickness_ratio": 0.0}, "thickness_ratio is 0"),
+        ({"radius": -1.0}, "radius is -1 m; give a number above 0"),
+    ],
+)
+def test_impossible_domes(parameters, reason):
+    with pytest.raises(ValueError, match=reason):
+        generators.dome(**parameters)

@@ -1,0 +1,205 @@
+"""Equilibrium of blocks in space against closed forms of elementary statics.
+
+Limit loads, reactions and whether a structure stands: of a prism on a tilted plane, a tetrahedron, a prism in a groove,
+a bar on two edges, a cube that is turned, a plug between faces and a stack with the largest overhang.
+"""
+
+import numpy as np
+import pytest
+
+import solver
+from solver.interfaces import InterfaceLaw, Interfaces
+from solver.kinematics import Pose
+from solver.program.admissible import admissible
+from solver.program.model import Model
+from solver.tolerances import COMPUTED_GAP
+
+EXACT = 1e-6
+
+
+def prism(outline, low, high):
+    """Extrude an outline in x and y, counter-clockwise seen from above, from z = low to z = high."""
+    n = len(outline)
+    corners = np.array([[*point, z] for z in (low, high) for point in outline])
+    sides = [[k, (k + 1) % n, n + (k + 1) % n, n + k] for k in range(n)]
+    return corners, [list(range(n))[::-1], list(range(n, 2 * n)), *sides]
+
+
+def along_x(outline, low, high):
+    """Extrude an outline in y and z from x = low to x = high."""
+    corners, faces = prism(outline, low, high)
+    return corners[:, [2, 0, 1]], faces
+
+
+def along_y(outline, low, high):
+    """Extrude an outline in x and z from y = low to y = high."""
+    corners, faces = prism(outline, low, high)
+    return corners[:, [0, 2, 1]], [face[::-1] for face in faces]
+
+
+def box(low, high):
+    (x, y, z), (u, v, w) = low, high
+    return prism([[x, y], [u, y], [u, v], [x, v]], z, w)
+
+
+def on_ground(solids, extent=5.0):
+    ground = box((-extent, -extent, -1.0), (extent, extent, 0.0))
+    return solver.Assembly.from_solids([*solids, ground], roles=["free"] * len(solids) + ["fixed"])
+
+
+def limit(assembly, live, friction, flow="associative"):
+    """The limit load, proved by its certificate."""
+    loads = solver.Loads(solver.self_weight(assembly).dead, live)
+    found = solver.limit_load(assembly, loads=loads, friction_coefficient=friction, flow=flow)
+    assert found.certificate.equilibrium_residual < 1e-8
+    assert found.certificate.complementarity < 1e-8
+    assert found.certificate.kinematic_violation < 1e-8
+    assert found.gap < 1e-8
+    return found
+
+
+def push(assembly, azimuth):
+    """A force on block 0 as large as its weight, horizontal, at its centroid."""
+    a = np.radians(azimuth)
+    return solver.weight_fraction(assembly, (np.cos(a), np.sin(a), 0.0), np.array([0]))
+
+
+def bounds(assembly, friction, rate=None, turned_by=0.0, azimuth=0.0):
+    """What equilibrium allows under the self-weight as drawn, on ground that is tilted."""
+    a, free = np.radians(azimuth), assembly.free
+    down = np.array([np.sin(turned_by) * np.cos(a), np.sin(turned_by) * np.sin(a), -np.cos(turned_by)])
+    load = np.zeros((assembly.n_blocks, 6))
+    load[:, :3] = (assembly.masses * solver.GRAVITY)[:, None] * down
+    force, length = float(np.linalg.norm(load[free, :3], axis=1).mean()), assembly.block_size
+    model = Model(assembly, Interfaces(InterfaceLaw(friction)), load, length, force, length, length / 4.0)
+    contacts = solver.find_contacts(assembly, assembly.vertices, COMPUTED_GAP * length)
+    return admissible(model, Pose.initial(assembly), contacts, np.full(len(contacts), friction), rate)
+
+
+PRISM = [[-0.5, -0.3], [0.5, -0.3], [0.5, 0.3], [-0.5, 0.3]]
+
+
+@pytest.mark.parametrize(
+    ("azimuth", "topples", "flow"),
+    [
+        (0.0, 0.463648, "associative"),
+        (20.0, 0.488988, "associative"),
+        (45.0, 0.401247, "associative"),
+        (45.0, 0.401247, "non-associative"),
+    ],
+)
+def test_a_prism_on_a_tilted_plane(azimuth, topples, flow):
+    """1 × 0.6 × 2: about an edge of its base where friction holds it, else down the plane at any azimuth."""
+    assembly = on_ground([prism(PRISM, 0.0, 2.0)])
+    a = np.radians(azimuth)
+    exact = min(0.5 / abs(np.cos(a)), 0.3 / max(abs(np.sin(a)), 1e-9))
+    assert np.arctan(exact) == pytest.approx(topples, abs=1e-6)
+    assert limit(assembly, push(assembly, azimuth), 0.9, flow).multiplier == pytest.approx(exact, rel=EXACT)
+    assert limit(assembly, push(assembly, azimuth), 0.2, flow).multiplier == pytest.approx(0.2, rel=EXACT)
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 20.0, 45.0])
+@pytest.mark.parametrize("friction", [0.9, 0.2])
+def test_a_prism_stands_up_to_its_angle_and_not_beyond(azimuth, friction):
+    assembly = on_ground([prism(PRISM, 0.0, 2.0)])
+    a = np.radians(azimuth)
+    angle = np.arctan(min(0.5 / np.cos(a), 0.3 / max(np.sin(a), 1e-9), friction))
+    assert bounds(assembly, friction, turned_by=angle * (1.0 - EXACT), azimuth=azimuth).exists
+    assert not bounds(assembly, friction, turned_by=angle * (1.0 + EXACT), azimuth=azimuth).exists
+
+
+@pytest.mark.parametrize(("azimuth", "exact"), [(0.0, 1.414214), (20.0, 1.504975)])
+def test_a_regular_tetrahedron_turns_about_an_edge(azimuth, exact):
+    """The inscribed radius of the base over the height of the centroid, √2, over the cosine to the edge's normal."""
+    corners = np.array([[np.cos(t), np.sin(t), 0.0] for t in np.radians([60.0, 180.0, 300.0])]) / np.sqrt(3.0)
+    corners = np.vstack([corners, [0.0, 0.0, np.sqrt(2.0 / 3.0)]])
+    assembly = on_ground([(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])])
+    assert np.sqrt(2.0) / np.cos(np.radians(azimuth)) == pytest.approx(exact, abs=1e-6)
+    found = limit(assembly, push(assembly, azimuth), 5.0)
+    assert found.multiplier == pytest.approx(np.sqrt(2.0) / np.cos(np.radians(azimuth)), rel=EXACT)
+
+
+def groove(half_angle):
+    """A triangular prism, edge down, in a groove of its own angle; along x."""
+    width = np.tan(half_angle)
+    wedge = [[width, 1.0], [-width, 1.0], [0.0, 0.0]]
+    right = [[0.0, -1.0], [width, -1.0], [width, 1.0], [0.0, 0.0]]
+    left = [[0.0, 0.0], [-width, 1.0], [-width, -1.0], [0.0, -1.0]]
+    solids = [along_x(wedge, -3.0, 3.0), along_x(right, -4.0, 4.0), along_x(left, -4.0, 4.0)]
+    return solver.Assembly.from_solids(solids, roles=["free", "fixed", "fixed"])
+
+
+@pytest.mark.parametrize(("half_angle", "friction"), [(45.0, 0.5), (30.0, 0.3), (60.0, 0.4)])
+def test_a_prism_pushed_along_a_groove(half_angle, friction):
+    """Without lift it slides at μ / sin β; associative friction lifts it, and carries more."""
+    beta = np.radians(half_angle)
+    assembly = groove(beta)
+    lifting = friction / (np.sin(beta) * np.sqrt(1.0 - (friction / np.tan(beta)) ** 2))
+    found = limit(assembly, push(assembly, 0.0), friction)
+    assert found.multiplier == pytest.approx(lifting, rel=EXACT)
+    assert "grooves and wedges" in found.caveat
+    assert found.caveat in str(found)
+    sliding = limit(assembly, push(assembly, 0.0), friction, "non-associative")
+    assert sliding.status is solver.LimitStatus.FOUND
+    assert sliding.multiplier == pytest.approx(friction / np.sin(beta), rel=EXACT)
+    assert sliding.caveat == ""
+    # It does not lift.
+    np.testing.assert_allclose(sliding.mechanism[0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-5)
+
+
+def test_a_turned_cube():
+    """Its corners have the friction: μ N a / √2."""
+    assembly = on_ground([box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))])
+    live = np.zeros((2, 6))
+    live[0, 5] = assembly.masses[0] * solver.GRAVITY
+    assert limit(assembly, live, 0.5).multiplier == pytest.approx(0.353553390593, rel=EXACT)
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.7])
+def test_a_bar_across_two_bars_slides_on_their_edges(friction):
+    """Edge on edge, pushed along its own edge and there: at μ."""
+    upper = along_x([[0.0, 0.0], [0.3, 0.5], [-0.3, 0.5]], -2.0, 2.0)
+    edges = [[[-0.3 + x, -0.5], [0.3 + x, -0.5], [x, 0.0]] for x in (-1.2, 1.0)]
+    lower = [along_y(edge, -1.0, 1.0) for edge in edges]
+    assembly = solver.Assembly.from_solids([upper, *lower], roles=["free", "fixed", "fixed"])
+    weight = assembly.masses[0] * solver.GRAVITY
+    live = solver.point_load(assembly, 0, (weight, 0.0, 0.0), point=(0.0, 0.0, 0.0))
+    assert limit(assembly, live, friction).multiplier == pytest.approx(friction, rel=EXACT)
+
+
+@pytest.mark.parametrize("count", [3, 6])
+def test_a_plug_between_faces_that_give_way(count):
+    """A pyramid, tip down, between supports that move out: their reaction at the least, W / tan(β + φ)."""
+    beta, friction = np.radians(20.0), 0.3
+    low, high = 0.5, 0.5 + np.tan(beta)
+    angles = 2.0 * np.pi * np.arange(count) / count
+    ring = np.stack([np.cos(angles), np.sin(angles)], axis=1) / np.cos(np.pi / count)
+
+    def frustum(inner, outer, z0, z1):
+        corners = np.concatenate([np.c_[inner, np.full(len(inner), z0)], np.c_[outer, np.full(len(outer), z1)]])
+        return corners, prism(inner, z0, z1)[1]
+
+    solids, out = [frustum(low * ring, high * ring, 0.0, 1.0)], np.zeros((count + 1, 6))
+    for k in range(count):
+        sides = ring[[k, (k + 1) % count]]
+        # Quadrilaterals from the plug's face outwards.
+        at = [np.array([r * sides[0], 2.0 * sides[0], 2.0 * sides[1], r * sides[1]]) for r in (low, high)]
+        solids.append(frustum(at[0], at[1], 0.0, 1.0))
+        out[k + 1, :2] = sides.mean(axis=0) / np.linalg.norm(sides.mean(axis=0))
+    assembly = solver.Assembly.from_solids(solids, roles=["free"] + ["moving"] * count)
+    found = bounds(assembly, friction, out)
+    weight = assembly.masses[0] * solver.GRAVITY
+    assert found.exists
+    assert 1.0 / np.tan(beta + np.arctan(friction)) == pytest.approx(1.3416399, abs=1e-7)
+    assert found.low / weight == pytest.approx(1.3416399, rel=EXACT)
+
+
+@pytest.mark.parametrize(("overhang", "stands"), [(0.999, True), (1.001, False)])
+def test_a_harmonic_stack_of_eight_along_the_diagonal(overhang, stands):
+    """Each block as far out over the one below as those above it allow: 1 / 2k of its side, along x and along y."""
+    solids, at = [], 0.0
+    for level in range(8):
+        solids.append(box((at, at, 0.2 * level), (at + 1.0, at + 1.0, 0.2 * (level + 1))))
+        at += overhang / (2.0 * (7 - level)) if level < 7 else 0.0
+    assembly = on_ground(solids)
+    assert bounds(assembly, 0.6).exists is stands
