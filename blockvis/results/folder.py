@@ -21,6 +21,7 @@ from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .cracks import MOST_LISTED, cracks_of
 from .increments import StoredIncrements, packed_increment
+from .joint_faces import JointFaces, LargestMovementsInSpace
 from .joints import InitialJoints, LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
@@ -209,8 +210,11 @@ class ResultsFolder:
         write_whole(self.path / "joints.csv", self._movements.table())
         for name, text in (tables or {}).items():
             write_whole(self.path / name, text)
-        cracks = cracks_of(self.assembly, response.path[-1].pose, self._movements.joints) if response.path else []
-        listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
+        listed = {}
+        # Crack lines are those of joints in the plane.
+        if isinstance(self._movements, LargestMovements):
+            cracks = cracks_of(self.assembly, response.path[-1].pose, self._movements.joints) if response.path else []
+            listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_whole(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
@@ -220,7 +224,8 @@ class ResultsFolder:
         self._rows = io.StringIO()
         self._table = csv.writer(self._rows, lineterminator="\n")
         self._table.writerow((*COLUMNS, *own_columns(self.parameter)))
-        self._movements = LargestMovements(self.assembly, self.parameter)
+        kind = LargestMovements if self.assembly.dimension == 2 else LargestMovementsInSpace
+        self._movements = kind(self.assembly, self.parameter)
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
@@ -281,7 +286,7 @@ def _write_grids(
     assembly: solver.Assembly,
     increment: solver.Increment,
     shape: str,
-    joints: InitialJoints | None = None,
+    joints: InitialJoints | JointFaces | None = None,
 ) -> None:
     """Write the VTU files of an increment."""
     from blockvis.vtk_files import write_vtu
@@ -342,18 +347,38 @@ def _stored_assembly(folder: Path) -> solver.Assembly:
         raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
     try:
         stored = checked_arrays(folder / "assembly.npz")
-        offsets = stored["offsets"].tolist()
+        names, roles, materials = (list(map(str, stored[key])) for key in ("names", "roles", "materials"))
         # Checked like a layout: the file may come from anywhere.
+        if "corners" in stored:
+            return solver.Assembly.from_solids(
+                _stored_solids(stored), names=names, roles=roles, density=stored["density"], materials=materials
+            )
         return solver.Assembly.from_outlines(
-            [stored["vertices"][first:last] for first, last in pairwise(offsets)],
-            names=list(map(str, stored["names"])),
-            roles=list(map(str, stored["roles"])),
+            [stored["vertices"][first:last] for first, last in pairwise(stored["offsets"].tolist())],
+            names=names,
+            roles=roles,
             density=stored["density"],
             thickness=stored["thickness"],
-            materials=list(map(str, stored["materials"])),
+            materials=materials,
         )
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise ValueError(f"'{folder / 'assembly.npz'}' cannot be read ({error}); run the case again") from None
+
+
+def _stored_solids(stored: Mapping[str, np.ndarray]) -> list[tuple[np.ndarray, list[list[int]]]]:
+    """Corners and faces of each block in space, the corners of a face numbered within the block."""
+    offsets, faces = (
+        stored["offsets"].tolist(),
+        np.searchsorted(stored["block_of_face"], np.arange(len(stored["offsets"]))),
+    )
+    loops = [
+        stored["corners"][first:last] - stored["offsets"][block]
+        for (first, last), block in zip(pairwise(stored["face_offsets"].tolist()), stored["block_of_face"], strict=True)
+    ]
+    return [
+        (stored["vertices"][first:last], [loop.tolist() for loop in loops[low:high]])
+        for (first, last), (low, high) in zip(pairwise(offsets), pairwise(faces.tolist()), strict=True)
+    ]
 
 
 def stored_case(folder: str | Path) -> str:
@@ -408,7 +433,7 @@ def _collapse_of(
 ) -> solver.Collapse | None:
     if summary.get("collapse_bracket") is None:
         return None
-    mechanism = np.zeros((assembly.n_blocks, 3))
+    mechanism = np.zeros((assembly.n_blocks, 3 * assembly.dimension - 3))
     falling = [i for i in increments if i.status == solver.Status.FALLING]
     if falling:
         motion = falling[0].velocity

@@ -312,7 +312,7 @@ def _solved(
 
 def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
     """Warn where the blocks as drawn were in no equilibrium and found one a little further."""
-    moved = np.hypot(*first.pose.displacements(assembly)[:, :2].T)
+    moved = np.linalg.norm(first.pose.positions - assembly.centroids, axis=1)
     block = int(np.argmax(moved))
     if first.status == solver.Status.EQUILIBRIUM and moved[block] > AS_DRAWN * assembly.block_size:
         warnings.warn(
