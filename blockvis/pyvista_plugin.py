@@ -26,7 +26,7 @@ from .formats.gmsh_mesh import holds_flat_blocks
 from .formats.pyvista_files import dataset_of, layout_of_dataset
 from .formats.read import read_layout, write_layout
 from .layout.assemble import assemble
-from .layout.layout import Layout
+from .layout.layout import AnyLayout, Layout
 from .layout.selection import sorted_out
 from .pictures import palette
 from .results.datasets import block_dataset
@@ -95,10 +95,11 @@ class BlockvisAccessor:
         """One line: how many blocks there are, and what can be done with them."""
         return f"<{self.layout().n_blocks} blocks: plot(), assembly(), settle(), limit_load(), save()>"
 
-    def layout(self) -> Layout:
-        """Read the blocks as a layout, lengths in m."""
+    def layout(self) -> AnyLayout:
+        """Read the blocks as a layout, lengths in m; closed surfaces that are not prisms side by side are in space."""
         layout = layout_of_dataset(self._mesh)
-        return sorted_out(replace(layout, unit=layout.unit or "m"))
+        layout = replace(layout, unit=layout.unit or "m")
+        return sorted_out(layout) if isinstance(layout, Layout) else layout
 
     def save(self, path: str | Path) -> Path:
         """Write the blocks to a layout file of any format that blockvis writes."""
