@@ -233,6 +233,26 @@ def solids_of_bodies(
     return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", ignore))
 
 
+def in_dimension(
+    found: Bodies,
+    path: Path | str,
+    dimension: int | None,
+    view: str | None = None,
+    ignore: Sequence[str] = (),
+    only: Sequence[str] = (),
+) -> Layout | SolidLayout:
+    """Make a layout in the plane, 2, or in space, 3; by default in space where bodies are not prisms side by side."""
+    if dimension == 3:
+        return solids_of_bodies(found, path, view, ignore, only)
+    try:
+        return layout_of_bodies(found, path, view, ignore, only)
+    except NotFlat as error:
+        if dimension == 2 or view is not None:
+            raise
+        layout = solids_of_bodies(found, path, None, ignore, only)
+        return replace(layout, notes=(f"blocks in space: {error.reason}", *layout.notes))
+
+
 @dataclass(frozen=True)
 class _Asked:
     """The bodies that are asked for, with their rows, the size of the drawing, and the numbers of the others."""
