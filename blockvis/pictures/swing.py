@@ -13,7 +13,7 @@ from .frame import framed
 
 #: A fall of so many frames needs no others; how many a mechanism has that swings out, and how far it goes, in motions of
 #: :class:`Swing`.
-ENOUGH_FRAMES, SWING_FRAMES, SWING_REACH = 8, 20, 2.5
+ENOUGH_FRAMES, SWING_FRAMES, SWING_REACH = 8, 15, 1.2
 
 #: Up to this many parts of a mechanism are tinted one by one.
 MOST_PARTS = 16
