@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
@@ -25,11 +26,13 @@ from .annotations import (
     settlement_arrows,
 )
 from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, matters
-from .curves import CurvePanel
 from .flat_scene import Scene, magnified
 from .frame import ColourBar, Key, Sheet, framed, write_labels
 from .live_load import LiveLoads
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
+
+if TYPE_CHECKING:
+    from .curves import CurvePanel
 
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
@@ -159,7 +162,12 @@ class Drawer:
         bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
         beside = round(0.36 * size[0]) if curve else 0
         self.sheet = Sheet(size, bar, beside)
-        self.panel = CurvePanel(response, size_of(self.sheet.beside), self.sheet.text) if curve else None
+        self.panel: CurvePanel | None = None
+        if curve:
+            # Figures and axes of matplotlib are loaded where a curve is drawn only.
+            from .curves import CurvePanel
+
+            self.panel = CurvePanel(response, size_of(self.sheet.beside), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
         frame = frame.holding(self.live.tails)
         fill = palette.block_colours(assembly.materials, assembly.free)
@@ -246,7 +254,7 @@ class Drawer:
             title=title or head,
             detail=note or detail,
             badge=badge or (badge_of(self.response) if falling else FAILED_BADGE if failed else ""),
-            keys=self.keys(),
+            keys=self._keys_of_tints() if blocks_only else self.keys(),
             pixel=self.scene.pixel,
             beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, parameter=s)),
         )
@@ -296,12 +304,7 @@ class Drawer:
     def keys(self) -> list[Key]:
         """Return the legend: what is marked in any of the increments, so that it is the same in all pictures."""
         if self._keys is None:
-            keys = []
-            if self._swing is not None and self._swing.moves:
-                together = int(self._swing.parts.max(initial=-1)) + 1 <= MOST_PARTS
-                colour = palette.PARTS[0] if together else palette.RAMP[5]
-                words = "parts of the last mechanism" if together else "faster in the last mechanism"
-                keys.append(Key("area", words, (int(colour[0]), int(colour[1]), int(colour[2]))))
+            keys = self._keys_of_tints()
             if self.look.joints:
                 seen = self._seen
                 keys += [Key("area", "open joint", palette.OPEN)] if seen.cracks else []
@@ -326,6 +329,15 @@ class Drawer:
                 keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT))
             self._keys = keys
         return self._keys
+
+    def _keys_of_tints(self) -> list[Key]:
+        """Return what the legend says of the colours of the blocks: all of it where only they are drawn."""
+        if self._swing is None or not self._swing.moves:
+            return []
+        together = int(self._swing.parts.max(initial=-1)) + 1 <= MOST_PARTS
+        red, green, blue = palette.PARTS[0] if together else palette.RAMP[5]
+        words = "parts of the last mechanism" if together else "faster in the last mechanism"
+        return [Key("area", words, (int(red), int(green), int(blue)))]
 
     @property
     def many(self) -> bool:

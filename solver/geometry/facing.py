@@ -21,6 +21,10 @@ FACING = 0.05
 #: Separations that differ by less than this, in widths, are equal: then the faces that oppose each other better count.
 SAME_SEPARATION = 1e-6
 
+#: Others than those that oppose each other best have to do so at least with this cosine: neighbours across a corner,
+#: which touch along an edge alone, open by a right angle in a wall and by a little less in a dome.
+OTHERS_FACING = 0.5
+
 #: Faces of a part that are tried against the one that leads, beside the one that opposes it best.
 OTHERS_TRIED = 6
 
@@ -79,7 +83,9 @@ class FacingParts:
         """(n,) bool array: whether the two faces do."""
         return self.cosine <= -FACING
 
-    def other_faces(self, solids: Solids, faces: Faces) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def other_faces(
+        self, solids: Solids, faces: Faces, inner: np.ndarray
+    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Give other faces that face each other, round by round, those that oppose each other better first.
 
         Yields
@@ -99,7 +105,7 @@ class FacingParts:
             face_i, face_j = (first, answer) if ours else (answer, first)
             new = (face_i != self.face_i[pair]) | (face_j != self.face_j[pair])
             cosine = dot(faces.normals[face_i], faces.normals[face_j])
-            new &= cosine <= -FACING
+            new &= (cosine <= -OTHERS_FACING) & ~inner[answer]
             tried.append((pair[new], face_i[new], face_j[new], cosine[new]))
         pair, face_i, face_j, cosine = (np.concatenate(column) for column in zip(*tried, strict=True))
         order = np.lexsort((face_j, face_i, cosine, pair))
@@ -121,14 +127,15 @@ def near_parts(
     return i[chosen], j[chosen]
 
 
-def _opposed_faces(solids: Solids, faces: Faces, leading: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """(n,) int array: the face of part j that opposes the leading face best."""
+def _opposed_faces(solids: Solids, faces: Faces, inner: np.ndarray, leading: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """(n,) int array: the face of part j, not inside its block, that opposes the leading face best."""
     first = solids.faces_of_block
     counts = np.diff(first)[j]
     answer = np.empty(len(j), dtype=np.int64)
     for k in alike(counts):
         face = first[j[k]][:, None] + np.arange(counts[k[0]])
-        answer[k] = face[np.arange(len(k)), dot(faces.normals[face], faces.normals[leading[k]][:, None]).argmin(axis=1)]
+        cosine = dot(faces.normals[face], faces.normals[leading[k]][:, None])
+        answer[k] = face[np.arange(len(k)), np.where(inner[face], np.inf, cosine).argmin(axis=1)]
     return answer
 
 
@@ -139,6 +146,7 @@ def facing_parts(
     parts: tuple[np.ndarray, np.ndarray],
     reach: float,
     width: np.ndarray,
+    inner: np.ndarray,
 ) -> FacingParts:
     """Choose the faces that near parts turn to each other, where no face keeps them farther apart than ``reach``.
 
@@ -151,16 +159,21 @@ def facing_parts(
     reach : float [m]
     width : (n,) array [m]
         Of the thinner of their blocks.
+    inner : (n_faces,) bool array
+        Faces inside a block, where it was cut into parts: what they keep apart, touches another part, if any.
     """
     i, j = parts
-    apart_i, lead_i = face_separations(solids, faces, vertices, i, j)
-    near = np.flatnonzero(apart_i <= reach)
-    i, j, apart_i, lead_i, width = i[near], j[near], apart_i[near], lead_i[near], width[near]
-    apart_j, lead_j = face_separations(solids, faces, vertices, j, i)
-    near = np.flatnonzero(apart_j <= reach)
-    i, j, width = i[near], j[near], width[near]
-    apart_i, lead_i, apart_j, lead_j = apart_i[near], lead_i[near], apart_j[near], lead_j[near]
-    answer_j, answer_i = _opposed_faces(solids, faces, lead_i, j), _opposed_faces(solids, faces, lead_j, i)
+    apart_i, lead_i, behind_i = face_separations(solids, faces, vertices, i, j, inner)
+    near = np.flatnonzero(np.maximum(apart_i, behind_i) <= reach)
+    i, j, apart_i, lead_i, behind_i, width = (value[near] for value in (i, j, apart_i, lead_i, behind_i, width))
+    apart_j, lead_j, behind_j = face_separations(solids, faces, vertices, j, i, inner)
+    inside = np.maximum(behind_i, behind_j) > np.maximum(apart_i, apart_j) + SAME_SEPARATION * width
+    near = np.flatnonzero((apart_j <= reach) & ~inside)
+    i, j, apart_i, lead_i, apart_j, lead_j, width = (
+        value[near] for value in (i, j, apart_i, lead_i, apart_j, lead_j, width)
+    )
+    answer_j = _opposed_faces(solids, faces, inner, lead_i, j)
+    answer_i = _opposed_faces(solids, faces, inner, lead_j, i)
     normals = faces.normals
     cosine_i, cosine_j = dot(normals[lead_i], normals[answer_j]), dot(normals[lead_j], normals[answer_i])
     equal = np.abs(apart_i - apart_j) <= SAME_SEPARATION * width

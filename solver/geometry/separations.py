@@ -15,12 +15,33 @@ ALONG = 1e-6
 
 
 def face_separations(
-    solids: Solids, faces: Faces, vertices: np.ndarray, i: np.ndarray, j: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """How far part j is in front of the face of part i from which it is farthest, (n,) [m], and that face."""
+    solids: Solids, faces: Faces, vertices: np.ndarray, i: np.ndarray, j: np.ndarray, inner: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How far faces keep two convex parts apart.
+
+    Parameters
+    ----------
+    solids : Solids
+    faces : Faces
+    vertices : (n_vertices, 3) array [m]
+    i, j : (n,) int arrays
+        Parts.
+    inner : (n_faces,) bool array
+        Faces inside a block.
+
+    Returns
+    -------
+    apart : (n,) array [m]
+        How far part j is in front of the face of part i from which it is farthest; negative behind it.
+    leading : (n,) int array
+        That face.
+    behind : (n,) array [m]
+        How far it is in front of a face of part i inside its block; minus infinity where there is none.
+    """
     first_face, first_vertex = solids.faces_of_block, solids.offsets
     n_faces, n_vertices = np.diff(first_face)[i], np.diff(first_vertex)[j]
-    apart, leading = np.empty(len(i)), np.empty(len(i), dtype=np.int64)
+    apart, leading, behind = np.empty(len(i)), np.empty(len(i), dtype=np.int64), np.full(len(i), -np.inf)
+    cut = inner.any()
     for k in alike(n_faces, n_vertices):
         face = first_face[i[k]][:, None] + np.arange(n_faces[k[0]])
         vertex = first_vertex[j[k]][:, None] + np.arange(n_vertices[k[0]])
@@ -29,10 +50,13 @@ def face_separations(
         normal, corner = faces.normals[face], vertices[vertex] - origin
         level = dot(normal, faces.middles[face] - origin)
         distance = dot(normal[:, :, None], corner[:, None]).min(axis=2) - level
+        if cut:
+            behind[k] = np.where(inner[face], distance, -np.inf).max(axis=1)
+            distance = np.where(inner[face], -np.inf, distance)
         best = distance.argmax(axis=1)
         row = np.arange(len(k))
         apart[k], leading[k] = distance[row, best], face[row, best]
-    return apart, leading
+    return apart, leading, behind
 
 
 def edge_separations(
@@ -59,7 +83,6 @@ def edge_separations(
     once = np.flatnonzero(np.arange(len(solids.corners)) < solids.twins)
     first = np.searchsorted(once, solids.face_offsets[solids.faces_of_block])
     count = np.diff(first)
-    face = solids.face_of_corner
     apart = np.full(len(i), -np.inf)
     found_own, found_other = np.zeros((2, len(i)), dtype=np.int64)
     for k in alike(count[i], count[j]):
@@ -73,9 +96,13 @@ def edge_separations(
         sides = outward(solids, faces, other)[:, None] - outward(solids, faces, own)[:, :, None]
         sense = np.sign(dot(normal, sides))
         normal, holds = unit(normal) * sense[..., None], holds & (sense != 0.0)
-        for edges, side, axis in ((own, -1.0, 2), (other, 1.0, 1)):
-            for one in (face[edges], face[solids.twins[edges]]):
-                holds &= side * dot(np.expand_dims(faces.normals[one], axis), normal) >= -ALONG
+        for edges, way, side, axis in ((own, along_a, 1.0, 2), (other, along_b, -1.0, 1)):
+            for face, sense in (
+                (solids.face_of_corner[edges], 1.0),
+                (solids.face_of_corner[solids.twins[edges]], -1.0),
+            ):
+                inward = sense * cross(faces.normals[face], way)
+                holds &= side * dot(np.expand_dims(inward, axis), normal) >= -ALONG
         distance = np.where(holds, dot(a[:, :, None] - b[:, None], normal), -np.inf).reshape(len(k), -1)
         best = distance.argmax(axis=1)
         row = np.arange(len(k))

@@ -15,6 +15,7 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 from .broad_phase import expand_ranges
 from .clipping import clipped_faces
 from .contacts import Contacts, joined_contacts
+from .convex_parts import ConvexParts
 from .facing import FacingParts, facing_parts, near_parts
 from .separations import edge_separations, outward
 from .solids import Faces, Solids, cross, dot, unit
@@ -125,21 +126,14 @@ def measured_points(
 
 
 def find_points(
-    solids: Solids,
-    block_of_part: np.ndarray,
-    vertices: np.ndarray,
-    reach: float,
-    useful: np.ndarray,
-    widths: np.ndarray,
+    parts: ConvexParts, vertices: np.ndarray, reach: float, useful: np.ndarray, widths: np.ndarray
 ) -> Contacts:
     """Find the points at which blocks touch or may touch within one increment.
 
     Parameters
     ----------
-    solids : Solids
-        Convex parts.
-    block_of_part : (n_parts,) int array
-        Parts of one block do not touch each other.
+    parts : ConvexParts
+        Those of one block do not touch each other, and faces inside it touch nothing.
     vertices : (n_vertices, 3) array [m]
         Current corners of all parts.
     reach : float [m]
@@ -160,10 +154,11 @@ def find_points(
     corner of one part in the face of the other, or an edge across an edge. Where they do not cover each other, the next
     best answer. Where no faces oppose each other, a tip stands on a face, or an edge lies across an edge.
     """
+    solids, block_of_part, inner = parts.solids, parts.block_of_part, parts.inner
     faces = solids.faces(vertices)
     i, j = near_parts(solids, block_of_part, vertices, reach, useful)
     width = np.minimum(widths[block_of_part[i]], widths[block_of_part[j]])
-    pairs = facing_parts(solids, faces, vertices, (i, j), reach, width)
+    pairs = facing_parts(solids, faces, vertices, (i, j), reach, width, inner)
 
     def measured(features: np.ndarray, areas: np.ndarray) -> Contacts:
         return measured_points(solids, block_of_part, vertices, features, areas)
@@ -174,15 +169,17 @@ def find_points(
 
     tried = np.flatnonzero(pairs.shallow & pairs.face_each_other)
     alone = pairs.shallow & ~pairs.face_each_other
-    found = [
-        measured(*_tips(solids, faces, vertices, pairs[alone], reach)),
-        measured(*_crossed_edges(solids, faces, vertices, pairs[pairs.cosine > OPPOSED], reach)),
-    ]
-    found = [contacts[near(contacts)] for contacts in found]
+    tips = measured(*_tips(solids, faces, vertices, pairs[alone], reach))
+    crossed = measured(*_crossed_edges(solids, faces, vertices, pairs[pairs.cosine > OPPOSED], reach))
+    own, other = crossed.features[:, 1], crossed.features[:, 2]
+    of_cuts = (inner[solids.face_of_corner] | inner[solids.face_of_corner[solids.twins]])[np.stack([own, other])]
+    crossed = crossed[~of_cuts.any(axis=0)]
+    crossed = crossed[near(crossed)]
+    found = [tips[near(tips)], crossed]
     # Where the faces that oppose each other best do not cover each other, others may.
     left = pairs[tried]
     resolved = np.zeros(len(left), dtype=bool)
-    rounds = chain([(np.arange(len(left)), left.face_i, left.face_j)], left.other_faces(solids, faces))
+    rounds = chain([(np.arange(len(left)), left.face_i, left.face_j)], left.other_faces(solids, faces, inner))
     for pair, face_i, face_j in rounds:
         now = ~resolved[pair]
         pair, face_i, face_j = pair[now], face_i[now], face_j[now]
@@ -199,13 +196,16 @@ def find_points(
     contacts = joined_contacts(found)
     kind, first, second, _ = contacts.features.T
     contacts = contacts[np.lexsort((second, first, kind))]
-    cut = np.bincount(block_of_part)[np.stack([contacts.block_a, contacts.block_b])] > 1
-    return _once(contacts, cut.any(axis=0), CORNER_TOLERANCE * float(widths.min()))
+    # Parts of one block may have a point in common, and edges across each other a corner of a polygon.
+    several = np.bincount(block_of_part, minlength=len(widths)) > 1
+    several[crossed.block_a] = True
+    twice = several[contacts.block_a] | several[contacts.block_b]
+    return _once(contacts, twice, CORNER_TOLERANCE * float(widths.min()))
 
 
-def _once(contacts: Contacts, cut: np.ndarray, near: float) -> Contacts:
-    """Keep one of several points at one place with one normal, where two parts of a block, ``cut``, meet another."""
-    chosen = np.flatnonzero(cut)
+def _once(contacts: Contacts, twice: np.ndarray, near: float) -> Contacts:
+    """Keep one of several points of two blocks at one place with one normal, among those chosen, (n,) bool."""
+    chosen = np.flatnonzero(twice)
     pairs = (
         cKDTree(contacts.points[chosen]).query_pairs(near, output_type="ndarray") if len(chosen) else np.zeros((0, 2))
     )
