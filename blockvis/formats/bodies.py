@@ -233,6 +233,17 @@ def solids_of_bodies(
     return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", ignore))
 
 
+def flat_or_solid(
+    found: Bodies, path: Path | str, ignore: Sequence[str] = (), only: Sequence[str] = ()
+) -> Layout | SolidLayout:
+    """Make a layout in the plane of bodies that are prisms side by side, of others one in space, with the reason."""
+    try:
+        return layout_of_bodies(found, path, None, ignore, only)
+    except NotFlat as error:
+        layout = solids_of_bodies(found, path, None, ignore, only)
+        return replace(layout, notes=(f"blocks in space: {error.reason}", *layout.notes))
+
+
 @dataclass(frozen=True)
 class _Asked:
     """The bodies that are asked for, with their rows, the size of the drawing, and the numbers of the others."""

@@ -18,7 +18,7 @@ from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import AnyLayout, Layout
 from blockvis.layout.solid_layout import SolidLayout
 
-from .bodies import Bodies, Body, body_of_polygons, layout_of_bodies
+from .bodies import Bodies, Body, body_of_polygons, flat_or_solid, layout_of_bodies
 from .cells import block_array, layout_of_cells, merged, row_of
 from .node_order import VTK, ring_of_nodes
 from .reading import Reading
@@ -252,7 +252,7 @@ def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
             _check_parts(target, (*seen, path))
 
 
-def layout_of_dataset(data: Any, path: Path | str = "dataset", view: str | None = None) -> Layout:
+def layout_of_dataset(data: Any, path: Path | str = "dataset", view: str | None = None) -> AnyLayout:
     """Make a layout of a pyvista dataset: a mesh, or a multiblock of meshes.
 
     Parameters
@@ -264,7 +264,9 @@ def layout_of_dataset(data: Any, path: Path | str = "dataset", view: str | None 
         As of :func:`blockvis.read_layout`.
     """
     found = found_in_dataset(data, path, view)
-    return layout_of_bodies(found, path, view) if isinstance(found, Bodies) else found
+    if isinstance(found, Bodies):
+        return flat_or_solid(found, path) if view is None else layout_of_bodies(found, path, view)
+    return found
 
 
 def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | Bodies:

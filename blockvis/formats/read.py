@@ -24,7 +24,7 @@ from blockvis.layout.solid_layout import SolidLayout
 from blockvis.layout.units import chosen_unit, doubt, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
 
-from .bodies import Bodies, NotFlat, layout_of_bodies, solids_of_bodies
+from .bodies import Bodies, flat_or_solid, layout_of_bodies, solids_of_bodies
 from .cells import of_files
 from .files import MissingFile as MissingFile
 from .files import files_of
@@ -141,13 +141,9 @@ def _in_dimension(
         return content
     if dimension == 3:
         return solids_of_bodies(content, path, view, ignore, only)
-    try:
+    if dimension == 2 or view is not None:
         return layout_of_bodies(content, path, view, ignore, only)
-    except NotFlat as error:
-        if dimension == 2 or view is not None:
-            raise
-        layout = solids_of_bodies(content, path, None, ignore, only)
-        return replace(layout, notes=(f"blocks in space: {error.reason}", *layout.notes))
+    return flat_or_solid(content, path, ignore, only)
 
 
 def _apart(content: AnyLayout | Bodies, path: Path) -> Layout | Bodies:

@@ -13,7 +13,7 @@ from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import AnyLayout, Layout
 from blockvis.layout.outlines import FLAT
 from blockvis.layout.solid_layout import SolidLayout
-from blockvis.layout.solids import Solid, area_vector, prism, triangles_of
+from blockvis.layout.solids import Solid, area_vectors, prism, triangles_of
 
 from .bodies import Bodies
 from .cells import layout_of_cells, merged
@@ -212,6 +212,6 @@ def _whole_faces(points: np.ndarray, faces: list[list[int]]) -> list[list[int]]:
     for face in faces:
         ring = points[face]
         turns = np.cross(np.roll(ring, -1, axis=0) - ring, np.roll(ring, -2, axis=0) - np.roll(ring, -1, axis=0))
-        convex = bool((turns @ area_vector(ring) >= 0.0).all())
+        convex = bool((turns @ area_vectors(points, [face])[0] >= 0.0).all())
         whole += [face] if convex else triangles_of(points, [face]).tolist()
     return whole

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .solids import Solid, area_vector, outward, triangles_of, volume
+from .solids import Solid, area_vectors, cross, off_planes, outward, planes_of, triangles_of, volume
 
 #: Triangles that lie within this fraction of the width of a block of one plane are one face: modellers warp the faces
 #: of stones by a tenth of it.
@@ -44,9 +44,9 @@ class PlaneSolid:
     place: np.ndarray
 
 
-def width_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> float:
+def width_of(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> float:
     """Six volumes over the surface: the edge of a cube, three times the thickness of a slab."""
-    surface = sum(float(np.linalg.norm(area_vector(points[list(face)]))) for face in faces)
+    surface = float(np.linalg.norm(area_vectors(points, faces), axis=1).sum())
     return 6.0 * abs(volume(points, faces)) / surface if surface else 0.0
 
 
@@ -67,9 +67,9 @@ def with_plane_faces(points: np.ndarray, triangles: np.ndarray, tolerance: float
     """
     used, index = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], index.reshape(-1, 3)
-    if volume(points, triangles.tolist()) < 0.0:
+    if volume(points, triangles) < 0.0:
         triangles = triangles[:, ::-1]
-    near = tolerance * width_of(points, triangles.tolist())
+    near = tolerance * width_of(points, triangles)
     faces = [ring for region in _regions(points, triangles, near) for ring in _rings_of(triangles[region])]
     return fitted(*_without_straight(points, faces, near), near)
 
@@ -85,11 +85,11 @@ def fitted(points: np.ndarray, faces: list[list[int]], near: float) -> PlaneSoli
         Largest warp, in the unit of the points.
     """
     rings = bent_in_triangles(points, faces, near)
-    planes = np.array([plane_of(points[ring]) for ring in rings])
-    away = [np.abs(points[ring] @ plane[:3] - plane[3]) for ring, plane in zip(rings, planes, strict=True)]
-    warp = np.array([distance.max() for distance in away])
+    planes = planes_of(points, rings)
+    warp = off_planes(points, rings, planes)
     worst = int(warp.argmax())
-    place = points[rings[worst][int(away[worst].argmax())]]
+    corners = points[rings[worst]]
+    place = corners[int(np.abs(corners @ planes[worst, :3] - planes[worst, 3]).argmax())]
     if warp[worst] <= ROUNDING * width_of(points, rings):
         return PlaneSolid(outward(points, rings), 0.0, place)
     return PlaneSolid(outward(*flattened(points, rings, planes)), float(warp[worst]), place)
@@ -111,9 +111,8 @@ def flattened(points: np.ndarray, faces: list[list[int]], planes: np.ndarray, fi
     moved = moved_to_planes(points, faces, planes, first)
     near = ROUNDING * width_of(moved, faces)
     for _ in range(ROUNDS):
-        now = np.array([plane_of(moved[ring]) for ring in faces])
-        off = [np.abs(moved[ring] @ plane[:3] - plane[3]).max() for ring, plane in zip(faces, now, strict=True)]
-        if max(off) <= near:
+        now = planes_of(moved, faces)
+        if off_planes(moved, faces, now).max() <= near:
             return moved, faces
         planes = now if first is None else np.where(first[:, None], planes, now)
         moved = moved_to_planes(moved, faces, planes, first)
@@ -122,19 +121,11 @@ def flattened(points: np.ndarray, faces: list[list[int]], planes: np.ndarray, fi
 
 def bent_in_triangles(points: np.ndarray, faces: Sequence[list[int]], near: float) -> list[list[int]]:
     """Cut the faces of which a corner is farther than ``near`` from their plane into triangles."""
+    flat = off_planes(points, faces, planes_of(points, faces)) <= near
     rings: list[list[int]] = []
-    for ring in faces:
-        plane = plane_of(points[ring])
-        flat = len(ring) == 3 or float(np.abs(points[ring] @ plane[:3] - plane[3]).max()) <= near
-        rings += [ring] if flat else triangles_of(points, [ring]).tolist()
+    for ring, is_flat in zip(faces, flat.tolist(), strict=True):
+        rings += [ring] if is_flat or len(ring) == 3 else triangles_of(points, [ring]).tolist()
     return rings
-
-
-def plane_of(ring: np.ndarray) -> np.ndarray:
-    """(4,) array: unit normal of a (n, 3) ring seen counter-clockwise, and its distance from the origin."""
-    normal = area_vector(ring)
-    normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
-    return np.append(normal, float(ring.mean(axis=0) @ normal))
 
 
 def moved_to_planes(
@@ -192,7 +183,7 @@ def _regions(points: np.ndarray, triangles: np.ndarray, near: float) -> list[np.
     from scipy.sparse.csgraph import connected_components
 
     corners = points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     double = np.linalg.norm(normal, axis=1)
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     normal = normal / np.maximum(double, 1e-300)[:, None]
@@ -259,7 +250,7 @@ def _neighbours(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _warp(points: np.ndarray, triangles: np.ndarray) -> float:
     """How far the corners of triangles are from their mean plane."""
     corners = points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
+    normal = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
     length = float(np.linalg.norm(normal))
     if length == 0.0:
         return np.inf

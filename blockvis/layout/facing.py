@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .faces import ROUNDING, flattened, plane_of, width_of
-from .solids import Solid, area_vector, volume
+from .faces import ROUNDING, flattened, width_of
+from .solids import Solid, area_vectors, planes_of, volume
 
 #: Gaps and overlaps of joints up to this fraction of the width of a typical block are faced unless the caller says
 #: otherwise: drawings of real vaults overlap by up to 8e-4 of a block, and their corners are as far off.
@@ -80,7 +80,7 @@ def faced(
     near = DEFAULT_FACING * width if tolerance is None else tolerance
     anchored = np.zeros(len(solids), dtype=bool) if anchored is None else anchored
     faces = _faces_of(solids)
-    one, other, apart = _joints(faces, near)
+    one, other, apart = _joints(faces, near, ROUNDING * width)
     kept = ~(anchored[faces.block[one]] & anchored[faces.block[other]])
     one, other, apart = one[kept], other[kept], apart[kept]
     rough = np.abs(apart) > ROUNDING * width
@@ -117,13 +117,16 @@ def faced(
 def _faces_of(solids: Sequence[Solid]) -> _Faces:
     rings = [points[face] for points, faces in solids for face in faces]
     block = np.repeat(np.arange(len(solids)), [len(faces) for _, faces in solids])
-    planes = np.array([plane_of(ring) for ring in rings])
-    areas = np.array([float(np.linalg.norm(area_vector(ring))) for ring in rings])
+    planes = np.concatenate([planes_of(*solid) for solid in solids])
+    areas = np.concatenate([np.linalg.norm(area_vectors(*solid), axis=1) for solid in solids])
     return _Faces(block, planes, rings, areas)
 
 
-def _joints(faces: _Faces, near: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find pairs of faces that face each other across at most ``near``: both, and the gap where it is largest."""
+def _joints(faces: _Faces, near: float, exact: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find pairs of faces that face each other across at most ``near``: both, and the gap where it is largest.
+
+    None where all of them are in one plane within ``exact``.
+    """
     import shapely
 
     low = np.array([ring.min(axis=0) for ring in faces.rings]) - near
@@ -135,7 +138,7 @@ def _joints(faces: _Faces, near: float) -> tuple[np.ndarray, np.ndarray, np.ndar
     pair = (low[one, 2] <= high[other, 2]) & (low[other, 2] <= high[one, 2])
     one, other = one[pair], other[pair]
     pair = np.einsum("ij,ij->i", faces.planes[one, :3], faces.planes[other, :3]) < OPPOSITE
-    one, other = one[pair], other[pair]
+    one, other = _near_planes(faces, one[pair], other[pair], near, exact)
     found = [(a, b, gap) for a, b in zip(one.tolist(), other.tolist(), strict=True) if (gap := _gap(faces, a, b, near))]
     if not found:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
@@ -144,6 +147,29 @@ def _joints(faces: _Faces, near: float) -> tuple[np.ndarray, np.ndarray, np.ndar
         np.array([b for _, b, _ in found]),
         np.array([gap[0] for _, _, gap in found]),
     )
+
+
+def _near_planes(
+    faces: _Faces, one: np.ndarray, other: np.ndarray, near: float, exact: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Keep the pairs of which a corner is near the other face's plane; none if all of these are as near as can be."""
+    counts = np.array([len(ring) for ring in faces.rings])
+    starts = np.cumsum(counts) - counts
+    corners = np.concatenate(faces.rings)
+    smaller = np.where(faces.areas[one] <= faces.areas[other], one, other)
+    larger = np.where(smaller == one, other, one)
+    # The corners of the smaller face of each pair, all pairs one after another.
+    n = counts[smaller]
+    begin = np.cumsum(n) - n
+    index = np.repeat(starts[smaller] - begin, n) + np.arange(int(n.sum()))
+    plane = np.repeat(larger, n)
+    away = np.abs((corners[index] * faces.planes[plane, :3]).sum(axis=1) - faces.planes[plane, 3])
+    if not len(away):
+        return one, other
+    close = np.minimum.reduceat(away, begin) <= near
+    if np.maximum.reduceat(away, begin)[close].max(initial=0.0) <= exact:
+        close[:] = False
+    return one[close], other[close]
 
 
 def _in_line(faces: _Faces, chosen: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:

@@ -115,7 +115,7 @@ def test_a_unit_and_its_doubt(dome, tmp_path):
 
 
 @pytest.mark.cad
-@pytest.mark.parametrize("suffix", [".step", ".brep", ".msh"])
+@pytest.mark.parametrize("suffix", [".step", pytest.param(".brep", marks=pytest.mark.slow), ".msh"])
 def test_volumes_of_gmsh(suffix, tmp_path):
     gmsh = pytest.importorskip("gmsh", reason="gmsh is an extra", exc_type=(ImportError, OSError))
     gmsh.initialize(["gmsh", "-nopopup"], interruptible=False)

@@ -16,14 +16,11 @@ from blockvis.layout.layout import layout_of
 from blockvis.layout.solids import box, triangles_of, volume
 
 SMALL = {
-    "extruded arch": {"voussoirs": 6},
     "barrel vault": {"voussoirs": 5, "stones": 2},
     "dome": {"lunes": 5, "courses": 2},
     "cross vault": {"voussoirs": 3, "stone": 2.0},
     "pavilion vault": {"voussoirs": 3, "bonded": False},
     "L corner": {"bricks": 2, "across": 2, "courses": 2},
-    "T corner": {"bricks": 2, "across": 2, "courses": 2},
-    "two-leaf wall": {"bricks": 2, "courses": 3},
 }
 
 
