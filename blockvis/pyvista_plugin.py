@@ -22,7 +22,7 @@ import pyvista as pv
 
 import solver
 
-from .formats.bodies import Bodies, NotFlat, layout_of_bodies, solids_of_bodies
+from .formats.bodies import Bodies, flat_or_solid, layout_of_bodies, solids_of_bodies
 from .formats.gmsh_mesh import holds_flat_blocks
 from .formats.pyvista_files import dataset_of, found_in_dataset
 from .formats.read import read_layout, write_layout
@@ -339,14 +339,9 @@ def _in_dimension(found: AnyLayout | Bodies, dimension: int | None) -> AnyLayout
     """Make a layout of what a dataset holds: in the plane where that can be and nothing else is asked for."""
     if not isinstance(found, Bodies):
         return found
-    if dimension == 3:
-        return solids_of_bodies(found, "dataset")
-    try:
-        return layout_of_bodies(found, "dataset")
-    except NotFlat:
-        if dimension == 2:
-            raise
-        return solids_of_bodies(found, "dataset")
+    if dimension is None:
+        return flat_or_solid(found, "dataset")
+    return solids_of_bodies(found, "dataset") if dimension == 3 else layout_of_bodies(found, "dataset")
 
 
 pv.register_dataset_accessor("blockvis", pv.DataObject)(BlockvisAccessor)

@@ -11,8 +11,8 @@ import solver
 from . import palette
 from .frame import framed
 
-#: A fall of so many frames needs no others; how many a mechanism has that swings out, and how far it goes, in motions of
-#: :class:`Swing`.
+#: A fall of so many frames needs no others; how many a mechanism has that swings out, and how far it goes, in motions
+#: of :class:`Swing`.
 ENOUGH_FRAMES, SWING_FRAMES, SWING_REACH = 8, 15, 1.2
 
 #: Up to this many parts of a mechanism are tinted one by one.
