@@ -465,8 +465,6 @@ def _add_words(attributes: Any, name: str, words: list[str]) -> None:
 
 def write(layout: AnyLayout, path: Path) -> None:
     """Write .vtu, .vtp or .vtk: a cell per block, polygon or polyhedron, double precision, lengths in m."""
-    if path.suffix.lower() == ".vtp" and isinstance(layout, SolidLayout):
-        raise ValueError(f"'{path}': .vtp holds surfaces; write blocks in space to .vtu, .obj, .stl, .ply or .json")
     grid = dataset_of(layout)
     if path.suffix.lower() == ".vtp":
         surface = _surface(grid)

@@ -288,6 +288,9 @@ def _read_by_suffix(path: Path, reading: Reading) -> AnyLayout | Bodies:
 def _write_by_suffix(layout: AnyLayout, path: Path) -> None:
     """Write a file, whole or not at all, with the module of its suffix."""
     module = _module_of(path, "write")
+    if layout.dimension == 3 and not _format(path, "write").writes_space:
+        able = " ".join(sorted(suffix for suffix, known in FORMATS.items() if known.writes_space))
+        raise ValueError(f"'{path}': {path.suffix} holds no blocks in space; use one of {able}")
     with whole_file(path) as partial:
         module.write(layout, partial)
 

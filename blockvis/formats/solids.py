@@ -20,6 +20,12 @@ from .cells import layout_of_cells, merged
 from .closed_surfaces import closed_bodies
 from .reading import Reading
 
+#: Programs that write coordinates to .glb as they are, with z up, in small letters.
+Z_IS_UP = ("trimesh", "blockvis")
+
+#: Largest description of a .glb file that is looked into [bytes].
+LARGEST_HEADER = 64 * 2**20
+
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read bodies or a flat mesh; .glb is in metres, the other formats state no unit."""
@@ -67,7 +73,22 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         by_name = {row.get("name"): row for row in rows}
         rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
-    return Bodies(tuple(bodies), tuple(known), unit)
+    up, says = _up(path) if suffix == ".glb" else ("z", "")
+    return Bodies(tuple(bodies), tuple(known), unit, up=up, up_says=says)
+
+
+def _up(path: Path) -> tuple[str, str]:
+    """Find the coordinate that points up in a .glb file: y, as the format has it, but of programs that write z."""
+    with path.open("rb") as stream:
+        head = stream.read(20)
+        content = stream.read(min(int.from_bytes(head[12:16], "little"), LARGEST_HEADER))
+    try:
+        generator = str(json.loads(content).get("asset", {}).get("generator", ""))
+    except (ValueError, AttributeError):
+        generator = ""
+    if any(word in generator.lower() for word in Z_IS_UP):
+        return "z", ""
+    return "y", f"y is up in .glb files{f' ({generator})' if generator else ''}"
 
 
 def _placed(scene: Any) -> list[tuple[str, Any]]:

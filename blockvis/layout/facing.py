@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .faces import ROUNDING, moved_to_planes, plane_of, width_of
+from .faces import ROUNDING, flattened, plane_of, width_of
 from .solids import Solid, area_vector, volume
 
 #: Gaps and overlaps of joints up to this fraction of the width of a typical block are faced unless the caller says
@@ -16,6 +16,9 @@ DEFAULT_FACING = 0.01
 
 #: Faces whose normals are this far from opposite (cosine of 10 degrees) are no joint.
 OPPOSITE = -np.cos(np.radians(10.0))
+
+#: Joints that go on beside each other are in one plane if they are within this many times the largest gap found.
+NOISE = 2.0
 
 #: Faces that cover each other by less than this fraction of the smaller one touch at an edge.
 COVERS = 1e-3
@@ -84,9 +87,9 @@ def faced(
     if not rough.any():
         return Facing(tuple(solids))
     planes, changed = faces.planes.copy(), np.zeros(len(faces.planes), dtype=bool)
-    for members, sides in _groups(faces, one, other, near):
-        rough_here = rough & np.isin(one, members)
-        if not rough_here.any():
+    in_line = _in_line(faces, np.unique([one, other]), min(near, NOISE * float(np.abs(apart).max())))
+    for members, sides in _groups(faces, np.append(one, in_line[0]), np.append(other, in_line[1]), near):
+        if not (rough & np.isin(one, members)).any():
             continue
         held = [n for n, k in enumerate(members) if anchored[faces.block[k]]]
         if held:
@@ -97,7 +100,9 @@ def faced(
         for k, side in zip(members, sides, strict=True):
             if not anchored[faces.block[k]]:
                 planes[k], changed[k] = side * plane, True
-    moved = _moved(solids, faces, planes, changed)
+    joint = np.zeros(len(planes), dtype=bool)
+    joint[np.concatenate([one, other])] = True
+    moved = _moved(solids, faces, planes, changed, joint)
     worst = int(np.abs(apart).argmax())
     n = int(rough.sum())
     a, b = names[faces.block[one[worst]]], names[faces.block[other[worst]]]
@@ -139,6 +144,31 @@ def _joints(faces: _Faces, near: float) -> tuple[np.ndarray, np.ndarray, np.ndar
         np.array([b for _, b, _ in found]),
         np.array([gap[0] for _, _, gap in found]),
     )
+
+
+def _in_line(faces: _Faces, chosen: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
+    """Find pairs of faces of joints that go on in one plane beside each other: a straight joint of several stones.
+
+    Stones that meet at an edge would overlap at it if every joint found a plane of its own.
+    """
+    from scipy.spatial import cKDTree
+
+    corner_of = np.repeat(chosen, [len(faces.rings[k]) for k in chosen])
+    corners = np.concatenate([faces.rings[k] for k in chosen])
+    close = cKDTree(corners).query_pairs(2.0 * near, output_type="ndarray")
+    pairs = np.unique(np.sort(corner_of[close], axis=1), axis=0)
+    one, other = pairs[:, 0], pairs[:, 1]
+    along = np.abs(np.einsum("ij,ij->i", faces.planes[one, :3], faces.planes[other, :3])) > -OPPOSITE
+    one, other = one[along], other[along]
+    off = [
+        max(
+            float(np.abs(faces.rings[b] @ faces.planes[a, :3] - faces.planes[a, 3]).max()),
+            float(np.abs(faces.rings[a] @ faces.planes[b, :3] - faces.planes[b, 3]).max()),
+        )
+        for a, b in zip(one.tolist(), other.tolist(), strict=True)
+    ]
+    flat = np.array(off) <= 2.0 * near if len(off) else np.zeros(0, dtype=bool)
+    return one[flat], other[flat]
 
 
 def _gap(faces: _Faces, a: int, b: int, near: float) -> tuple[float] | None:
@@ -227,12 +257,16 @@ def _common_plane(rings: Sequence[np.ndarray], sides: np.ndarray, planes: np.nda
     return np.append(normal, float(share @ (middles @ normal)))
 
 
-def _moved(solids: Sequence[Solid], faces: _Faces, planes: np.ndarray, changed: np.ndarray) -> tuple[Solid, ...]:
-    """Move the corners of the blocks with changed planes."""
+def _moved(
+    solids: Sequence[Solid], faces: _Faces, planes: np.ndarray, changed: np.ndarray, joint: np.ndarray
+) -> tuple[Solid, ...]:
+    """Move the corners of the blocks with changed planes, to those of joints before those of free faces."""
     moved = list(solids)
     start = np.searchsorted(faces.block, np.arange(len(solids) + 1))
     for i in np.unique(faces.block[changed]).tolist():
         points, rings = solids[i]
-        found = moved_to_planes(points, rings, planes[start[i] : start[i + 1]])
-        moved[i] = (found, rings) if volume(found, rings) > 0.0 else solids[i]
+        mine = slice(start[i], start[i + 1])
+        found = flattened(points, rings, planes[mine], joint[mine])
+        if volume(*found) > 0.0:
+            moved[i] = found
     return tuple(moved)

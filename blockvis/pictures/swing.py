@@ -53,7 +53,7 @@ def swing_of(response: solver.Response) -> Swing:
     fastest = float(speeds.max(initial=0.0))
     if response.collapse is None and fastest > 0.0:
         # Without collapse a single loose brick may be the fastest: it would make the motion of the whole invisible.
-        fastest = _exceeded_by(0.01, speeds, assembly.areas) or fastest
+        fastest = _exceeded_by(0.01, speeds, assembly.shapes.volumes) or fastest
         motion = motion * np.minimum(1.0, fastest / np.maximum(speeds, fastest))[:, None]
     reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
     displaced = solver.swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
@@ -72,7 +72,7 @@ def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing)
     """
     if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
         return palette.part_colours(fill, swing.parts)
-    travel = np.hypot(*(swing.displaced.positions - swing.increment.pose.positions).T)
+    travel = np.linalg.norm(swing.displaced.positions - swing.increment.pose.positions, axis=1)
     tints = palette.displacement_colours(0.75 * travel / travel[assembly.free].max())
     return np.where(assembly.free[:, None], tints, fill)
 
@@ -81,12 +81,13 @@ def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) ->
     """(n_blocks,) array: speed of the fastest corner of each free block, zero for supports."""
     block = assembly.block_of_vertex
     velocity = solver.point_velocities(solver.moved_vertices(assembly, pose), block, pose, motion)
-    speeds = np.maximum.reduceat(np.hypot(*velocity.T), assembly.offsets[:-1])
+    speeds = np.zeros(assembly.n_blocks)
+    np.maximum.at(speeds, block, np.linalg.norm(velocity, axis=1))
     return np.where(assembly.free, speeds, 0.0)
 
 
-def _exceeded_by(share: float, speeds: np.ndarray, areas: np.ndarray) -> float:
-    """Speed that blocks of this share of the moving area reach or exceed."""
+def _exceeded_by(share: float, speeds: np.ndarray, volumes: np.ndarray) -> float:
+    """Speed that blocks of this share of the moving volume reach or exceed."""
     order = np.argsort(speeds)[::-1]
-    moving = np.where(speeds[order] > 0.0, areas[order], 0.0).cumsum()
+    moving = np.where(speeds[order] > 0.0, volumes[order], 0.0).cumsum()
     return float(speeds[order[np.searchsorted(moving, share * moving[-1])]])
