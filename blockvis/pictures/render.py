@@ -17,7 +17,7 @@ from blockvis.results.about import loss_of
 
 from .drawer import Drawer, Look
 from .film import film_of
-from .swing import MOST_PARTS, swing_of
+from .swing import MOST_PARTS, shown_increments, swing_of
 from .video import write_film
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def animate(
         fall = None
     elif fall is None:
         fall = fall_of(response)
-    shown = response.increments if fall is None else response.path
+    shown = shown_increments(response) if fall is None else response.path
     drawer = _drawer(response, look, size, shown, curve=curve, fall=fall)
     holds, pictures = film_of(drawer, fps, seconds, progress)
     return write_film(pictures, path, size=size, fps=fps, holds=holds)

@@ -37,7 +37,7 @@ from .drawer import (
 from .flat_scene import magnified
 from .frame import ColourBar, Key, Sheet, framed
 from .solid_inspection import role_colours
-from .solid_marks import SolidMarks, settlement_arrows_in_space, solid_marks
+from .solid_marks import SolidMarks, live_arrows, settlement_arrows_in_space, solid_marks
 from .solid_scene import IN_FRONT_OF_ALL, SolidScene
 from .solid_view import chosen_view
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
@@ -93,9 +93,11 @@ class SolidDrawer:
         self.view = chosen_view(response, self._swing.displaced.positions - self._swing.increment.pose.positions)
         self._largest = self._widest = self._strongest = 0.0
         self._marked: set[str] = set()
+        live = float(np.linalg.norm(response.loads.live[assembly.free, :3], axis=1).max(initial=0.0))
+        self._strongest_live = live * max((abs(_multiplier(i)) for i in increments), default=0.0)
         self._sizes: list[np.ndarray] = []
         poses = chain([solver.Pose.initial(assembly)], self._surveyed(), extra)
-        frame = framed(assembly, poses, margin=0.05, supports=0.2, axes=self.view.axes[:2])
+        frame = framed(assembly, poses, margin=0.05, supports=0.3, axes=self.view.axes[:2])
         self._arrow = ARROW * float(frame.size.max())
         frame = frame.holding(self._arrow_tips())
         self.largest = self._largest
@@ -175,6 +177,7 @@ class SolidDrawer:
         self._draw_joints(at, where)
         self._draw_forces(at, where)
         self._draw_settlement(at, where)
+        self._draw_live_load(increment, where)
         failed = self.response.stop == solver.Status.SOLVER_FAILED
         head, detail = caption_of(self.response, increment, self.look.magnification)
         return self.sheet.composed(
@@ -245,6 +248,8 @@ class SolidDrawer:
                 keys.append(Key("line", f"{text}up to {force_text(self._strongest)}", palette.FORCE))
             if self.assembly.moving.any():
                 keys.append(Key("area", "moving support", palette.MOVING))
+            if self._strongest_live > 0.0:
+                keys.append(Key("line", "live load × α", palette.LIVE))
             if self._motion is not None:
                 keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT))
             self._keys = keys
@@ -336,6 +341,9 @@ class SolidDrawer:
             if settlement is not None:
                 _, places, directions = settlement_arrows_in_space(self.assembly, settlement, increment.pose)
                 tips.append(places + self._arrow * directions)
+            if self._strongest_live > 0.0:
+                ends, along, _ = live_arrows(self.assembly, self.response.loads, _multiplier(increment), increment.pose)
+                tips.append(ends - self._arrow * along)
         return self.view.projected(np.concatenate(tips))
 
     def _draw_settlement(self, increment: solver.Increment, shown: solver.Pose) -> None:
@@ -343,6 +351,14 @@ class SolidDrawer:
         if settlement is not None:
             _, places, directions = settlement_arrows_in_space(self.assembly, settlement, shown)
             self.scene.arrows("settlement", places, directions, self._arrow)
+
+    def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose) -> None:
+        """Draw the live load times its multiplier as arrows to scale that end where it meets the blocks."""
+        if self._strongest_live == 0.0:
+            return
+        tips, directions, sizes = live_arrows(self.assembly, self.response.loads, _multiplier(increment), shown)
+        long = self._arrow * sizes / self._strongest_live
+        self.scene.arrows("live load", tips - long[:, None] * directions, directions, long, palette.LIVE)
 
 
 def _dashed(ends: np.ndarray, length: float) -> np.ndarray:
@@ -354,6 +370,12 @@ def _dashed(ends: np.ndarray, length: float) -> np.ndarray:
     # Half a gap at either end.
     shares = (place[:, None] + np.array([0.25, 0.75])) / counts[line][:, None]
     return ends[line, :1] + shares[:, :, None] * along[line][:, None]
+
+
+def _multiplier(increment: solver.Increment) -> float:
+    """Load multiplier of an increment; 0 in a fall and where it is not bounded."""
+    known = increment.status == solver.Status.EQUILIBRIUM and np.isfinite(increment.load_multiplier)
+    return float(increment.load_multiplier) if known else 0.0
 
 
 def _opening_text(length: float) -> str:

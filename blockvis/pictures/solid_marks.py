@@ -177,9 +177,43 @@ def settlement_arrows_in_space(
         some = np.linspace(0, len(part) - 1, MOST_ARROWS).round().astype(int)
         part, speeds, sizes = part[some], speeds[some], sizes[some]
     directions = speeds / sizes[:, None]
+    return part, _leaving(assembly, pose, part, directions), directions
+
+
+def live_arrows(
+    assembly: solver.Assembly, loads: solver.Loads, multiplier: float, pose: solver.Pose
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find where arrows show the live loads: they end where they meet the blocks.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    loads : solver.Loads
+    multiplier : float
+        Of the live loads; where it is negative they point the other way.
+    pose : solver.Pose
+
+    Returns
+    -------
+    tips : (n, 3) array [m]
+    directions : (n, 3) array
+        Unit vectors.
+    sizes : (n,) array [N]
+    """
+    forces = loads.live[:, :3] * multiplier
+    sizes = np.linalg.norm(forces, axis=1)
+    blocks = np.flatnonzero((sizes > 1e-3 * sizes.max(initial=0.0)) & assembly.free)
+    if len(blocks) > MOST_ARROWS:
+        blocks = blocks[np.linspace(0, len(blocks) - 1, MOST_ARROWS).round().astype(int)]
+    directions = forces[blocks] / sizes[blocks, None]
+    return _leaving(assembly, pose, blocks, -directions), directions, sizes[blocks]
+
+
+def _leaving(assembly: solver.Assembly, pose: solver.Pose, blocks: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """(n, 3) array [m]: as far from the centroids of blocks along directions (n, 3) as their corners lie."""
     corners, offsets = solver.moved_vertices(assembly, pose), assembly.polyhedra.offsets
-    places = pose.positions[part].copy()
-    for k, block in enumerate(part.tolist()):
+    places = pose.positions[blocks].copy()
+    for k, block in enumerate(blocks.tolist()):
         reach = (corners[offsets[block] : offsets[block + 1]] - places[k]) @ directions[k]
         places[k] += max(float(reach.max()), 0.0) * directions[k]
-    return part, places, directions
+    return places

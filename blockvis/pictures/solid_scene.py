@@ -169,7 +169,14 @@ class SolidScene:
             faces = np.insert(np.arange(len(points)), np.cumsum(counts) - counts, counts)
             self._add(layer, pv.PolyData(points, faces=faces), colour, forward=forward, lit=lit, opacity=opacity)
 
-    def arrows(self, layer: str, tails: np.ndarray, directions: np.ndarray, length: float) -> None:
+    def arrows(
+        self,
+        layer: str,
+        tails: np.ndarray,
+        directions: np.ndarray,
+        lengths: np.ndarray | float,
+        colour: tuple[int, int, int] = palette.SETTLEMENT,
+    ) -> None:
         """Draw solid arrows from tails (n, 3) [m] along directions (n, 3), in one layer, instead of those before."""
         self.clear(layer)
         if len(tails):
@@ -177,10 +184,11 @@ class SolidScene:
             across = np.cross(directions, np.where(np.abs(directions[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
             across /= np.linalg.norm(across, axis=1)[:, None]
             turns = np.stack([directions, across, np.cross(directions, across)], axis=1)
-            placed = tails[:, None] + length * np.einsum("pi,nij->npj", points, turns)
+            long = np.broadcast_to(lengths, len(tails))[:, None, None]
+            placed = tails[:, None] + long * np.einsum("pi,nij->npj", points, turns)
             every = faces[None] + len(points) * np.arange(len(tails))[:, None, None]
             mesh = pv.PolyData.from_regular_faces(placed.reshape(-1, 3), every.reshape(-1, 3))
-            self._add(layer, mesh, palette.SETTLEMENT, lit=True)
+            self._add(layer, mesh, colour, lit=True)
 
     def clear(self, *layers: str) -> None:
         """Remove layers."""

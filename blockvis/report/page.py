@@ -43,7 +43,7 @@ from blockvis.pictures.captions import (
 )
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
-from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, swing_of
+from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.results.about import about, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
@@ -188,7 +188,7 @@ def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> li
         return _Frame(swing.increment if increment is governing else increment, place.get(id(increment), len(path)))
 
     if fall is None or not path:
-        return [framed_at(increment) for increment in _thinned(response.increments, most)]
+        return [framed_at(increment) for increment in _thinned(shown_increments(response), most)]
     n = min(len(fall) - 1, most // 2)
     chosen = np.linspace(len(fall) - 1, 1, n).round().astype(int)[::-1]
     falling = [

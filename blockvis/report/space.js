@@ -130,7 +130,7 @@
     "vec4 clip(vec3 v) { return vec4((place.x + place.z * v.x) / size.x * 2.0 - 1.0, 1.0 - (place.y - place.z * v.y) / size.y * 2.0, -(v.z - place.w) / deep, 1.0); }\n";
   const solid = gl && program(
     `${SEE} in vec3 at; in vec3 colour; out vec3 v; out vec3 c; void main() { v = seen(at); c = colour; gl_Position = clip(v); }`,
-    "in vec3 v; in vec3 c; out vec4 o; uniform float lit; void main() { vec3 n = normalize(cross(dFdx(v), dFdy(v)));" +
+    "in vec3 v; in vec3 c; out vec4 o; uniform float lit; void main() { vec3 k = cross(dFdx(v), dFdy(v)); float l = length(k); vec3 n = l > 1e-12 ? k / l : vec3(0.0, 0.0, 1.0);" +
     " float light = mix(1.0, 0.58 + 0.5 * max(0.0, dot(n, normalize(vec3(-0.45, 0.85, 1.2)))), lit); o = vec4(c * light, 1.0); }");
   const thick = gl && program(
     `${SEE} in vec3 at; in vec3 to; in vec3 colour; in vec2 wide; uniform float ahead; out vec3 c; void main() { vec4 p = clip(seen(at)), r = clip(seen(to));` +
