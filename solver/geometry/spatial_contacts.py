@@ -35,6 +35,9 @@ SLIVER_WIDTH, SLIVER_AREA = 0.02, 0.02
 #: Points at one place with normals nearer to each other than this cosine are one.
 ONE_NORMAL = 1.0 - 1e-4
 
+#: Gap of a point below the separation of its parts by the planes of their faces, in widths, from which on it is none.
+BEHIND = 1e-3
+
 #: Faces that cover each other on a strip narrower than this fraction of either, with a gap of more than
 #: ``STEEPEST_LANDING`` times its width, slide past each other before they touch.
 STRIP, STEEPEST_LANDING = 0.5, 0.25
@@ -198,7 +201,10 @@ def find_points(
         np.maximum.at(largest, joint[pair], np.bincount(corners.owner, corners.areas, minlength=len(pair)))
         sliver = _slivers(parts, face_i, face_j, corners, largest[joint[pair]])
         slides = strip & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)
-        kept = np.flatnonzero(near(contacts) & ~slides & ~sliver)
+        # Points are no nearer than a plane keeps their parts apart: edges that cross behind it do not touch.
+        owner = pair[corners.owner]
+        behind = contacts.gaps < left.apart[owner] - BEHIND * left.width[owner]
+        kept = np.flatnonzero(near(contacts) & ~slides & ~sliver & ~behind)
         resolved[pair[corners.owner[kept]]] = True
         found.append(contacts[kept])
     contacts = joined_contacts(found)
