@@ -1,8 +1,9 @@
 """Twenty synthetic cases for ``blockvis explain``: how often the cause comes first, and its amount within 25 %.
 
 Each case is made by the solver from blocks of another size and with another friction than the inverse assumes; what
-is observed are the widths of its open joints and of some closed ones, by x and y, with 20 % of noise. The inverse never
-sees the structure that cracked. ``python benchmarks/explain_cases.py [numbers]`` prints the table; it takes minutes.
+is observed are the widths near both ends of its open joints, and some closed ones, by x and y, with 20 % of noise. The
+inverse never sees the structure that cracked. ``python benchmarks/explain_cases.py [numbers]`` prints the table; it
+takes minutes.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import blockvis
 import solver
 from blockvis import generators
 from blockvis.cases.profiles import Profile, cut_ground
-from blockvis.results.joints import initial_joints, opening_and_slip
+from blockvis.results.joints import end_openings, initial_joints
 from blockvis.toml_text import as_toml
 
 #: Relative standard deviation of the observed widths.
@@ -30,6 +31,9 @@ NOISE = 0.2
 
 #: Cracks narrower than this [m] are not seen, and every so manieth closed joint is noted as closed.
 SEEN, EVERY_CLOSED = 3e-4, 3
+
+#: Widths are measured near both ends of a joint: fractions of its length.
+AT = (0.1, 0.9)
 
 #: Increments of the path to the amount that is looked for.
 INCREMENTS = 6
@@ -156,17 +160,20 @@ def observed(structure: Structure, case: Case, seed: int) -> list[dict[str, Any]
     if response.stop is not solver.Status.LIMIT_REACHED:
         raise RuntimeError(f"{case} is no case: {response.message}")
     joints = initial_joints(assembly)
-    opening = opening_and_slip(assembly, joints, response.path[-1].pose)[:, 0]
+    ends = end_openings(assembly, joints, response.path[-1].pose)
     random = np.random.default_rng(seed)
     rows, closed = [], 0
-    for k in range(len(opening)):
-        x, y = joints.ends[k].mean(axis=0).tolist()
-        width = float(opening[k] * (1.0 + NOISE * random.standard_normal()))
-        if opening[k] < SEEN:
-            closed += 1
-            if closed % EVERY_CLOSED:
-                continue
-        rows.append({"x": x, "y": y, "width [mm]": round(1e3 * max(width, 0.0), 2) if opening[k] >= SEEN else "closed"})
+    for line, both in zip(joints.ends, ends, strict=True):
+        for share in AT:
+            x, y = (line[0] + share * (line[1] - line[0])).tolist()
+            opening = float(both[0] + share * (both[1] - both[0]))
+            width = opening * (1.0 + NOISE * float(random.standard_normal()))
+            if opening < SEEN:
+                closed += 1
+                if closed % EVERY_CLOSED:
+                    continue
+            said = "closed" if opening < SEEN else round(1e3 * max(width, 0.0), 2)
+            rows.append({"x": x, "y": y, "width [mm]": said})
     return rows
 
 

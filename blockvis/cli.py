@@ -167,9 +167,8 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
-    _add_sweep(verbs)
-    _add_new(verbs)
-    _add_schema(verbs)
+    for add in (_add_explain, _add_sweep, _add_new, _add_schema):
+        add(verbs)
     completion = verbs.add_parser(
         "completion",
         help="a script that completes verbs and options in a shell",
@@ -232,6 +231,22 @@ def _add_choice(verb: argparse.ArgumentParser) -> None:
         )
 
 
+def _add_explain(verbs: Any) -> None:
+    explain = verbs.add_parser(
+        "explain",
+        help="which movements of the supports may have caused observed cracks",
+        epilog='observations: a table with joint ("A | B") or x and y, width [mm] and perhaps uncertainty [mm]; '
+        "or with block, dx [mm] and dy [mm]; or a drawing of the damaged state",
+    )
+    explain.add_argument("case", metavar="CASE.toml", help="of the undamaged structure; it needs no settlement")
+    explain.add_argument("--observed", metavar="FILE", required=True, help="cracks.csv, or a drawing")
+    explain.add_argument("-o", "--output", metavar="OUT", help="folder of page and numbers (default: <case>-explain)")
+    explain.add_argument("--force", action="store_true", help="replace an explanation that is there already")
+    explain.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster that exists, tcp://host:8786")
+    explain.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: one per core)")
+    explain.set_defaults(verb=_explain)
+
+
 def _add_sweep(verbs: Any) -> None:
     sweep = verbs.add_parser("sweep", help="many runs of one case, on this machine or a Dask cluster")
     sweep.add_argument("study", metavar="STUDY.toml")
@@ -271,7 +286,7 @@ def _completion(options: argparse.Namespace) -> int:
     parser = _parser()
     # Choices here, not in the parser: a name that does not exist gets a better message than argparse has.
     choices: dict[str, Any] = {"name": _layout_names()}
-    files = {"case", "output", "resume", "file", "source", "target", "results", "study", "picture"}
+    files = {"case", "output", "resume", "file", "source", "target", "results", "study", "picture", "observed"}
     for action in parser._actions:
         for verb in (action.choices or {}).values() if isinstance(action.choices, dict) else ():
             for argument in verb._actions:
@@ -281,6 +296,24 @@ def _completion(options: argparse.Namespace) -> int:
                     argument.complete = shtab.FILE
     print(shtab.complete(parser, options.shell))
     return 0
+
+
+def _explain(options: argparse.Namespace) -> int:
+    from .explanation.explain import explain
+
+    folder = Path(options.output or f"{Path(options.case).stem}-explain")
+    found = explain(
+        options.case,
+        options.observed,
+        folder,
+        overwrite=options.force,
+        workers=options.workers,
+        scheduler=options.scheduler,
+        progress=True,
+    )
+    print(found)
+    print(f"explain.html, explain.json and explain.png in {folder}/")
+    return 0 if found.causes else NO_EQUILIBRIUM
 
 
 def _sweep(options: argparse.Namespace) -> int:

@@ -22,9 +22,8 @@ import pyvista as pv
 
 import solver
 
-from .formats.bodies import Bodies, flat_or_solid, layout_of_bodies, solids_of_bodies
 from .formats.gmsh_mesh import holds_flat_blocks
-from .formats.pyvista_files import dataset_of, found_in_dataset
+from .formats.pyvista_files import dataset_of, layout_of_dataset
 from .formats.read import read_layout, write_layout
 from .layout.assemble import assemble
 from .layout.layout import AnyLayout
@@ -102,7 +101,7 @@ class BlockvisAccessor:
 
     def layout(self, dimension: int | None = None) -> AnyLayout:
         """Read the blocks as a layout, lengths in m, in 2 or 3 dimensions; as they are drawn by default."""
-        layout = _in_dimension(found_in_dataset(self._mesh, "dataset", None), dimension)
+        layout = layout_of_dataset(self._mesh, dimension=dimension)
         layout = replace(layout, unit=layout.unit or "m")
         return layout if isinstance(layout, SolidLayout) else sorted_out(layout)
 
@@ -333,15 +332,6 @@ class BlockvisAccessor:
             width, height = 2.0 * np.abs(view.projected(assembly.vertices - (low + high) / 2.0)).max(axis=0)
         plotter.camera.parallel_scale = 0.55 * max(height, width * window_size[1] / window_size[0])
         return plotter.show(screenshot=False if screenshot is None else str(screenshot))
-
-
-def _in_dimension(found: AnyLayout | Bodies, dimension: int | None) -> AnyLayout:
-    """Make a layout of what a dataset holds: in the plane where that can be and nothing else is asked for."""
-    if not isinstance(found, Bodies):
-        return found
-    if dimension is None:
-        return flat_or_solid(found, "dataset")
-    return solids_of_bodies(found, "dataset") if dimension == 3 else layout_of_bodies(found, "dataset")
 
 
 pv.register_dataset_accessor("blockvis", pv.DataObject)(BlockvisAccessor)

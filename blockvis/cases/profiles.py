@@ -185,6 +185,8 @@ def with_profiles(
     for k, settlement in enumerate(settlements):
         profile = profiles[k] if k < len(profiles) else None
         where = f"{source}: [settlement{f' {k + 1}' if len(settlements) > 1 else ''}] profile"
+        if assembly.dimension != 2 and (profile is not None or settlement.profile is not None):
+            raise ValueError(f"{where} is of structures in the plane; this one is in space: give a direction")
         if profile is None:
             for name in settlement.profile or ():
                 _check_support(name, assembly, where)
@@ -227,6 +229,8 @@ def cut_ground(
         The pieces of a support "ground" are named "ground 1", "ground 2" ... from left to right.
     """
     bending = [profile for profile in profiles if profile is not None]
+    if assembly.dimension != 2:
+        return assembly
     if chosen is None:
         extents = {int(i): assembly.outline(int(i))[:, 0] for i in np.flatnonzero(assembly.moving)} if bending else {}
         chosen = [i for i, x in extents.items() if any(p.bends(float(x.min()), float(x.max())) for p in bending)]

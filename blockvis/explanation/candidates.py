@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +25,9 @@ FEWEST_FEET = 3
 
 #: Blocks touch within this fraction of the block size.
 TOUCHING = 2e-3
+
+#: Blocks stand on faces longer than this, in block sizes.
+SHORTEST_FOOT = 0.05
 
 #: Movements whose difference from a translation of everything is as alike as this open the same cracks.
 ALIKE = 1e-9
@@ -112,8 +116,6 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
     whole = {assembly.names[i]: (assembly.names[i],) for i in supports}
     if settings.trough is False:
         return Ground(fixed, whole, troughs=False)
-    import warnings
-
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         cut = cut_ground(fixed, (), chosen=supports)
@@ -137,10 +139,15 @@ def _touching(assembly: solver.Assembly) -> solver.Contacts:
 
 
 def _bearing(assembly: solver.Assembly, names: Sequence[str]) -> list[int]:
-    """Supports of these names on which free blocks stand."""
+    """Find the supports of these names on which free blocks stand, with a face, not a corner alone."""
     contacts = _touching(assembly)
-    touching = set(contacts.block_a.tolist()) | set(contacts.block_b.tolist())
-    return [i for name in names if (i := assembly.index(name)) in touching]
+    found = []
+    for name in names:
+        block = assembly.index(name)
+        points = contacts.points[(contacts.block_a == block) | (contacts.block_b == block)]
+        if len(points) and np.ptp(points, axis=0).max() > SHORTEST_FOOT * assembly.block_size:
+            found.append(block)
+    return found
 
 
 def candidates_of(ground: Ground, settings: ExplainSettings, source: Path) -> list[Candidate]:
@@ -233,7 +240,7 @@ def _troughs(ground: Ground, settings: ExplainSettings) -> list[Candidate]:
 
 
 def _extent(ground: Ground) -> tuple[float, float]:
-    """The x between which the structure stands on its supports [m]."""
+    """Find the x between which the structure stands on its supports [m]."""
     bearing = _bearing(ground.assembly, [piece for pieces in ground.pieces.values() for piece in pieces])
     x = np.concatenate([ground.assembly.outline(i)[:, 0] for i in bearing])
     return float(x.min()), float(x.max())
@@ -331,7 +338,8 @@ def twins_of(assembly: solver.Assembly, candidates: Sequence[Candidate]) -> list
     supports = np.flatnonzero(~assembly.free)
     bearing = _bearing(assembly, [assembly.names[i] for i in supports])
     size = float(np.ptp(assembly.vertices, axis=0).max())
-    shapes, found = [], []
+    shapes: list[tuple[np.ndarray, float, np.ndarray]] = []
+    found: list[Twin] = []
     for number, one in enumerate(candidates):
         full = scaled_motions(one)
         motion = np.array([full.get(assembly.names[i], (0.0, 0.0, 0.0)) for i in bearing])

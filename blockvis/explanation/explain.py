@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,66 +30,16 @@ from .candidates import (
 from .forward import Order, Run, all_followed, ordered, workers_for
 from .likelihood import Comparison, Trial, Trust, tried
 from .observations import Observations, read_observations
-from .ranking import Cause, Measurement, alike, next_measurement, ranked, unexplained
+from .ranking import Cause, next_measurement, ranked, unexplained
+from .result import Explanation
+from .words import in_words
+from .write import refuse_explanation, write_explanation
 
 #: Range of the coefficient of friction, as fractions of that of the case, where the case gives none.
 FRICTIONS = (0.8, 1.25)
 
 #: Causes that are looked at more closely: so probable at least, and at most so many.
 WORTH_IT, MOST_REFINED = 0.01, 4
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """What may have caused what was observed.
-
-    Attributes
-    ----------
-    case : Case
-    assembly : solver.Assembly
-        As it was analysed: every support fixed, the ground cut where troughs were looked at.
-    observations : Observations
-    comparison : Comparison
-    causes : tuple of Cause
-        The most probable first; empty where no candidate stands at any amount.
-    unexplained : tuple of int
-        Numbers of the observed widths that the best cause does not make.
-    made_by_none : tuple of int
-        Those of them that no candidate makes.
-    next_measurement : Measurement or None
-        The joint that would tell the first causes apart best.
-    runs : dict
-        Of the candidates: ``explain(..., runs=...)`` takes them instead of following them again.
-    notes : tuple of str
-    """
-
-    case: Case
-    assembly: solver.Assembly
-    observations: Observations
-    comparison: Comparison
-    causes: tuple[Cause, ...]
-    unexplained: tuple[int, ...]
-    made_by_none: tuple[int, ...]
-    next_measurement: Measurement | None
-    runs: dict[Any, Run] = field(repr=False, default_factory=dict)
-    notes: tuple[str, ...] = ()
-
-    @property
-    def alike(self) -> tuple[Cause, ...]:
-        """The best cause, and those that the observations cannot tell from it."""
-        return tuple(alike(self.causes)) if self.causes else ()
-
-    def __str__(self) -> str:
-        """Say in words what came out."""
-        from .words import in_words
-
-        return in_words(self)
-
-    def _repr_html_(self) -> str:
-        """Show the words in a notebook."""
-        import html
-
-        return f"<pre>{html.escape(str(self))}</pre>"
 
 
 def explain(
@@ -136,11 +86,9 @@ def explain(
     Notes
     -----
     One run along s gives every amount of a movement. The probability of a cause is by Bayes' rule, with a prior that
-    weighs causes alike and amounts evenly in their logarithm; see `docs/explain.md`. Nothing is drawn at random: the
+    weighs causes alike and amounts evenly up to a largest; see `docs/explain.md`. Nothing is drawn at random: the
     same input gives the same answer.
     """
-    from .write import refuse_explanation, write_explanation
-
     if folder is not None:
         refuse_explanation(folder, overwrite)
     with warnings.catch_warnings(record=True) as caught:
@@ -149,6 +97,8 @@ def explain(
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
         drawn = case_assembly(case)
+        if drawn.dimension != 2:
+            raise ValueError(f"{case.source}: explain knows structures in the plane only; this one is in space")
         needs_dry_joints(case)
         solver.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)
@@ -185,6 +135,7 @@ def explain(
         runs=search.runs,
         notes=tuple(notes),
     )
+    found = replace(found, words=in_words(found))
     if folder is not None:
         write_explanation(found, folder, overwrite=overwrite)
     return found
@@ -209,7 +160,7 @@ def _any_settlement(assembly: solver.Assembly) -> tuple[solver.Assembly, tuple[s
 
 
 def _closest(cause: Cause) -> list[Candidate]:
-    """The candidates of a cause whose friction is worth varying: the likeliest ones, at most three."""
+    """Choose the candidates of a cause whose friction is worth varying: the likeliest ones, at most three."""
     order = np.argsort(-np.array(cause.weights), kind="stable")[:3]
     return [cause.trials[k].candidate for k in order if cause.weights[k] > 0.05]
 
@@ -302,6 +253,6 @@ class _Search:
         return ranked(self.trials, apart=self.apart)
 
     def _key(self, candidate: Candidate, friction: float) -> Any:
-        """What a run depends on, within one case."""
+        """Name what a run depends on, within one case."""
         motions = tuple(sorted(scaled_motions(candidate).items()))
         return (motions, friction, self.widest, self.case.explain.limit)

@@ -19,6 +19,7 @@ from scipy.optimize import linear_sum_assignment
 import solver
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
+from blockvis.layout.layout import Layout
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
 from blockvis.suggestions import files_like, nearest
 
@@ -62,6 +63,8 @@ class Observations:
         Of the widths, in the drawing.
     named : (n,) bool array
         Whether the joint itself is known, not only a place.
+    whole : (n,) bool array
+        Whether the width is the largest of a joint, not that at a place along it.
     widths, uncertainties : (n,) arrays [m]
         A width of 0 is a closed joint.
     labels : tuple of str
@@ -78,6 +81,7 @@ class Observations:
 
     places: np.ndarray
     named: np.ndarray
+    whole: np.ndarray
     widths: np.ndarray
     uncertainties: np.ndarray
     labels: tuple[str, ...]
@@ -200,19 +204,19 @@ def _of_rows(
 ) -> Observations:
     columns = _columns(header, where)
     joints = initial_joints(assembly)
-    widths: list[tuple[np.ndarray, bool, float, float, str]] = []
+    widths: list[tuple[np.ndarray, bool, bool, float, float, str]] = []
     points: list[tuple[np.ndarray, str, np.ndarray, float]] = []
     for number, row in rows:
         cells = _Cells(row, columns, f"{where}, {counted} {number}")
         width = cells.width()
         if width is not None:
-            place, named, label = _place(cells, assembly, joints)
+            place, named, whole, label = _place(cells, assembly, joints)
             _check_width(width, cells, assembly)
             uncertainty = cells.number("uncertainty")
             if uncertainty is not None and uncertainty <= 0.0:
                 raise cells.error("uncertainty", f"is {uncertainty:g} m; give a length above 0")
             usual = max(WIDTH_UNCERTAINTY * width, LEAST_UNCERTAINTY)
-            widths.append((place, named, width, usual if uncertainty is None else uncertainty, label))
+            widths.append((place, named, whole, width, usual if uncertainty is None else uncertainty, label))
         moved = _displacement(cells, assembly)
         if moved is not None:
             points.append(moved)
@@ -224,15 +228,16 @@ def _of_rows(
 
 
 def _observations(
-    widths: Sequence[tuple[np.ndarray, bool, float, float, str]],
+    widths: Sequence[tuple[np.ndarray, bool, bool, float, float, str]],
     points: Sequence[tuple[np.ndarray, str, np.ndarray, float]],
     where: str,
 ) -> Observations:
     found = Observations(
         places=np.array([place for place, *_ in widths], dtype=float).reshape(-1, 2),
         named=np.array([named for _, named, *_ in widths], dtype=bool),
-        widths=np.array([width for _, _, width, *_ in widths], dtype=float),
-        uncertainties=np.array([sigma for _, _, _, sigma, _ in widths], dtype=float),
+        whole=np.array([whole for _, _, whole, *_ in widths], dtype=bool),
+        widths=np.array([width for _, _, _, width, *_ in widths], dtype=float),
+        uncertainties=np.array([sigma for *_, sigma, _ in widths], dtype=float),
         labels=tuple(label for *_, label in widths),
         points=np.array([point for point, *_ in points], dtype=float).reshape(-1, 2),
         blocks=tuple(block for _, block, *_ in points),
@@ -292,8 +297,19 @@ def _check_width(width: float, cells: _Cells, assembly: solver.Assembly) -> None
         )
 
 
-def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> tuple[np.ndarray, bool, str]:
-    """Find where a width was measured: the middle of the joint between two blocks, or x and y."""
+def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> tuple[np.ndarray, bool, bool, str]:
+    """Find where a width was measured: somewhere in the joint between two blocks, or at x and y.
+
+    Returns
+    -------
+    place : (2,) array [m]
+    named : bool
+        Whether the joint is known.
+    whole : bool
+        Whether the place along the joint is not.
+    label : str
+    """
+    x, y = cells.number("x"), cells.number("y")
     if cells.text("joint"):
         names = [name.strip() for name in re.split(r"\s*\|\s*", cells.text("joint"))]
         if len(names) != 2:
@@ -314,10 +330,15 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
             raise cells.error(
                 keys[1], f"names '{names[0]}' and '{names[1]}', which do not touch; '{names[0]}' touches {others}"
             )
+        label = f"{names[0]} | {names[1]}"
         ends = joints.ends[between]
+        if x is not None and y is not None:
+            lines = shapely.linestrings(ends)
+            line = lines[int(np.argmin(shapely.distance(lines, shapely.Point(x, y))))]
+            place = line.interpolate(line.project(shapely.Point(x, y)))
+            return np.array(place.coords[0]), True, False, f"{label} at ({x:.4g}, {y:.4g})"
         length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
-        return length @ ends.mean(axis=1) / length.sum(), True, f"{names[0]} | {names[1]}"
-    x, y = cells.number("x"), cells.number("y")
+        return length @ ends.mean(axis=1) / length.sum(), True, True, label
     if x is None or y is None:
         raise cells.error("x" if x is None else "y", "is missing; give the place of the crack, or the joint")
     place = np.array([x, y])
@@ -329,7 +350,7 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
             f"and y are ({x:g}, {y:g}) m, {distance.min():.3g} m from any joint; the blocks lie between "
             f"({low[0]:.4g}, {low[1]:.4g}) and ({high[0]:.4g}, {high[1]:.4g}) m: check the unit",
         )
-    return place, False, f"({x:.4g}, {y:.4g})"
+    return place, False, False, f"({x:.4g}, {y:.4g})"
 
 
 def _block(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> int:
@@ -373,6 +394,8 @@ def block_at(assembly: solver.Assembly, point: np.ndarray) -> int:
 def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
     """Compare a drawing of the damaged state with the undamaged one, block by block."""
     layout = read_layout(path)
+    if not isinstance(layout, Layout):
+        raise ValueError(f"{path}: draws blocks in space; give a drawing in the plane, as the case is")
     partner = _partners(layout.names, layout.outlines, assembly)
     if not partner:
         raise ValueError(f"{path}: none of its {layout.n_blocks} blocks is one of the case, by its name or its shape")
@@ -392,6 +415,7 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
         (
             joints.ends[k].mean(axis=0),
             True,
+            True,
             float(opening[k]),
             float(np.hypot(sigma, WIDTH_UNCERTAINTY * opening[k])),
             f"{assembly.names[joints.block_a[k]]} | {assembly.names[joints.block_b[k]]}",
@@ -406,7 +430,7 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
 
 
 def _partners(names: Sequence[str], outlines: Sequence[np.ndarray], assembly: solver.Assembly) -> dict[int, int]:
-    """Pair the blocks of the case with those of a drawing, by their names where these fit, else by the nearest shape."""
+    """Pair the blocks of the case with those of a drawing, by their names where these fit, else by their shapes."""
     numbers = {name: i for i, name in enumerate(assembly.names)}
     if len(set(names)) == len(names) and sum(name in numbers for name in names) > 0.5 * len(names):
         return {numbers[name]: k for k, name in enumerate(names) if name in numbers}

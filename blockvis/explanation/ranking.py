@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from .likelihood import Comparison, Trial
+from .likelihood import FLOOR, Comparison, Trial
 
 #: Causes less probable than the best by more than this factor are told apart from it.
 TOLD_APART = 10.0
@@ -20,7 +20,10 @@ EXPLAINED = 3.0
 TAILS = (0.05, 0.5, 0.95)
 
 #: A joint tells causes apart where their widths differ by so many standard deviations.
-DECISIVE = 2.0
+DECISIVE = 1.0
+
+#: Causes less probable than this are not worth a measurement, but for the second.
+WORTH_A_WORD = 0.01
 
 
 @dataclass(frozen=True)
@@ -102,8 +105,9 @@ def ranked(trials: Sequence[Trial], *, apart: bool) -> list[Cause]:
     Notes
     -----
     The prior weighs causes as their candidates say, usually alike; within a cause its candidates alike (a candidate
-    that refines another shares the weight of that one), coefficients of friction alike, and amounts evenly in their
-    logarithm. The probability of a cause is its prior times the mean likelihood over all it leaves open, by Bayes.
+    that refines another shares the weight of that one), coefficients of friction alike, and amounts evenly up to the
+    largest that is looked at. The probability of a cause is its prior times the mean likelihood over all it leaves
+    open, by Bayes.
     """
     groups: dict[str, list[Trial]] = {}
     also: dict[str, list[str]] = {}
@@ -223,14 +227,14 @@ def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measure
     causes : sequence of Cause
         In the order of their probability.
     """
-    chosen = [cause for cause in causes if cause.probability > 1e-6][:4]
-    if len(chosen) < 2:
+    if len(causes) < 2:
         return None
+    chosen = [cause for k, cause in enumerate(causes[:4]) if k < 2 or cause.probability > WORTH_A_WORD]
     table = np.array([_expected(cause) for cause in chosen])
     mean, spread = table[:, 0], table[:, 1]
     widest = comparison.observations.largest
-    sigma = np.sqrt(spread**2 + (comparison.trust.model * mean) ** 2 + (0.03 * widest) ** 2)
-    weights = np.array([cause.probability for cause in chosen])
+    sigma = np.sqrt(spread**2 + (comparison.trust.model * mean) ** 2 + (FLOOR * widest) ** 2)
+    weights = np.array([max(cause.probability, WORTH_A_WORD) for cause in chosen])
     n = len(comparison.joints.block_a)
     gain, apart = np.zeros(n), np.zeros(n)
     for a in range(len(chosen)):
@@ -241,7 +245,7 @@ def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measure
     # Where somebody has measured already nothing new is to be found.
     gain[(comparison.nearness > 0.99).any(axis=0)] = 0.0
     best = int(np.argmax(gain))
-    if gain[best] <= 0.0:
+    if gain[best] <= 0.0 or apart[best] < DECISIVE:
         return None
     assembly, joints = comparison.assembly, comparison.joints
     x, y = joints.ends[best].mean(axis=0)
@@ -262,7 +266,7 @@ def _expected(cause: Cause) -> tuple[np.ndarray, np.ndarray]:
             continue
         mass = share * np.exp(trial.log_likelihood - logsumexp(trial.log_likelihood))
         heavy = np.flatnonzero(mass > 1e-3 * mass.max())
-        openings = trial.run.at(trial.amounts[heavy] / trial.twin.scale, trial.run.openings)
+        openings = trial.openings(heavy).max(axis=2)
         first, second = mass[heavy] @ openings, mass[heavy] @ openings**2
         mean, square = (first, second) if len(mean) == 0 else (mean + first, square + second)
     return mean, np.sqrt(np.maximum(square - mean**2, 0.0))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from .explain import Explanation
     from .ranking import Cause, Measurement
+    from .result import Explanation
 
 #: Causes that the command line lists.
 LISTED = 6
@@ -24,6 +24,17 @@ def amount_text(value: float, unit: str) -> str:
     ('12.3 mm', '2.1 mrad')
     """
     return f"{1e3 * value:.3g} {'mm' if unit == 'm' else 'mrad'}"
+
+
+def width_text(width: float) -> str:
+    """Write a width [m] in mm; what nobody can measure is 0.
+
+    Examples
+    --------
+    >>> width_text(0.00412), width_text(0.0123), width_text(1e-12)
+    ('4.1', '12.3', '0')
+    """
+    return "0" if width < 5e-5 else f"{1e3 * width:.1f}"
 
 
 def range_text(cause: Cause) -> str:
@@ -54,7 +65,7 @@ def cause_text(cause: Cause) -> str:
 def measurement_text(measurement: Measurement) -> str:
     """Say which joint to measure next, and what each cause has there."""
     x, y = measurement.place
-    there = "; ".join(f"{1e3 * width:.3g} mm if {name}" for name, width in measurement.widths)
+    there = "; ".join(f"{width_text(width)} mm if {name}" for name, width in measurement.widths)
     return f"the joint {measurement.name} at ({x:.3g}, {y:.3g}) m: {there}"
 
 
@@ -94,7 +105,7 @@ def unexplained_texts(found: Explanation) -> list[str]:
     """Say which observations the best cause, or every candidate, leaves unexplained."""
     lines = []
     for k in found.unexplained:
-        width = f"{1e3 * found.observations.widths[k]:.3g} mm at {found.observations.labels[k]}"
+        width = f"{width_text(found.observations.widths[k])} mm at {found.observations.labels[k]}"
         whom = "no candidate makes it" if k in found.made_by_none else "the first cause does not make it"
         lines.append(f"unexplained: {width}; {whom}")
     return lines
@@ -151,7 +162,7 @@ def values_of(found: Explanation) -> dict[str, Any]:
             ],
         },
         "assumed": {
-            "prior": "causes alike, amounts evenly in their logarithm, frictions and places of troughs alike",
+            "prior": "causes alike, amounts evenly up to the largest looked at, frictions and places of troughs alike",
             "model_uncertainty": settings.model_uncertainty,
             "place_uncertainty": found.comparison.trust.place,
             "outliers": settings.outliers,

@@ -1,6 +1,200 @@
-def refuse_explanation(*a):
-    pass
+"""explain.html, explain.json and explain.png in a folder."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING
+
+from blockvis.atomic_files import make_folder, write_whole
+from blockvis.results.folder import ResultsExist
+
+from .likelihood import INDEPENDENT
+from .picture import draw_explanation
+from .words import (
+    amount_text,
+    cause_text,
+    measurement_text,
+    percent,
+    range_text,
+    unexplained_texts,
+    values_of,
+    verdict,
+    width_text,
+)
+
+if TYPE_CHECKING:
+    from .result import Explanation
+
+#: What an explanation leaves in its folder.
+FILES = ("explain.html", "explain.json", "explain.png")
+
+#: Causes and observations that the page lists.
+MOST_CAUSES, MOST_OBSERVATIONS = 12, 200
 
 
-def write_explanation(*a, **k):
-    pass
+def refuse_explanation(folder: str | Path, overwrite: bool) -> None:
+    """Raise :class:`ResultsExist` if a folder holds an explanation that may not be replaced."""
+    folder = Path(folder)
+    if folder.exists() and not folder.is_dir():
+        raise ResultsExist(f"'{folder}' is a file; choose a folder with -o")
+    there = [name for name in FILES if (folder / name).exists()]
+    if there and not overwrite:
+        raise ResultsExist(
+            f"'{folder}' holds an explanation already ({there[0]}); choose another folder with -o or add --force"
+        )
+
+
+def write_explanation(found: Explanation, folder: str | Path, *, overwrite: bool = False) -> Path:
+    """Write the page, its numbers and its picture.
+
+    Parameters
+    ----------
+    found : Explanation
+    folder : str or Path
+    overwrite : bool
+        Whether an explanation that is there already may be replaced.
+
+    Returns
+    -------
+    pathlib.Path
+    """
+    refuse_explanation(folder, overwrite)
+    folder = Path(folder)
+    make_folder(folder)
+    write_whole(folder / "explain.json", json.dumps(values_of(found), indent=2, ensure_ascii=False) + "\n")
+    picture = draw_explanation(found, folder / "explain.png")
+    write_whole(folder / "explain.html", explanation_html(found, picture.read_bytes()))
+    return folder
+
+
+def explanation_html(found: Explanation, picture: bytes) -> str:
+    """Make the page as HTML text; it needs no network and makes no request.
+
+    Parameters
+    ----------
+    found : Explanation
+    picture : bytes
+        Its picture, a PNG.
+    """
+    room = files("blockvis")
+    name = found.case.source.stem
+    try:
+        ours = f"blockvis {version('blockvis')}"
+    except PackageNotFoundError:
+        ours = "blockvis"
+    problems = [*unexplained_texts(found), *found.notes]
+    return Template((room / "explanation" / "explain.html").read_text(encoding="utf-8")).substitute(
+        title=html.escape(f"{name} · likely causes of its cracks"),
+        about=html.escape(" · ".join((str(found.case.source), found.observations.source, ours))),
+        style=(room / "report" / "player.css").read_text(encoding="utf-8"),
+        verdict=html.escape(verdict(found)),
+        picture=base64.b64encode(picture).decode("ascii"),
+        words=html.escape(_picture_text(found)),
+        causes=_causes(found),
+        alike=_alike(found),
+        problems="".join(f"<li>{html.escape(text)}</li>" for text in problems)
+        or "<li>Every open joint is explained by the first cause, within what observations and model leave open.</li>",
+        measurement=html.escape(
+            measurement_text(found.next_measurement)
+            if found.next_measurement is not None
+            else "no joint of the model tells the causes apart; measure how the supports themselves have moved"
+        ),
+        observations=_observations(found),
+        points=_points(found),
+        assumed="".join(f"<li>{html.escape(text)}</li>" for text in _assumed(found)),
+        case=html.escape(found.case.text or "no case file: explained from Python"),
+    )
+
+
+def _picture_text(found: Explanation) -> str:
+    """Say in words what the picture shows, for those who do not see it."""
+    causes = "; ".join(cause_text(cause) for cause in found.causes[:2])
+    return f"Observed cracks beside those computed for: {causes}" if causes else "Observed cracks"
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    head = "".join(f'<th scope="col">{html.escape(cell)}</th>' for cell in header)
+    body = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _causes(found: Explanation) -> str:
+    rows = []
+    for number, cause in enumerate(found.causes[:MOST_CAUSES], start=1):
+        also = f" (the same cracks: {', '.join(cause.also)})" if cause.also else ""
+        low, high = cause.friction
+        friction = f"{low:.2g}" if low == high else f"{low:.2g} to {high:.2g}"
+        rows.append((str(number), cause_text(cause) + also, percent(cause.probability), range_text(cause), friction))
+    return _table(("", "cause", "probability", "amount, median (5 % to 95 %)", "friction"), rows)
+
+
+def _alike(found: Explanation) -> str:
+    if len(found.alike) < 2:
+        return "The first cause is more than ten times as probable as any other that was looked at."
+    names = ", ".join(cause_text(cause) for cause in found.alike)
+    return html.escape(f"The observations cannot tell these apart (less than a factor of ten between them): {names}.")
+
+
+def _observations(found: Explanation) -> str:
+    given = found.observations
+    if not len(given.widths):
+        return ""
+    best = found.causes[:2]
+    order = sorted(range(len(given.widths)), key=lambda k: -given.widths[k])
+    rows = []
+    for k in order[:MOST_OBSERVATIONS]:
+        width = "closed" if given.widths[k] == 0.0 else width_text(given.widths[k])
+        computed = [width_text(cause.best.widths[cause.at][k]) for cause in best]
+        strange = "no candidate" if k in found.made_by_none else "unexplained" if k in found.unexplained else ""
+        rows.append((given.labels[k], width, f"± {1e3 * given.uncertainties[k]:.2g}", *computed, strange))
+    header = ("joint or place", "observed, mm", "", *(f"cause {n}, mm" for n in range(1, len(best) + 1)), "")
+    return "<h2>Widths</h2>" + _table(header, rows)
+
+
+def _points(found: Explanation) -> str:
+    given = found.observations
+    if not len(given.points):
+        return ""
+    best = found.causes[:2]
+    computed = [found.comparison.displacements(c.best.moved(c.at)[None])[0] for c in best]
+    rows = [
+        (
+            f"{given.blocks[k]} at ({given.points[k, 0]:.3g}, {given.points[k, 1]:.3g}) m",
+            _vector(given.displacements[k]),
+            *(_vector(there[k]) for there in computed),
+        )
+        for k in range(min(len(given.points), MOST_OBSERVATIONS))
+    ]
+    header = ("point", "observed, mm", *(f"cause {n}, mm" for n in range(1, len(best) + 1)))
+    return "<h2>Displaced points</h2>" + _table(header, rows)
+
+
+def _vector(value: Sequence[float]) -> str:
+    return f"({1e3 * value[0]:.3g}, {1e3 * value[1]:.3g})"
+
+
+def _assumed(found: Explanation) -> list[str]:
+    trust, runs = found.comparison.trust, found.runs
+    frictions = sorted({trial.friction for cause in found.causes for trial in cause.trials})
+    largest = float(found.causes[0].best.amounts[-1]) if found.causes else 0.0
+    return [
+        "Blocks are rigid, joints dry: cracks in stones, mortar that hardened later and loads that changed are not in "
+        "the model.",
+        "Before anything was observed the causes are taken as equally probable (movements between two directions half "
+        "as much), their amounts as evenly spread"
+        + (f" up to {amount_text(largest, found.causes[0].unit)} (first cause)" if found.causes else "")
+        + ", frictions and places of troughs as equally probable.",
+        f"Computed widths are trusted to {100.0 * trust.model:.3g} %, besides the uncertainty of each observation; a "
+        f"crack at x, y may be another joint within {1e3 * trust.place:.3g} mm; an observation has another cause with "
+        f"a probability of {100.0 * trust.outliers:.3g} %.",
+        f"Observations share the errors of the model: more than {INDEPENDENT} do not count as independent.",
+        f"Coefficients of friction: {', '.join(f'{value:.3g}' for value in frictions) or 'none'}; {len(runs)} runs.",
+        "Probabilities are among the causes that were looked at: a cause that is not in the list has none.",
+    ]

@@ -233,13 +233,22 @@ def solids_of_bodies(
     return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", ignore))
 
 
-def flat_or_solid(
-    found: Bodies, path: Path | str, ignore: Sequence[str] = (), only: Sequence[str] = ()
+def in_dimension(
+    found: Bodies,
+    path: Path | str,
+    dimension: int | None,
+    view: str | None = None,
+    ignore: Sequence[str] = (),
+    only: Sequence[str] = (),
 ) -> Layout | SolidLayout:
-    """Make a layout in the plane of bodies that are prisms side by side, of others one in space, with the reason."""
+    """Make a layout in the plane, 2, or in space, 3; by default in space where bodies are not prisms side by side."""
+    if dimension == 3:
+        return solids_of_bodies(found, path, view, ignore, only)
     try:
-        return layout_of_bodies(found, path, None, ignore, only)
+        return layout_of_bodies(found, path, view, ignore, only)
     except NotFlat as error:
+        if dimension == 2 or view is not None:
+            raise
         layout = solids_of_bodies(found, path, None, ignore, only)
         return replace(layout, notes=(f"blocks in space: {error.reason}", *layout.notes))
 

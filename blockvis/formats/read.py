@@ -24,7 +24,7 @@ from blockvis.layout.solid_layout import SolidLayout
 from blockvis.layout.units import chosen_unit, doubt, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
 
-from .bodies import Bodies, flat_or_solid, layout_of_bodies, solids_of_bodies
+from .bodies import Bodies, in_dimension
 from .cells import of_files
 from .files import MissingFile as MissingFile
 from .files import files_of
@@ -139,11 +139,7 @@ def _in_dimension(
         if dimension == 2:
             raise ValueError(f"'{path}' draws its blocks in space; leave out dimension = 2")
         return content
-    if dimension == 3:
-        return solids_of_bodies(content, path, view, ignore, only)
-    if dimension == 2 or view is not None:
-        return layout_of_bodies(content, path, view, ignore, only)
-    return flat_or_solid(content, path, ignore, only)
+    return in_dimension(content, path, dimension, view, ignore, only)
 
 
 def _apart(content: AnyLayout | Bodies, path: Path) -> Layout | Bodies:

@@ -126,6 +126,12 @@ def opening_and_slip(assembly: solver.Assembly, joints: InitialJoints, pose: sol
     return np.stack([across.max(axis=1), np.take_along_axis(along, closer, axis=1)[:, 0]], axis=1)
 
 
+def end_openings(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> np.ndarray:
+    """(n_joints, 2) array [m]: distance of the faces of the joints of the layout at their ends, along the normal."""
+    on_a, on_b, normals = faces_at(assembly, joints, pose)
+    return np.asarray(np.einsum("nij,nj->ni", on_a - on_b, normals))
+
+
 def joint_states(assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment) -> JointStates:
     """Work out opening, slip and forces of all joints of an increment.
 

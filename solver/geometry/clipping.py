@@ -8,10 +8,11 @@ import numpy as np
 
 from solver.tolerances import CORNER_TOLERANCE
 
+from .convex_parts import ConvexParts
 from .outlines import next_vertices
 from .portions import alike
 from .separations import SMALLEST_SINE
-from .solids import Faces, Solids, cross, dot, unit
+from .solids import Faces, cross, dot, unit
 from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of
 
 
@@ -37,14 +38,15 @@ class ClippedCorners:
 
 
 def clipped_faces(
-    solids: Solids, faces: Faces, vertices: np.ndarray, face_a: np.ndarray, face_b: np.ndarray
+    parts: ConvexParts, faces: Faces, vertices: np.ndarray, face_a: np.ndarray, face_b: np.ndarray
 ) -> ClippedCorners:
     """Corners of the polygons in which faces a and faces b, (n,) int arrays, cover each other."""
+    solids = parts.solids
     sizes = np.diff(solids.face_offsets)
     owners, features = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 4), dtype=np.int64)]
     areas, widths = [np.zeros(0)], [np.zeros(0)]
     for k in alike(sizes[face_a], sizes[face_b]):
-        owner, rows, area, width = _clipped(solids, faces, vertices, face_a[k], face_b[k])
+        owner, rows, area, width = _clipped(parts, faces, vertices, face_a[k], face_b[k])
         owners.append(k[owner])
         features.append(rows)
         areas.append(area)
@@ -53,9 +55,10 @@ def clipped_faces(
 
 
 def _clipped(
-    solids: Solids, faces: Faces, vertices: np.ndarray, face_a: np.ndarray, face_b: np.ndarray
+    parts: ConvexParts, faces: Faces, vertices: np.ndarray, face_a: np.ndarray, face_b: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Owners, features, areas and widths for faces a that all have as many corners, and faces b likewise."""
+    solids = parts.solids
     n_a, n_b = (int(solids.face_offsets[face[0] + 1] - solids.face_offsets[face[0]]) for face in (face_a, face_b))
     # Corners of a run clockwise seen along the normal of b; turned round, both run counter-clockwise. Edge k of either
     # polygon runs from its corner k to the next, which for a is the edge that starts at the latter.
@@ -107,10 +110,10 @@ def _clipped(
     )
     alone_a, alone_b = used_a & ~both.any(axis=2), used_b & ~both.any(axis=1)
     pair, p = np.nonzero(alone_a)
-    vertex_a = _on_face(solids, vertices, end, depth_a, nearest_b, pair, p, corner_a, face_b, edge_b), a[pair, p]
+    vertex_a = _on_face(parts, vertices, end, depth_a, nearest_b, pair, p, corner_a, face_b, edge_b), a[pair, p]
     pair_a = pair
     pair, q = np.nonzero(alone_b)
-    vertex_b = _on_face(solids, vertices, end, depth_b, nearest_a, pair, q, corner_b, face_a, edge_a), b[pair, q]
+    vertex_b = _on_face(parts, vertices, end, depth_b, nearest_a, pair, q, corner_b, face_a, edge_a), b[pair, q]
     pair_b = pair
     pair, p, q = np.nonzero(crosses)
     u, v = on_a[pair, p, q], on_b[pair, p, q]
@@ -141,7 +144,7 @@ def _inside(points: np.ndarray, corners: np.ndarray, directions: np.ndarray) -> 
 
 
 def _on_face(
-    solids: Solids,
+    parts: ConvexParts,
     vertices: np.ndarray,
     end: np.ndarray,
     depth: np.ndarray,
@@ -153,6 +156,7 @@ def _on_face(
     edge: np.ndarray,
 ) -> np.ndarray:
     """(n, 4) int array: features of corners on faces, with the edges that cross where they are on the boundary."""
+    solids, cut = parts.solids, parts.cut_edges
     own = corner[pair, p]
     other = edge[pair, nearest[pair, p]]
     start, following = vertices[solids.corners], solids.next_corner
@@ -163,6 +167,7 @@ def _on_face(
     best = sine.argmax(axis=1)
     row = np.arange(len(own))
     on_boundary = (depth[pair, p] <= end[pair, 0]) & (sine[row, best] >= SMALLEST_SINE)
+    on_boundary &= ~cut[other] & ~cut[candidates[row, best]]
     code = np.where(on_boundary, other * np.int64(len(solids.corners)) + candidates[row, best], -1)
     return feature_rows(ON_FACE, solids.corners[own], face[pair], code)
 

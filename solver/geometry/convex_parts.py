@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -56,6 +57,12 @@ class ConvexParts:
     source: np.ndarray
     weights: np.ndarray
     inner: np.ndarray
+
+    @cached_property
+    def cut_edges(self) -> np.ndarray:
+        """(n_corners,) bool array: edges at a face inside the block, which are none of the block, or not as sharp."""
+        face = self.solids.face_of_corner
+        return self.inner[face] | self.inner[face[self.solids.twins]]
 
     @property
     def whole(self) -> bool:

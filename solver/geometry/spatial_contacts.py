@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import expand_ranges
-from .clipping import clipped_faces
+from .clipping import ClippedCorners, clipped_faces
 from .contacts import Contacts, joined_contacts
 from .convex_parts import ConvexParts
 from .facing import FacingParts, facing_parts, near_parts
@@ -27,6 +27,10 @@ EDGES_APART = 1e-4
 
 #: Two faces that oppose each other better than this cosine leave no room for edges between them.
 OPPOSED = -0.94
+
+#: At a cut, what is narrower than this fraction of both faces and smaller than that of the area in which the same two
+#: stones touch is a sliver.
+SLIVER_WIDTH, SLIVER_AREA = 0.02, 0.02
 
 #: Points at one place with normals nearer to each other than this cosine are one.
 ONE_NORMAL = 1.0 - 1e-4
@@ -171,26 +175,30 @@ def find_points(
     alone = pairs.shallow & ~pairs.face_each_other
     tips = measured(*_tips(solids, faces, vertices, pairs[alone], reach))
     crossed = measured(*_crossed_edges(solids, faces, vertices, pairs[pairs.cosine > OPPOSED], reach))
-    own, other = crossed.features[:, 1], crossed.features[:, 2]
-    of_cuts = (inner[solids.face_of_corner] | inner[solids.face_of_corner[solids.twins]])[np.stack([own, other])]
-    crossed = crossed[~of_cuts.any(axis=0)]
+    crossed = crossed[~parts.cut_edges[crossed.features[:, 1:3]].any(axis=1)]
     crossed = crossed[near(crossed)]
     found = [tips[near(tips)], crossed]
     # Where the faces that oppose each other best do not cover each other, others may.
     left = pairs[tried]
     resolved = np.zeros(len(left), dtype=bool)
+    blocks = np.sort(np.stack([block_of_part[left.i], block_of_part[left.j]]), axis=0)
+    _, joint = np.unique(blocks[0] * len(widths) + blocks[1], return_inverse=True)
+    largest = np.zeros(len(left))
     rounds = chain([(np.arange(len(left)), left.face_i, left.face_j)], left.other_faces(solids, faces, inner))
     for pair, face_i, face_j in rounds:
         now = ~resolved[pair]
         pair, face_i, face_j = pair[now], face_i[now], face_j[now]
-        corners = clipped_faces(solids, faces, vertices, face_i, face_j)
+        corners = clipped_faces(parts, faces, vertices, face_i, face_j)
         contacts = measured(corners.features, corners.areas)
         lowest = np.full(len(pair), np.inf)
         np.minimum.at(lowest, corners.owner, contacts.gaps)
         strip = (
             corners.widths < STRIP * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])[corners.owner]
         )
-        kept = np.flatnonzero(near(contacts) & ~(strip & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)))
+        np.maximum.at(largest, joint[pair], np.bincount(corners.owner, corners.areas, minlength=len(pair)))
+        sliver = _slivers(parts, face_i, face_j, corners, largest[joint[pair]])
+        slides = strip & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)
+        kept = np.flatnonzero(near(contacts) & ~slides & ~sliver)
         resolved[pair[corners.owner[kept]]] = True
         found.append(contacts[kept])
     contacts = joined_contacts(found)
@@ -201,6 +209,30 @@ def find_points(
     several[crossed.block_a] = True
     twice = several[contacts.block_a] | several[contacts.block_b]
     return _once(contacts, twice, CORNER_TOLERANCE * float(widths.min()))
+
+
+def _slivers(
+    parts: ConvexParts, face_i: np.ndarray, face_j: np.ndarray, corners: ClippedCorners, largest: np.ndarray
+) -> np.ndarray:
+    """Whether corners are those of a sliver at a cut, (n,) bool: beside the area in which two stones touch, it is none.
+
+    Where two stones of two arms each slide along each other, the arm of one comes over the end of the other's joint
+    before it comes down.
+
+    Parameters
+    ----------
+    parts : ConvexParts
+    face_i, face_j : (n_pairs,) int arrays
+    corners : ClippedCorners
+    largest : (n_pairs,) array [m²]
+        Of all polygons in which the same two blocks cover each other.
+    """
+    solids = parts.solids
+    area = np.bincount(corners.owner, corners.areas, minlength=len(face_i))
+    at_cut = np.bincount(solids.face_of_corner, parts.cut_edges) > 0
+    small = (area < SLIVER_AREA * largest) & (at_cut[face_i] | at_cut[face_j])
+    narrow = SLIVER_WIDTH * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])
+    return small[corners.owner] & (corners.widths < narrow[corners.owner])
 
 
 def _once(contacts: Contacts, twice: np.ndarray, near: float) -> Contacts:

@@ -185,6 +185,7 @@ def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tm
     """A run kept as a folder is a run of the table."""
     out, study = tmp_path / "out", STUDY.replace("runs = 24", "runs = 8")
     arches.write_text(study, encoding="utf-8")
+    (tmp_path / "case.toml").write_text(ARCH.replace("increment = 0.02", "increment = 0.05"), encoding="utf-8")
     _made_here(read_study(arches), out, range(3))
     done = (out / "runs.jsonl").read_bytes()
     assert main(["sweep", str(arches), "-o", str(out), "--scheduler", scheduler, "--keep", "5"]) == 0

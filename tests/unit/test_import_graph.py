@@ -19,6 +19,7 @@ ORDER = (
     "blockvis.__main__",
     "blockvis.cli",
     "blockvis.reference",
+    "blockvis.explanation",
     "blockvis.studies",
     "blockvis.runs.run",
     "blockvis.report",

@@ -1,0 +1,245 @@
+"""``blockvis explain``: from a case and a table of cracks to ranked causes, its page, numbers and picture."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import blockvis
+import solver
+from blockvis import cli, generators
+from blockvis.formats.read import save_layout
+from blockvis.results.joints import end_openings, initial_joints
+
+#: The structure as the inverse assumes it; the real one has other friction, and twelve voussoirs.
+CASE = """
+[geometry]
+layout = "segmental arch"
+parameters = { voussoirs = 10 }
+[material]
+friction_coefficient = 0.7
+[explain]
+directions = ["down", "right"]
+friction = [0.7, 0.7]
+"""
+
+SPREAD = 0.01
+
+
+def moved(assembly, direction, amount=SPREAD):
+    """The pose of an arch whose right springer has moved."""
+    settlement = solver.Settlement(direction=direction, increment=amount / 2.0, limit=amount)
+    controls = solver.Controls(falling_frames=0)
+    return solver.settle(assembly, settlement, friction_coefficient=0.8, controls=controls).path[-1].pose
+
+
+def rows_of(assembly, pose, noise=0.1):
+    """Widths near both ends of the joints."""
+    joints = initial_joints(assembly)
+    random = np.random.default_rng(3)
+    rows = []
+    for line, both in zip(joints.ends, end_openings(assembly, joints, pose), strict=True):
+        for share in (0.1, 0.9):
+            (x, y), w = line[0] + share * (line[1] - line[0]), both[0] + share * (both[1] - both[0])
+            width = f"{1e3 * w * (1.0 + noise * random.standard_normal()):.2f}" if w > 3e-4 else "closed"
+            rows.append(f"{x:.4f},{y:.4f},{width}")
+    # Nobody notes every joint that is closed.
+    return [row for k, row in enumerate(rows) if not row.endswith("closed") or k % 3 == 0]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A case, and what was seen on the real arch."""
+    folder = tmp_path_factory.mktemp("explain")
+    (folder / "arch.toml").write_text(CASE, encoding="utf-8")
+    real = generators.segmental_arch(voussoirs=12)
+    rows = rows_of(real, moved(real, (1.0, 0.0)))
+    (folder / "cracks.csv").write_text("\n".join(["x,y,width [mm]", *rows]) + "\n", encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def said(folder):
+    """What the command says, and the folder that it writes."""
+    with pytest.MonkeyPatch.context() as patched:
+        import contextlib
+        import io
+
+        patched.chdir(folder)
+        words = io.StringIO()
+        with contextlib.redirect_stdout(words):
+            code = cli.main(["explain", "arch.toml", "--observed", "cracks.csv", "-o", "out", "--workers", "1"])
+    assert code == 0
+    return words.getvalue()
+
+
+def test_the_cause_comes_first_with_its_amount(folder, said):
+    causes = json.loads((folder / "out" / "explain.json").read_text(encoding="utf-8"))["causes"]
+    best = causes[0]
+    assert best["cause"] == "right springer moves right"
+    assert best["amount"] == pytest.approx(SPREAD, rel=0.25)
+    assert best["amount_low"] < best["amount"] < best["amount_high"]
+    assert sum(cause["probability"] for cause in causes) == pytest.approx(1.0)
+    assert "right springer moves right" in said.splitlines()[1].lower()
+    assert "measure next: the joint" in said
+
+
+def test_the_page_needs_no_network_and_tells_the_same(folder, said):
+    page = (folder / "out" / "explain.html").read_text(encoding="utf-8")
+    assert not re.findall(r"(?:src|href)=\"(?!data:)", page)
+    assert "http:" not in page
+    assert "https:" not in page
+    stored = json.loads((folder / "out" / "explain.json").read_text(encoding="utf-8"))
+    for words in (
+        stored["causes"][0]["cause"],
+        stored["next_measurement"]["joint"],
+        "directions = [&quot;down&quot;, &quot;right&quot;]",
+    ):
+        assert words in page
+    for one in stored["observations"]["widths"]:
+        assert one["place"] in page
+
+
+def test_the_picture_has_three_panels_of_blocks_with_cracks(folder, said):
+    with Image.open(folder / "out" / "explain.png") as picture:
+        pixels = np.asarray(picture.convert("RGB")).astype(int)
+    orange = np.abs(pixels - [226, 78, 27]).sum(axis=2) < 40
+    thirds = np.array_split(orange, 3, axis=1)
+    assert all(third.sum() > 100 for third in thirds)
+
+
+@pytest.mark.slow
+def test_the_same_input_gives_the_same_answer(folder, said):
+    before = {name: (folder / "out" / name).read_bytes() for name in ("explain.json", "explain.png")}
+    again = folder / "again"
+    with pytest.MonkeyPatch.context() as patched:
+        patched.chdir(folder)
+        assert cli.main(["explain", "arch.toml", "--observed", "cracks.csv", "-o", "again", "--workers", "1"]) == 0
+    assert {name: (again / name).read_bytes() for name in before} == before
+
+
+def test_what_is_there_is_not_replaced_unless_asked(folder, said, capsys):
+    command = ["explain", str(folder / "arch.toml"), "--observed", str(folder / "cracks.csv"), "-o"]
+    assert cli.main([*command, str(folder / "out")]) == cli.BAD_INPUT
+    assert "holds an explanation already (explain.html)" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_crack_that_no_candidate_makes_is_said_to_be_unexplained(folder):
+    case = blockvis.explanation.explain.read_explained(folder / "arch.toml")
+    runs = {}
+    seen = [
+        dict(zip(("x", "y", "width [mm]"), row.split(","), strict=True))
+        for row in (folder / "cracks.csv").read_text(encoding="utf-8").splitlines()[1:]
+    ]
+    plain = blockvis.explain(case, seen, runs=runs)
+    assert plain.made_by_none == ()
+    # A wide crack at a quarter of the span, halfway between two hinges, where all candidates keep the arch together.
+    closed = [k for k, row in enumerate(seen) if row["width [mm]"] == "closed"]
+    made = np.max([trial.widths.max(axis=0) for cause in plain.causes for trial in cause.trials], axis=0)
+    still = min(closed, key=lambda k: float(made[k]))
+    seen[still] = {**seen[still], "width [mm]": "4.0"}
+    strange = blockvis.explain(case, seen, runs=runs)
+    assert still in strange.unexplained
+    assert f"unexplained: 4.0 mm at {strange.observations.labels[still]}" in str(strange)
+    assert strange.causes[0].name == "right springer moves right", "one strange crack does not change the cause"
+
+
+@pytest.mark.slow
+def test_displaced_points_tell_which_springer_has_moved(folder):
+    arch = generators.segmental_arch(voussoirs=10)
+    pose = moved(arch, (1.0, 0.0))
+    rows = [
+        {"block": arch.names[i], "dx": pose.positions[i, 0] - arch.centroids[i, 0],
+         "dy": pose.positions[i, 1] - arch.centroids[i, 1]}
+        for i in range(arch.n_blocks)
+    ]  # fmt: skip
+    (folder / "both.toml").write_text(CASE.replace('["down", "right"]', '["left", "right"]'), encoding="utf-8")
+    found = blockvis.explain(folder / "both.toml", rows)
+    assert len(found.runs) == 3, "movements that differ by a translation share their run"
+    assert found.causes[0].name == "right springer moves right"
+    assert found.causes[0].also == ()
+    assert found.causes[0].amount[1] == pytest.approx(SPREAD, rel=0.1)
+    other = next(cause for cause in found.causes if cause.name == "left springer moves left")
+    assert other.probability < 0.01
+    np.testing.assert_allclose(
+        found.comparison.displacements(other.best.moved(other.at)[None])[0, :, 0].max(), 0.0, atol=2e-3
+    )
+
+
+@pytest.mark.slow
+def test_a_drawing_of_the_damaged_arch_is_explained(folder, tmp_path):
+    arch = generators.segmental_arch(voussoirs=10)
+    save_layout(arch, tmp_path / "damaged.svg", pose=moved(arch, (0.0, -1.0)))
+    found = blockvis.explain(folder / "arch.toml", tmp_path / "damaged.svg", tmp_path / "out")
+    assert found.causes[0].name == "right springer moves down"
+    assert found.causes[0].amount[1] == pytest.approx(SPREAD, rel=0.1)
+    assert (tmp_path / "out" / "explain.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("joint\nvoussoir 1 | voussoir 2\n", "has no column 'width'"),
+        ("joint,width [mm]\nvoussoir 1 | vousoir 2,3\n", "did you mean 'voussoir"),
+        ("joint,width [mm]\nvoussoir 1 | voussoir 2,-3\n", "give a width of at least 0"),
+    ],
+)
+def test_observations_that_cannot_be_used_end_with_bad_input(folder, tmp_path, capsys, table, words):
+    (tmp_path / "cracks.csv").write_text(table, encoding="utf-8")
+    command = ["explain", str(folder / "arch.toml"), "--observed", str(tmp_path / "cracks.csv")]
+    assert cli.main([*command, "-o", str(tmp_path / "out")]) == cli.BAD_INPUT
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            'directions = ["down", "right"]',
+            'directions = ["under"]',
+        ),
+        ("friction = [0.7, 0.7]", "friction = [0.8, 0.7]"),
+        ("friction = [0.7, 0.7]", "outliers = 1"),
+        ("friction = [0.7, 0.7]", "inflections = [-1]"),
+        ("friction = [0.7, 0.7]", "trough = 3"),
+        ("friction = [0.7, 0.7]", "supports = [3]"),
+        ("friction = [0.7, 0.7]", "frictions = 3"),
+    ],
+)
+def test_keys_of_the_case_are_checked(folder, tmp_path, capsys, change, words):
+    (tmp_path / "case.toml").write_text(CASE.replace(change, words), encoding="utf-8")
+    command = ["explain", str(tmp_path / "case.toml"), "--observed", str(folder / "cracks.csv")]
+    assert cli.main([*command, "-o", str(tmp_path / "out")]) == cli.BAD_INPUT
+    assert f"[explain] {words.split(' ')[0]}" in capsys.readouterr().err
+
+
+def test_a_structure_that_does_not_stand_has_no_cause(folder, tmp_path, capsys):
+    slippery = CASE.replace("friction = [0.7, 0.7]", "friction = [0.01, 0.01]").replace("= 0.7\n", "= 0.01\n")
+    (tmp_path / "case.toml").write_text(slippery, encoding="utf-8")
+    command = ["explain", str(tmp_path / "case.toml"), "--observed", str(folder / "cracks.csv"), "--workers", "1"]
+    assert cli.main([*command, "-o", str(tmp_path / "out")]) == cli.NO_EQUILIBRIUM
+    assert "does not stand as drawn" in capsys.readouterr().out
+    assert "does not stand as drawn" in (tmp_path / "out" / "explain.html").read_text(encoding="utf-8")
+
+
+def test_an_analysis_of_another_kind_is_refused(folder, tmp_path, capsys):
+    (tmp_path / "case.toml").write_text(CASE + '[analysis]\nkind = "limit load"\n', encoding="utf-8")
+    command = ["explain", str(tmp_path / "case.toml"), "--observed", str(folder / "cracks.csv")]
+    assert cli.main([*command, "-o", str(tmp_path / "out")]) == cli.BAD_INPUT
+    assert "explain follows settlements" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_workers_give_the_same_answer(folder, said, scheduler, tmp_path):
+    command = ["explain", str(folder / "arch.toml"), "--observed", str(folder / "cracks.csv"), "--scheduler", scheduler]
+    assert cli.main([*command, "-o", str(tmp_path / "out")]) == 0
+    mine, theirs = (
+        json.loads((Path(path) / "explain.json").read_text(encoding="utf-8"))
+        for path in (folder / "out", tmp_path / "out")
+    )
+    assert mine["causes"] == theirs["causes"]

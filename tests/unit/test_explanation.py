@@ -1,0 +1,195 @@
+"""Candidates that open the same cracks, the comparison with observations, and Bayes' rule over what is left open."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import structures
+
+import solver
+from blockvis import generators
+from blockvis.cases.explain_settings import ExplainSettings
+from blockvis.explanation.candidates import candidates_of, ground_of, opens_cracks, refined, twins_of
+from blockvis.explanation.likelihood import Comparison, Trust
+from blockvis.explanation.observations import read_observations
+from blockvis.explanation.ranking import ranked
+
+CASE = structures.Path("case.toml")
+ARCH = generators.arch(voussoirs=6)
+TRUST = Trust(0.25, 0.05, 0.05)
+
+
+def candidates(assembly, **settings):
+    ground = ground_of(assembly, ExplainSettings(**settings), CASE)
+    return ground, candidates_of(ground, ExplainSettings(**settings), CASE)
+
+
+def test_springers_go_down_apart_together_and_turn():
+    ground, found = candidates(ARCH)
+    assert not ground.troughs
+    assert [one.cause for one in found if "left springer" in one.cause] == [
+        "left springer moves down",
+        "left springer moves left",
+        "left springer moves right",
+        "left springer turns counter-clockwise",
+        "left springer turns clockwise",
+    ]
+    assert len(found) == 10
+
+
+def test_movements_that_differ_by_a_translation_of_everything_are_twins():
+    ground, found = candidates(ARCH)
+    names = [one.cause for one in found]
+    twins = twins_of(ground.assembly, found)
+    for name, other in (
+        ("right springer moves right", "left springer moves left"),
+        ("right springer moves left", "left springer moves right"),
+    ):
+        twin = twins[names.index(name)]
+        assert names[twin.of] == other
+        assert twin.scale == pytest.approx(1.0)
+        sign = 1.0 if name.endswith("right") else -1.0
+        np.testing.assert_allclose(twin.travel, [sign, 0.0], atol=1e-12)
+    down = [twins[names.index(f"{side} springer moves down")].of for side in ("left", "right")]
+    assert down == [names.index("left springer moves down"), names.index("right springer moves down")]
+
+
+def test_a_support_turns_about_the_middle_of_where_it_carries():
+    _, found = candidates(ARCH, directions=("rotation",))
+    turn = next(one for one in found if one.cause == "left springer turns counter-clockwise")
+    dx, dy, angle = turn.motions["left springer"]
+    contacts = solver.find_contacts(ARCH, ARCH.vertices, 1e-4)
+    block = ARCH.index("left springer")
+    here = contacts.points[(contacts.block_a == block) | (contacts.block_b == block)]
+    arms = here - ARCH.centroids[block]
+    speeds = np.array([dx, dy]) + angle * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+    np.testing.assert_allclose(speeds.mean(axis=0), 0.0, atol=1e-9)
+
+
+def test_supports_that_move_together_open_nothing():
+    ground, found = candidates(ARCH, supports=(("left springer", "right springer"),), directions=("down",))
+    assert not opens_cracks(ground.assembly, found[0])
+
+
+def test_a_wall_on_one_ground_has_troughs_and_slopes():
+    wall = generators.wall(bricks=3, courses=2, settling=[0.0, 0.75])
+    ground, found = candidates(wall)
+    assert ground.troughs
+    assert {one.cause for one in found} == {
+        "a trough of the ground",
+        "the ground slopes down to the left",
+        "the ground slopes down to the right",
+    }
+    assert len(ground.pieces["ground"]) == 5
+
+
+def test_around_the_best_lie_movements_between_two_directions_and_nearer_troughs():
+    ground, found = candidates(ARCH)
+    best = [one for one in found if one.cause == "left springer moves left"]
+    assert [one.cause for one in refined(ground, best, found)] == ["left springer moves down and left"]
+    wall = generators.wall(bricks=3, courses=2, settling=[0.0, 0.75])
+    ground, found = candidates(wall)
+    trough = next(one for one in found if one.is_trough)
+    nearer = refined(ground, [trough], found)
+    assert len(nearer) == 8
+    assert all(one.is_trough and one.refines == trough.detail for one in nearer)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"supports": (("left spring",),)}, r"supports: 'left spring' is no block \(did you mean 'left springer'\?\)"),
+        ({"supports": (("voussoir 1",),)}, "'voussoir 1' is a free block"),
+    ],
+)
+def test_a_support_that_there_is_not_is_named(settings, words):
+    with pytest.raises(ValueError, match=words):
+        candidates(ARCH, **settings)
+
+
+def test_a_structure_on_one_block_has_nothing_that_can_move_against_another():
+    column = generators.column(blocks=2)
+    with pytest.raises(ValueError, match="there is one support"):
+        candidates(column)
+    free = column.with_roles(["free"] * column.n_blocks)
+    with pytest.raises(ValueError, match="no block is a support"):
+        candidates(free)
+
+
+def comparison(rows):
+    return Comparison(ARCH, read_observations(rows, ARCH), TRUST)
+
+
+def test_a_width_that_fits_is_likelier_than_one_that_does_not():
+    compared = comparison([{"joint": "voussoir 3 | voussoir 4", "width": 0.004}])
+    joint = int(compared.nearness[0].argmax())
+    openings = np.zeros((3, len(compared.joints.block_a), 2))
+    openings[:, joint, 1] = [0.0, 0.004, 0.006]
+    found = compared.log_likelihood(compared.widths(openings), np.zeros((3, 0, 2)))
+    assert found[1] > found[2] > found[0]
+    # No observation weighs more than its chance of having another cause.
+    assert found[1] - found[0] < np.log(1.0 / TRUST.outliers) + 3.0
+
+
+def test_a_crack_in_the_next_joint_counts_where_only_its_place_is_known():
+    x, y = 0.0, 1.0
+    placed, named = (
+        comparison([{"x": x, "y": y, "width": 0.004}]),
+        comparison([{"joint": "voussoir 3 | voussoir 4", "width": 0.004}]),
+    )
+    assert placed.nearness.max() == named.nearness.max() == 1.0
+    assert (placed.nearness >= named.nearness - 1e-12).all()
+
+
+def test_on_which_side_a_joint_gapes_counts_where_it_was_measured():
+    inner, outer = 0.93, 1.07
+    compared = comparison([{"x": 0.0, "y": inner, "width": 0.004}, {"x": 0.0, "y": outer, "width": 0.0}])
+    joint = int(compared.own[0])
+    assert joint == compared.own[1]
+    np.testing.assert_allclose(compared.smoothed, [0.004, 0.0], atol=1e-12)
+    lower = int(np.argmin(compared.joints.ends[joint, :, 1]))
+    openings = np.zeros((2, len(compared.joints.block_a), 2))
+    openings[0, joint, lower] = openings[1, joint, 1 - lower] = 0.004
+    found = compared.log_likelihood(compared.widths(openings), np.zeros((2, 0, 2)))
+    assert found[0] > found[1] + 3.0
+
+
+def test_displacements_follow_the_rotation_of_a_block():
+    compared = comparison([{"block": "voussoir 3", "x": -0.2, "y": 1.0, "dx": 0.0, "dy": -0.01}])
+    moved = np.zeros((1, ARCH.n_blocks, 3))
+    moved[0, ARCH.index("voussoir 3")] = [0.0, 0.0, 0.3]
+    arm = np.array([-0.2, 1.0]) - ARCH.centroids[ARCH.index("voussoir 3")]
+    turned = [np.cos(0.3) * arm[0] - np.sin(0.3) * arm[1], np.sin(0.3) * arm[0] + np.cos(0.3) * arm[1]]
+    np.testing.assert_allclose(compared.displacements(moved)[0, 0], np.array(turned) - arm)
+
+
+def trial(cause, evidence, *, shared=None, prior=1.0, detail="", refines=""):
+    candidate = SimpleNamespace(cause=cause, prior=prior, detail=detail, refines=refines)
+    log = np.full(10, evidence, dtype=float)
+    return SimpleNamespace(
+        candidate=candidate, shared=shared or candidate, friction=0.6, unit="m", amounts=np.geomspace(1e-3, 1e-2, 10),
+        log_likelihood=log, log_evidence=evidence, best=0,
+    )  # fmt: skip
+
+
+def test_probabilities_are_those_of_bayes():
+    causes = ranked([trial("a", 0.0), trial("b", np.log(0.25)), trial("c", -np.inf)], apart=False)
+    assert [(c.name, round(c.probability, 6)) for c in causes] == [("a", 0.8), ("b", 0.2)]
+    half = ranked([trial("a", 0.0, prior=0.5), trial("b", 0.0)], apart=False)
+    assert [(c.name, round(c.probability, 6)) for c in half] == [("b", 0.666667), ("a", 0.333333)]
+
+
+def test_what_a_cause_leaves_open_is_averaged_and_refinements_share_a_weight():
+    coarse = [trial("trough", 0.0, detail="x"), trial("trough", -np.inf, detail="y"), trial("other", 0.0)]
+    assert ranked(coarse, apart=False)[0].name == "other"
+    assert ranked(coarse, apart=False)[0].probability == pytest.approx(2.0 / 3.0)
+    finer = [*coarse, trial("trough", 0.0, detail="x2", refines="x")]
+    assert ranked(finer, apart=False)[0].probability == pytest.approx(2.0 / 3.0)
+
+
+def test_twins_are_one_cause_for_cracks_and_two_for_displaced_points():
+    one = trial("left moves left", 0.0)
+    other = trial("right moves right", 0.0, shared=one.candidate)
+    (cause,) = ranked([one, other], apart=False)
+    assert (cause.name, cause.also) == ("left moves left", ("right moves right",))
+    assert len(ranked([one, other], apart=True)) == 2

@@ -1,0 +1,152 @@
+"""Tables of cracks and displaced points, and drawings of the damaged state, as observations."""
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis import generators
+from blockvis.explanation.observations import read_observations
+from blockvis.formats.read import save_layout, write_layout
+from blockvis.layout.layout import layout_of
+
+ARCH = generators.arch(voussoirs=6)
+CROWN = "voussoir 3 | voussoir 4"
+
+
+def table(tmp_path, text):
+    path = tmp_path / "cracks.csv"
+    path.write_text(text, encoding="utf-8")
+    return read_observations(path, ARCH)
+
+
+def test_a_width_belongs_to_the_middle_of_the_joint_between_two_blocks(tmp_path):
+    found = table(tmp_path, f"joint,width [mm],uncertainty [mm]\n{CROWN},4.5,0.5\n")
+    np.testing.assert_allclose(found.places, [[0.0, 1.0]], atol=1e-12)
+    assert found.widths == pytest.approx([0.0045])
+    assert found.uncertainties == pytest.approx([0.0005])
+    assert found.named.tolist() == [True]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "block_a,block_b,width\nvoussoir 3,voussoir 4,0.0045\n",
+        "Block A;Block B;Width [mm]\nvoussoir 3;voussoir 4;4,5\n",
+        "block_a\tblock_b\twidth_cm\nvoussoir 3\tvoussoir 4\t0.45\n",
+        "block_a,block_b,width\n# seen in May\nvoussoir 4,voussoir 3,4.5e-3\n",
+        "\ufeffjoint,width (mm)\nvoussoir 3 | voussoir 4,4.5\n\n",
+    ],
+)
+def test_tables_of_other_makes_say_the_same(tmp_path, text):
+    found = table(tmp_path, text)
+    assert found.widths == pytest.approx([0.0045])
+    assert found.uncertainties == pytest.approx([0.2 * 0.0045]), "a fifth, where the table gives none"
+
+
+def test_closed_is_an_observation(tmp_path):
+    found = table(tmp_path, "x,y,width [mm]\n0,1.0,3\n-0.85,0.5,closed\n0.85,0.5,0\n")
+    assert found.widths == pytest.approx([0.003, 0.0, 0.0])
+    assert found.uncertainties[1] == pytest.approx(2e-4)
+    assert not found.named.any()
+
+
+def test_columns_that_say_something_else_are_left_out_with_a_note(tmp_path):
+    with pytest.warns(UserWarning, match="columns left out: seen by"):
+        table(tmp_path, f"joint,width [mm],seen by\n{CROWN},3,A. Mason\n")
+
+
+def test_displaced_points_by_block_and_by_place(tmp_path):
+    found = table(
+        tmp_path,
+        "block,x,y,dx [mm],dy [mm],displaced_x,displaced_y\n"
+        "voussoir 3,,,1.0,-5.0,,\n"
+        "voussoir 4,0.3,1.0,,,0.301,0.995\n"
+        ",0.3,1.0,2,0,,\n",
+    )
+    assert found.blocks == ("voussoir 3", "voussoir 4", "voussoir 4")
+    np.testing.assert_allclose(found.points[0], ARCH.centroids[ARCH.index("voussoir 3")])
+    np.testing.assert_allclose(found.displacements, [[1e-3, -5e-3], [1e-3, -5e-3], [2e-3, 0.0]], atol=1e-12)
+
+
+def test_rows_of_a_table_in_python():
+    found = read_observations([{"joint": CROWN, "width": 0.004, "uncertainty": float("nan")}], ARCH)
+    assert found.widths == pytest.approx([0.004])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("joint,width\n", "has no observation"),
+        ("joint\nvoussoir 3 | voussoir 4\n", "has no column 'width'; its columns are joint"),
+        ("width\n0.003\n", "has no column 'joint'"),
+        ("block_a,width\nvoussoir 3,0.003\n", "has no column 'block_b'"),
+        ("x,width\n0,0.003\n", "has no column 'y'"),
+        ("joint,widht\na | b,1\n", r"column 'widht' is not known \(did you mean 'width'\?\)"),
+        ("joint,width,opening\na | b,1,1\n", "columns 'width' and 'opening' hold the same"),
+        ("joint,width [inch]\na | b,1\n", "has the unit 'inch'; lengths are in m, cm, mm"),
+        (f"joint,width\n{CROWN},-0.001\n", "line 2: width is -0.001; give a width of at least 0"),
+        (f"joint,width\n{CROWN},wide\n", "line 2: width is 'wide'; give a number"),
+        (f"joint,width\n{CROWN},nan\n", "line 2: width is nan; give a finite number"),
+        (f"joint,width\n{CROWN},\n", "line 2: width is missing"),
+        (f"joint,width\n{CROWN},4.5\n", "is it in mm"),
+        (f"joint,width,uncertainty\n{CROWN},0.004,0\n", "uncertainty is 0 m"),
+        (f"joint,width\n{CROWN},0\n", "nothing has opened or moved"),
+        ("joint,width\nvoussoir 3,0.004\n", 'name two blocks as "A | B"'),
+        ("joint,width\nvousoir 3 | voussoir 4,0.004\n", r"'vousoir 3' is no block \(did you mean 'voussoir \d'\?\)"),
+        ("joint,width\nvoussoir 1 | voussoir 4,0.004\n", "do not touch; 'voussoir 1' touches"),
+        ("x,y,width\n1000,1,0.004\n", "m from any joint"),
+        ("x,y,width\n,1,0.004\n", "line 2: x is missing"),
+        ("block,dx,dy\nvoussoir 1,0.1,\n", "dy is missing; give both"),
+        ("block,x,y,dx,dy\n,,,0.1,0.1\n", "block is missing"),
+    ],
+)
+def test_what_cannot_be_used_is_named(tmp_path, text, words):
+    with pytest.raises(ValueError, match=words):
+        table(tmp_path, text)
+
+
+def test_a_missing_file_names_those_beside_it(tmp_path):
+    (tmp_path / "cracks.csv").write_text("x", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"no observations '.*crack\.csv'; beside it are cracks\.csv"):
+        read_observations(tmp_path / "crack.csv", ARCH)
+
+
+def test_a_file_of_another_kind_is_no_table(tmp_path):
+    (tmp_path / "photo.jpg").write_bytes(b"\xff\xd8\xff\xe0")
+    with pytest.raises(ValueError, match="is no table in UTF-8"):
+        read_observations(tmp_path / "photo.jpg", ARCH)
+
+
+def lifted():
+    pose = solver.Pose.initial(ARCH)
+    right = ARCH.centroids[:, 0] > 0.0
+    pose.positions[right] += [0.004, 0.0]
+    pose.rotations[ARCH.index("voussoir 6")] -= 0.01
+    return pose
+
+
+@pytest.mark.parametrize("renamed", [False, True])
+def test_a_drawing_of_the_damaged_state_gives_widths_and_displacements(tmp_path, renamed):
+    path = tmp_path / "damaged.json"
+    if renamed:
+        moved = layout_of(ARCH, pose=lifted())
+        order = list(range(moved.n_blocks))[::-1]
+        drawn = moved.chosen(order)
+        write_layout(type(drawn)(drawn.outlines, tuple(f"stone {k}" for k in order)), path)
+    else:
+        save_layout(ARCH, path, pose=lifted())
+    found = read_observations(path, ARCH)
+    wide = dict(zip(found.labels, found.widths.tolist(), strict=True))
+    crown = next(width for label, width in wide.items() if set(label.split(" | ")) == set(CROWN.split(" | ")))
+    assert crown == pytest.approx(0.004, abs=2e-5)
+    moved = dict(zip(found.blocks, found.displacements.tolist(), strict=True))
+    assert moved["voussoir 4"] == pytest.approx([0.004, 0.0], abs=2e-5)
+    assert moved["voussoir 3"] == pytest.approx([0.0, 0.0], abs=2e-5)
+    assert found.widths[[k for k, label in enumerate(found.labels) if "voussoir 6" in label]].max() > 1e-3
+
+
+def test_a_drawing_of_something_else_is_refused(tmp_path):
+    save_layout(generators.wall(bricks=2, courses=2, brick_length=0.05, brick_height=0.02), tmp_path / "other.json")
+    with pytest.raises(ValueError, match="none of its"):
+        read_observations(tmp_path / "other.json", generators.arch(radius=30.0))
