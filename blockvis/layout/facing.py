@@ -127,16 +127,7 @@ def _joints(faces: _Faces, near: float, exact: float) -> tuple[np.ndarray, np.nd
 
     None where all of them are in one plane within ``exact``.
     """
-    import shapely
-
-    low = np.array([ring.min(axis=0) for ring in faces.rings]) - near
-    high = np.array([ring.max(axis=0) for ring in faces.rings]) + near
-    boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
-    one, other = shapely.STRtree(boxes).query(boxes)
-    pair = (one < other) & (faces.block[one] != faces.block[other])
-    one, other = one[pair], other[pair]
-    pair = (low[one, 2] <= high[other, 2]) & (low[other, 2] <= high[one, 2])
-    one, other = one[pair], other[pair]
+    one, other = _near_boxes(faces, near)
     pair = np.einsum("ij,ij->i", faces.planes[one, :3], faces.planes[other, :3]) < OPPOSITE
     one, other = _near_planes(faces, one[pair], other[pair], near, exact)
     found = [(a, b, gap) for a, b in zip(one.tolist(), other.tolist(), strict=True) if (gap := _gap(faces, a, b, near))]
@@ -147,6 +138,20 @@ def _joints(faces: _Faces, near: float, exact: float) -> tuple[np.ndarray, np.nd
         np.array([b for _, b, _ in found]),
         np.array([gap[0] for _, _, gap in found]),
     )
+
+
+def _near_boxes(faces: _Faces, near: float) -> tuple[np.ndarray, np.ndarray]:
+    """Find pairs of faces of different blocks whose boxes are no farther apart than ``near``."""
+    import shapely
+
+    low = np.array([ring.min(axis=0) for ring in faces.rings]) - near
+    high = np.array([ring.max(axis=0) for ring in faces.rings]) + near
+    boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    one, other = shapely.STRtree(boxes).query(boxes)
+    pair = (one < other) & (faces.block[one] != faces.block[other])
+    one, other = one[pair], other[pair]
+    pair = (low[one, 2] <= high[other, 2]) & (low[other, 2] <= high[one, 2])
+    return one[pair], other[pair]
 
 
 def _near_planes(
@@ -177,13 +182,9 @@ def _in_line(faces: _Faces, chosen: np.ndarray, near: float) -> tuple[np.ndarray
 
     Stones that meet at an edge would overlap at it if every joint found a plane of its own.
     """
-    from scipy.spatial import cKDTree
-
-    corner_of = np.repeat(chosen, [len(faces.rings[k]) for k in chosen])
-    corners = np.concatenate([faces.rings[k] for k in chosen])
-    close = cKDTree(corners).query_pairs(2.0 * near, output_type="ndarray")
-    pairs = np.unique(np.sort(corner_of[close], axis=1), axis=0)
-    one, other = pairs[:, 0], pairs[:, 1]
+    one, other = _near_boxes(faces, near)
+    pair = np.isin(one, chosen) & np.isin(other, chosen)
+    one, other = one[pair], other[pair]
     along = np.abs(np.einsum("ij,ij->i", faces.planes[one, :3], faces.planes[other, :3])) > -OPPOSITE
     one, other = one[along], other[along]
     off = [
