@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 import subprocess
 import warnings
@@ -13,7 +14,7 @@ import pyvista as pv
 from PIL import Image
 from structures import vault_response
 from test_paraview import PVPYTHON, READ
-from test_report import body_of, browser
+from test_report import browser, visited
 
 import blockvis
 import solver
@@ -308,12 +309,28 @@ def test_page_unpacks_every_frame_as_it_was(tmp_path):
     response = vault_response()
     page = write_report(response, tmp_path / "report.html")
     k = len(response.path) - 1
-    attributes = body_of(page, tmp_path, f"#frame={k}")
+    # WebGL in software writes to the console that it is slow.
+    text = visited(page, tmp_path, "--dump-dom", anchor=f"#frame={k}", quiet=False)
+    attributes = dict(re.findall(r'data-([a-z]+)="([^"]*)"', re.search(r"<body[^>]*>", text).group()))
+    assert attributes["ready"] == "1"
     poses = [solver.Pose.initial(response.assembly), *(i.pose for i in response.increments)]
     frame = framed(response.assembly, poses, margin=0.0, supports=0.25)
     corners = solver.moved_vertices(response.assembly, response.increments[k].pose) - np.round(frame.low, 3)
     expected = float(corners.ravel() @ (np.arange(corners.size) % 97 + 1))
     assert float(attributes["corners"]) == pytest.approx(expected, abs=0.02)
+
+
+@browser
+@pytest.mark.slow
+def test_page_draws_blocks_cracks_and_supports(tmp_path):
+    page, shot = write_report(vault_response(), tmp_path / "report.html"), tmp_path / "shot.png"
+    options = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", f"--screenshot={shot}")
+    visited(page, tmp_path, *options, anchor="#frame=4", quiet=False)
+    stage = np.asarray(Image.open(shot).convert("RGB")).astype(int)[110:700, 20:780]
+    hue = stage / np.maximum(stage.sum(axis=2, keepdims=True), 1)
+    for colour, least in ((palette.MOVING, 4000), (palette.STONES[0], 20_000), (palette.OPEN, 150)):
+        assert (np.abs(hue - np.array(colour) / sum(colour)).max(axis=2) < 0.02).sum() > least
+    assert (stage.max(axis=2) < 40).sum() > 200
 
 
 @pytest.mark.paraview
@@ -334,6 +351,7 @@ def test_paraview_reads_polyhedra_faces_and_contacts(tmp_path):
             assert set(names["Cell"]) == set(ours.cell_data.keys())
 
 
+@pytest.mark.pictures
 @pytest.mark.slow
 def test_one_command_from_case_to_pictures_and_again(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
