@@ -10,6 +10,7 @@ process in each part, and of the first and the others in all: they tell a slow c
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import resource
@@ -61,6 +62,8 @@ def one_run(case: str, begun: float) -> None:
     memory = [one.ru_maxrss / 1024 for one in used]
     found = {"code": code, "seconds": seconds, "memory": memory, "processor": processor, "shares": shares}
     print("\n" + json.dumps(found))
+    # As the console script ends.
+    gc.freeze()
 
 
 def measured(case: Path) -> dict[str, object]:

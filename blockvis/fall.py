@@ -109,12 +109,14 @@ def fall_of(response: solver.Response, progress: Callable[[float], None] | None 
     Returns
     -------
     Fall or None
-        None where nothing collapses along a path (limit loads, "limit reached"), where nothing falls, and without
-        the engine.
+        None where nothing collapses along a path (limit loads, "limit reached"), where nothing falls, in space, which
+        the engine does not know, and without the engine.
     """
     path, collapse = response.path, response.collapse
     collapsed = response.stop == solver.Status.COLLAPSED and response.parameter.is_path and not response.limits
     if not collapsed or collapse is None or not path or not collapse.mechanism.any() or not engine_installed():
+        return None
+    if response.assembly.dimension == 3:
         return None
     push = PUSH * np.sqrt(solver.GRAVITY * response.assembly.block_size)
     for _ in range(DOUBLINGS + 1):

@@ -26,14 +26,17 @@ from .formats.gmsh_mesh import holds_flat_blocks
 from .formats.pyvista_files import dataset_of, layout_of_dataset
 from .formats.read import read_layout, write_layout
 from .layout.assemble import assemble
-from .layout.layout import Layout
+from .layout.layout import AnyLayout
 from .layout.selection import sorted_out
+from .layout.solid_layout import SolidLayout
 from .pictures import palette
+from .pictures.solid_scene import drawn_forward
+from .pictures.solid_view import ABOVE, AROUND, View, showing_faces
 from .results.datasets import block_dataset
 
 
 def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:
-    """Read a layout as a dataset of one polygon per block; the options are those of ``read_layout``."""
+    """Read a layout as a dataset of one polygon or polyhedron per block; the options are those of ``read_layout``."""
     return dataset_of(read_layout(path, **options))
 
 
@@ -81,11 +84,12 @@ WRITES = _registered(pv.register_writer, (".dxf", ".json", ".msh", ".svg"), _wri
 
 
 class BlockvisAccessor:
-    """The blocks of a polygon mesh, or of several in a MultiBlock: ``mesh.blockvis``.
+    """The blocks of a mesh of polygons or closed bodies, or of several in a MultiBlock: ``mesh.blockvis``.
 
     A cell array ``block_id`` says which cells form one block; without it every polygon is a block, and triangles that
     share points form one. The cell arrays ``name``, ``role``, ``material``, ``density`` and ``thickness`` are optional;
-    a block of a MultiBlock that has no name takes that of its part.
+    a block of a MultiBlock that has no name takes that of its part. Bodies that are prisms side by side are blocks in
+    the plane, others in space, where z is up; ``dimension`` decides otherwise.
     """
 
     def __init__(self, mesh: Any) -> None:
@@ -95,10 +99,11 @@ class BlockvisAccessor:
         """One line: how many blocks there are, and what can be done with them."""
         return f"<{self.layout().n_blocks} blocks: plot(), assembly(), settle(), limit_load(), save()>"
 
-    def layout(self) -> Layout:
-        """Read the blocks as a layout, lengths in m."""
-        layout = layout_of_dataset(self._mesh)
-        return sorted_out(replace(layout, unit=layout.unit or "m"))
+    def layout(self, dimension: int | None = None) -> AnyLayout:
+        """Read the blocks as a layout, lengths in m, in 2 or 3 dimensions; as they are drawn by default."""
+        layout = layout_of_dataset(self._mesh, dimension=dimension)
+        layout = replace(layout, unit=layout.unit or "m")
+        return layout if isinstance(layout, SolidLayout) else sorted_out(layout)
 
     def save(self, path: str | Path) -> Path:
         """Write the blocks to a layout file of any format that blockvis writes."""
@@ -114,6 +119,7 @@ class BlockvisAccessor:
         thickness: float = 1.0,
         joint_thickness: float | str = 0.0,
         overlap_tolerance: float | None = None,
+        dimension: int | None = None,
     ) -> solver.Assembly:
         """Build an assembly of the blocks.
 
@@ -121,9 +127,11 @@ class BlockvisAccessor:
         ----------
         roles, supports, density, thickness, joint_thickness, overlap_tolerance
             As of :func:`blockvis.layout.assemble.assemble`.
+        dimension : {2, 3}, optional
+            As of :meth:`layout`.
         """
         return assemble(
-            self.layout(),
+            self.layout(dimension),
             roles=roles,
             supports=supports,
             density=density,
@@ -136,7 +144,7 @@ class BlockvisAccessor:
         self,
         roles: Mapping[str, str] | None = None,
         *,
-        direction: tuple[float, float] = (0.0, -1.0),
+        direction: Sequence[float] | None = None,
         increment: float = 0.01,
         limit: float = 0.5,
         tolerance: float | None = None,
@@ -150,14 +158,15 @@ class BlockvisAccessor:
         thickness: float = 1.0,
         joint_thickness: float | str = 0.0,
         overlap_tolerance: float | None = None,
+        dimension: int | None = None,
     ) -> solver.Response:
         """Move the moving supports until the structure collapses.
 
         Parameters
         ----------
         roles : mapping of str to {"free", "fixed", "moving"}, optional
-        direction : (2,) tuple
-            Of the settlement of the moving supports.
+        direction : (d,) sequence, optional
+            Of the settlement of the moving supports; down by default. Three numbers are for blocks in space.
         increment, limit : float [m]
             Length of a step, and the settlement at which the analysis stops.
         tolerance : float, optional [m]
@@ -169,6 +178,8 @@ class BlockvisAccessor:
             As of :func:`solver.settle`.
         supports, density, thickness, joint_thickness, overlap_tolerance
             As of :func:`blockvis.layout.assemble.assemble`.
+        dimension : {2, 3}, optional
+            As of :meth:`layout`.
 
         Returns
         -------
@@ -181,8 +192,12 @@ class BlockvisAccessor:
             thickness=thickness,
             joint_thickness=joint_thickness,
             overlap_tolerance=overlap_tolerance,
+            dimension=3 if direction is not None and len(direction) == 3 else dimension,
         )
-        one = solver.Settlement(direction=direction, increment=increment, limit=limit, tolerance=tolerance)
+        down = [*[0.0] * (assembly.dimension - 1), -1.0]
+        one = solver.Settlement(
+            direction=down if direction is None else direction, increment=increment, limit=limit, tolerance=tolerance
+        )
         return solver.settle(
             assembly,
             tuple(phases) or one,
@@ -196,7 +211,7 @@ class BlockvisAccessor:
         self,
         roles: Mapping[str, str] | None = None,
         *,
-        weight_fraction: tuple[float, float] = (1.0, 0.0),
+        weight_fraction: Sequence[float] | None = None,
         loads: solver.Loads | None = None,
         friction_coefficient: float = solver.InterfaceLaw.friction_coefficient,
         interfaces: solver.Interfaces | None = None,
@@ -206,14 +221,16 @@ class BlockvisAccessor:
         thickness: float = 1.0,
         joint_thickness: float | str = 0.0,
         overlap_tolerance: float | None = None,
+        dimension: int | None = None,
     ) -> solver.LimitLoad:
         """Find the largest multiplier of live loads that the blocks carry as drawn; all supports stand still.
 
         Parameters
         ----------
         roles : mapping of str to {"free", "fixed", "moving"}, optional
-        weight_fraction : (2,) tuple
-            Live load of each block as a fraction of its weight, along x and y.
+        weight_fraction : (d,) sequence, optional
+            Live load of each block as a fraction of its weight, along x and y, in space along z too; all of it along x
+            by default.
         loads : solver.Loads, optional
             Dead and live loads, in place of the self-weight and ``weight_fraction``.
         friction_coefficient : float
@@ -221,6 +238,8 @@ class BlockvisAccessor:
             As of :func:`solver.limit_load`.
         supports, density, thickness, joint_thickness, overlap_tolerance
             As of :func:`blockvis.layout.assemble.assemble`.
+        dimension : {2, 3}, optional
+            As of :meth:`layout`.
 
         Returns
         -------
@@ -233,9 +252,11 @@ class BlockvisAccessor:
             thickness=thickness,
             joint_thickness=joint_thickness,
             overlap_tolerance=overlap_tolerance,
+            dimension=3 if weight_fraction is not None and len(weight_fraction) == 3 else dimension,
         )
         if loads is None:
-            live = solver.weight_fraction(assembly, weight_fraction, assembly.free)
+            along = [1.0, *[0.0] * (assembly.dimension - 1)] if weight_fraction is None else weight_fraction
+            live = solver.weight_fraction(assembly, along, assembly.free)
             loads = replace(solver.self_weight(assembly), live=live)
         return solver.limit_load(
             assembly, loads=loads, friction_coefficient=friction_coefficient, interfaces=interfaces, flow=flow
@@ -246,6 +267,7 @@ class BlockvisAccessor:
         roles: Mapping[str, str] | None = None,
         *,
         names: bool = True,
+        dimension: int | None = None,
         off_screen: bool | None = None,
         screenshot: str | os.PathLike[str] | None = None,
         window_size: tuple[int, int] = (1280, 720),
@@ -257,6 +279,8 @@ class BlockvisAccessor:
         roles : mapping of str to {"free", "fixed", "moving"}, optional
         names : bool
             Write the name of each block on it, and the role of supports.
+        dimension : {2, 3}, optional
+            As of :meth:`layout`.
         off_screen : bool, optional
             Draw without a window; as of :class:`pyvista.Plotter`.
         screenshot : path, optional
@@ -268,29 +292,44 @@ class BlockvisAccessor:
         -------
         As :meth:`pyvista.Plotter.show`: in a notebook a view.
         """
-        assembly = self.assembly(roles)
+        assembly = self.assembly(roles, dimension=dimension)
         blocks = block_dataset(assembly)
         colours = palette.block_colours(assembly.materials, assembly.free)
-        colours[assembly.moving] = np.asarray(palette.SETTLEMENT) // 2 + 127
+        colours[assembly.moving] = palette.MOVING
         blocks.cell_data["colour"] = colours
         plotter = pv.Plotter(off_screen=off_screen, window_size=list(window_size))
         plotter.background_color = "white"
-        # Triangulated first: VTK fills bent polygons wrongly.
-        plotter.add_mesh(blocks.triangulate(), scalars="colour", rgb=True, lighting=False)
-        plotter.add_mesh(blocks.extract_all_edges(), color=palette.OUTLINE, line_width=1.5, lighting=False)
+        if assembly.dimension == 2:
+            # Triangulated first: VTK fills bent polygons wrongly.
+            plotter.add_mesh(blocks.triangulate(), scalars="colour", rgb=True, lighting=False)
+        else:
+            plotter.add_mesh(blocks, scalars="colour", rgb=True, ambient=0.4, diffuse=0.6)
+        edges = plotter.add_mesh(blocks.extract_all_edges(), color=palette.OUTLINE, line_width=1.5, lighting=False)
+        drawn_forward(edges, 1.0)
+        flat = assembly.dimension == 2
+        view = View(AROUND[0], ABOVE)
         if names:
-            places = np.column_stack([assembly.centroids, np.zeros(assembly.n_blocks)])
+            if flat:
+                places = np.column_stack([assembly.centroids, np.zeros(assembly.n_blocks)])
+            else:
+                places = showing_faces(assembly.polyhedra, view.axes[2])[0]
             labels = [
                 name if free else f"{name} ({role})"
                 for name, role, free in zip(assembly.names, assembly.roles, assembly.free, strict=True)
             ]
             plotter.add_point_labels(
-                places, labels, shape=None, show_points=False, always_visible=True, font_size=14,
+                places, labels, shape=None, show_points=False, always_visible=flat, font_size=14,
                 text_color=palette.INK, justification_horizontal="center", justification_vertical="center",
             )  # fmt: skip
-        plotter.view_xy()
         plotter.enable_parallel_projection()
-        width, height = np.ptp(assembly.vertices, axis=0)
+        if flat:
+            plotter.view_xy()
+            width, height = np.ptp(assembly.vertices, axis=0)
+        else:
+            plotter.view_vector(view.axes[2], viewup=(0.0, 0.0, 1.0))
+            low, high = assembly.vertices.min(axis=0), assembly.vertices.max(axis=0)
+            # The camera looks at the middle of the box around the blocks.
+            width, height = 2.0 * np.abs(view.projected(assembly.vertices - (low + high) / 2.0)).max(axis=0)
         plotter.camera.parallel_scale = 0.55 * max(height, width * window_size[1] / window_size[0])
         return plotter.show(screenshot=False if screenshot is None else str(screenshot))
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from .geometry.contacts import Contacts
 from .geometry.outlines import next_vertices, polygon_integrals, self_crossings
 from .geometry.polygons import Polygons
+from .geometry.polyhedra import Polyhedra
 from .geometry.shapes import Shapes
 from .geometry.surfaces import polyhedra_of
 from .tolerances import DRAWN_GAP
@@ -221,6 +222,13 @@ class Assembly:
         """The shapes of blocks in the plane; raises ``TypeError`` for others."""
         if not isinstance(self.shapes, Polygons):
             raise TypeError(f"blocks in the plane are needed; these have {self.vertices.shape[1]} coordinates")
+        return self.shapes
+
+    @property
+    def polyhedra(self) -> Polyhedra:
+        """The shapes of blocks in space; raises ``TypeError`` for others."""
+        if not isinstance(self.shapes, Polyhedra):
+            raise TypeError(f"blocks in space are needed; these have {self.vertices.shape[1]} coordinates")
         return self.shapes
 
     @property

@@ -32,6 +32,14 @@ def arch_response() -> solver.Response:
     return solver.settle(generators.arch(), spread, friction_coefficient=0.6, controls=controls)
 
 
+@cache
+def vault_response() -> solver.Response:
+    """An arch of 6 voussoirs in space, 0.5 m deep, whose right springer spreads until it collapses."""
+    spread = solver.Settlement(direction=(1, 0, 0), increment=0.1, limit=0.8, tolerance=0.05)
+    arch = generators.extruded_arch(voussoirs=6, thickness_ratio=0.2)
+    return solver.settle(arch, spread, friction_coefficient=1.0, controls=solver.Controls(falling_frames=3))
+
+
 def wall(columns: int, courses: int) -> solver.Assembly:
     """Bricks of 0.25 m × 0.1 m in running bond on two footings, the right one moving."""
     length, height = 0.25, 0.1

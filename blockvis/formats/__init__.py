@@ -14,27 +14,28 @@ __all__ = ["FORMATS", "Format"]
 
 @dataclass(frozen=True)
 class Format:
-    """One family of files: its module in this room, and whether it reads and writes them."""
+    """One family of files: its module in this room, and whether it reads and writes them, also blocks in space."""
 
     module: str
     reads: bool = True
     writes: bool = False
+    writes_space: bool = False
 
 
 _CAD = Format("gmsh_cad")
 _PYVISTA = Format("pyvista_files")
-_SOLID = Format("solids", writes=True)
+_SOLID = Format("solids", writes=True, writes_space=True)
 _MESHIO = Format("meshio_files")
 
 #: By suffix. Every other suffix that meshio knows goes to meshio.
 FORMATS = {
     ".msh": Format("gmsh_mesh", writes=True),
-    ".json": Format("layout_json", writes=True),
+    ".json": Format("layout_json", writes=True, writes_space=True),
     ".dxf": Format("dxf", writes=True),
     ".svg": Format("svg", writes=True),
-    ".vtu": Format("pyvista_files", writes=True),
+    ".vtu": Format("pyvista_files", writes=True, writes_space=True),
     ".vtp": Format("pyvista_files", writes=True),
-    ".vtk": Format("pyvista_files", writes=True),
+    ".vtk": Format("pyvista_files", writes=True, writes_space=True),
     ".vtm": _PYVISTA,
     ".vtmb": _PYVISTA,
     ".pvd": _PYVISTA,

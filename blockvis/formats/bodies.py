@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+import solver
 from blockvis.layout.block_table import with_rows
 from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.layout import Layout
@@ -30,6 +32,9 @@ COVERS = 0.01
 
 #: Sizes beyond this are damage: their squares, or those of their products, could not be computed.
 LARGEST_SIZE = 1e50
+
+#: Roles by the word with which the name or group of a body may begin.
+ROLE_WORDS = {"fixed": solver.FIXED, "support": solver.FIXED, "supports": solver.FIXED, "moving": solver.MOVING}
 
 #: Bodies compared with all others at a time.
 AT_A_TIME = 20
@@ -228,6 +233,26 @@ def solids_of_bodies(
     return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", ignore))
 
 
+def in_dimension(
+    found: Bodies,
+    path: Path | str,
+    dimension: int | None,
+    view: str | None = None,
+    ignore: Sequence[str] = (),
+    only: Sequence[str] = (),
+) -> Layout | SolidLayout:
+    """Make a layout in the plane, 2, or in space, 3; by default in space where bodies are not prisms side by side."""
+    if dimension == 3:
+        return solids_of_bodies(found, path, view, ignore, only)
+    try:
+        return layout_of_bodies(found, path, view, ignore, only)
+    except NotFlat as error:
+        if dimension == 2 or view is not None:
+            raise
+        layout = solids_of_bodies(found, path, None, ignore, only)
+        return replace(layout, notes=(f"blocks in space: {error.reason}", *layout.notes))
+
+
 @dataclass(frozen=True)
 class _Asked:
     """The bodies that are asked for, with their rows, the size of the drawing, and the numbers of the others."""
@@ -271,7 +296,19 @@ def _asked(found: Bodies, path: Path | str, ignore: Sequence[str], only: Sequenc
     if not 0.0 < size < LARGEST_SIZE:
         raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
     dropped = [k for k, keep in enumerate(wanted) if not keep]
-    return _Asked(bodies, [found.rows[k] for k in kept], size, dropped)
+    return _Asked(bodies, [_with_role(found.rows[k]) for k in kept], size, dropped)
+
+
+def _with_role(row: dict[str, Any]) -> dict[str, Any]:
+    """Take the role of a body from the beginning of its group or name: modellers number objects, "fixed.001"."""
+    if row.get("role"):
+        return row
+    for label in (str(row.get("group", "")), str(row.get("name", ""))):
+        word = re.match(r"[a-z]*", label.strip().lower())
+        begin = ROLE_WORDS.get(word[0] if word else "")
+        if begin:
+            return {**row, "role": begin}
+    return row
 
 
 def _seen_along(axis: int, bodies: Sequence[Body], size: float) -> _Seen:

@@ -7,6 +7,7 @@ elements with a geometry. https://compas.dev describes the data of each class.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,8 +16,10 @@ from typing import Any
 import numpy as np
 
 import solver
+from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import FLAT
+from blockvis.layout.solid_layout import SolidLayout
 
 from .bodies import Bodies, fans
 from .cells import layout_of_cells
@@ -290,9 +293,11 @@ def _mesh(points: np.ndarray, faces: list[list[int]], data: dict[str, Any], name
         row["group"] = context.group
     if support:
         row["role"] = solver.FIXED
+    # What our own writer says of a block, which COMPAS keeps and hands on.
+    row |= {key: str(attributes[key]) for key in ("role", "material") if isinstance(attributes.get(key), str)}
     if context.material.get("name"):
         row["material"] = str(context.material["name"])
-    density = context.material.get("density")
+    density = context.material.get("density", attributes.get("density"))
     if isinstance(density, int | float) and density > 0:
         row["density"] = float(density)
     outside = [k for face in faces for k in face if not 0 <= k < len(points)]
@@ -300,3 +305,25 @@ def _mesh(points: np.ndarray, faces: list[list[int]], data: dict[str, Any], name
         raise IndexError(f"a face uses point {outside[0]} of {len(points)}")
     matrix = context.matrix
     return _Mesh(points @ matrix[:3, :3].T + matrix[:3, 3], faces, row)
+
+
+def write(layout: SolidLayout, path: Path) -> None:
+    """Write the blocks of a layout in space as meshes of COMPAS 2: its ``json_load`` gives blocks and supports."""
+    lists: dict[str, list[dict[str, Any]]] = {"blocks": [], "supports": []}
+    for (points, faces), row in zip(layout.solids, rows_of(layout), strict=True):
+        support = row.get("role") in (solver.FIXED, solver.MOVING)
+        data = {
+            "attributes": {**{key: value for key, value in row.items() if key != "name"}, "is_support": support},
+            "default_vertex_attributes": {"x": 0.0, "y": 0.0, "z": 0.0},
+            "default_edge_attributes": {},
+            "default_face_attributes": {},
+            "vertex": {str(k): dict(zip("xyz", map(float, point), strict=True)) for k, point in enumerate(points)},
+            "face": {str(k): list(face) for k, face in enumerate(faces)},
+            "facedata": {},
+            "edgedata": {},
+            "max_vertex": len(points) - 1,
+            "max_face": len(faces) - 1,
+        }
+        mesh = {"dtype": "compas.datastructures/Mesh", "data": data, "name": str(row["name"])}
+        lists["supports" if support else "blocks"].append(mesh)
+    path.write_text(json.dumps(lists, ensure_ascii=False), encoding="utf-8")

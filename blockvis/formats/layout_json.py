@@ -27,6 +27,9 @@ from .reading import Reading
 
 FORMAT = "blockvis layout"
 
+#: In the name of a file for COMPAS, before its suffix.
+COMPAS = ".compas."
+
 
 def read(path: Path, reading: Reading) -> AnyLayout | Bodies:
     """Read a .json layout, or the blocks of a file of COMPAS."""
@@ -100,7 +103,12 @@ def _read_solids(content: dict[str, Any], path: Path) -> SolidLayout:
 
 
 def write(layout: AnyLayout, path: Path) -> None:
-    """Write a .json layout."""
+    """Write a .json layout; of blocks in space to a name that ends in .compas.json meshes of COMPAS."""
+    if COMPAS in path.name.lower():
+        if not isinstance(layout, SolidLayout):
+            raise ValueError(f"'{path}': COMPAS knows blocks in space only; give dimension 3, or write to .json")
+        compas_json.write(layout, path)
+        return
     shapes: list[dict[str, Any]]
     if isinstance(layout, SolidLayout):
         shapes = [{"points": points.tolist(), "faces": faces} for points, faces in layout.solids]

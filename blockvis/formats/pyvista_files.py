@@ -18,7 +18,7 @@ from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import AnyLayout, Layout
 from blockvis.layout.solid_layout import SolidLayout
 
-from .bodies import Bodies, Body, body_of_polygons, layout_of_bodies
+from .bodies import Bodies, Body, body_of_polygons, in_dimension
 from .cells import block_array, layout_of_cells, merged, row_of
 from .node_order import VTK, ring_of_nodes
 from .reading import Reading
@@ -252,7 +252,9 @@ def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
             _check_parts(target, (*seen, path))
 
 
-def layout_of_dataset(data: Any, path: Path | str = "dataset", view: str | None = None) -> Layout:
+def layout_of_dataset(
+    data: Any, path: Path | str = "dataset", view: str | None = None, dimension: int | None = None
+) -> AnyLayout:
     """Make a layout of a pyvista dataset: a mesh, or a multiblock of meshes.
 
     Parameters
@@ -262,9 +264,11 @@ def layout_of_dataset(data: Any, path: Path | str = "dataset", view: str | None 
         Named in messages.
     view : {"xy", "xz", "yz"}, optional
         As of :func:`blockvis.read_layout`.
+    dimension : {2, 3}, optional
+        In the plane or in space; by default in space where bodies are not prisms side by side.
     """
     found = found_in_dataset(data, path, view)
-    return layout_of_bodies(found, path, view) if isinstance(found, Bodies) else found
+    return in_dimension(found, path, dimension, view) if isinstance(found, Bodies) else found
 
 
 def found_in_dataset(data: Any, path: Path | str, view: str | None) -> Layout | Bodies:
@@ -465,8 +469,6 @@ def _add_words(attributes: Any, name: str, words: list[str]) -> None:
 
 def write(layout: AnyLayout, path: Path) -> None:
     """Write .vtu, .vtp or .vtk: a cell per block, polygon or polyhedron, double precision, lengths in m."""
-    if path.suffix.lower() == ".vtp" and isinstance(layout, SolidLayout):
-        raise ValueError(f"'{path}': .vtp holds surfaces; write blocks in space to .vtu, .obj, .stl, .ply or .json")
     grid = dataset_of(layout)
     if path.suffix.lower() == ".vtp":
         surface = _surface(grid)

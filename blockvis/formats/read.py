@@ -24,7 +24,7 @@ from blockvis.layout.solid_layout import SolidLayout
 from blockvis.layout.units import chosen_unit, doubt, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
 
-from .bodies import Bodies, NotFlat, layout_of_bodies, solids_of_bodies
+from .bodies import Bodies, in_dimension
 from .cells import of_files
 from .files import MissingFile as MissingFile
 from .files import files_of
@@ -139,15 +139,7 @@ def _in_dimension(
         if dimension == 2:
             raise ValueError(f"'{path}' draws its blocks in space; leave out dimension = 2")
         return content
-    if dimension == 3:
-        return solids_of_bodies(content, path, view, ignore, only)
-    try:
-        return layout_of_bodies(content, path, view, ignore, only)
-    except NotFlat as error:
-        if dimension == 2 or view is not None:
-            raise
-        layout = solids_of_bodies(content, path, None, ignore, only)
-        return replace(layout, notes=(f"blocks in space: {error.reason}", *layout.notes))
+    return in_dimension(content, path, dimension, view, ignore, only)
 
 
 def _apart(content: AnyLayout | Bodies, path: Path) -> Layout | Bodies:
@@ -288,6 +280,9 @@ def _read_by_suffix(path: Path, reading: Reading) -> AnyLayout | Bodies:
 def _write_by_suffix(layout: AnyLayout, path: Path) -> None:
     """Write a file, whole or not at all, with the module of its suffix."""
     module = _module_of(path, "write")
+    if layout.dimension == 3 and not _format(path, "write").writes_space:
+        able = " ".join(sorted(suffix for suffix, known in FORMATS.items() if known.writes_space))
+        raise ValueError(f"'{path}': {path.suffix} holds no blocks in space; use one of {able}")
     with whole_file(path) as partial:
         module.write(layout, partial)
 

@@ -13,12 +13,18 @@ from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import AnyLayout, Layout
 from blockvis.layout.outlines import FLAT
 from blockvis.layout.solid_layout import SolidLayout
-from blockvis.layout.solids import Solid, area_vector, prism, triangles_of
+from blockvis.layout.solids import Solid, area_vectors, prism, triangles_of
 
 from .bodies import Bodies
 from .cells import layout_of_cells, merged
 from .closed_surfaces import closed_bodies
 from .reading import Reading
+
+#: Programs that write coordinates to .glb as they are, with z up, in small letters.
+Z_IS_UP = ("trimesh", "blockvis")
+
+#: Largest description of a .glb file that is looked into [bytes].
+LARGEST_HEADER = 64 * 2**20
 
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
@@ -67,7 +73,22 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         by_name = {row.get("name"): row for row in rows}
         rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
-    return Bodies(tuple(bodies), tuple(known), unit)
+    up, says = _up(path) if suffix == ".glb" else ("z", "")
+    return Bodies(tuple(bodies), tuple(known), unit, up=up, up_says=says)
+
+
+def _up(path: Path) -> tuple[str, str]:
+    """Find the coordinate that points up in a .glb file: y, as the format has it, but of programs that write z."""
+    with path.open("rb") as stream:
+        head = stream.read(20)
+        content = stream.read(min(int.from_bytes(head[12:16], "little"), LARGEST_HEADER))
+    try:
+        generator = str(json.loads(content).get("asset", {}).get("generator", ""))
+    except (ValueError, AttributeError):
+        generator = ""
+    if any(word in generator.lower() for word in Z_IS_UP):
+        return "z", ""
+    return "y", f"y is up in .glb files{f' ({generator})' if generator else ''}"
 
 
 def _placed(scene: Any) -> list[tuple[str, Any]]:
@@ -191,6 +212,6 @@ def _whole_faces(points: np.ndarray, faces: list[list[int]]) -> list[list[int]]:
     for face in faces:
         ring = points[face]
         turns = np.cross(np.roll(ring, -1, axis=0) - ring, np.roll(ring, -2, axis=0) - np.roll(ring, -1, axis=0))
-        convex = bool((turns @ area_vector(ring) >= 0.0).all())
+        convex = bool((turns @ area_vectors(points, [face])[0] >= 0.0).all())
         whole += [face] if convex else triangles_of(points, [face]).tolist()
     return whole

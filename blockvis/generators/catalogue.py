@@ -12,8 +12,10 @@ import solver
 from blockvis.suggestions import nearest, refuse_unknown
 
 from .arches import arch, basket_handle_arch, pointed_arch, segmental_arch
+from .corners import l_corner, t_corner, two_leaf_wall
 from .domes import dome
 from .frames import arch_on_piers, buttressed_arch, column, portal
+from .groins import church_bay, cross_vault, pavilion_vault
 from .vaults import barrel_vault, extruded_arch
 from .walls import facade, panel, wall
 
@@ -36,11 +38,27 @@ LAYOUTS: dict[str, Callable[..., solver.Assembly]] = {
     "extruded arch": extruded_arch,
     "barrel vault": barrel_vault,
     "dome": dome,
+    "cross vault": cross_vault,
+    "pavilion vault": pavilion_vault,
+    "church bay": church_bay,
+    "L corner": l_corner,
+    "T corner": t_corner,
+    "two-leaf wall": two_leaf_wall,
 }
 
 
 #: Those of blocks in space.
-IN_SPACE = ("extruded arch", "barrel vault", "dome")
+IN_SPACE = (
+    "extruded arch",
+    "barrel vault",
+    "dome",
+    "cross vault",
+    "pavilion vault",
+    "church bay",
+    "L corner",
+    "T corner",
+    "two-leaf wall",
+)
 
 
 #: Kinds of parameters without a unit, in plain words.
@@ -55,7 +73,7 @@ def dimension_of(name: str) -> int:
     >>> dimension_of("dome")
     3
     """
-    return 3 if _plain(name) in IN_SPACE else 2
+    return 3 if _plain(name) in map(_plain, IN_SPACE) else 2
 
 
 def parameters_of(name: str) -> dict[str, Any]:

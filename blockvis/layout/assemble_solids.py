@@ -56,7 +56,8 @@ def assemble_solids(
     Raises
     ------
     ValueError
-        For an unknown role, a key of ``roles`` that matches no block, and a support without a volume.
+        For an unknown role, a key of ``roles`` that matches no block, a support without a volume, and an overlap deeper
+        than the tolerance.
     """
     for note in layout.notes:
         if note.startswith(TOLD):
@@ -78,12 +79,33 @@ def assemble_solids(
     if facing.note:
         warnings.warn(f"{layout.source or 'layout'}: {facing.note}", stacklevel=2)
     unknown = np.full(layout.n_blocks, np.nan) if layout.density is None else layout.density
-    return solver.Assembly.from_solids(
+    assembly = solver.Assembly.from_solids(
         facing.solids,
         names=layout.names,
         roles=roles_of(layout, roles or {}),
         density=np.where(np.isnan(unknown), float(density), unknown),
         materials=layout.materials,
+    )
+    _refuse_overlaps(assembly, near)
+    return assembly
+
+
+def _refuse_overlaps(assembly: solver.Assembly, tolerance: float) -> None:
+    """Refuse blocks that overlap by more than a tolerance [m], with the place and the remedy."""
+    one, other, depth = assembly.shapes.overlaps(assembly.vertices, tolerance)
+    free = assembly.free[one] | assembly.free[other]
+    one, other, depth = one[free], other[free], depth[free]
+    if not len(depth):
+        return
+    k = int(depth.argmax())
+    i, j = int(one[k]), int(other[k])
+    boxes = [assembly.vertices[assembly.block_of_vertex == block] for block in (i, j)]
+    low, high = np.max([b.min(axis=0) for b in boxes], axis=0), np.min([b.max(axis=0) for b in boxes], axis=0)
+    place = ", ".join(f"{x:.6g}" for x in (low + high) / 2.0)
+    others = f"; {len(depth) - 1} more pairs overlap" if len(depth) > 1 else ""
+    raise ValueError(
+        f"block {i} ('{assembly.names[i]}') overlaps block {j} ('{assembly.names[j]}') by {depth[k]:.3g} m near "
+        f"({place}); move them apart or raise overlap_tolerance ({tolerance:.3g} m){others}"
     )
 
 

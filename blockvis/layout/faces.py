@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .solids import Solid, area_vector, outward, volume
+from .solids import Solid, area_vectors, cross, off_planes, outward, planes_of, triangles_of, volume
 
 #: Triangles that lie within this fraction of the width of a block of one plane are one face: modellers warp the faces
 #: of stones by a tenth of it.
@@ -18,6 +18,9 @@ ROUNDING = 2e-6
 
 #: Neighbouring triangles whose normals differ by more than this angle (15 degrees) are different faces.
 SAME_FACE = np.cos(np.radians(15.0))
+
+#: Rounds in which planes give way to each other, and the warp, as a fraction of the width, that may be left then.
+ROUNDS, STRAIGHT = 40, 2e-4
 
 #: Directions in which the planes around a corner say less than this of where it lies are left as drawn.
 UNDETERMINED = 0.05
@@ -41,9 +44,9 @@ class PlaneSolid:
     place: np.ndarray
 
 
-def width_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> float:
+def width_of(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> float:
     """Six volumes over the surface: the edge of a cube, three times the thickness of a slab."""
-    surface = sum(float(np.linalg.norm(area_vector(points[list(face)]))) for face in faces)
+    surface = float(np.linalg.norm(area_vectors(points, faces), axis=1).sum())
     return 6.0 * abs(volume(points, faces)) / surface if surface else 0.0
 
 
@@ -64,9 +67,9 @@ def with_plane_faces(points: np.ndarray, triangles: np.ndarray, tolerance: float
     """
     used, index = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], index.reshape(-1, 3)
-    if volume(points, triangles.tolist()) < 0.0:
+    if volume(points, triangles) < 0.0:
         triangles = triangles[:, ::-1]
-    near = tolerance * width_of(points, triangles.tolist())
+    near = tolerance * width_of(points, triangles)
     faces = [ring for region in _regions(points, triangles, near) for ring in _rings_of(triangles[region])]
     return fitted(*_without_straight(points, faces, near), near)
 
@@ -81,29 +84,53 @@ def fitted(points: np.ndarray, faces: list[list[int]], near: float) -> PlaneSoli
     near : float
         Largest warp, in the unit of the points.
     """
-    rings: list[list[int]] = []
-    for ring in faces:
-        plane = plane_of(points[ring])
-        flat = len(ring) == 3 or float(np.abs(points[ring] @ plane[:3] - plane[3]).max()) <= near
-        rings += [ring] if flat else [[ring[0], ring[k], ring[k + 1]] for k in range(1, len(ring) - 1)]
-    planes = np.array([plane_of(points[ring]) for ring in rings])
-    away = [np.abs(points[ring] @ plane[:3] - plane[3]) for ring, plane in zip(rings, planes, strict=True)]
-    warp = np.array([distance.max() for distance in away])
+    rings = bent_in_triangles(points, faces, near)
+    planes = planes_of(points, rings)
+    warp = off_planes(points, rings, planes)
     worst = int(warp.argmax())
-    place = points[rings[worst][int(away[worst].argmax())]]
+    corners = points[rings[worst]]
+    place = corners[int(np.abs(corners @ planes[worst, :3] - planes[worst, 3]).argmax())]
     if warp[worst] <= ROUNDING * width_of(points, rings):
         return PlaneSolid(outward(points, rings), 0.0, place)
-    return PlaneSolid(outward(moved_to_planes(points, rings, planes), rings), float(warp[worst]), place)
+    return PlaneSolid(outward(*flattened(points, rings, planes)), float(warp[worst]), place)
 
 
-def plane_of(ring: np.ndarray) -> np.ndarray:
-    """(4,) array: unit normal of a (n, 3) ring seen counter-clockwise, and its distance from the origin."""
-    normal = area_vector(ring)
-    normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
-    return np.append(normal, float(ring.mean(axis=0) @ normal))
+def flattened(points: np.ndarray, faces: list[list[int]], planes: np.ndarray, first: np.ndarray | None = None) -> Solid:
+    """Move the corners of a block to its planes until its faces are plane.
+
+    Parameters
+    ----------
+    points, faces, planes, first
+        As of :func:`moved_to_planes`; the planes of other faces than ``first`` give way where more than three meet.
+
+    Returns
+    -------
+    Solid
+        With faces that stay warped cut into triangles.
+    """
+    moved = moved_to_planes(points, faces, planes, first)
+    near = ROUNDING * width_of(moved, faces)
+    for _ in range(ROUNDS):
+        now = planes_of(moved, faces)
+        if off_planes(moved, faces, now).max() <= near:
+            return moved, faces
+        planes = now if first is None else np.where(first[:, None], planes, now)
+        moved = moved_to_planes(moved, faces, planes, first)
+    return moved, bent_in_triangles(moved, faces, STRAIGHT * width_of(moved, faces))
 
 
-def moved_to_planes(points: np.ndarray, faces: Sequence[Sequence[int]], planes: np.ndarray) -> np.ndarray:
+def bent_in_triangles(points: np.ndarray, faces: Sequence[list[int]], near: float) -> list[list[int]]:
+    """Cut the faces of which a corner is farther than ``near`` from their plane into triangles."""
+    flat = off_planes(points, faces, planes_of(points, faces)) <= near
+    rings: list[list[int]] = []
+    for ring, is_flat in zip(faces, flat.tolist(), strict=True):
+        rings += [ring] if is_flat or len(ring) == 3 else triangles_of(points, [ring]).tolist()
+    return rings
+
+
+def moved_to_planes(
+    points: np.ndarray, faces: Sequence[Sequence[int]], planes: np.ndarray, first: np.ndarray | None = None
+) -> np.ndarray:
     """Move the corners of a block to where the planes of their faces meet, as little as that takes.
 
     Parameters
@@ -112,12 +139,15 @@ def moved_to_planes(points: np.ndarray, faces: Sequence[Sequence[int]], planes: 
     faces : sequence of sequences of int
     planes : (n_faces, 4) array
         Unit normals and distances from the origin.
+    first : (n_faces,) bool array, optional
+        Faces whose planes come before those of the others, where more than three meet.
 
     Returns
     -------
     (n, 3) array
         Where more than three planes meet nearly in a point, the point nearest to them.
     """
+    before = np.zeros(len(planes), dtype=bool) if first is None else first
     around: list[list[int]] = [[] for _ in points]
     for number, face in enumerate(faces):
         for corner in face:
@@ -125,10 +155,26 @@ def moved_to_planes(points: np.ndarray, faces: Sequence[Sequence[int]], planes: 
     moved = points.copy()
     for corner, met in enumerate(around):
         if met:
-            normals = planes[met, :3]
-            missing = planes[met, 3] - normals @ points[corner]
-            moved[corner] += np.linalg.lstsq(normals, missing, rcond=UNDETERMINED)[0]
+            chosen = before[met] if len(met) > 3 and before[met].any() else np.ones(len(met), dtype=bool)
+            for some in (chosen, ~chosen):
+                moved[corner] += _towards(moved[corner], planes[met], some, chosen)
     return moved
+
+
+def _towards(point: np.ndarray, planes: np.ndarray, some: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """(3,) array: the way of a point to some of the planes, along those that hold it already."""
+    if not some.any():
+        return np.zeros(3)
+    normals = planes[some, :3]
+    missing = planes[some, 3] - normals @ point
+    if some is held:
+        return np.asarray(np.linalg.lstsq(normals, missing, rcond=UNDETERMINED)[0])
+    _, sizes, axes = np.linalg.svd(planes[held, :3])
+    rank = int((sizes > UNDETERMINED * sizes[0]).sum())
+    free = axes[rank:].T
+    if free.shape[1] == 0:
+        return np.zeros(3)
+    return np.asarray(free @ np.linalg.lstsq(normals @ free, missing, rcond=UNDETERMINED)[0])
 
 
 def _regions(points: np.ndarray, triangles: np.ndarray, near: float) -> list[np.ndarray]:
@@ -137,7 +183,7 @@ def _regions(points: np.ndarray, triangles: np.ndarray, near: float) -> list[np.
     from scipy.sparse.csgraph import connected_components
 
     corners = points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     double = np.linalg.norm(normal, axis=1)
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     normal = normal / np.maximum(double, 1e-300)[:, None]
@@ -204,7 +250,7 @@ def _neighbours(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _warp(points: np.ndarray, triangles: np.ndarray) -> float:
     """How far the corners of triangles are from their mean plane."""
     corners = points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
+    normal = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
     length = float(np.linalg.norm(normal))
     if length == 0.0:
         return np.inf

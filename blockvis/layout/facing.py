@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .faces import ROUNDING, moved_to_planes, plane_of, width_of
-from .solids import Solid, area_vector, volume
+from .faces import ROUNDING, flattened, width_of
+from .solids import Solid, area_vectors, planes_of, volume
 
 #: Gaps and overlaps of joints up to this fraction of the width of a typical block are faced unless the caller says
 #: otherwise: drawings of real vaults overlap by up to 8e-4 of a block, and their corners are as far off.
@@ -16,6 +16,9 @@ DEFAULT_FACING = 0.01
 
 #: Faces whose normals are this far from opposite (cosine of 10 degrees) are no joint.
 OPPOSITE = -np.cos(np.radians(10.0))
+
+#: Joints that go on beside each other are in one plane if they are within this many times the largest gap found.
+NOISE = 2.0
 
 #: Faces that cover each other by less than this fraction of the smaller one touch at an edge.
 COVERS = 1e-3
@@ -77,16 +80,16 @@ def faced(
     near = DEFAULT_FACING * width if tolerance is None else tolerance
     anchored = np.zeros(len(solids), dtype=bool) if anchored is None else anchored
     faces = _faces_of(solids)
-    one, other, apart = _joints(faces, near)
+    one, other, apart = _joints(faces, near, ROUNDING * width)
     kept = ~(anchored[faces.block[one]] & anchored[faces.block[other]])
     one, other, apart = one[kept], other[kept], apart[kept]
     rough = np.abs(apart) > ROUNDING * width
     if not rough.any():
         return Facing(tuple(solids))
     planes, changed = faces.planes.copy(), np.zeros(len(faces.planes), dtype=bool)
-    for members, sides in _groups(faces, one, other, near):
-        rough_here = rough & np.isin(one, members)
-        if not rough_here.any():
+    in_line = _in_line(faces, np.unique([one, other]), min(near, NOISE * float(np.abs(apart).max())))
+    for members, sides in _groups(faces, np.append(one, in_line[0]), np.append(other, in_line[1]), near):
+        if not (rough & np.isin(one, members)).any():
             continue
         held = [n for n, k in enumerate(members) if anchored[faces.block[k]]]
         if held:
@@ -97,7 +100,9 @@ def faced(
         for k, side in zip(members, sides, strict=True):
             if not anchored[faces.block[k]]:
                 planes[k], changed[k] = side * plane, True
-    moved = _moved(solids, faces, planes, changed)
+    joint = np.zeros(len(planes), dtype=bool)
+    joint[np.concatenate([one, other])] = True
+    moved = _moved(solids, faces, planes, changed, joint)
     worst = int(np.abs(apart).argmax())
     n = int(rough.sum())
     a, b = names[faces.block[one[worst]]], names[faces.block[other[worst]]]
@@ -112,13 +117,16 @@ def faced(
 def _faces_of(solids: Sequence[Solid]) -> _Faces:
     rings = [points[face] for points, faces in solids for face in faces]
     block = np.repeat(np.arange(len(solids)), [len(faces) for _, faces in solids])
-    planes = np.array([plane_of(ring) for ring in rings])
-    areas = np.array([float(np.linalg.norm(area_vector(ring))) for ring in rings])
+    planes = np.concatenate([planes_of(*solid) for solid in solids])
+    areas = np.concatenate([np.linalg.norm(area_vectors(*solid), axis=1) for solid in solids])
     return _Faces(block, planes, rings, areas)
 
 
-def _joints(faces: _Faces, near: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find pairs of faces that face each other across at most ``near``: both, and the gap where it is largest."""
+def _joints(faces: _Faces, near: float, exact: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find pairs of faces that face each other across at most ``near``: both, and the gap where it is largest.
+
+    None where all of them are in one plane within ``exact``.
+    """
     import shapely
 
     low = np.array([ring.min(axis=0) for ring in faces.rings]) - near
@@ -130,7 +138,7 @@ def _joints(faces: _Faces, near: float) -> tuple[np.ndarray, np.ndarray, np.ndar
     pair = (low[one, 2] <= high[other, 2]) & (low[other, 2] <= high[one, 2])
     one, other = one[pair], other[pair]
     pair = np.einsum("ij,ij->i", faces.planes[one, :3], faces.planes[other, :3]) < OPPOSITE
-    one, other = one[pair], other[pair]
+    one, other = _near_planes(faces, one[pair], other[pair], near, exact)
     found = [(a, b, gap) for a, b in zip(one.tolist(), other.tolist(), strict=True) if (gap := _gap(faces, a, b, near))]
     if not found:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
@@ -139,6 +147,54 @@ def _joints(faces: _Faces, near: float) -> tuple[np.ndarray, np.ndarray, np.ndar
         np.array([b for _, b, _ in found]),
         np.array([gap[0] for _, _, gap in found]),
     )
+
+
+def _near_planes(
+    faces: _Faces, one: np.ndarray, other: np.ndarray, near: float, exact: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Keep the pairs of which a corner is near the other face's plane; none if all of these are as near as can be."""
+    counts = np.array([len(ring) for ring in faces.rings])
+    starts = np.cumsum(counts) - counts
+    corners = np.concatenate(faces.rings)
+    smaller = np.where(faces.areas[one] <= faces.areas[other], one, other)
+    larger = np.where(smaller == one, other, one)
+    # The corners of the smaller face of each pair, all pairs one after another.
+    n = counts[smaller]
+    begin = np.cumsum(n) - n
+    index = np.repeat(starts[smaller] - begin, n) + np.arange(int(n.sum()))
+    plane = np.repeat(larger, n)
+    away = np.abs((corners[index] * faces.planes[plane, :3]).sum(axis=1) - faces.planes[plane, 3])
+    if not len(away):
+        return one, other
+    close = np.minimum.reduceat(away, begin) <= near
+    if np.maximum.reduceat(away, begin)[close].max(initial=0.0) <= exact:
+        close[:] = False
+    return one[close], other[close]
+
+
+def _in_line(faces: _Faces, chosen: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
+    """Find pairs of faces of joints that go on in one plane beside each other: a straight joint of several stones.
+
+    Stones that meet at an edge would overlap at it if every joint found a plane of its own.
+    """
+    from scipy.spatial import cKDTree
+
+    corner_of = np.repeat(chosen, [len(faces.rings[k]) for k in chosen])
+    corners = np.concatenate([faces.rings[k] for k in chosen])
+    close = cKDTree(corners).query_pairs(2.0 * near, output_type="ndarray")
+    pairs = np.unique(np.sort(corner_of[close], axis=1), axis=0)
+    one, other = pairs[:, 0], pairs[:, 1]
+    along = np.abs(np.einsum("ij,ij->i", faces.planes[one, :3], faces.planes[other, :3])) > -OPPOSITE
+    one, other = one[along], other[along]
+    off = [
+        max(
+            float(np.abs(faces.rings[b] @ faces.planes[a, :3] - faces.planes[a, 3]).max()),
+            float(np.abs(faces.rings[a] @ faces.planes[b, :3] - faces.planes[b, 3]).max()),
+        )
+        for a, b in zip(one.tolist(), other.tolist(), strict=True)
+    ]
+    flat = np.array(off) <= 2.0 * near if len(off) else np.zeros(0, dtype=bool)
+    return one[flat], other[flat]
 
 
 def _gap(faces: _Faces, a: int, b: int, near: float) -> tuple[float] | None:
@@ -227,12 +283,16 @@ def _common_plane(rings: Sequence[np.ndarray], sides: np.ndarray, planes: np.nda
     return np.append(normal, float(share @ (middles @ normal)))
 
 
-def _moved(solids: Sequence[Solid], faces: _Faces, planes: np.ndarray, changed: np.ndarray) -> tuple[Solid, ...]:
-    """Move the corners of the blocks with changed planes."""
+def _moved(
+    solids: Sequence[Solid], faces: _Faces, planes: np.ndarray, changed: np.ndarray, joint: np.ndarray
+) -> tuple[Solid, ...]:
+    """Move the corners of the blocks with changed planes, to those of joints before those of free faces."""
     moved = list(solids)
     start = np.searchsorted(faces.block, np.arange(len(solids) + 1))
     for i in np.unique(faces.block[changed]).tolist():
         points, rings = solids[i]
-        found = moved_to_planes(points, rings, planes[start[i] : start[i + 1]])
-        moved[i] = (found, rings) if volume(found, rings) > 0.0 else solids[i]
+        mine = slice(start[i], start[i + 1])
+        found = flattened(points, rings, planes[mine], joint[mine])
+        if volume(*found) > 0.0:
+            moved[i] = found
     return tuple(moved)

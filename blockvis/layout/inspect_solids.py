@@ -79,8 +79,7 @@ class SolidInspection:
         """Write the measurements as lines of a table."""
         layout, kept = self.layout, self.kept
         size = " × ".join(f"{length:.4g}" for length in self.high - self.low)
-        across = np.array([size_of(layout.solids[i][0]) for i in kept])
-        largest = int(across.argmax())
+        largest = int(kept[self.volumes.argmax()])
         free = np.array([self.roles[i] == "free" for i in kept])
         known = layout.density is not None and bool(np.isfinite(layout.density[kept]).all())
         supports = f", supports {self.weights[~free].sum():.6g} N" if (~free).any() else ""
@@ -94,7 +93,7 @@ class SolidInspection:
             f"{np.median(self.volumes):.4g}, sum {self.volumes.sum():.6g} m³",
             f"weight          {self.weights[free].sum():.6g} N{supports}"
             + ("" if known else f", at {DENSITY:g} kg/m³ where the file has no density"),
-            f"largest block   '{layout.names[kept[largest]]}', {across[largest]:.4g} m across",
+            f"largest block   '{layout.names[largest]}', {size_of(layout.solids[largest][0]):.4g} m across",
             f"corners, faces  {sum(len(layout.solids[i][0]) for i in kept)}, "
             f"{sum(len(layout.solids[i][1]) for i in kept)}",
         ]

@@ -13,26 +13,57 @@ from .triangulation import triangles_of_ring
 Solid = tuple[np.ndarray, list[list[int]]]
 
 
-def volume(points: np.ndarray, faces: Sequence[Sequence[int]]) -> float:
+def cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(n, 3) array: cross products, several times as fast as ``np.cross`` for the few faces of a block."""
+    found = np.empty_like(first)
+    found[:, 0] = first[:, 1] * second[:, 2] - first[:, 2] * second[:, 1]
+    found[:, 1] = first[:, 2] * second[:, 0] - first[:, 0] * second[:, 2]
+    found[:, 2] = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    return found
+
+
+def _fans(faces: Sequence[Sequence[int]] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cut faces into fans from their first corners: (m, 3) corners, and where the fan of each face begins."""
+    if isinstance(faces, np.ndarray):
+        return faces, np.arange(len(faces))
+    rows: list[tuple[int, int, int]] = []
+    starts = []
+    for face in faces:
+        starts.append(len(rows))
+        rows += [(face[0], face[k], face[k + 1]) for k in range(1, len(face) - 1)]
+    return np.array(rows), np.array(starts)
+
+
+def volume(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> float:
     """Volume of a block; negative if its faces are seen clockwise from outside."""
-    middle = points.mean(axis=0)
-    total = 0.0
-    for face in faces:
-        fan = points[list(face)] - middle
-        total += float(np.cross(fan[1:-1], fan[2:]).dot(fan[0]).sum())
-    return total / 6.0
+    a, b, c = (points - points.mean(axis=0))[_fans(faces)[0].T]
+    return float((cross(b, c) * a).sum()) / 6.0
 
 
-def centroid(points: np.ndarray, faces: Sequence[Sequence[int]]) -> np.ndarray:
-    """(3,) array: centre of gravity of a block."""
-    middle = points.mean(axis=0)
-    total, moment = 0.0, np.zeros(3)
-    for face in faces:
-        fan = points[list(face)] - middle
-        parts = np.cross(fan[1:-1], fan[2:]) @ fan[0]
-        total += float(parts.sum())
-        moment += parts @ (fan[0] + fan[1:-1] + fan[2:]) / 4.0
-    return np.asarray(middle + moment / total)
+def area_vectors(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
+    """(n_faces, 3) array: normals of faces that are seen counter-clockwise, as long as their areas are large."""
+    fan, starts = _fans(faces)
+    a, b, c = points[fan.T]
+    return np.asarray(np.add.reduceat(cross(b - a, c - a), starts, axis=0) / 2.0)
+
+
+def planes_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> np.ndarray:
+    """(n_faces, 4) array: unit normals of faces, and the distances of their planes from the origin."""
+    normals = area_vectors(points, faces)
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    counts = np.array([len(face) for face in faces])
+    corners = points[np.concatenate(faces)]
+    starts = np.cumsum(counts) - counts
+    middles = np.add.reduceat(corners, starts, axis=0) / counts[:, None]
+    return np.column_stack([normals, (middles * normals).sum(axis=1)])
+
+
+def off_planes(points: np.ndarray, faces: Sequence[Sequence[int]], planes: np.ndarray) -> np.ndarray:
+    """(n_faces,) array: how far the corner of each face that is farthest from its plane is from it."""
+    counts = np.array([len(face) for face in faces])
+    whose = np.repeat(np.arange(len(faces)), counts)
+    away = np.abs((points[np.concatenate(faces)] * planes[whose, :3]).sum(axis=1) - planes[whose, 3])
+    return np.asarray(np.maximum.reduceat(away, np.cumsum(counts) - counts))
 
 
 def outward(points: np.ndarray, faces: list[list[int]]) -> Solid:
@@ -47,12 +78,6 @@ def outward(points: np.ndarray, faces: list[list[int]]) -> Solid:
     return points, faces if volume(points, faces) > 0.0 else [face[::-1] for face in faces]
 
 
-def area_vector(ring: np.ndarray) -> np.ndarray:
-    """(3,) array: normal of a (n, 3) ring that is seen counter-clockwise, as long as its area is large."""
-    fan = ring[1:] - ring[0]
-    return np.asarray(np.cross(fan[:-1], fan[1:]).sum(axis=0) / 2.0)
-
-
 def triangles_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> np.ndarray:
     """(n, 3) int array: the faces of a block cut into triangles, those with re-entrant corners included."""
     found = []
@@ -61,7 +86,7 @@ def triangles_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> np.ndarr
             found.append(np.array([face]))
             continue
         ring = points[list(face)]
-        across = int(np.abs(area_vector(ring)).argmax())
+        across = int(np.abs(area_vectors(ring, [range(len(ring))])[0]).argmax())
         found.append(np.array(face)[triangles_of_ring(np.delete(ring, across, axis=1))])
     return np.concatenate(found)
 

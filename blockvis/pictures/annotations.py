@@ -106,9 +106,9 @@ def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.
 
     Returns
     -------
-    points : (n, 2) array [m]
+    points : (n, d) array [m]
         Where the resultant crosses the joint, at the increment's pose.
-    forces : (n, 2) array [N]
+    forces : (n, d) array [N]
         On ``blocks[:, 0]``.
     blocks : (n, 2) int array
     """
@@ -116,7 +116,7 @@ def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.
     sense = np.where(contacts.block_a > contacts.block_b, -1.0, 1.0)
     force = np.einsum("ki,kij->kj", increment.forces, contacts.frames) * sense[:, None]
     pairs, which = contacts[carrying].joints()
-    forces, points = np.zeros((len(pairs), 2)), np.zeros((len(pairs), 2))
+    forces, points = np.zeros((2, len(pairs), contacts.points.shape[1]))
     normal = increment.forces[carrying, 0]
     np.add.at(forces, which, force[carrying])
     np.add.at(points, which, normal[:, None] * contacts.points[carrying])

@@ -159,3 +159,46 @@ def failure_text(response: solver.Response) -> str:
     if response.path and response.parameter.is_path:
         where = f" after {response.parameter.name} {parameter_text(response.path[-1].parameter, response)}"
     return f"The solver failed{where}: {response.message}" if response.message else f"The solver failed{where}"
+
+
+def caption_of(response: solver.Response, increment: solver.Increment, magnification: float) -> tuple[str, str]:
+    """First and second line of a caption: what is true of the increment, in frames between two of the one before.
+
+    Parameters
+    ----------
+    response : solver.Response
+    increment : solver.Increment
+    magnification : float
+        Of the displacements.
+    """
+    parts = [_state(response, increment)]
+    if len(response.settlements) > 1:
+        parts.append(f"phase {increment.phase + 1} of {len(response.settlements)}")
+    # A mechanism that swings out of a limit state has no scale.
+    if not (response.swings and increment.status == solver.Status.FALLING):
+        parts.append("true scale" if magnification == 1.0 else f"displacements × {magnification:g}")
+    parts.append(f"W = {force_text(response.total_weight)}")
+    return state_text(increment, response), "   ·   ".join(parts)
+
+
+def _state(response: solver.Response, increment: solver.Increment) -> str:
+    if increment.status == solver.Status.FALLING:
+        if response.swings:
+            return "pseudo-motion: the mechanism at the limit load, followed to first order and out of scale"
+        return "no equilibrium, no dynamics: the mechanism followed step by step"
+    if response.limits:
+        lowest = len(response.path) > 1 and not response.parameter.is_path and _decides(response, increment)
+        words = f"limit state, {response.limits[0].flow} friction"
+        return words + (f"   ·   the lowest of {len(response.path)} positions" if lowest else "")
+    last = response.path[-1]
+    if (increment.phase, increment.parameter) == (last.phase, last.parameter):
+        if response.stop == solver.Status.COLLAPSED:
+            return f"last equilibrium before {lost_text(response)}"
+        if response.stop == solver.Status.SOLVER_FAILED:
+            return "last equilibrium found before the solver failed"
+    return "equilibrium"
+
+
+def _decides(response: solver.Response, increment: solver.Increment) -> bool:
+    lowest = response.governing
+    return lowest is not None and lowest.parameter == increment.parameter

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
@@ -24,12 +25,14 @@ from .annotations import (
     resultants,
     settlement_arrows,
 )
-from .captions import FAILED_BADGE, FALL_BADGE, badge_of, lost_text, matters, state_text
-from .curves import CurvePanel
+from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, matters
 from .flat_scene import Scene, magnified
 from .frame import ColourBar, Key, Sheet, framed, write_labels
 from .live_load import LiveLoads
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
+
+if TYPE_CHECKING:
+    from .curves import CurvePanel
 
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
@@ -152,14 +155,19 @@ class Drawer:
         assembly = self.assembly = response.assembly
         self.joints = initial_joints(assembly)
         self._swing = swing_of(response) if look.colour_by == "mechanism" else None
-        self._seen = _Seen(sampled=_sampled([k for k, i in enumerate(increments) if matters(i, response)]))
+        self._seen = _Seen(sampled=sampled([k for k, i in enumerate(increments) if matters(i, response)]))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = framed(assembly, chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
         bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
         beside = round(0.36 * size[0]) if curve else 0
         self.sheet = Sheet(size, bar, beside)
-        self.panel = CurvePanel(response, _size_of(self.sheet.beside), self.sheet.text) if curve else None
+        self.panel: CurvePanel | None = None
+        if curve:
+            # Figures and axes of matplotlib are loaded where a curve is drawn only.
+            from .curves import CurvePanel
+
+            self.panel = CurvePanel(response, size_of(self.sheet.beside), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
         frame = frame.holding(self.live.tails)
         fill = palette.block_colours(assembly.materials, assembly.free)
@@ -181,14 +189,14 @@ class Drawer:
         """
         seen, look = self._seen, self.look
         for number, increment in enumerate(self.increments):
-            seen.largest = max(seen.largest, _largest_displacement(self.assembly, increment))
+            seen.largest = max(seen.largest, largest_displacement(self.assembly, increment))
             if look.joints:
                 found = marks_of(self.assembly, self.joints, self._shown(increment), increment.pose)
                 seen.cracks |= len(found.cracks) + len(found.faces) > 0
                 seen.sliding |= len(found.sliding) > 0
                 seen.hinges |= len(found.hinges) > 0
             if look.forces != "none" and matters(increment, self.response):
-                sizes = np.hypot(*_joint_forces(increment, look.forces)[1].T)
+                sizes = np.hypot(*joint_forces(increment, look.forces)[1].T)
                 seen.largest_force = max(seen.largest_force, float(sizes.max(initial=0.0)))
                 if number in seen.sampled:
                     seen.forces.append(sizes)
@@ -225,7 +233,7 @@ class Drawer:
         increment = increment if pose is not None else self._shown(increment)
         true = increment.pose if pose is None else pose
         shown = magnified(self.assembly, true, self.look.magnification)
-        at = increment.with_arrays(pose=true, contacts=_contacts_at(increment, true)) if pose is not None else increment
+        at = increment.with_arrays(pose=true, contacts=contacts_at(increment, true)) if pose is not None else increment
         self.scene.pose(shown, self._block_colours(true))
         if blocks_only:
             self.scene.clear(*OF_STATICS)
@@ -237,7 +245,7 @@ class Drawer:
             self._draw_live_load(increment, shown)
         falling = increment.status == solver.Status.FALLING
         failed = self.response.stop == solver.Status.SOLVER_FAILED
-        head, detail = _caption(self.response, increment, self.look)
+        head, detail = caption_of(self.response, increment, self.look.magnification)
         picture = self.scene.image()
         if widths and self.look.joints and not falling:
             self._write_widths(picture, true, shown)
@@ -246,7 +254,7 @@ class Drawer:
             title=title or head,
             detail=note or detail,
             badge=badge or (badge_of(self.response) if falling else FAILED_BADGE if failed else ""),
-            keys=self.keys(),
+            keys=self._keys_of_tints() if blocks_only else self.keys(),
             pixel=self.scene.pixel,
             beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, parameter=s)),
         )
@@ -296,12 +304,7 @@ class Drawer:
     def keys(self) -> list[Key]:
         """Return the legend: what is marked in any of the increments, so that it is the same in all pictures."""
         if self._keys is None:
-            keys = []
-            if self._swing is not None and self._swing.moves:
-                together = int(self._swing.parts.max(initial=-1)) + 1 <= MOST_PARTS
-                colour = palette.PARTS[0] if together else palette.RAMP[5]
-                words = "parts of the last mechanism" if together else "faster in the last mechanism"
-                keys.append(Key("area", words, (int(colour[0]), int(colour[1]), int(colour[2]))))
+            keys = self._keys_of_tints()
             if self.look.joints:
                 seen = self._seen
                 keys += [Key("area", "open joint", palette.OPEN)] if seen.cracks else []
@@ -326,6 +329,15 @@ class Drawer:
                 keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT))
             self._keys = keys
         return self._keys
+
+    def _keys_of_tints(self) -> list[Key]:
+        """Return what the legend says of the colours of the blocks: all of it where only they are drawn."""
+        if self._swing is None or not self._swing.moves:
+            return []
+        together = int(self._swing.parts.max(initial=-1)) + 1 <= MOST_PARTS
+        red, green, blue = palette.PARTS[0] if together else palette.RAMP[5]
+        words = "parts of the last mechanism" if together else "faster in the last mechanism"
+        return [Key("area", words, (int(red), int(green), int(blue)))]
 
     @property
     def many(self) -> bool:
@@ -382,7 +394,7 @@ class Drawer:
             # Without equilibrium the forces have no meaning.
             scene.clear("force", "force line")
             return
-        points, forces, blocks = _joint_forces(increment, self.look.forces)
+        points, forces, blocks = joint_forces(increment, self.look.forces)
         size = np.hypot(*forces.T)
         kept = size > SMALLEST_RESULTANT * size.max(initial=0.0)
         points, forces, blocks, size = points[kept], forces[kept], blocks[kept], size[kept]
@@ -394,7 +406,7 @@ class Drawer:
         bars = [points - half - side, points + half - side, points + half + side, points - half + side]
         scene.polygons("force", np.stack(bars, axis=1), palette.FORCE)
         if self.look.forces == "thrust":
-            scene.lines("force line", _thrust_line(points, blocks, self.assembly), palette.FORCE, scene.size[1] / 500.0)
+            scene.lines("force line", thrust_line(points, blocks, self.assembly), palette.FORCE, scene.size[1] / 500.0)
 
     def _force_scale(self) -> tuple[float, float]:
         """Length per force [m/N] and the force of the legend [N]; 0 where none is drawn."""
@@ -463,18 +475,18 @@ class Drawer:
         scene = self.scene
         thick = weight * scene.size[1] / 110.0 * scene.pixel
         for name, grown, colour in (("rim", 1.0, palette.PAPER), ("top", 0.0, fill)):
-            shafts, heads = _arrow_shapes(tails, tips, thick, grown * weight * scene.size[1] / 360.0 * scene.pixel)
+            shafts, heads = arrow_shapes(tails, tips, thick, grown * weight * scene.size[1] / 360.0 * scene.pixel)
             scene.polygons(f"{layer} {name}/shaft", shafts, colour)
             scene.polygons(f"{layer} {name}/head", heads, colour)
 
 
-def _sampled(numbers: list[int]) -> frozenset[int]:
+def sampled(numbers: list[int]) -> frozenset[int]:
     """Up to ``FORCES_OF`` of the numbers, evenly chosen."""
     chosen = np.linspace(0, len(numbers) - 1, min(len(numbers), FORCES_OF)).round().astype(int)
     return frozenset(numbers[k] for k in chosen)
 
 
-def _arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: float) -> tuple[np.ndarray, np.ndarray]:
+def arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: float) -> tuple[np.ndarray, np.ndarray]:
     """Shafts (n, 4, 2) and heads (n, 3, 2) of arrows, a margin ``grown`` larger all around [m]."""
     along = tips - tails
     length = np.hypot(*along.T)
@@ -493,7 +505,8 @@ def _arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: floa
     return shafts, heads
 
 
-def _joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find points (n, d) [m], forces (n, d) [N] and blocks (n, 2) of the resultants, or by "points" of all contacts."""
     if kind == "thrust":
         return resultants(increment)
     contacts = increment.contacts
@@ -503,69 +516,36 @@ def _joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, n
     return contacts.points[carrying], force[carrying], blocks[carrying]
 
 
-def _thrust_line(points: np.ndarray, blocks: np.ndarray, assembly: solver.Assembly) -> np.ndarray:
-    """(n, 2, 2) array [m]: the line from joint to joint, where every block has two at most: an arch, a column."""
+def thrust_line(points: np.ndarray, blocks: np.ndarray, assembly: solver.Assembly) -> np.ndarray:
+    """(n, 2, d) array [m]: the line from joint to joint, where every block has two at most: an arch, a column."""
     owner = np.concatenate([blocks[:, 0], blocks[:, 1]])
     which = np.concatenate([np.arange(len(blocks))] * 2)
     counts = np.bincount(owner, minlength=assembly.n_blocks)
     if counts[assembly.free].max(initial=0) > 2:
-        return np.zeros((0, 2, 2))
+        return np.zeros((0, 2, points.shape[1]))
     order = np.argsort(owner, kind="stable")
     owner, which = owner[order], which[order]
     pairs = (owner[1:] == owner[:-1]) & assembly.free[owner[1:]]
     return np.stack([points[which[:-1][pairs]], points[which[1:][pairs]]], axis=1)
 
 
-def _contacts_at(increment: solver.Increment, pose: solver.Pose) -> solver.Contacts:
+def contacts_at(increment: solver.Increment, pose: solver.Pose) -> solver.Contacts:
     """Contact points of an increment, carried to a pose nearby."""
     contacts = increment.contacts
     points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
     return replace(contacts, points=points)
 
 
-def _caption(response: solver.Response, increment: solver.Increment, look: Look) -> tuple[str, str]:
-    """First and second line of the caption: what is true of the increment, in frames between two of the one before."""
-    parts = [_state(response, increment)]
-    if len(response.settlements) > 1:
-        parts.append(f"phase {increment.phase + 1} of {len(response.settlements)}")
-    # A mechanism that swings out of a limit state has no scale.
-    if not (response.swings and increment.status == solver.Status.FALLING):
-        parts.append("true scale" if look.magnification == 1.0 else f"displacements × {look.magnification:g}")
-    parts.append(f"W = {force_text(response.total_weight)}")
-    return state_text(increment, response), "   ·   ".join(parts)
-
-
-def _state(response: solver.Response, increment: solver.Increment) -> str:
-    if increment.status == solver.Status.FALLING:
-        if response.swings:
-            return "pseudo-motion: the mechanism at the limit load, followed to first order and out of scale"
-        return "no equilibrium, no dynamics: the mechanism followed step by step"
-    if response.limits:
-        lowest = len(response.path) > 1 and not response.parameter.is_path and _decides(response, increment)
-        words = f"limit state, {response.limits[0].flow} friction"
-        return words + (f"   ·   the lowest of {len(response.path)} positions" if lowest else "")
-    last = response.path[-1]
-    if (increment.phase, increment.parameter) == (last.phase, last.parameter):
-        if response.stop == solver.Status.COLLAPSED:
-            return f"last equilibrium before {lost_text(response)}"
-        if response.stop == solver.Status.SOLVER_FAILED:
-            return "last equilibrium found before the solver failed"
-    return "equilibrium"
-
-
-def _decides(response: solver.Response, increment: solver.Increment) -> bool:
-    lowest = response.governing
-    return lowest is not None and lowest.parameter == increment.parameter
-
-
-def _largest_displacement(assembly: solver.Assembly, increment: solver.Increment) -> float:
+def largest_displacement(assembly: solver.Assembly, increment: solver.Increment) -> float:
+    """Largest displacement [m] of a corner of a free block since the layout."""
     moved = solver.moved_vertices(assembly, increment.pose) - assembly.vertices
-    return float(np.hypot(*moved.T)[assembly.free[assembly.block_of_vertex]].max(initial=0.0))
+    return float(np.linalg.norm(moved, axis=1)[assembly.free[assembly.block_of_vertex]].max(initial=0.0))
 
 
 def _edges(assembly: solver.Assembly, corners: np.ndarray) -> np.ndarray:
     return np.stack([corners, corners[assembly.next_vertex]], axis=1)
 
 
-def _size_of(box: tuple[int, int, int, int]) -> tuple[int, int]:
+def size_of(box: tuple[int, int, int, int]) -> tuple[int, int]:
+    """Width and height of a box of left, top, right and bottom."""
     return box[2] - box[0], box[3] - box[1]

@@ -123,7 +123,9 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     out, sys.stdout = sys.stdout.buffer, sys.stderr
     from . import render
+    from .video import find_encoder
 
+    find_encoder()
     try:
         response, path, fall = pickle.load(sys.stdin.buffer)
     except EOFError:

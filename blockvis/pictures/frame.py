@@ -15,6 +15,9 @@ from blockvis.numbers import length_text, rounded_length
 
 from . import palette
 
+#: Names of fewer pixels are not written.
+SMALLEST_NAME = 8
+
 #: Height of the text as a fraction of the height of the picture, and its least size in pixels.
 TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 36.0, 12
 
@@ -249,6 +252,28 @@ def write_labels(picture: Image.Image, places: np.ndarray, words: Sequence[str],
             return
 
 
+def write_names(picture: Image.Image, names: Sequence[str], places: np.ndarray, room: np.ndarray) -> None:
+    """Write names on a picture where they fit, with a pale rim.
+
+    Parameters
+    ----------
+    picture : PIL.Image.Image
+        Drawn upon.
+    names : sequence of str
+    places : (n, 2) array [pixel]
+        The middle of each name.
+    room : (n,) array [pixel]
+        How wide it may be.
+    """
+    draw = ImageDraw.Draw(picture)
+    largest = round(picture.height / 55.0)
+    for name, (x, y), wide in zip(names, places.tolist(), room.tolist(), strict=True):
+        # A letter is some 0.6 of its size wide.
+        size = min(largest, int(0.85 * wide / (0.6 * max(len(name), 1))))
+        if size >= SMALLEST_NAME:
+            draw.text((x, y), name, palette.INK, _font(size), anchor="mm", stroke_width=2, stroke_fill=(255, 255, 255))
+
+
 def _swatch(draw: ImageDraw.ImageDraw, key: Key, x: float, y: float, wide: float, text: float) -> None:
     if key.kind == "area":
         draw.rectangle((x, y - 0.38 * text, x + wide, y + 0.38 * text), fill=key.colour)
@@ -285,7 +310,7 @@ class Frame:
 
     Attributes
     ----------
-    low, high : (2,) arrays [m]
+    low, high : (d,) arrays [m]
         Opposite corners.
     """
 
@@ -294,7 +319,7 @@ class Frame:
 
     @property
     def size(self) -> np.ndarray:
-        """(2,) array [m]: width and height."""
+        """(d,) array [m]: width and height, in space depth and height."""
         return self.high - self.low
 
     def holding(self, points: np.ndarray) -> Frame:
@@ -315,17 +340,21 @@ class Frame:
 
 
 class _Box:
-    """Bounds of all points so far."""
+    """Bounds of all points so far, in d dimensions."""
 
-    def __init__(self) -> None:
-        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
+    def __init__(self, d: int) -> None:
+        self.low, self.high = np.full(d, np.inf), np.full(d, -np.inf)
 
     def hold(self, points: np.ndarray) -> None:
         self.low, self.high = np.minimum(self.low, points.min(axis=0)), np.maximum(self.high, points.max(axis=0))
 
 
 def framed(
-    assembly: solver.Assembly, poses: Iterable[solver.Pose], margin: float = 0.04, supports: float = 0.13
+    assembly: solver.Assembly,
+    poses: Iterable[solver.Pose],
+    margin: float = 0.04,
+    supports: float = 0.13,
+    axes: np.ndarray | None = None,
 ) -> Frame:
     """Frame in which every free block stays over all poses.
 
@@ -339,11 +368,15 @@ def framed(
     supports : float
         Supports are shown as far as this fraction of the larger dimension beyond the free blocks; layouts have
         supports of any extent.
+    axes : (2, d) array, optional
+        Unit vectors to the right and up in the picture; the axes of the drawing by default.
     """
     free = assembly.free[assembly.block_of_vertex]
-    inner, outer = _Box(), _Box()
+    d = assembly.dimension if axes is None else len(axes)
+    inner, outer = _Box(d), _Box(d)
     for pose in poses:
         corners = solver.moved_vertices(assembly, pose)
+        corners = corners if axes is None else corners @ axes.T
         inner.hold(corners[free] if free.any() else corners)
         outer.hold(corners[~free] if (~free).any() else corners)
     low, high = inner.low, inner.high

@@ -28,21 +28,20 @@ def draw_inspection(inspection: Inspection | SolidInspection, path: str | Path) 
 
     Parameters
     ----------
-    inspection : Inspection
+    inspection : Inspection or SolidInspection
     path : str or Path
-        .png, .svg or .pdf.
+        .png, .svg or .pdf; of blocks in space .png or .pdf.
 
     Returns
     -------
     pathlib.Path
     """
+    if isinstance(inspection, SolidInspection):
+        from .solid_inspection import draw_solid_inspection
+
+        return draw_solid_inspection(inspection, path)
     from matplotlib.figure import Figure
 
-    if isinstance(inspection, SolidInspection):
-        raise ValueError(
-            f"'{inspection.layout.source}' has its blocks in space; blockvis convert writes them to .vtu for a "
-            "viewer such as ParaView, or one view of them by --dimension 2 --view xz"
-        )
     layout = inspection.layout
     found = f", joint_thickness {inspection.joint_thickness * 1e3:g} mm found" if len(inspection.joints) else ""
     low, high = _box(inspection)

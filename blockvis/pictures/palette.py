@@ -16,6 +16,8 @@ SLIDING = (126, 55, 178)
 FORCE = (20, 92, 168)
 HINGE = (17, 17, 17)
 SETTLEMENT = (0, 121, 107)
+#: Of supports that move, where their motion is not hatched.
+MOVING = (127, 187, 180)
 LIVE = (190, 24, 118)
 WARNING = (190, 30, 30)
 
@@ -34,6 +36,9 @@ PARTS = np.array(
 
 #: Blocks of one material differ in lightness by up to this fraction, which distinguishes neighbours.
 SHADE = 0.035
+
+#: Cracks in space, from narrow to wide: all stand out from stone.
+CRACKS = np.array([(244, 162, 97), (226, 78, 27), (122, 16, 16)], dtype=float)
 
 #: Pale to deep blue-green, even in lightness, and light enough at its end for outlines to show.
 RAMP = np.array(
@@ -88,10 +93,19 @@ def part_colours(fill: np.ndarray, parts: np.ndarray) -> np.ndarray:
 
 def displacement_colours(fraction: np.ndarray) -> np.ndarray:
     """(n, 3) uint8 array: colours of the displacement scale, ``fraction`` (n,) from 0 to 1, clamped."""
-    place = np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0) * (len(RAMP) - 1)
-    below = np.minimum(place.astype(int), len(RAMP) - 2)
-    rest = (place - below)[:, None]
-    return np.rint(RAMP[below] * (1.0 - rest) + RAMP[below + 1] * rest).astype(np.uint8)
+    return _on_ramp(RAMP, fraction)
+
+
+def crack_colours(fraction: np.ndarray) -> np.ndarray:
+    """(..., 3) uint8 array: colours of cracks in space by their opening, ``fraction`` from 0 to 1, clamped."""
+    return _on_ramp(CRACKS, fraction)
+
+
+def _on_ramp(ramp: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+    place = np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0) * (len(ramp) - 1)
+    below = np.minimum(place.astype(int), len(ramp) - 2)
+    rest = (place - below)[..., None]
+    return np.rint(ramp[below] * (1.0 - rest) + ramp[below + 1] * rest).astype(np.uint8)
 
 
 def hexadecimal(colour: tuple[int, int, int]) -> str:

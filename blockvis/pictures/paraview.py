@@ -9,13 +9,14 @@ from string import Template
 from blockvis.atomic_files import write_whole
 
 from . import palette
+from .solid_view import ABOVE, AROUND, View
 
 _SCRIPT = Template('''\
 """Opens these results in ParaView: View > Python Shell > Run Script, or paraview --script=paraview_colours.py
 
 Blocks are coloured by displacement [m], with their outlines, open joints by their opening [m]; hinges and sliding
 points by state, with arrows of the contact forces [N]. Cells are triangulated first: ParaView fills bent polygons
-wrongly otherwise.
+wrongly otherwise. Blocks in space are as of glass, so that the faces of their open joints are seen.
 """
 
 import os
@@ -27,7 +28,6 @@ view = GetActiveViewOrCreate("RenderView")
 view.Background = [1.0, 1.0, 1.0]
 view.UseColorPaletteForBackground = 0
 view.OrientationAxesVisibility = 0
-view.InteractionMode = "2D"
 
 blocks = OpenDataFile(os.path.join(here, "blocks.pvd"))
 contacts = OpenDataFile(os.path.join(here, "contacts.pvd"))
@@ -43,6 +43,9 @@ scene.AnimationTime = last
 UpdatePipeline(last, blocks)
 UpdatePipeline(last, contacts)
 UpdatePipeline(last, joints)
+x0, x1, y0, y1, z0, z1 = blocks.GetDataInformation().GetBounds()
+in_space = z1 - z0 > 0.0
+view.InteractionMode = "3D" if in_space else "2D"
 
 surface = ExtractSurface(Input=blocks)
 RenameSource("blocks, surface", surface)
@@ -50,7 +53,8 @@ filled = Triangulate(Input=surface)
 RenameSource("blocks, filled", filled)
 faces = Show(filled, view)
 faces.Representation = "Surface"
-faces.Ambient, faces.Diffuse, faces.Specular = 1.0, 0.0, 0.0
+faces.Ambient, faces.Diffuse, faces.Specular = (0.5, 0.6, 0.0) if in_space else (1.0, 0.0, 0.0)
+faces.Opacity = 0.45 if in_space else 1.0
 ColorBy(faces, ("CELLS", "displacement", "Magnitude"))
 scale = GetColorTransferFunction("displacement")
 scale.RGBPoints = [$ramp]
@@ -116,8 +120,7 @@ forces = Glyph(Input=carrying, GlyphType="Arrow")
 forces.OrientationArray, forces.ScaleArray = ["POINTS", "force"], ["POINTS", "force"]
 UpdatePipeline(last, carrying)
 largest = carrying.PointData["normal_force"].GetRange()[1] if carrying.PointData.GetNumberOfArrays() else 0.0
-low, high = blocks.GetDataInformation().GetBounds()[0:2]
-forces.ScaleFactor = 0.1 * (high - low) / largest if largest > 0 else 1.0
+forces.ScaleFactor = 0.1 * (x1 - x0) / largest if largest > 0 else 1.0
 forces.GlyphMode = "All Points"
 RenameSource("contact forces", forces)
 arrows = Show(forces, view)
@@ -125,6 +128,11 @@ arrows.ColorArrayName = ["POINTS", ""]
 arrows.AmbientColor = arrows.DiffuseColor = [$force]
 arrows.Ambient, arrows.Diffuse = 1.0, 0.0
 
+if in_space:
+    view.CameraParallelProjection = 1
+    view.CameraFocalPoint = [(x0 + x1) / 2.0, (y0 + y1) / 2.0, (z0 + z1) / 2.0]
+    view.CameraPosition = [at + far for at, far in zip(view.CameraFocalPoint, [$eye])]
+    view.CameraViewUp = [0.0, 0.0, 1.0]
 ResetCamera(view)
 Render(view)
 ''')
@@ -155,6 +163,7 @@ def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
         sliding=_fractions(palette.SLIDING),
         hinge=_fractions(palette.HINGE),
         force=_fractions(palette.FORCE),
+        eye=", ".join(f"{component:.4f}" for component in View(AROUND[0], ABOVE).axes[2]),
     )
     return write_whole(path, text)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,10 @@ import solver
 
 from . import palette
 from .frame import framed
+
+#: A fall of so many frames needs no others; how many a mechanism has that swings out, and how far it goes, in motions
+#: of :class:`Swing`.
+ENOUGH_FRAMES, SWING_FRAMES, SWING_REACH = 8, 15, 1.2
 
 #: Up to this many parts of a mechanism are tinted one by one.
 MOST_PARTS = 16
@@ -29,12 +33,15 @@ class Swing:
         As ``solver.rigid_parts`` gives them.
     moves : bool
         Whether anything moves.
+    motion : (n_blocks, n_dof) array
+        From the increment's pose to the displaced one.
     """
 
     increment: solver.Increment
     displaced: solver.Pose
     parts: np.ndarray
     moves: bool
+    motion: np.ndarray
 
 
 def swing_of(response: solver.Response) -> Swing:
@@ -53,11 +60,40 @@ def swing_of(response: solver.Response) -> Swing:
     fastest = float(speeds.max(initial=0.0))
     if response.collapse is None and fastest > 0.0:
         # Without collapse a single loose brick may be the fastest: it would make the motion of the whole invisible.
-        fastest = _exceeded_by(0.01, speeds, assembly.areas) or fastest
+        fastest = _exceeded_by(0.01, speeds, assembly.shapes.volumes) or fastest
         motion = motion * np.minimum(1.0, fastest / np.maximum(speeds, fastest))[:, None]
     reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
-    displaced = solver.swung(last.pose, motion * (reach / fastest if fastest > 0 else 0.0))
-    return Swing(last, displaced, solver.rigid_parts(assembly, last), fastest > 0.0)
+    motion = motion * (reach / fastest if fastest > 0 else 0.0)
+    displaced = solver.swung(last.pose, motion)
+    return Swing(last, displaced, solver.rigid_parts(assembly, last), fastest > 0.0, motion)
+
+
+def shown_increments(response: solver.Response) -> tuple[solver.Increment, ...]:
+    """Increments that films and pages show: those of a response, and in space enough frames of a fall.
+
+    In space blocks that fall soon meet others, and the analysis ends there; the mechanism then swings out instead, ever
+    faster, as it begins at the last equilibrium.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    path = response.path
+    if response.assembly.dimension == 2 or response.collapse is None or not path:
+        return response.increments
+    if len(response.increments) - len(path) >= ENOUGH_FRAMES:
+        return response.increments
+    swing = swing_of(response)
+    if not swing.moves:
+        return response.increments
+    last, contacts = swing.increment, swing.increment.contacts
+    frames = []
+    for k in range(1, SWING_FRAMES + 1):
+        pose = solver.swung(last.pose, SWING_REACH * (k / SWING_FRAMES) ** 2 * swing.motion)
+        points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, last.pose, pose)
+        frame = replace(last, status=solver.Status.FALLING, checkpoint=None)
+        frames.append(frame.with_arrays(pose=pose, contacts=replace(contacts, points=points)))
+    return (*path, *frames)
 
 
 def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing) -> np.ndarray:
@@ -72,7 +108,7 @@ def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing)
     """
     if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
         return palette.part_colours(fill, swing.parts)
-    travel = np.hypot(*(swing.displaced.positions - swing.increment.pose.positions).T)
+    travel = np.linalg.norm(swing.displaced.positions - swing.increment.pose.positions, axis=1)
     tints = palette.displacement_colours(0.75 * travel / travel[assembly.free].max())
     return np.where(assembly.free[:, None], tints, fill)
 
@@ -81,12 +117,13 @@ def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) ->
     """(n_blocks,) array: speed of the fastest corner of each free block, zero for supports."""
     block = assembly.block_of_vertex
     velocity = solver.point_velocities(solver.moved_vertices(assembly, pose), block, pose, motion)
-    speeds = np.maximum.reduceat(np.hypot(*velocity.T), assembly.offsets[:-1])
+    speeds = np.zeros(assembly.n_blocks)
+    np.maximum.at(speeds, block, np.linalg.norm(velocity, axis=1))
     return np.where(assembly.free, speeds, 0.0)
 
 
-def _exceeded_by(share: float, speeds: np.ndarray, areas: np.ndarray) -> float:
-    """Speed that blocks of this share of the moving area reach or exceed."""
+def _exceeded_by(share: float, speeds: np.ndarray, volumes: np.ndarray) -> float:
+    """Speed that blocks of this share of the moving volume reach or exceed."""
     order = np.argsort(speeds)[::-1]
-    moving = np.where(speeds[order] > 0.0, areas[order], 0.0).cumsum()
+    moving = np.where(speeds[order] > 0.0, volumes[order], 0.0).cumsum()
     return float(speeds[order[np.searchsorted(moving, share * moving[-1])]])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import importlib
 import os
 import shutil
 from collections.abc import Iterable, Sequence
@@ -98,6 +99,12 @@ def write_film(
         if partial.is_file() and not _reaches_its_end(partial):
             raise _not_written(path, None)
     return path
+
+
+def find_encoder() -> None:
+    """Load what writes films and find its program, for who has nothing else to do yet."""
+    importlib.import_module("imageio.v2")
+    importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
 
 
 def _encode(frames: Iterable[Image.Image], path: Path, fps: float, holds: Sequence[int] | None) -> None:

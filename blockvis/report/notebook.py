@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
+import io
 import tempfile
 from collections import Counter
 from dataclasses import dataclass
@@ -97,17 +98,28 @@ def collapse_html(collapse: solver.Collapse) -> str:
 
 def assembly_html(assembly: solver.Assembly) -> str:
     """Show an assembly: its blocks by material, supports grey, those that move outlined, and its numbers."""
-    width, height = np.ptp(assembly.vertices, axis=0)
+    size = " × ".join(f"{length:.4g} m" for length in np.ptp(assembly.vertices, axis=0))
     counts = Counter(map(str, assembly.roles))
     weight = float((assembly.masses * solver.GRAVITY)[assembly.free].sum())
     materials = [f"{name} {n}" for name, n in sorted(Counter(assembly.materials).items()) if name]
     rows = [
         ("blocks", f"{assembly.n_blocks}: " + ", ".join(f"{counts[r]} {r}" for r in solver.ROLES if counts[r])),
-        ("size", f"{width:.4g} m × {height:.4g} m"),
+        ("size", size),
         ("weight", force_text(weight)),
         *([("materials", ", ".join(materials))] if materials else []),
     ]
-    return f"<div>{_drawn(assembly)}{_table(rows)}</div>"
+    picture = _drawn(assembly) if assembly.dimension == 2 else _drawn_in_space(assembly)
+    return f"<div>{picture}{_table(rows)}</div>"
+
+
+def _drawn_in_space(assembly: solver.Assembly) -> str:
+    """Draw blocks in space as PNG, at twice the pixels that it is shown with."""
+    from blockvis.pictures.solid_inspection import blocks_picture, role_colours
+
+    buffer = io.BytesIO()
+    blocks_picture(assembly, (2 * WIDE, 2 * HIGH), role_colours(assembly)).save(buffer, "PNG")
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return f'<img alt="blocks" width="{WIDE}" src="data:image/png;base64,{data}">'
 
 
 def _drawn(assembly: solver.Assembly) -> str:

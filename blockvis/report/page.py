@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import base64
 import html
 import json
 import os
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources import files
@@ -45,24 +43,24 @@ from blockvis.pictures.captions import (
 )
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
-from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, swing_of
+from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.results.about import about, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.runs.kinds import KINDS
 
+from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, hexadecimals, rounded
+from .space import model_in_space
+
 #: Increments beyond this many are thinned out evenly; the page stays below 2 MB for a thousand blocks. Of more than
 #: four thousand blocks fewer are shown, so that poses times blocks stay what a browser can hold.
 MOST_FRAMES, MOST_POSES, FEWEST_FRAMES = 160, 640_000, 24
 
-#: Lengths are stored in this fraction of the extent of the structure, rotations in this many radians.
-FINENESS, TURN_UNIT = 1e-6, 1e-6
-
-#: Forces are stored in this fraction of the largest.
-FORCE_FINENESS = 1e-3
-
 #: Seconds the path takes at even settlement, each frame of a fall without time, and the pause before a fall.
 PATH_SECONDS, FALL_SECONDS, PAUSE = 6.0, 0.06, 0.6
+
+#: How the picture of blocks in space is turned and moved.
+TURNING = "the mouse or Shift with the arrows turns the picture, the mouse with Shift moves it"
 
 #: Crack lines that the table of the page lists.
 LISTED_CRACKS = 8
@@ -138,7 +136,8 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
         badge=html.escape(FALL_BADGE if fall is not None else badge_of(response)),
         notes=_notes(response),
         style=(page / "player.css").read_text(encoding="utf-8"),
-        script=(page / "player.js").read_text(encoding="utf-8"),
+        script=_script(response.assembly.dimension),
+        turning=TURNING if response.assembly.dimension == 3 else "Shift with the arrows moves the picture",
         summary=html_rows(summary_rows(response, fall)),
         cracks=_cracks(response),
         certificate=html_rows(_certificate(response)),
@@ -146,6 +145,13 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
         case_open=" open" if case_text else "",
         model=data,
     )
+
+
+def _script(dimension: int) -> str:
+    """Put what draws blocks in the plane, or in space, into the script of the page."""
+    page = files("blockvis") / "report"
+    scene = (page / ("space.js" if dimension == 3 else "plane.js")).read_text(encoding="utf-8")
+    return (page / "player.js").read_text(encoding="utf-8").replace("  // SCENE\n", scene)
 
 
 def headline_of(response: solver.Response) -> str:
@@ -163,7 +169,7 @@ def _notes(response: solver.Response) -> str:
 
 def _cracks(response: solver.Response) -> str:
     """List the crack lines of the last equilibrium."""
-    if not response.path or response.assembly.dimension != 2:
+    if not response.path or response.assembly.dimension == 3:
         return ""
     rows = crack_rows(cracks_of(response.assembly, response.path[-1].pose), LISTED_CRACKS)
     return f'<h2>Cracks at the last equilibrium</h2><table id="crack-lines">{html_rows(rows)}</table>' if rows else ""
@@ -182,7 +188,7 @@ def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> li
         return _Frame(swing.increment if increment is governing else increment, place.get(id(increment), len(path)))
 
     if fall is None or not path:
-        return [framed_at(increment) for increment in _thinned(response.increments, most)]
+        return [framed_at(increment) for increment in _thinned(shown_increments(response), most)]
     n = min(len(fall) - 1, most // 2)
     chosen = np.linspace(len(fall) - 1, 1, n).round().astype(int)[::-1]
     falling = [
@@ -196,6 +202,45 @@ def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
     swing = swing_of(response)
     frames = _frames_of(response, swing, fall)
     shown = [frame.increment for frame in frames]
+    if assembly.dimension == 3:
+        own = model_in_space(response, swing, shown)
+    else:
+        own = _model_in_plane(response, shown, None if fall is None else fall.ground)
+    roles = {role: number for number, role in enumerate(solver.ROLES)}
+    fills = palette.block_colours(assembly.materials, assembly.free)
+    return own | {
+        "space": assembly.dimension == 3,
+        "turn_unit": TURN_UNIT,
+        "block_size": assembly.block_size,
+        "smallest_opening": SMALLEST_OPENING * assembly.block_size,
+        "widest": [WIDEST * assembly.block_size, STEEPEST],
+        "names": list(assembly.names),
+        "materials": list(assembly.materials),
+        "roles": [roles[str(role)] for role in assembly.roles],
+        "fills": hexadecimals(fills),
+        "tints": hexadecimals(mechanism_colours(assembly, fills, swing)) if swing.moves else [],
+        "tints_words": _tints_text(response, swing),
+        "moving": int(np.argmax(swing.parts >= 0)),
+        "ramp": hexadecimals(palette.RAMP.astype(int)),
+        "many": assembly.n_blocks > FEW_BLOCKS,
+        "colours": {
+            name: palette.hexadecimal(getattr(palette, name.upper()))
+            for name in (
+                "ink", "outline", "support", "moving", "hatch", "open", "sliding", "force", "hinge", "settlement",
+                "warning", "live",
+            )
+        },
+        "frames": _frames(response, frames),
+        "times": _times(frames),
+        # In a fall in time blocks part and meet anew: what lay between two of them is no joint any more.
+        "joints_of_fall": fall is None,
+        "curve": _curve(response),
+    }  # fmt: skip
+
+
+def _model_in_plane(response: solver.Response, shown: list[solver.Increment], ground: float | None) -> dict[str, Any]:
+    """Pack what only blocks in the plane have: outlines, joints as lines, and what lies on them."""
+    assembly = response.assembly
     frame, largest = _surveyed(assembly, shown)
     live = LiveLoads(response, shown, float(frame.size.max()))
     frame = frame.holding(live.tails)
@@ -206,52 +251,20 @@ def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
     force_length = tables.force_length(assembly.block_size, float(frame.size.max()))
     shown_force = rounded_length(largest)
     packed = _packed_geometry(assembly, origin, unit) | tables.packed() | _packed_live(live, shown, origin, unit)
-    materials = list(assembly.materials)
-    roles = {role: number for number, role in enumerate(solver.ROLES)}
-    fills = palette.block_colours(assembly.materials, assembly.free)
     return {
         "unit": unit,
-        "turn_unit": TURN_UNIT,
         "origin": origin.tolist(),
         "bounds": [*(frame.low - origin).tolist(), *(frame.high - origin).tolist()],
-        "block_size": assembly.block_size,
-        "smallest_opening": SMALLEST_OPENING * assembly.block_size,
-        "widest": [WIDEST * assembly.block_size, STEEPEST],
-        "names": list(assembly.names),
-        "materials": materials,
-        "roles": [roles[str(role)] for role in assembly.roles],
-        "fills": _hexadecimal(fills),
-        "tints": _hexadecimal(mechanism_colours(assembly, fills, swing)) if swing.moves else [],
-        "tints_words": _tints_text(response, swing),
-        "moving": int(np.argmax(swing.parts >= 0)),
-        "ramp": _hexadecimal(palette.RAMP.astype(int)),
         "largest_displacement": tables.largest_displacement,
         "arrows": _arrows(response, frame, origin),
         "has_forces": any(map(len, tables.sizes)),
         "live_words": live.words if live.largest > 0.0 else "",
-        "ground": None if fall is None else float(fall.ground - origin[1]),
-        "many": assembly.n_blocks > FEW_BLOCKS,
-        "colours": {
-            name: palette.hexadecimal(getattr(palette, name.upper()))
-            for name in (
-                "ink", "outline", "support", "hatch", "open", "sliding", "force", "hinge", "settlement", "warning",
-                "live",
-            )
-        },
-        "frames": _frames(response, frames),
-        "times": _times(frames),
-        # In a fall in time blocks part and meet anew: what lay between two of them is no joint any more.
-        "joints_of_fall": fall is None,
-        "curve": _curve(response),
+        "ground": None if ground is None else float(ground - origin[1]),
         "force_unit": FORCE_FINENESS * largest,
         "force_length": force_length,
         "force_scale": [shown_force, force_text(shown_force)],
         "packed": packed,
-    }  # fmt: skip
-
-
-def _hexadecimal(colours: np.ndarray) -> list[str]:
-    return [palette.hexadecimal((int(r), int(g), int(b))) for r, g, b in colours]
+    }
 
 
 def _tints_text(response: solver.Response, swing: Swing) -> str:
@@ -303,28 +316,15 @@ def _surveyed(assembly: solver.Assembly, shown: list[solver.Increment]) -> tuple
     return frame, largest or 1.0
 
 
-def _deflated(values: np.ndarray, rows: int) -> dict[str, Any]:
-    """Integers as differences along the first axis, split in planes of bytes, deflated, in base 64."""
-    table = np.asarray(values).astype("<i4").reshape(rows, -1) if rows else np.zeros((0, 1), dtype="<i4")
-    steps = np.diff(table, axis=0, prepend=np.zeros((1, table.shape[1]), dtype="<i4"))
-    planes = steps.reshape(-1, 1).view(np.uint8).T
-    data = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
-    return {"rows": rows, "columns": table.shape[1], "data": data}
-
-
-def _rounded(values: np.ndarray, unit: float) -> np.ndarray:
-    return np.rint(np.asarray(values, dtype=float) / unit).astype(np.int64).astype(np.int32)
-
-
 def _packed_geometry(assembly: solver.Assembly, origin: np.ndarray, unit: float) -> dict[str, Any]:
     joints = initial_joints(assembly)
     n = len(joints.block_a)
     return {
-        "vertices": _deflated(_rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
-        "offsets": _deflated(assembly.offsets, len(assembly.offsets)),
-        "centroids": _deflated(_rounded(assembly.centroids - origin, unit), assembly.n_blocks),
-        "joint_blocks": _deflated(np.stack([joints.block_a, joints.block_b], axis=1), n),
-        "joint_ends": _deflated(_rounded(joints.ends - origin, unit), n),
+        "vertices": deflated(rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
+        "offsets": deflated(assembly.offsets, len(assembly.offsets)),
+        "centroids": deflated(rounded(assembly.centroids - origin, unit), assembly.n_blocks),
+        "joint_blocks": deflated(np.stack([joints.block_a, joints.block_b], axis=1), n),
+        "joint_ends": deflated(rounded(joints.ends - origin, unit), n),
     }
 
 
@@ -359,18 +359,18 @@ class _Tables:
             if increment.status != solver.Status.FALLING:
                 far = float(np.hypot(*moved[assembly.free, :2].T).max(initial=0.0))
                 self.largest_displacement = max(self.largest_displacement, far)
-            self.travel.append(_rounded(moved[:, :2], unit))
-            self.turn.append(_rounded(moved[:, 2], TURN_UNIT))
+            self.travel.append(rounded(moved[:, :2], unit))
+            self.turn.append(rounded(moved[:, 2], TURN_UNIT))
             points, forces, pairs = resultants(increment)
             size = np.hypot(*forces.T) * (increment.status != solver.Status.FALLING)
             kept = size > SMALLEST_RESULTANT * largest
-            self.places.append(_rounded(points[kept] - origin, unit * coarse) * coarse)
-            self.vectors.append(_rounded(forces[kept], FORCE_FINENESS * largest))
+            self.places.append(rounded(points[kept] - origin, unit * coarse) * coarse)
+            self.vectors.append(rounded(forces[kept], FORCE_FINENESS * largest))
             self.sizes.append(size[kept])
             self.pairs.append(pairs[kept].astype(np.int32))
             hinges, sliding = joint_marks(assembly, increment)
             ends = np.concatenate([np.repeat(hinges[:, None], 2, axis=1), sliding])
-            self.mark_places.append(_rounded(ends - origin, unit).reshape(-1, 4))
+            self.mark_places.append(rounded(ends - origin, unit).reshape(-1, 4))
             self.mark_kinds.append(np.repeat([1, 2], [len(hinges), len(sliding)]))
 
     def force_length(self, block_size: float, extent: float) -> float:
@@ -381,15 +381,15 @@ class _Tables:
         """As the page unpacks them."""
         forces, found = (np.cumsum([len(k) for k in rows]).tolist() for rows in (self.sizes, self.mark_kinds))
         return {
-            "travel": _deflated(np.stack(self.travel), self.n),
-            "turn": _deflated(np.stack(self.turn), self.n),
-            "force_first": _deflated(forces, len(forces)),
-            "force_place": _deflated(np.concatenate(self.places), forces[-1]),
-            "force_vector": _deflated(np.concatenate(self.vectors), forces[-1]),
-            "force_blocks": _deflated(np.concatenate(self.pairs), forces[-1]),
-            "mark_first": _deflated(found, len(found)),
-            "mark_place": _deflated(np.concatenate(self.mark_places), found[-1]),
-            "mark_kind": _deflated(np.concatenate(self.mark_kinds), found[-1]),
+            "travel": deflated(np.stack(self.travel), self.n),
+            "turn": deflated(np.stack(self.turn), self.n),
+            "force_first": deflated(forces, len(forces)),
+            "force_place": deflated(np.concatenate(self.places), forces[-1]),
+            "force_vector": deflated(np.concatenate(self.vectors), forces[-1]),
+            "force_blocks": deflated(np.concatenate(self.pairs), forces[-1]),
+            "mark_first": deflated(found, len(found)),
+            "mark_place": deflated(np.concatenate(self.mark_places), found[-1]),
+            "mark_kind": deflated(np.concatenate(self.mark_kinds), found[-1]),
         }
 
 
@@ -401,9 +401,9 @@ def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndar
     first = np.cumsum([0, *(len(tips) for _, tips in found)]).tolist()
     tails, tips = (np.concatenate([np.zeros((0, 2)), *ends]) for ends in zip(*found, strict=True))
     return {
-        "live_first": _deflated(first, len(first)),
-        "live_tail": _deflated(_rounded(tails - origin, unit), first[-1]),
-        "live_tip": _deflated(_rounded(tips - origin, unit), first[-1]),
+        "live_first": deflated(first, len(first)),
+        "live_tail": deflated(rounded(tails - origin, unit), first[-1]),
+        "live_tip": deflated(rounded(tips - origin, unit), first[-1]),
     }
 
 

@@ -1,5 +1,7 @@
 "use strict";
-// Plays a response: outlines and poses come packed in the page, nothing is fetched.
+// Plays a response: shapes and poses come packed in the page, nothing is fetched. What draws the blocks, in the plane or
+// in space, stands where SCENE is; it has poseAt, paint, fit, blockAt, jointAt, blockText, placeOf, dragged, nudged, faces and
+// forceOf, and fills corners.
 (async () => {
   const $ = (id) => document.getElementById(id);
   const fail = (text) => { $("failure").textContent = text; };
@@ -31,87 +33,19 @@
   }
   const scaled = (name, unit) => Float64Array.from(raw[name], (v) => v * unit);
   const nBlocks = model.names.length, nFrames = model.frames.length;
-  const q = model.unit;
-  const vertices = scaled("vertices", q), offsets = raw.offsets, centroids = scaled("centroids", q);
-  const travel = scaled("travel", q), turn = scaled("turn", model.turn_unit);
-  const joints = { blocks: raw.joint_blocks, ends: scaled("joint_ends", q), n: model.packed.joint_blocks.rows };
-  const forces = { place: scaled("force_place", q), vector: scaled("force_vector", model.force_unit), blocks: raw.force_blocks, first: raw.force_first };
-  const live = { tail: scaled("live_tail", q), tip: scaled("live_tip", q), first: raw.live_first };
-  const marks = { place: scaled("mark_place", q), kind: raw.mark_kind, first: raw.mark_first };
-  const jointsOf = Array.from({ length: nBlocks }, () => []);
-  for (let j = 0; j < joints.n; j++) { jointsOf[joints.blocks[2 * j]].push(j); jointsOf[joints.blocks[2 * j + 1]].push(j); }
-
+  const q = model.unit, norm = Math.hypot;
   const state = { frame: 0, playing: false, clock: 0, magnify: 1, speed: 1, colours: "material", view: null, hover: -1, joint: -1 };
   const layers = { cracks: true, hinges: !model.many, sliding: !model.many, forces: false, thrust: false, start: true };
   const canvas = $("blocks");
-  const corners = new Float64Array(vertices.length), pose = new Float64Array(nBlocks * 3), shown = new Float64Array(nBlocks * 3);
   const still = window.matchMedia("(prefers-reduced-motion: reduce)"), dark = window.matchMedia("(prefers-color-scheme: dark)");
 
   const LIGHT = { paper: "#ffffff", ink: model.colours.ink, grid: "#e4e4e4", ghost: "#8a8a8a" };
   const DARK = { paper: "#17191c", ink: "#e6e6e6", grid: "#3a3d42", ghost: "#9a9a9a" };
   const theme = () => (dark.matches ? DARK : LIGHT);
 
-  // pose: true displacements and rotations; shown and corners: those times the magnification.
-  function poseAt(position) {
-    const k = Math.min(Math.floor(position), nFrames - 1), t = position - k, next = Math.min(k + 1, nFrames - 1);
-    for (let b = 0; b < nBlocks; b++) {
-      const i = (k * nBlocks + b), j = (next * nBlocks + b);
-      pose[3 * b] = travel[2 * i] * (1 - t) + travel[2 * j] * t;
-      pose[3 * b + 1] = travel[2 * i + 1] * (1 - t) + travel[2 * j + 1] * t;
-      pose[3 * b + 2] = turn[i] * (1 - t) + turn[j] * t;
-    }
-    for (let i = 0; i < pose.length; i++) shown[i] = state.magnify * pose[i];
-    for (let b = 0; b < nBlocks; b++) {
-      const c = Math.cos(shown[3 * b + 2]), s = Math.sin(shown[3 * b + 2]), x0 = centroids[2 * b], y0 = centroids[2 * b + 1];
-      for (let v = offsets[b]; v < offsets[b + 1]; v++) {
-        const x = vertices[2 * v] - x0, y = vertices[2 * v + 1] - y0;
-        corners[2 * v] = x0 + shown[3 * b] + c * x - s * y;
-        corners[2 * v + 1] = y0 + shown[3 * b + 1] + s * x + c * y;
-      }
-    }
-  }
-
-  // Where a point of the drawing, riding on a block, is at a pose.
-  function carried(at, b, x, y) {
-    const c = Math.cos(at[3 * b + 2]), s = Math.sin(at[3 * b + 2]), dx = x - centroids[2 * b], dy = y - centroids[2 * b + 1];
-    return [centroids[2 * b] + at[3 * b] + c * dx - s * dy, centroids[2 * b + 1] + at[3 * b + 1] + s * dx + c * dy];
-  }
-
-  const norm = Math.hypot;
-  // The faces of a joint at a pose: ends on both blocks, opening, slip, normal from block b into block a.
-  function faces(at, j) {
-    const a = joints.blocks[2 * j], b = joints.blocks[2 * j + 1], e = joints.ends;
-    const ends = [[e[4 * j], e[4 * j + 1]], [e[4 * j + 2], e[4 * j + 3]]];
-    const [a0, a1] = ends.map((p) => carried(at, a, ...p)), [b0, b1] = ends.map((p) => carried(at, b, ...p));
-    const length = norm(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]);
-    // The outward normal of block b: its face runs from the first end to the second.
-    const nx = (b1[1] - b0[1]) / length, ny = -(b1[0] - b0[0]) / length;
-    const across = [[a0, b0], [a1, b1]].map(([p, r]) => (p[0] - r[0]) * nx + (p[1] - r[1]) * ny);
-    const along = [[a0, b0], [a1, b1]].map(([p, r]) => (p[1] - r[1]) * nx - (p[0] - r[0]) * ny);
-    const closer = Math.abs(across[0]) <= Math.abs(across[1]) ? 0 : 1;
-    const apart = Math.min(norm(a0[0] - b0[0], a0[1] - b0[1]), norm(a1[0] - b1[0], a1[1] - b1[1]));
-    return { a, b, a0, a1, b0, b1, length, nx, ny, opening: Math.max(...across), slip: along[closer], apart, bent: Math.abs(at[3 * a + 2] - at[3 * b + 2]) };
-  }
-
-  // Resultant of a joint on its block a: normal force, compression positive, and shear force; null where there is none.
-  function forceOf(k, face) {
-    if (model.frames[k].falling) return null;
-    const low = Math.min(face.a, face.b), high = Math.max(face.a, face.b);
-    for (let i = forces.first[k]; i < forces.first[k + 1]; i++) {
-      if (forces.blocks[2 * i] !== low || forces.blocks[2 * i + 1] !== high) continue;
-      const sign = face.a === low ? 1 : -1, fx = sign * forces.vector[2 * i], fy = sign * forces.vector[2 * i + 1];
-      return [fx * face.nx + fy * face.ny, -fx * face.ny + fy * face.nx];
-    }
-    return [0, 0];
-  }
+  // SCENE
 
   const MARGIN = 36;
-  function fitted(w, h) {
-    const [x0, y0, x1, y1] = model.bounds, scale = Math.min(w / (x1 - x0), (h - MARGIN) / (y1 - y0));
-    return { scale, x: w / 2 - scale * (x0 + x1) / 2, y: (h - MARGIN) / 2 + scale * (y0 + y1) / 2 };
-  }
-  function fit() { state.view = fitted(canvas.clientWidth, canvas.clientHeight); }
-
   function sharp(target) {
     const ratio = window.devicePixelRatio || 1, w = target.clientWidth, h = target.clientHeight;
     if (target.width !== Math.round(w * ratio) || target.height !== Math.round(h * ratio)) {
@@ -123,113 +57,11 @@
     return pen;
   }
 
-  const px = (x) => state.view.x + state.view.scale * x, py = (y) => state.view.y - state.view.scale * y;
-
-  function ring(pen, points) {
-    pen.beginPath();
-    points.forEach(([x, y], i) => (i ? pen.lineTo(px(x), py(y)) : pen.moveTo(px(x), py(y))));
-    pen.closePath();
-  }
-
-  function outline(pen, points, b) {
-    pen.beginPath();
-    for (let v = offsets[b]; v < offsets[b + 1]; v++) {
-      if (v === offsets[b]) pen.moveTo(px(points[2 * v]), py(points[2 * v + 1])); else pen.lineTo(px(points[2 * v]), py(points[2 * v + 1]));
-    }
-    pen.closePath();
-  }
-
-  function lineBetween(pen, ends) {
-    pen.beginPath();
-    for (const [x0, y0, x1, y1] of ends) { pen.moveTo(px(x0), py(y0)); pen.lineTo(px(x1), py(y1)); }
-    pen.stroke();
-  }
-
-  function hatch() {
-    const tile = document.createElement("canvas"), pen = tile.getContext("2d");
-    tile.width = tile.height = 9;
-    pen.fillStyle = model.colours.support; pen.fillRect(0, 0, 9, 9);
-    pen.strokeStyle = model.colours.hatch; pen.lineWidth = 0.9;
-    pen.beginPath();
-    for (const x of [-9, 0, 9]) { pen.moveTo(x - 1, 10); pen.lineTo(x + 10, -1); }
-    pen.stroke();
-    return canvas.getContext("2d").createPattern(tile, "repeat");
-  }
-  const support = hatch();
-
-  function fillOf(b, vector) {
-    if (model.roles[b]) return vector ? model.colours.support : support;
-    if (state.colours === "mechanism" && model.tints.length) return model.tints[b];
-    if (state.colours === "displacement") {
-      const part = norm(pose[3 * b], pose[3 * b + 1]) / (model.largest_displacement || 1);
-      return mixed(Math.max(0, Math.min(1, part)));
-    }
-    return model.fills[b];
-  }
-
   function mixed(part) {
     const at = part * (model.ramp.length - 1), k = Math.min(Math.floor(at), model.ramp.length - 2);
     const rgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
     const [low, high] = [rgb(model.ramp[k]), rgb(model.ramp[k + 1])];
     return `rgb(${low.map((v, i) => Math.round(v + (high[i] - v) * (at - k))).join(",")})`;
-  }
-
-  // Fills the open joints; returns the middle lines of those too narrow to be seen as areas.
-  function drawCracks(pen) {
-    const lines = [], [widest, steepest] = model.widest;
-    pen.fillStyle = model.colours.open;
-    for (let j = 0; j < joints.n; j++) {
-      const f = faces(shown, j), m = state.magnify;
-      // Blocks that have parted have no joint any more: what lies between them is air.
-      if (f.opening < model.smallest_opening * m || f.apart > m * Math.min(f.length, widest)) continue;
-      state.cracks++;
-      // A wedge that gapes is open to the room: its faces have the colour.
-      if (f.bent > m * steepest) { lines.push([...f.a0, ...f.a1], [...f.b0, ...f.b1]); continue; }
-      ring(pen, [f.a0, f.a1, f.b1, f.b0]);
-      pen.fill();
-      if (f.opening * state.view.scale < 12) lines.push([(f.a0[0] + f.b0[0]) / 2, (f.a0[1] + f.b0[1]) / 2, (f.a1[0] + f.b1[0]) / 2, (f.a1[1] + f.b1[1]) / 2]);
-    }
-    return lines;
-  }
-
-  // Everything in the picture; pen is that of a canvas, or one that writes SVG.
-  function paint(pen, w, h, colours) {
-    const near = Math.min(Math.round(state.frame), nFrames - 1), falling = model.frames[near].falling;
-    pen.lineJoin = "round"; pen.lineCap = "butt";
-    if (model.ground !== null) {
-      pen.strokeStyle = model.colours.hatch; pen.lineWidth = 1.5;
-      pen.beginPath(); pen.moveTo(0, py(model.ground)); pen.lineTo(w, py(model.ground)); pen.stroke();
-    }
-    if (layers.start) drawStart(pen, colours);
-    state.cracks = 0;
-    const lines = layers.cracks && (!falling || model.joints_of_fall) ? drawCracks(pen) : [];
-    pen.strokeStyle = model.colours.outline;
-    pen.lineWidth = Math.max(0.4, Math.min(1.1, model.block_size * state.view.scale / 25));
-    for (let b = 0; b < nBlocks; b++) {
-      outline(pen, corners, b);
-      pen.fillStyle = fillOf(b, pen instanceof SvgPen);
-      pen.fill(); pen.stroke();
-    }
-    pen.strokeStyle = model.colours.open; pen.lineWidth = 1.6; lineBetween(pen, lines);
-    if (state.hover >= 0) {
-      outline(pen, corners, state.hover);
-      pen.strokeStyle = model.colours.settlement; pen.lineWidth = 3; pen.stroke();
-    }
-    if (layers.start && !falling) drawArrows(pen, near);
-    // Marks stand at true scale; magnified, they would not lie on their blocks.
-    if (state.magnify === 1 && Math.abs(state.frame - near) < 0.5) {
-      if (layers.sliding) drawSliding(pen, near);
-      if (!falling) drawForces(pen, near);
-      if (layers.hinges) drawHinges(pen, near);
-      drawLive(pen, near);
-    }
-    scaleBar(pen, w, h, colours);
-  }
-
-  function drawStart(pen, colours) {
-    pen.strokeStyle = colours.ghost; pen.lineWidth = 1.2; pen.setLineDash([5, 4]);
-    for (let b = 0; b < nBlocks; b++) if (model.roles[b] === 2) { outline(pen, vertices, b); pen.stroke(); }
-    pen.setLineDash([]);
   }
 
   function arrow(pen, x0, y0, x1, y1, colour, width) {
@@ -241,57 +73,6 @@
     pen.lineTo(x1 - head * ux - 0.5 * head * uy, y1 - head * uy + 0.5 * head * ux);
     pen.lineTo(x1 - head * ux + 0.5 * head * uy, y1 - head * uy - 0.5 * head * ux);
     pen.closePath(); pen.fill();
-  }
-
-  // Which way the supports go in this phase.
-  function drawArrows(pen, k) {
-    for (const [b, x, y, dx, dy] of model.arrows[model.frames[k].phase] || []) {
-      const [cx, cy] = carried(shown, b, x, y), long = 22;
-      arrow(pen, px(cx) - long * dx, py(cy) + long * dy, px(cx) + long * dx, py(cy) - long * dy, model.colours.settlement, 5);
-    }
-  }
-
-  function drawForces(pen, k) {
-    pen.strokeStyle = model.colours.force; pen.lineCap = "round";
-    if (layers.forces) {
-      const bars = [];
-      for (let i = forces.first[k]; i < forces.first[k + 1]; i++) {
-        const x = forces.place[2 * i], y = forces.place[2 * i + 1];
-        const dx = forces.vector[2 * i] * model.force_length / 2, dy = forces.vector[2 * i + 1] * model.force_length / 2;
-        bars.push([x - dx, y - dy, x + dx, y + dy]);
-      }
-      pen.lineWidth = 2; lineBetween(pen, bars);
-    }
-    if (layers.thrust) { pen.lineWidth = 3; lineBetween(pen, thrustLine(k)); }
-  }
-
-  // From joint to joint, where every free block has two at most: an arch, a column.
-  function thrustLine(k) {
-    const met = Array.from({ length: nBlocks }, () => []);
-    for (let i = forces.first[k]; i < forces.first[k + 1]; i++) for (const b of [forces.blocks[2 * i], forces.blocks[2 * i + 1]]) if (!model.roles[b]) met[b].push(i);
-    if (met.some((of) => of.length > 2)) return [];
-    return met.filter((of) => of.length === 2).map(([i, j]) => [forces.place[2 * i], forces.place[2 * i + 1], forces.place[2 * j], forces.place[2 * j + 1]]);
-  }
-
-  function drawHinges(pen, k) {
-    const radius = Math.max(2.2, Math.min(6.5, 0.09 * model.block_size * state.view.scale));
-    for (let i = marks.first[k]; i < marks.first[k + 1]; i++) {
-      if (marks.kind[i] !== 1) continue;
-      pen.beginPath(); pen.arc(px(marks.place[4 * i]), py(marks.place[4 * i + 1]), radius, 0, 2 * Math.PI);
-      pen.fillStyle = model.colours.hinge; pen.strokeStyle = "#fff"; pen.lineWidth = 1.5; pen.stroke(); pen.fill();
-    }
-  }
-
-  function drawSliding(pen, k) {
-    const ends = [];
-    for (let i = marks.first[k]; i < marks.first[k + 1]; i++) if (marks.kind[i] === 2) ends.push([...marks.place.slice(4 * i, 4 * i + 4)]);
-    pen.strokeStyle = model.colours.sliding; pen.lineWidth = 3.5; pen.lineCap = "round"; lineBetween(pen, ends);
-  }
-
-  function drawLive(pen, k) {
-    for (let i = live.first[k]; i < live.first[k + 1]; i++) {
-      arrow(pen, px(live.tail[2 * i]), py(live.tail[2 * i + 1]), px(live.tip[2 * i]), py(live.tip[2 * i + 1]), model.colours.live, 2.5);
-    }
   }
 
   const FONT = "system-ui, DejaVu Sans, sans-serif";
@@ -350,12 +131,14 @@
     const falling = model.frames[k].falling, entries = [];
     const add = (kind, text, colour) => entries.push([kind, text, colour]);
     const marked = state.magnify === 1;
-    if (state.cracks) add("area", "open joint", model.colours.open);
-    if (layers.hinges && marked && countOf(k, 1)) add("dot", "hinge", model.colours.hinge);
+    if (state.cracks && model.space) add("ramp", `open joint, to ${(1000 * model.widest_crack).toPrecision(2)} mm`, `linear-gradient(90deg, ${model.cracks.join(",")})`);
+    else if (state.cracks) add("area", "open joint", model.colours.open);
+    if (layers.hinges && marked && countOf(k, 1)) add(model.space ? "line" : "dot", "hinge", model.colours.hinge);
     if (layers.sliding && marked && countOf(k, 2)) add("line", "sliding joint", model.colours.sliding);
     if (layers.forces && marked && !falling && model.has_forces) add("line", "resultant of a joint", model.colours.force);
     if (layers.thrust && marked && !falling && thrustLine(k).length) add("line", "thrust line", model.colours.force);
-    if (layers.start && model.arrows.length) add("line", falling ? "dashed: where the support was" : "settlement; dashed: where the support was", falling ? model.colours.hatch : model.colours.settlement);
+    const was = `${model.space ? "thin" : "dashed"}: where the support was`;
+    if (layers.start && model.arrows.length) add("line", falling ? was : `settlement; ${was}`, falling ? model.colours.hatch : model.colours.settlement);
     if (marked && model.live_words) add("line", model.live_words, model.colours.live);
     if (state.colours === "mechanism" && model.tints.length) add("area", model.tints_words, model.tints[model.moving]);
     if (state.colours === "displacement") add("ramp", `displacement, 0 to ${(1000 * model.largest_displacement).toPrecision(3)} mm`, `linear-gradient(90deg, ${model.ramp.join(",")})`);
@@ -453,58 +236,12 @@
     requestAnimationFrame(step);
   }
 
-  const world = (x, y) => [(x - state.view.x) / state.view.scale, (state.view.y - y) / state.view.scale];
-
-  function blockAt(x, y) {
-    const [wx, wy] = world(x, y);
-    for (let b = nBlocks - 1; b >= 0; b--) {
-      let inside = false;
-      for (let v = offsets[b], w = offsets[b + 1] - 1; v < offsets[b + 1]; w = v++) {
-        const x0 = corners[2 * v], y0 = corners[2 * v + 1], x1 = corners[2 * w], y1 = corners[2 * w + 1];
-        if ((y0 > wy) !== (y1 > wy) && wx < x0 + (x1 - x0) * (wy - y0) / (y1 - y0)) inside = !inside;
-      }
-      if (inside) return b;
-    }
-    return -1;
-  }
-
-  // The joint of a block that is nearest to a place, if it is within reach of a finger.
-  function jointAt(b, x, y) {
-    let best = -1, least = 12;
-    for (const j of jointsOf[b] || []) {
-      const f = faces(shown, j), x0 = px((f.a0[0] + f.b0[0]) / 2), y0 = py((f.a0[1] + f.b0[1]) / 2);
-      const dx = px((f.a1[0] + f.b1[0]) / 2) - x0, dy = py((f.a1[1] + f.b1[1]) / 2) - y0;
-      const t = Math.max(0, Math.min(1, ((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy || 1)));
-      const away = norm(x - x0 - t * dx, y - y0 - t * dy);
-      if (away < least) { least = away; best = j; }
-    }
-    return best;
-  }
-
   function newtons(value) {
     const size = Math.abs(value), [factor, unit] = size >= 1e6 ? [1e6, "MN"] : size >= 1e3 ? [1e3, "kN"] : [1, "N"];
     return `${+(value / factor).toPrecision(3)} ${unit}`;
   }
 
   const millimetres = (v) => (1000 * v).toFixed(2);
-  function jointText(j, b) {
-    const f = faces(pose, j), other = f.a === b ? f.b : f.a;
-    const force = forceOf(Math.min(Math.round(state.frame), nFrames - 1), f);
-    const carries = force === null ? "no equilibrium" : `N ${newtons(force[0])}, T ${newtons(force[1])}`;
-    return `joint with ${model.names[other]}: opening ${millimetres(Math.max(0, f.opening))} mm, slip ${millimetres(Math.abs(f.slip))} mm, ${carries}`;
-  }
-
-  const MOST_JOINTS = 6;
-  function blockText(b) {
-    const size = norm(pose[3 * b], pose[3 * b + 1]);
-    const kind = ["free", "fixed support", "moving support"][model.roles[b]];
-    const own = jointsOf[b].map((j) => [j === state.joint ? Infinity : faces(pose, j).opening, j]).sort((one, two) => two[0] - one[0]).map(([, j]) => j);
-    const more = own.length > MOST_JOINTS ? `\nand ${own.length - MOST_JOINTS} more joints` : "";
-    return `${model.names[b]}${model.materials[b] ? " · " + model.materials[b] : ""} · ${kind}\n` +
-      `displacement ${millimetres(size)} mm (${millimetres(pose[3 * b])}, ${millimetres(pose[3 * b + 1])})\nrotation ${(1000 * pose[3 * b + 2]).toFixed(2)} mrad` +
-      own.slice(0, MOST_JOINTS).map((j) => `\n${jointText(j, b)}`).join("") + more;
-  }
-
   function tell(x, y) {
     const tip = $("tip"), b = state.hover;
     tip.textContent = blockText(b);
@@ -532,8 +269,7 @@
     state.hover = state.hover < 0 ? (by > 0 ? 0 : nBlocks - 1) : (state.hover + by + nBlocks) % nBlocks;
     state.joint = -1;
     draw();
-    const [x, y] = carried(shown, state.hover, centroids[2 * state.hover], centroids[2 * state.hover + 1]);
-    tell(px(x), py(y));
+    tell(...placeOf(state.hover));
     canvas.setAttribute("aria-label", `The blocks. ${$("tip").textContent.replaceAll("\n", "; ")}`);
   }
 
@@ -562,7 +298,7 @@
       state.view.x += now[1] - was[1]; state.view.y += now[2] - was[2];
       zoom(now[0] / (was[0] || 1), now[1], now[2]);
     } else if (e.pointerType !== "touch") {
-      state.view.x += e.offsetX - before[0]; state.view.y += e.offsetY - before[1];
+      dragged(e.offsetX - before[0], e.offsetY - before[1], e);
       draw();
     }
   });
@@ -583,7 +319,7 @@
     else if (e.key === "n" || e.key === "N") nextBlock(1);
     else if (e.key === "p" || e.key === "P") nextBlock(-1);
     else if (e.key === "Escape") letGo();
-    else if (e.shiftKey && pan) { state.view.x += pan[0]; state.view.y += pan[1]; draw(); e.stopPropagation(); }
+    else if (e.shiftKey && pan) { nudged(...pan); draw(); e.stopPropagation(); }
     else return;
     e.preventDefault();
   });
@@ -712,6 +448,7 @@
   $("forces").disabled = !model.has_forces;
   $("mechanism").disabled = !model.tints.length;
   $("start").disabled = !model.arrows.length;
+  $("svg").disabled = model.space;
   const some = model.frames.findIndex((f) => !f.falling);
   $("thrust").disabled = some < 0 || !thrustLine(some).length;
   const c = model.curve, known = c.reaction.filter((v) => v !== null);

@@ -1,5 +1,6 @@
-"""Assemblies and increments as VTK grids: blocks as polygons, joints as lines, contact points as vertices.
+"""Assemblies and increments as VTK grids: blocks, joints and contact points.
 
+In the plane blocks are polygons and joints lines, in space polyhedra and faces; contact points are vertices.
 A run writes them without pyvista, whose import takes longer than the files of a small structure; who asks for a dataset
 is given one of pyvista's.
 """
@@ -12,10 +13,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints, vtkStringArray
-from vtkmodules.vtkCommonDataModel import VTK_LINE, VTK_POLYGON, VTK_VERTEX, vtkCellArray, vtkUnstructuredGrid
+from vtkmodules.vtkCommonDataModel import (
+    VTK_LINE,
+    VTK_POLYGON,
+    VTK_POLYHEDRON,
+    VTK_VERTEX,
+    vtkCellArray,
+    vtkUnstructuredGrid,
+)
 
 import solver
 
+from .joint_faces import JointFaces, face_states, joint_faces
 from .joints import InitialJoints, initial_joints, joint_states
 
 if TYPE_CHECKING:
@@ -31,14 +40,14 @@ SHAPES = ("moved", "undeformed")
 #: Units of the arrays; those that are not here are names, numbers of blocks or states, or have no unit.
 UNITS = {
     "displacement": "m", "reference": "m", "to_reference": "m", "rotation": "rad", "force": "N", "normal_force": "N",
-    "shear_force": "N", "gap": "m", "opening": "m", "slip": "m", "length": "m",
+    "shear_force": "N", "gap": "m", "opening": "m", "slip": "m", "length": "m", "area": "m²", "shear": "N",
 }  # fmt: skip
 
 
 def block_dataset(
     assembly: solver.Assembly, increment: solver.Increment | None = None, *, shape: str = "moved"
 ) -> pv.UnstructuredGrid:
-    """Make a dataset of the blocks of one increment, one polygon cell per block, non-convex outlines too.
+    """Make a dataset of the blocks of one increment, one cell per block: a polygon, or in space a polyhedron.
 
     Parameters
     ----------
@@ -53,11 +62,11 @@ def block_dataset(
     -------
     pyvista.UnstructuredGrid
         Cell arrays ``block_id``, ``name``, ``role`` (number), ``role_name``, ``material_id``, ``material``,
-        ``displacement`` (n_blocks, 3) of the centroids [m] and ``rotation`` [rad]; point arrays ``displacement``
-        (n_vertices, 3) [m], ``reference``, the coordinates in the layout [m], and of moved shapes ``to_reference``, the
-        vector back to them [m]; field arrays ``units`` as "displacement [m]", ``settlement`` (the parameter: of a
-        pushover the control displacement, of a load that moves its position), ``phase``, ``load_multiplier``,
-        ``reaction`` [N or N·m], ``status``, ``role_names`` and ``material_names``.
+        ``displacement`` (n_blocks, 3) of the centroids [m] and ``rotation`` [rad], in space a vector; point arrays
+        ``displacement`` (n_vertices, 3) [m], ``reference``, the coordinates in the layout [m], and of moved shapes
+        ``to_reference``, the vector back to them [m]; field arrays ``units`` as "displacement [m]", ``settlement`` (the
+        parameter: of a pushover the control displacement, of a load that moves its position), ``phase``,
+        ``load_multiplier``, ``reaction`` [N or N·m], ``status``, ``role_names`` and ``material_names``.
 
     Examples
     --------
@@ -74,16 +83,19 @@ def block_grid(
 ) -> vtkUnstructuredGrid:
     """Make what :func:`block_dataset` wraps."""
     pose = solver.Pose.initial(assembly) if increment is None else increment.pose
-    grid = _grid(solver.moved_vertices(assembly, pose), assembly.offsets, VTK_POLYGON)
+    corners = solver.moved_vertices(assembly, pose)
+    if assembly.dimension == 2:
+        grid = _grid(corners, assembly.offsets, VTK_POLYGON)
+    else:
+        grid = _polyhedra(assembly.polyhedra, corners)
     materials = sorted(set(assembly.materials))
     number = {material: k for k, material in enumerate(materials)}
-    moved = pose.displacements(assembly)
     cells = {
         "block_id": np.arange(assembly.n_blocks, dtype=np.int32),
         "role": np.array([ROLE_NUMBERS[str(role)] for role in assembly.roles], dtype=np.int32),
         "material_id": np.array([number[material] for material in assembly.materials], dtype=np.int32),
-        "displacement": _in_space(moved[:, :2]),
-        "rotation": moved[:, 2].copy(),
+        "displacement": _in_space(pose.positions - assembly.centroids),
+        "rotation": pose.rotations[:, 0].copy() if assembly.dimension == 2 else pose.rotations.copy(),
     }
     add_arrays(grid.GetCellData(), cells)
     grid.GetCellData().SetActiveScalars("block_id")
@@ -103,9 +115,9 @@ def joint_dataset(
     increment: solver.Increment,
     *,
     shape: str = "moved",
-    joints: InitialJoints | None = None,
+    joints: InitialJoints | JointFaces | None = None,
 ) -> pv.UnstructuredGrid:
-    """Make a dataset of the joints of one increment: a line cell for each, midway between its two faces.
+    """Make a dataset of the joints of one increment: a line for each, in space a face, midway between its two faces.
 
     Parameters
     ----------
@@ -113,7 +125,7 @@ def joint_dataset(
     increment : solver.Increment
     shape : {"moved", "undeformed"}
         As of :func:`block_dataset`.
-    joints : InitialJoints, optional
+    joints : InitialJoints or JointFaces, optional
         Of the assembly, where they are at hand.
 
     Returns
@@ -122,7 +134,9 @@ def joint_dataset(
         Cell arrays ``opening`` and ``slip`` [m], ``normal_force`` (compression positive) and ``shear_force`` [N] on
         ``block_a``, ``length`` of the faces in common [m], ``block_a``, ``block_b``, ``joint`` (their names) and
         ``initial``: 1 for joints of the layout, 0 for blocks that have come to touch since, whose opening and slip are
-        0. In frames of a fall there are no forces. Point and field arrays as those of :func:`block_dataset`.
+        0. In frames of a fall there are no forces. Point and field arrays as those of :func:`block_dataset`. In space
+        ``slip`` and ``shear_force`` are sizes, ``area`` [m²] takes the place of ``length``, ``normal`` and ``force``
+        [N] are vectors, and the point array ``gap`` [m] is the distance of the faces at each corner.
     """
     return _as_dataset(joint_grid(assembly, increment, shape=shape, joints=joints))
 
@@ -132,9 +146,14 @@ def joint_grid(
     increment: solver.Increment,
     *,
     shape: str = "moved",
-    joints: InitialJoints | None = None,
+    joints: InitialJoints | JointFaces | None = None,
 ) -> vtkUnstructuredGrid:
     """Make what :func:`joint_dataset` wraps."""
+    if assembly.dimension == 3:
+        return _face_grid(
+            assembly, increment, joints if isinstance(joints, JointFaces) else joint_faces(assembly), shape
+        )
+    assert not isinstance(joints, JointFaces)
     states = joint_states(assembly, initial_joints(assembly) if joints is None else joints, increment)
     blocks = (np.repeat(states.block_a, 2), np.repeat(states.block_b, 2))
     grid = _grid_between(assembly, increment, states.ends.reshape(-1, 2), blocks, VTK_LINE, shape)
@@ -146,6 +165,41 @@ def joint_grid(
             "normal_force": states.normal_force,
             "shear_force": states.shear_force,
             "length": np.hypot(*(states.ends[:, 1] - states.ends[:, 0]).T),
+            "block_a": states.block_a.astype(np.int32),
+            "block_b": states.block_b.astype(np.int32),
+            "initial": states.initial.astype(np.int32),
+        },
+    )
+    names = assembly.names
+    words = (f"{names[a]} | {names[b]}" for a, b in zip(states.block_a, states.block_b, strict=True))
+    grid.GetCellData().AddArray(_strings("joint", words))
+    _describe(grid, increment)
+    _state_units(grid)
+    return grid
+
+
+def _face_grid(
+    assembly: solver.Assembly, increment: solver.Increment, joints: JointFaces, shape: str
+) -> vtkUnstructuredGrid:
+    """Make the grid of joints in space: polygons, and lines or vertices where blocks touch at an edge or a corner."""
+    states = face_states(assembly, joints, increment)
+    rings = states.rings
+    kinds = np.array([VTK_VERTEX, VTK_LINE, VTK_POLYGON], dtype=np.uint8)
+    grid = _grid(rings.points, rings.offsets, kinds[np.minimum(np.diff(rings.offsets), 3) - 1])
+    blocks = states.block_a[rings.ring], states.block_b[rings.ring]
+    initial = solver.Pose.initial(assembly)
+    _give_shape(grid, solver.carried_between(rings.points, *blocks, increment.pose, initial), shape)
+    add_arrays(grid.GetPointData(), {"gap": states.gaps})
+    add_arrays(
+        grid.GetCellData(),
+        {
+            "opening": states.opening,
+            "slip": np.linalg.norm(states.slip, axis=1),
+            "normal_force": states.normal_force,
+            "shear_force": states.shear_force,
+            "area": rings.areas(),
+            "normal": states.normals,
+            "force": states.force,
             "block_a": states.block_a.astype(np.int32),
             "block_b": states.block_b.astype(np.int32),
             "initial": states.initial.astype(np.int32),
@@ -178,7 +232,8 @@ def contact_dataset(
         ``normal_force`` (compression positive) and ``shear_force`` [N], ``gap`` [m], ``friction``, ``state``
         (number of :class:`solver.ContactState`), ``block_a`` and ``block_b``, ``displacement`` and ``reference`` as of
         :func:`block_dataset`; its field arrays, and ``state_names``. In frames of a fall, which are no
-        equilibrium, forces are 0.
+        equilibrium, forces are 0. In space ``shear_force`` is the size of the vector ``shear`` [N], and ``slip`` [m]
+        is how far block a has moved along block b there since the layout.
     """
     return _as_dataset(contact_grid(assembly, increment, shape=shape))
 
@@ -192,19 +247,23 @@ def contact_grid(
     grid = _grid_between(assembly, increment, contacts.points, blocks, VTK_VERTEX, shape)
     normal, tangent = contacts.frames[:, 0], contacts.frames[:, 1]
     balanced = increment.forces * (increment.status != solver.Status.FALLING)
-    force = balanced[:, :1] * normal + balanced[:, 1:] * tangent
+    shear = np.einsum("ki,kij->kj", balanced[:, 1:], contacts.frames[:, 1:])
+    force = balanced[:, :1] * normal + shear
+    in_space = assembly.dimension == 3
     points = {
         "normal": _in_space(normal),
         "tangent": _in_space(tangent),
         "force": _in_space(force),
         "normal_force": balanced[:, 0],
-        "shear_force": balanced[:, 1],
+        "shear_force": np.linalg.norm(shear, axis=1) if in_space else balanced[:, 1],
         "gap": np.asarray(contacts.gaps, dtype=float),
         "friction": np.asarray(increment.friction, dtype=float),
         "state": increment.states.astype(np.int32),
         "block_a": contacts.block_a.astype(np.int32),
         "block_b": contacts.block_b.astype(np.int32),
     }
+    if in_space:
+        points |= {"shear": shear, "slip": _slip(assembly, increment)}
     add_arrays(grid.GetPointData(), points)
     grid.GetFieldData().AddArray(_strings("state_names", [state.name.lower() for state in solver.ContactState]))
     _describe(grid, increment)
@@ -245,16 +304,50 @@ def _as_dataset(grid: vtkUnstructuredGrid) -> pv.UnstructuredGrid:
     return pv.UnstructuredGrid(grid)
 
 
-def _grid(points: np.ndarray, offsets: np.ndarray, kind: int) -> vtkUnstructuredGrid:
-    """Make a grid of cells of one kind, each of its own points, (n, 2) [m]: cell i of offsets[i] to offsets[i + 1]."""
-    grid, nodes, cells = vtkUnstructuredGrid(), vtkPoints(), vtkCellArray()
-    nodes.SetData(numpy_to_vtk(_in_space(points), deep=True))
-    grid.SetPoints(nodes)
-    cells.SetData(
-        *(numpy_to_vtk(np.asarray(ids, dtype=np.int64), deep=True) for ids in (offsets, np.arange(len(points))))
-    )
-    grid.SetCells(numpy_to_vtk(np.full(len(offsets) - 1, kind, dtype=np.uint8), deep=True), cells)
+def _grid(points: np.ndarray, offsets: np.ndarray, kind: int | np.ndarray) -> vtkUnstructuredGrid:
+    """Make a grid of cells of their own points, (n, d) [m]: cell i of offsets[i] to offsets[i + 1]."""
+    grid = _grid_of_points(points)
+    kinds = np.broadcast_to(np.asarray(kind, dtype=np.uint8), len(offsets) - 1)
+    grid.SetCells(numpy_to_vtk(np.ascontiguousarray(kinds), deep=True), _cells(offsets, np.arange(len(points))))
     return grid
+
+
+def _polyhedra(shapes: solver.Polyhedra, corners: np.ndarray) -> vtkUnstructuredGrid:
+    """Make a grid of one polyhedron per block, with the corners of all blocks, (n_vertices, 3) [m]."""
+    grid = _grid_of_points(corners)
+    grid.SetPolyhedralCells(
+        numpy_to_vtk(np.full(len(shapes), VTK_POLYHEDRON, dtype=np.uint8), deep=True),
+        _cells(shapes.offsets, np.arange(len(corners))),
+        _cells(shapes.faces_of_block, np.arange(len(shapes.block_of_face))),
+        _cells(shapes.face_offsets, shapes.corners),
+    )
+    return grid
+
+
+def _grid_of_points(points: np.ndarray) -> vtkUnstructuredGrid:
+    grid, nodes = vtkUnstructuredGrid(), vtkPoints()
+    nodes.SetData(numpy_to_vtk(np.ascontiguousarray(_in_space(points)), deep=True))
+    grid.SetPoints(nodes)
+    return grid
+
+
+def _cells(offsets: np.ndarray, members: np.ndarray) -> vtkCellArray:
+    cells = vtkCellArray()
+    cells.SetData(*(numpy_to_vtk(np.asarray(ids, dtype=np.int64), deep=True) for ids in (offsets, members)))
+    return cells
+
+
+def _slip(assembly: solver.Assembly, increment: solver.Increment) -> np.ndarray:
+    """(n_contacts, 3) array [m]: how far block a has moved along block b at each contact point since the layout."""
+    contacts, initial = increment.contacts, solver.Pose.initial(assembly)
+    on_a, on_b = (
+        solver.carried(contacts.points, block, increment.pose, initial)
+        for block in (contacts.block_a, contacts.block_b)
+    )
+    # What now lies together was apart by so much, seen with the axes of the layout.
+    moved = solver.turned(on_b - on_a, increment.pose.rotations[contacts.block_b])
+    normal = contacts.frames[:, 0]
+    return np.asarray(moved - (moved * normal).sum(axis=1)[:, None] * normal)
 
 
 def _grid_between(
@@ -265,7 +358,7 @@ def _grid_between(
     kind: int,
     shape: str,
 ) -> vtkUnstructuredGrid:
-    """Make a grid of vertices or lines, whose points, (n, 2) [m], lie between two blocks each."""
+    """Make a grid of vertices or lines, whose points, (n, d) [m], lie between two blocks each."""
     grid = _grid(points, np.arange(0, len(points) + 1, 2 if kind == VTK_LINE else 1), kind)
     initial = solver.Pose.initial(assembly)
     _give_shape(grid, solver.carried_between(points, *blocks, increment.pose, initial), shape)
@@ -298,7 +391,7 @@ def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def _give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str) -> None:
-    """Let the points of a moved grid stay or go where the layout has them, (n, 2) [m], and say how far they move.
+    """Let the points of a moved grid stay or go where the layout has them, (n, d) [m], and say how far they move.
 
     The active vectors are what Warp By Vector takes first: of moved shapes those that do not move them a second time.
     """
@@ -310,7 +403,7 @@ def _give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str) ->
     add_arrays(grid.GetPointData(), vectors | {"displacement": moved, "reference": drawn})
     grid.GetPointData().SetActiveVectors("to_reference" if shape == "moved" else "displacement")
     if shape == "undeformed":
-        grid.GetPoints().SetData(numpy_to_vtk(drawn, deep=True))
+        grid.GetPoints().SetData(numpy_to_vtk(np.ascontiguousarray(drawn), deep=True))
 
 
 def _state_units(grid: vtkUnstructuredGrid) -> None:
@@ -335,5 +428,5 @@ def _strings(name: str, words: Iterable[str]) -> vtkStringArray:
 
 
 def _in_space(vectors: np.ndarray) -> np.ndarray:
-    """(n, 2) vectors with a zero third component, as VTK wants them."""
-    return np.column_stack([vectors, np.zeros(len(vectors))])
+    """(n, 2) or (n, 3) vectors with three components, as VTK wants them."""
+    return vectors if vectors.shape[1] == 3 else np.column_stack([vectors, np.zeros(len(vectors))])

@@ -21,7 +21,8 @@ from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .cracks import MOST_LISTED, cracks_of
 from .increments import StoredIncrements, packed_increment
-from .joints import LargestMovements
+from .joint_faces import JointFaces, LargestMovementsInSpace
+from .joints import InitialJoints, LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
@@ -90,7 +91,8 @@ class ResultsFolder:
     -----
     The checkpoint is the last file of an increment to be written: files of later increments, which a killed run may
     have left, are removed when the run goes on. Each increment waits for the disk with its state and the checkpoint;
-    VTU files and lists, which can be made again from the states, are flushed all at once at the end.
+    lists are flushed at the end, and VTU files by :meth:`flush`, which a run calls while it draws: both can be made
+    again from the states.
     """
 
     def __init__(
@@ -145,8 +147,6 @@ class ResultsFolder:
         ValueError
             If the folder holds no run.
         """
-        from blockvis.vtk_files import is_whole
-
         results = cls.__new__(cls)
         results.path, results.parameter, results.shape = Path(path), parameter, shape
         results.record = read_record(results.path)
@@ -166,9 +166,7 @@ class ResultsFolder:
         results._start_table()
         for number, increment in enumerate(results.increments):
             results._add_row(number, increment)
-            # A power cut may have left them empty: only the states are waited for.
-            if not all(is_whole(results._grid_file(kind, number)) for kind in GRIDS):
-                results._write_grids(number, increment)
+        restore_grids(results.path, results.assembly, results.increments, shape)
         results._write_lists()
         results._remove_from(count)
         return results, checkpoint
@@ -180,7 +178,7 @@ class ResultsFolder:
         :mod:`blockvis.results.increments`.
         """
         number = len(self.increments)
-        self._write_grids(number, increment)
+        _write_grids(self.path, number, self.assembly, increment, self.shape, self._movements.joints)
         write_whole(self._files.file(number), packed_increment(increment))
         self.increments.append(self._files.without_arrays(number, increment))
         self._add_row(number, increment)
@@ -209,19 +207,14 @@ class ResultsFolder:
             Tables of the kind of analysis.
         """
         self._write_lists(durable=True)
-        # No increment waited for the disk with these: all at once takes a fraction of that.
-        for file in sorted((self.path / "increments").glob("*.vtu")):
-            flush(file)
-        flush(self.path / "increments")
         write_whole(self.path / "joints.csv", self._movements.table())
         for name, text in (tables or {}).items():
             write_whole(self.path / name, text)
-        cracks = (
-            cracks_of(self.assembly, response.path[-1].pose, self._movements.joints)
-            if response.path and self.assembly.dimension == 2
-            else []
-        )
-        listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
+        listed = {}
+        # Crack lines are those of joints in the plane.
+        if isinstance(self._movements, LargestMovements):
+            cracks = cracks_of(self.assembly, response.path[-1].pose, self._movements.joints) if response.path else []
+            listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_whole(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
@@ -231,28 +224,19 @@ class ResultsFolder:
         self._rows = io.StringIO()
         self._table = csv.writer(self._rows, lineterminator="\n")
         self._table.writerow((*COLUMNS, *own_columns(self.parameter)))
-        self._movements = LargestMovements(self.assembly, self.parameter)
+        kind = LargestMovements if self.assembly.dimension == 2 else LargestMovementsInSpace
+        self._movements = kind(self.assembly, self.parameter)
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
             self._table.writerow(row_of_increment(number, increment, self.assembly, self.parameter))
             self._movements.add(increment)
 
-    def _write_grids(self, number: int, increment: solver.Increment) -> None:
-        """Write the VTU files of an increment."""
-        from blockvis.vtk_files import write_vtu
-
-        from .datasets import block_grid, contact_grid, joint_grid
-
-        for kind, grid in (
-            ("blocks", block_grid(self.assembly, increment, shape=self.shape)),
-            ("contacts", contact_grid(self.assembly, increment, shape=self.shape)),
-            ("joints", joint_grid(self.assembly, increment, shape=self.shape, joints=self._movements.joints)),
-        ):
-            write_vtu(grid, self._grid_file(kind, number), durable=False)
-
-    def _grid_file(self, kind: str, number: int) -> Path:
-        return self.path / "increments" / f"{kind}_{number:05d}.vtu"
+    def flush(self) -> None:
+        """Flush the VTU files to the disk: each increment waits for its state only, of which they are made."""
+        for file in sorted((self.path / "increments").glob("*.vtu")):
+            flush(file)
+        flush(self.path / "increments")
 
     def _write_lists(self, *, durable: bool = False) -> None:
         """Write the table and the lists of files, of everything so far."""
@@ -275,6 +259,50 @@ class ResultsFolder:
                 old.unlink()
         for half in (*self.path.glob(PARTIAL), *folder.glob(PARTIAL)):
             remove(half)
+
+
+def restore_grids(folder: Path, assembly: solver.Assembly, increments: Sequence[solver.Increment], shape: str) -> None:
+    """Make the VTU files again that a power cut has left empty, or half there.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    assembly, increments
+        Of the results.
+    shape : {"moved", "undeformed"}
+        As of the folder.
+    """
+    from blockvis.vtk_files import is_whole
+
+    for number, increment in enumerate(increments):
+        if not all(is_whole(_grid_file(folder, kind, number)) for kind in GRIDS):
+            _write_grids(folder, number, assembly, increment, shape)
+
+
+def _write_grids(
+    folder: Path,
+    number: int,
+    assembly: solver.Assembly,
+    increment: solver.Increment,
+    shape: str,
+    joints: InitialJoints | JointFaces | None = None,
+) -> None:
+    """Write the VTU files of an increment."""
+    from blockvis.vtk_files import write_vtu
+
+    from .datasets import block_grid, contact_grid, joint_grid
+
+    for kind, grid in (
+        ("blocks", block_grid(assembly, increment, shape=shape)),
+        ("contacts", contact_grid(assembly, increment, shape=shape)),
+        ("joints", joint_grid(assembly, increment, shape=shape, joints=joints)),
+    ):
+        write_vtu(grid, _grid_file(folder, kind, number), durable=False)
+
+
+def _grid_file(folder: Path, kind: str, number: int) -> Path:
+    return folder / "increments" / f"{kind}_{number:05d}.vtu"
 
 
 def _held(owner: ResultsFolder, folder: Path) -> Callable[[], None]:
@@ -319,18 +347,38 @@ def _stored_assembly(folder: Path) -> solver.Assembly:
         raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
     try:
         stored = checked_arrays(folder / "assembly.npz")
-        offsets = stored["offsets"].tolist()
+        names, roles, materials = (list(map(str, stored[key])) for key in ("names", "roles", "materials"))
         # Checked like a layout: the file may come from anywhere.
+        if "corners" in stored:
+            return solver.Assembly.from_solids(
+                _stored_solids(stored), names=names, roles=roles, density=stored["density"], materials=materials
+            )
         return solver.Assembly.from_outlines(
-            [stored["vertices"][first:last] for first, last in pairwise(offsets)],
-            names=list(map(str, stored["names"])),
-            roles=list(map(str, stored["roles"])),
+            [stored["vertices"][first:last] for first, last in pairwise(stored["offsets"].tolist())],
+            names=names,
+            roles=roles,
             density=stored["density"],
             thickness=stored["thickness"],
-            materials=list(map(str, stored["materials"])),
+            materials=materials,
         )
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise ValueError(f"'{folder / 'assembly.npz'}' cannot be read ({error}); run the case again") from None
+
+
+def _stored_solids(stored: Mapping[str, np.ndarray]) -> list[tuple[np.ndarray, list[list[int]]]]:
+    """Corners and faces of each block in space, the corners of a face numbered within the block."""
+    offsets, faces = (
+        stored["offsets"].tolist(),
+        np.searchsorted(stored["block_of_face"], np.arange(len(stored["offsets"]))),
+    )
+    loops = [
+        stored["corners"][first:last] - stored["offsets"][block]
+        for (first, last), block in zip(pairwise(stored["face_offsets"].tolist()), stored["block_of_face"], strict=True)
+    ]
+    return [
+        (stored["vertices"][first:last], [loop.tolist() for loop in loops[low:high]])
+        for (first, last), (low, high) in zip(pairwise(offsets), pairwise(faces.tolist()), strict=True)
+    ]
 
 
 def stored_case(folder: str | Path) -> str:
@@ -385,7 +433,7 @@ def _collapse_of(
 ) -> solver.Collapse | None:
     if summary.get("collapse_bracket") is None:
         return None
-    mechanism = np.zeros((assembly.n_blocks, 3))
+    mechanism = np.zeros((assembly.n_blocks, 3 * assembly.dimension - 3))
     falling = [i for i in increments if i.status == solver.Status.FALLING]
     if falling:
         motion = falling[0].velocity

@@ -134,8 +134,9 @@ class StoredIncrements:
     def _read(self, number: int) -> solver.Increment:
         try:
             arrays = checked_arrays(self.file(number))
-            n, k = len(arrays["rotations"]), len(arrays["gaps"])
-            for name, shape in (("positions", (n, 2)), ("velocity", (n, 3)), ("points", (k, 2)), ("forces", (k, 2))):
+            n, k, d = len(arrays["rotations"]), len(arrays["gaps"]), 3 if arrays["rotations"].ndim == 2 else 2
+            shapes = {"positions": (n, d), "velocity": (n, 3 * d - 3), "points": (k, d), "forces": (k, d)}
+            for name, shape in shapes.items():
                 if arrays[name].shape != shape:
                     raise ValueError(f"{name} has shape {arrays[name].shape}, not {shape}")
             return _increment_of(arrays)
@@ -156,8 +157,13 @@ def packed_increment(increment: solver.Increment) -> bytes:
 
 
 def _arrays_of(state: solver.State) -> dict[str, np.ndarray]:
-    """Name the arrays as the files do: contact points have a vertex, an edge and a corner, and slip along it."""
+    """Name the arrays as the files do: in the plane a contact point has vertex, edge and corner, and one slip.
+
+    In space they have their own names.
+    """
     arrays = flat(state)
+    if state.pose.positions.shape[1] == 3:
+        return arrays
     vertex, edge, corner = solver.corners_and_edges(arrays.pop("features"))
     rotations, slip = arrays["rotations"][:, 0], arrays.pop("slip")[:, 0]
     return arrays | {"vertex": vertex, "edge": edge, "corner": corner, "along": slip, "rotations": rotations}
@@ -165,8 +171,9 @@ def _arrays_of(state: solver.State) -> dict[str, np.ndarray]:
 
 def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
     named = dict(arrays) | {name: arrays[stored] for name, stored in _STORED_AS.items()}
-    named["features"] = solver.features_of(arrays["vertex"], arrays["edge"], arrays["corner"])
-    named["slip"], named["rotations"] = arrays["along"][:, None], arrays["rotations"][:, None]
+    if "features" not in arrays:
+        named["features"] = solver.features_of(arrays["vertex"], arrays["edge"], arrays["corner"])
+        named["slip"], named["rotations"] = arrays["along"][:, None], arrays["rotations"][:, None]
     return from_flat(named, solver.Increment, held=from_flat(named, solver.State), checkpoint=None)
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 RECORD = "run.json"
 
 #: Packages whose version may change the last digits of a result.
-_DECIDING = ("python", "platform", "blockvis", "numpy", "scipy", "highspy")
+_DECIDING = ("python", "platform", "blockvis", "numpy", "scipy", "highspy", "clarabel")
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def read_record(folder: Path) -> Record:
 def versions() -> dict[str, str]:
     """Versions of Python, of the packages that a result depends on, and the platform."""
     found = {"python": platform.python_version(), "platform": platform.platform()}
-    for name in ("blockvis", "numpy", "scipy", "highspy", "pyvista", "vtk", "meshio"):
+    for name in ("blockvis", "numpy", "scipy", "highspy", "clarabel", "pyvista", "vtk", "meshio"):
         try:
             found[name] = version(name)
         except PackageNotFoundError:

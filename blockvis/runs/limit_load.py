@@ -25,6 +25,9 @@ from .settlement import not_reached, settlement_course, settlement_steps, stored
 #: Flow rules of the sliding joints of a limit load.
 FLOWS = ("associative", "non-associative")
 
+#: What faces of blocks in space resist when they turn in their own plane.
+TORSIONS = ("points", "uniform")
+
 #: Frames in which the mechanism of a limit load is swung, and how far its fastest block gets, in extents of the
 #: structure.
 SWINGING_FRAMES, SWING = 30, 0.05
@@ -42,6 +45,8 @@ class LimitLoadSettings:
     ----------
     flow : str
         One of ``FLOWS``.
+    torsion : str
+        One of ``TORSIONS``.
     capacity_at : tuple of float, optional [m or rad]
         Settlements at which limit loads are wanted; all by default.
     displacement : float, optional [m]
@@ -51,6 +56,7 @@ class LimitLoadSettings:
     flow: str = "associative"
     capacity_at: tuple[float, ...] | None = None
     displacement: float | None = None
+    torsion: str = "points"
 
 
 @dataclass(frozen=True)
@@ -82,6 +88,8 @@ class LimitLoadKind(AnalysisKind):
     keys = (
         Key("flow", one_of(FLOWS), "Whether sliding joints of a limit load dilate (associative) or not", FLOWS[1],
             default=FLOWS[0]),
+        Key("torsion", one_of(TORSIONS), "Torsion of faces in space: by their contact points, or at uniform pressure",
+            TORSIONS[1], default=TORSIONS[0]),
         Key("capacity_at", NUMBERS, "Settlements at which limit loads are wanted; of a rotation in rad", [0.0, 0.02],
             "m", otherwise="every increment"),
         Key("displacement", NOT_NEGATIVE, "Within which joints that a settlement has opened may close", 0.001, "m",
@@ -89,13 +97,14 @@ class LimitLoadKind(AnalysisKind):
     )  # fmt: skip
 
     def read(self, top: Table, analysis: Table) -> LimitLoadSettings:
-        """Read the keys ``flow``, ``capacity_at`` and ``displacement``."""
+        """Read the keys ``flow``, ``torsion``, ``capacity_at`` and ``displacement``."""
         flow = analysis.text("flow", "associative", among=FLOWS)
+        torsion = analysis.text("torsion", "points", among=TORSIONS)
         capacity_at = analysis.numbers("capacity_at")
         displacement = analysis.number("displacement")
         if displacement is not None and displacement < 0.0:
             raise analysis.error("displacement", f"is {displacement:g}; give a length in m of at least 0")
-        return LimitLoadSettings(flow, capacity_at, displacement)
+        return LimitLoadSettings(flow, capacity_at, displacement, torsion)
 
     def refuse(self, settings: LimitLoadSettings, case: Case) -> None:
         """Refuse keys of limit loads."""
@@ -103,6 +112,11 @@ class LimitLoadKind(AnalysisKind):
             raise ValueError(
                 f'{case.source}: [analysis] flow "{settings.flow}" belongs to kind = "{self.name}"; a {case.analysis} '
                 "follows the geometry, in which friction never dilates"
+            )
+        if settings.torsion != "points":
+            raise ValueError(
+                f'{case.source}: [analysis] torsion "{settings.torsion}" belongs to kind = "{self.name}"; a '
+                f"{case.analysis} has the torsion of its contact points"
             )
         if settings.displacement is not None:
             raise _displacement_without_settlement(case)
@@ -164,10 +178,13 @@ class LimitLoadKind(AnalysisKind):
                     "flow": limit.flow,
                     "live_load": limit.live_force,
                     "programs": limit.programs,
+                    **({"torsion": limit.torsion} if limit.torsion != "points" else {}),
                 }
                 for number, (limit, _) in enumerate(states)
             ],
         }
+        if limit is not None and response.assembly.dimension == 3:
+            summary["limit_load_torsion"] = limit.torsion
         if limit is not None and limit.caveat:
             summary["limit_load_caveat"] = limit.caveat
         if chosen is not None and response.collapse is None:
@@ -226,6 +243,9 @@ class LimitLoadKind(AnalysisKind):
         ]
         if said["limit_load_status"] != solver.LimitStatus.FOUND:
             lines.append(f"status: {said['limit_load_status']}")
+        if "limit_load_torsion" in said:
+            by = "friction at their points" if said["limit_load_torsion"] == "points" else "a uniform pressure"
+            lines.append(f"torsion of the faces: that of {by}")
         if "limit_load_caveat" in said:
             lines.append(f"note: {said['limit_load_caveat']}")
         if not response.parameter.is_path and len(path) > 1:
@@ -262,6 +282,8 @@ class LimitLoadKind(AnalysisKind):
         if limit is not None:
             rows.append(("static, kinematic value", f"{limit.bounds[0]:.7g}, {limit.bounds[1]:.7g}"))
             rows.append(("friction", limit.flow))
+            if response.assembly.dimension == 3:
+                rows.append(("torsion of the faces", limit.torsion))
             if limit.caveat:
                 rows.append(("note", limit.caveat))
             rows.append(("live load at α = 1", force_text(limit.live_force)))
@@ -304,6 +326,7 @@ def _stored_limits(summary: Mapping[str, Any], increments: Sequence[solver.Incre
                 live_force=stored["live_load"],
                 programs=stored["programs"],
                 held=state.held,
+                torsion=stored.get("torsion", "points"),
             )
         )
     return tuple(limits)
@@ -428,6 +451,7 @@ def _limit_state(
             interfaces=run.given.interfaces,
             pose=pose,
             flow=case.settings.flow,
+            torsion=case.settings.torsion,
             displacement=_displacement(case, assembly),
             overlap_tolerance=case.controls.overlap_tolerance,
         )

@@ -6,6 +6,7 @@ import json
 import time
 import warnings
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +21,7 @@ from blockvis.cases.case import Case, parse_case, read_case
 from blockvis.fall import fall_of
 from blockvis.formats.files import checksum_of_files
 from blockvis.results.fall_files import remove_fall, stored_fall, write_fall
-from blockvis.results.folder import ResultsFolder, refuse_results
+from blockvis.results.folder import ResultsFolder, refuse_results, restore_grids
 from blockvis.results.record import Record, checksum_of, read_record, versions
 
 from .kind import AnalysisRun
@@ -194,6 +195,7 @@ def resume_run(folder: str | Path, *, film: bool = True, pictures: bool = True) 
     finished = _finished(folder)
     if finished is not None:
         response = open_results(folder)
+        restore_grids(folder, response.assembly, response.increments, case.vtu)
         missing: tuple[str, ...] = ()
         if not all((folder / name).is_file() for name in _drawn(case, drawing)):
             missing = _drawn_results(case, response, folder, drawing, Clock())
@@ -297,8 +299,12 @@ def _solved(
     try:
         with clock.counting("write"):
             summary = finish(results, response)
-        if ending.stop is not solver.Status.INTERRUPTED:
-            missing = _drawn_results(case, response, folder, drawing, clock, process)
+        # Waiting for the disk takes no processor: it goes on while the pictures are drawn.
+        with ThreadPoolExecutor(1) as waiting:
+            flushed = waiting.submit(results.flush)
+            if ending.stop is not solver.Status.INTERRUPTED:
+                missing = _drawn_results(case, response, folder, drawing, clock, process)
+            flushed.result()
     except OSError as error:
         raise _given_up(folder, error) from None
     return Run(response, folder, summary, missing, stages=dict(clock.seconds))
@@ -306,7 +312,7 @@ def _solved(
 
 def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
     """Warn where the blocks as drawn were in no equilibrium and found one a little further."""
-    moved = np.hypot(*first.pose.displacements(assembly)[:, :2].T)
+    moved = np.linalg.norm(first.pose.positions - assembly.centroids, axis=1)
     block = int(np.argmax(moved))
     if first.status == solver.Status.EQUILIBRIUM and moved[block] > AS_DRAWN * assembly.block_size:
         warnings.warn(

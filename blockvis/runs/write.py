@@ -34,6 +34,7 @@ def write(response: solver.Response, folder: str | Path, *, overwrite: bool = Fa
     for increment in response.increments:
         results.add(increment)
     finish(results, response)
+    results.flush()
     return results.path
 
 

@@ -94,7 +94,7 @@ def _reason(error: Exception) -> str:
 def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
     assembly = case_assembly(case)
     case = replace(case, settlements=case_settlements(case, assembly), profiles=())
-    # The first frame of the fall shows the mechanism; the others are not needed.
+    # Where nothing stands at all the first frame of the fall shows the mechanism; the others are not needed.
     controls = replace(case.controls, falling_frames=1)
     steps = solver.settlement_increments(
         assembly,
@@ -141,18 +141,23 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
     elif ending.stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
         # It collapses before any settlement.
         found |= {"collapse_displacement": 0.0, "bracket_low": 0.0, "bracket_high": 0.0}
-    if falling is None or "collapse_displacement" not in found:
+    if ending.collapse is not None and last is not None:
+        # As everywhere else: the mechanism at the last equilibrium. In the fall other joints may touch.
+        falls: solver.Increment | None = solver.with_motion(last, ending.collapse.mechanism)
+    else:
+        falls = falling
+    if falls is None or "collapse_displacement" not in found:
         return found, b""
-    mechanism = solver.mechanism_of(assembly, falling)
+    mechanism = solver.mechanism_of(assembly, falls)
     found |= {
-        "falling_share": loss_in(assembly, falling).share,
+        "falling_share": loss_in(assembly, falls).share,
         "mechanism": str(mechanism),
         "mechanism_class": mechanism_class(mechanism),
         "macro_blocks": len(mechanism.motions),
         "hinges": len(mechanism.hinges),
         "sliding_joints": len(mechanism.sliding),
     }
-    return found, _shape(assembly, falling, mechanism, case.settlements[falling.phase])
+    return found, _shape(assembly, falls, mechanism, case.settlements[falls.phase])
 
 
 def mechanism_class(mechanism: solver.Mechanism) -> str:

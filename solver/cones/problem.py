@@ -127,9 +127,12 @@ def raise_if_proved(program: ConicProgram, ray: np.ndarray) -> None:
     if not (np.isfinite(size) and size > 0.0):
         return
     x = ray / size
-    off = max(float(np.abs(program.matrix @ x).max(initial=0.0)), program.outside(x))
-    # It has to gain far more than what it is off by could.
-    if off <= RAY_BALANCE and program.cost @ x < -10.0 * RAY_BALANCE * (1.0 + np.abs(program.cost).max(initial=0.0)):
+    left, outside = np.abs(program.matrix @ x), program.outside(x)
+    if max(float(left.max(initial=0.0)), outside) > RAY_BALANCE:
+        return
+    # It has to gain far more than what it is off by could cost.
+    off = float(left.sum()) + outside * len(program.friction)
+    if program.cost @ x < -RAY_BALANCE - 10.0 * off * float(np.abs(program.cost).max(initial=0.0)):
         raise Unbounded(x)
 
 

@@ -8,18 +8,29 @@ import scipy.sparse as sp
 from solver.lp.problem import LinearProgram, LPSolution, SolveError
 from solver.lp.solve import solve_lp
 
-from .clarabel import ROUTES, run_clarabel
+from .clarabel import run_clarabel
+from .cuts import run_cuts
+from .interior import run_interior
 from .problem import ConicProgram, ConicSolution
 
+#: Our own way, for programs whose rows form a band; pyramids and cuts, which need nothing but linear programs.
+OWN, CUTS = "interior", "cuts"
 
-def solve_cones(program: ConicProgram, routes: tuple[str, ...] = tuple(ROUTES)) -> ConicSolution:
+#: The order in which they are tried.
+LADDER = ("clarabel", "clarabel at 1e-9", "clarabel without presolve", CUTS)
+
+#: From this many rows on our own method is the faster one: from 300 blocks; with 1,000 it takes half the time.
+OWN_ROWS = 1800
+
+
+def solve_cones(program: ConicProgram, routes: tuple[str, ...] | None = None) -> ConicSolution:
     """Solve a conic program, trying one route after another until a solution passes its check.
 
     Parameters
     ----------
     program : ConicProgram
-    routes : tuple of str
-        In the order to try.
+    routes : tuple of str, optional
+        ``OWN``, ``CUTS`` or names out of Clarabel's ``ROUTES``, in the order to try; chosen by size by default.
 
     Raises
     ------
@@ -28,9 +39,11 @@ def solve_cones(program: ConicProgram, routes: tuple[str, ...] = tuple(ROUTES)) 
     SolveError
         If no route gives a solution that passes; the message lists what each of them ended with.
     """
+    if routes is None:
+        routes = (OWN, *LADDER) if program.matrix.shape[0] >= OWN_ROWS else LADDER
     outcomes = []
     for route in routes:
-        solution, status = run_clarabel(program, route)
+        solution, status = _run(program, route)
         if solution is not None and solution.accepted:
             return solution
         if solution is not None:
@@ -40,6 +53,12 @@ def solve_cones(program: ConicProgram, routes: tuple[str, ...] = tuple(ROUTES)) 
         f"no solution of the conic program with {program.matrix.shape[0]} rows and {len(program.friction)} cones "
         f"passed its check ({'; '.join(outcomes)})"
     )
+
+
+def _run(program: ConicProgram, route: str) -> tuple[ConicSolution | None, str]:
+    if route == OWN:
+        return run_interior(program)
+    return run_cuts(program) if route == CUTS else run_clarabel(program, route)
 
 
 def solve_between(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -60,6 +61,11 @@ class Contacts:
         count = int(high.max(initial=0)) + 1
         keys, joint = np.unique(low * count + high, return_inverse=True)
         return np.stack([keys // count, keys % count], axis=1), joint.ravel()
+
+
+def joined_contacts(groups: Sequence[Contacts]) -> Contacts:
+    """Put groups of contact points, at least one, into one."""
+    return Contacts(*(np.concatenate([getattr(g, field.name) for g in groups]) for field in fields(Contacts)))
 
 
 def matched_contacts(contacts: Contacts, before: Contacts) -> tuple[np.ndarray, np.ndarray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -12,7 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from solver.tolerances import DRAWN_GAP
 
-from .flat_faces import merged_faces
+from .flat_faces import ONE_WAY, merged_faces
 from .outlines import next_vertices
 from .portions import alike
 from .solids import Solids, dot
@@ -47,12 +48,21 @@ class ConvexParts:
         Four corners of the block from which each corner of the parts follows.
     weights : (n_corners, 4) array
         With these weights.
+    inner : (n_faces,) bool array
+        Faces of the parts inside their block, where it was cut.
     """
 
     solids: Solids
     block_of_part: np.ndarray
     source: np.ndarray
     weights: np.ndarray
+    inner: np.ndarray
+
+    @cached_property
+    def cut_edges(self) -> np.ndarray:
+        """(n_corners,) bool array: edges at a face inside the block, which are none of the block, or not as sharp."""
+        face = self.solids.face_of_corner
+        return self.inner[face] | self.inner[face[self.solids.twins]]
 
     @property
     def whole(self) -> bool:
@@ -93,16 +103,18 @@ def convex_parts(solids: Solids) -> ConvexParts:
     bent = np.flatnonzero(_out_of_faces(solids) > DRAWN_GAP * solids.widths)
     if len(bent) == 0:
         none = np.zeros((0, 4))
-        return ConvexParts(solids, np.arange(len(solids)), none.astype(np.int64), none)
-    vertices, faces, sources, weights, block_of_part = [], [], [], [], []
+        inner = np.zeros(len(solids.block_of_face), dtype=bool)
+        return ConvexParts(solids, np.arange(len(solids)), none.astype(np.int64), none, inner)
+    vertices, faces, sources, weights, block_of_part, inner_faces = [], [], [], [], [], []
     is_bent = np.zeros(len(solids), dtype=bool)
     is_bent[bent] = True
     for block in range(len(solids)):
         own, loops = surface_of(solids, block)
         start = int(solids.offsets[block])
         frame = _spread_corners(own)
-        parts = _parts_of(solids, block, own, loops) if is_bent[block] else [(own, loops)]
-        for corners, around in parts:
+        parts = _parts_of(solids, block, own, loops) if is_bent[block] else [(own, loops, [False] * len(loops))]
+        for corners, around, inside in parts:
+            inner_faces += inside
             vertices.append(corners)
             faces.append(around)
             block_of_part.append(block)
@@ -115,7 +127,11 @@ def convex_parts(solids: Solids) -> ConvexParts:
                 sources.append(np.tile(number[:, None], (1, 4)))
                 weights.append(np.tile([1.0, 0.0, 0.0, 0.0], (len(corners), 1)))
     return ConvexParts(
-        joined(vertices, faces), np.array(block_of_part), np.concatenate(sources), np.concatenate(weights)
+        joined(vertices, faces),
+        np.array(block_of_part),
+        np.concatenate(sources),
+        np.concatenate(weights),
+        np.array(inner_faces),
     )
 
 
@@ -192,7 +208,8 @@ class _Piece:
 
 def _parts_of(
     solids: Solids, block: int, vertices: np.ndarray, faces: list[list[int]]
-) -> list[tuple[np.ndarray, list[list[int]]]]:
+) -> list[tuple[np.ndarray, list[list[int]], list[bool]]]:
+    """Corners and faces of each part of a block, and which of the faces are inside the block."""
     origin = vertices[0]
     own = vertices - origin
     width, volume = float(solids.widths[block]), float(solids.volumes[block])
@@ -205,21 +222,35 @@ def _parts_of(
         if cut is None:
             hull = _hull(piece.points)
             if hull is not None and hull.volume > SMALLEST_PART * volume:
-                hulls.append(hull)
+                hulls.append((hull, piece))
         else:
             for side in _cut(piece, *cut, near):
                 queue += _separate(side, *cut, near)
         if len(queue) + len(hulls) > MOST_PARTS:
             raise NoParts(block, f"has more than {MOST_PARTS} convex parts; simplify its surface")
-    total = sum(hull.volume for hull in hulls)
+    total = sum(hull.volume for hull, _ in hulls)
     if abs(total - volume) > VOLUME_LEFT * volume:
         raise NoParts(
             block,
             f"of {volume:.6g} m³ falls into convex parts of {total:.6g} m³ in all; its surface crosses itself: "
             "redraw it, or draw it as several blocks",
         )
-    parts = [merged_faces(_surface_of_hull(hull), flatness) for hull in hulls]
-    return [(corners + origin, loops) for corners, loops in parts]
+    parts = []
+    for hull, piece in hulls:
+        corners, loops = merged_faces(_surface_of_hull(hull), flatness)
+        parts.append((corners + origin, loops, [_is_inner(corners[loop], piece, flatness) for loop in loops]))
+    return parts
+
+
+def _is_inner(face: np.ndarray, piece: _Piece, flatness: float) -> bool:
+    """Whether nothing of the surface of the block lies in a face of a part."""
+    arms = face - face[0]
+    area = np.cross(arms[1:-1], arms[2:]).sum(axis=0)
+    normal, middle = area / np.linalg.norm(area), face.mean(axis=0)
+    return not any(
+        outward @ normal > ONE_WAY and np.abs((polygon - middle) @ normal).max() <= 2.0 * flatness
+        for polygon, outward in zip(piece.polygons, piece.normals, strict=True)
+    )
 
 
 #: A part with less than this fraction of the volume of its block is what rounding has left at a cut.

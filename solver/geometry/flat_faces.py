@@ -10,9 +10,10 @@ from solver.tolerances import CORNER_TOLERANCE
 
 #: Neighbouring faces within the flatness of one plane are one face where their normals differ by less than this cosine;
 #: slivers, whose normals are rounding, are not asked.
-ONE_WAY = 0.9
+ONE_WAY = 0.999
 
-#: A face smaller than this fraction of the largest is a sliver.
+#: A face smaller than this fraction of its neighbour is a sliver; it belongs to the plane of the neighbour if it is no
+#: farther out of it than this fraction of the diagonal of the block.
 SLIVER = 1e-6
 
 
@@ -44,6 +45,7 @@ def merged_faces(surface: tuple[np.ndarray, list[list[int]]], flatness: float) -
     sizes = np.linalg.norm(areas, axis=1)
     owner = {edge: k for k, face in enumerate(faces) for edge in edges_of(face)}
     group = [-1] * len(faces)
+    sliver_flatness = SLIVER * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     loops: list[list[int]] = []
     for seed in np.argsort(-sizes, kind="stable").tolist():
         if group[seed] >= 0:
@@ -56,7 +58,8 @@ def merged_faces(surface: tuple[np.ndarray, list[list[int]]], flatness: float) -
                 other = owner[b, a]
                 sliver = sizes[other] <= SLIVER * sizes[seed]
                 same_way = sliver or areas[other] @ normal > ONE_WAY * sizes[other]
-                flat = np.abs((vertices[faces[other]] - middle) @ normal).max() <= flatness
+                out = np.abs((vertices[faces[other]] - middle) @ normal).max()
+                flat = out <= (sliver_flatness if sliver else flatness)
                 if group[other] < 0 and same_way and flat:
                     group[other] = seed
                     members.append(other)

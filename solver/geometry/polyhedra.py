@@ -44,7 +44,7 @@ class Polyhedra(Solids):
     def find(self, vertices: np.ndarray, reach: float, useful: np.ndarray) -> Contacts:
         """Find contact points with a gap up to ``reach`` [m], one of their blocks of the useful, (n_blocks,) bool."""
         parts = self.parts
-        return find_points(parts.solids, parts.block_of_part, parts.placed(vertices), reach, useful, self.widths)
+        return find_points(parts, parts.placed(vertices), reach, useful, self.widths)
 
     def measure(self, vertices: np.ndarray, contacts: Contacts) -> Contacts:
         """Measure the contact points between the same features, with the corners (n_vertices, 3) [m] elsewhere."""

@@ -165,6 +165,14 @@ class Solids:
         return np.sqrt(dot(area, area))
 
     @cached_property
+    def face_widths(self) -> np.ndarray:
+        """(n_faces,) array [m]: area over longest extent of each face, near b for a long a × b."""
+        middles = self.faces(self.vertices).middles
+        arms = self.vertices[self.corners] - middles[self.face_of_corner]
+        far = np.maximum.reduceat(np.sqrt(dot(arms, arms)), self.face_offsets[:-1])
+        return self.face_areas / (2.0 * far)
+
+    @cached_property
     def surfaces(self) -> np.ndarray:
         """(n,) array [m²]: area of all faces of each solid."""
         return np.add.reduceat(self.face_areas, self.faces_of_block[:-1])

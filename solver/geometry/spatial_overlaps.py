@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .broad_phase import box_pairs, boxes
+from .separations import edge_separations, face_separations
 from .solids import Solids
-from .spatial_contacts import edge_separations, face_separations
 
 
 def overlap_depths_in_space(
@@ -39,11 +39,11 @@ def overlap_depths_in_space(
     i, j = box_pairs(low + tolerance / 2.0, high - tolerance / 2.0)
     other = block_of_part[i] != block_of_part[j]
     i, j = i[other], j[other]
-    faces = solids.faces(vertices)
-    apart, _ = face_separations(solids, faces, vertices, i, j)
+    faces, none = solids.faces(vertices), np.zeros(len(solids.block_of_face), dtype=bool)
+    apart, _, _ = face_separations(solids, faces, vertices, i, j, none)
     deep = np.flatnonzero(apart < -tolerance)
     i, j, apart = i[deep], j[deep], apart[deep]
-    apart = np.maximum(apart, face_separations(solids, faces, vertices, j, i)[0])
+    apart = np.maximum(apart, face_separations(solids, faces, vertices, j, i, none)[0])
     deep = np.flatnonzero(apart < -tolerance)
     i, j, apart = i[deep], j[deep], apart[deep]
     apart = np.maximum(apart, edge_separations(solids, faces, vertices, i, j)[0])

@@ -89,7 +89,7 @@ class _Band:
         counts = np.diff(matrix.indptr)
         # Each column is as wide as it has entries, at least: a load on every block fills the matrix.
         self._refuse_wide(int(counts.max(initial=0)))
-        self.order, place = _narrowest(matrix, along)
+        self.order, place = narrowest(matrix, along)
         row, column, weight, entry = [], [], [], []
         for count in np.unique(counts[counts > 0]):
             members = np.flatnonzero(counts == count)
@@ -291,7 +291,7 @@ class _Method:
         return corrected, (by_primal[p], by_dual[d])
 
 
-def _narrowest(matrix: sp.csc_array, along: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+def narrowest(matrix: sp.csc_array, along: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Choose the order of the rows that makes the narrower band; also gives the place of each row in it."""
     rows = matrix.shape[0]
     pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape[::-1])

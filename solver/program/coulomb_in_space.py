@@ -22,14 +22,9 @@ from .factors import factorised
 from .step import (
     BALANCE,
     CAREFUL,
-    CORRECTION,
     EQUATIONS,
-    FIRST_DISTANCE,
-    FIRST_FORCE,
-    FRACTION,
     ITERATIONS,
     LOOK_BACK,
-    LOST,
     NEAR,
     PRODUCT,
     PRODUCT_LEFT,
@@ -41,8 +36,22 @@ from .step import (
     paired,
 )
 
+#: Starts: least forces in mean block weights, least distances in parts of a step and an elastic give, and whether steps
+#: are kept short.
+STARTS = ((0.1, 1.0, False), (1.0, 3.0, True))
+
 #: Newton's iterations on the answers of the contact points, and how often a change may be halved that leads away.
 TRIALS, HALVINGS = 25, 6
+
+#: Part of the way to the nearest bound that is gone: less than in the plane, since shear forces that turn about a round
+#: cone soon leave it where they are close to its edge.
+SPARE = 0.9
+
+#: A corrected step shorter than this part of the one before its correction is compared with one without.
+WORSE = 0.9
+
+#: Part of the mean product that is left after as many steps as one looks back, from which on the path leads nowhere.
+STALLED = 0.5
 
 #: Nearest that a point comes to the boundary of its cone, squared, as a part of its axis: keeps the scaling finite.
 INSIDE = 1e-20
@@ -67,19 +76,18 @@ def solve_in_space(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: f
         except NotSolved:
             pass
     lean = (step.shear / np.maximum(step.friction, 1e-12)[:, None]).T
-    start = _within(step.normal, lean, 2.0 * FIRST_FORCE), _apart(step.gap, step.slip.T, FIRST_DISTANCE * scale)
-    try:
-        return _followed(step, pattern, gone, multiplier, *start)
-    except NotSolved:
-        pass
-    try:
-        return _followed(step, pattern, gone, multiplier, *start, careful=True)
-    except NotSolved:
-        # In steps so short that nothing moves all is as it was.
-        found = _in_answers(step, pattern, gone, multiplier)
-        if found is None:
-            raise
-        return found
+    failed = NotSolved("no start")
+    for force, distance, careful in STARTS:
+        start = _within(step.normal, lean, force), _apart(step.gap, step.slip.T, distance * scale)
+        try:
+            return _followed(step, pattern, gone, multiplier, *start, careful)
+        except NotSolved as error:
+            failed = error
+    # In steps so short that nothing moves all is as it was.
+    found = _in_answers(step, pattern, gone, multiplier)
+    if found is None:
+        raise failed
+    return found
 
 
 def _within(normal: np.ndarray, lean: np.ndarray, least: float) -> np.ndarray:
@@ -109,7 +117,8 @@ def _followed(
     mu, (across, along) = step.friction, step.give
     scale, no_slip = step.size + along, step.shear.T
     gap, slip = step.gap, step.slip.T
-    motion, short, recent, lost = np.zeros(len(step.load)), False, [1.0] * LOOK_BACK, 0
+    motion, short = np.zeros(len(step.load)), False
+    means: list[float] = []
     for iteration in range(ITERATIONS):
         normal, shear = forces[0], mu * forces[1:]
         gap_error = distances[0] - (gap + across * (normal - step.normal))
@@ -126,29 +135,31 @@ def _followed(
         wrong = max(float(np.abs(gap_error).max()), float(np.abs(slip_error).max()), abs(behind))
         if out < BALANCE and wrong < EQUATIONS * scale and largest < PRODUCT * across:
             return Moved(motion, normal, shear.T, multiplier, iteration, forces, distances, pattern)
-        if sum(part < SHORT for part in recent[-LOOK_BACK:]) >= LOST:
-            lost, recent = lost + 1, [1.0] * LOOK_BACK
-            if lost > 1:
-                break
+        means.append(mean)
+        if len(means) > LOOK_BACK and out < BALANCE and mean > STALLED * means[-1 - LOOK_BACK]:
+            break
         newton = _Newton(step, pattern, forces, distances)
         errors = (gap_error, slip_error, unbalanced, behind)
         found = newton.direction(-across_products, -_product(newton.middle, newton.middle), *errors)
         part = newton.longest(found)
         after = _mean(forces + part * found.forces, distances + part * found.distances)
         centring = min(max((after / mean) ** 3, 1e-3), 0.8)
-        most = CORRECTION * mean
-        second = np.clip(found.forces[0] * found.distances[0], -most, most)
-        third = np.clip(_product(newton.scaled(found.forces), newton.unscaled(found.distances[1:])), -most, most)
+        second = found.forces[0] * found.distances[0]
+        third = _product(newton.scaled(found.forces), newton.unscaled(found.distances[1:]))
         if careful or short:
             centring, second, third = (1.0 if short else max(centring, CAREFUL)), 0.0 * second, 0.0 * third
-        aims = -_product(newton.middle, newton.middle) - third
+        aims = -_product(newton.middle, newton.middle)
         aims[0] += centring * mean
-        found = newton.direction(centring * mean - across_products - second, aims, *errors)
-        part = FRACTION * newton.longest(found)
+        ahead, found = part, newton.direction(centring * mean - across_products - second, aims - third, *errors)
+        part = newton.longest(found)
+        if part < WORSE * ahead and not (careful or short):
+            # Far from the path the second order leads astray.
+            straight = newton.direction(centring * mean - across_products, aims, *errors)
+            found, part = max((found, part), (straight, newton.longest(straight)), key=lambda one: one[1])
+        part *= SPARE
         if not (part > 0.0 and np.isfinite(found.motion).all()):
             break
         short = part < SHORT and not short
-        recent.append(part)
         motion, multiplier = motion + part * found.motion, multiplier + part * found.multiplier
         gap, slip = gap + part * found.relative[0], slip + part * found.relative[1:]
         forces, distances = forces + part * found.forces, distances + part * found.distances

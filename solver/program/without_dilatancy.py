@@ -99,15 +99,16 @@ def solve_without_dilatancy(
         # The disc of a point is the cone of slope 1 whose first number is 1.
         cost, right, slopes = [first.T @ price, np.zeros(size * n)], np.ones(n), np.concatenate([dilatancy, np.ones(n)])
         off = np.zeros(rows)
+    costs = np.concatenate([*cost, np.full(2 * n, change_cost), [-1.0], np.full(2 * rows, UNBALANCED_COST)])
     solution = solve_between(
-        np.concatenate([*cost, np.full(2 * n, change_cost), [-1.0], np.full(2 * rows, UNBALANCED_COST)]),
+        costs,
         sp.csc_array(sp.block_array([balance, cone, change, crush], format="csc")),
         np.concatenate([-dead - off, right, normal, np.zeros(len(brittle))]),
         np.concatenate([-dead + off, right, normal, crushing[brittle]]),
         slopes,
         size,
     )
-    x = solution.x
+    x = solution.x[: len(costs)]
     if size == 2:
         forces = np.stack([x[:n], (x[n : 2 * n] - x[2 * n : 3 * n]) / 2.0], axis=1)
     else:

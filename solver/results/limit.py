@@ -55,6 +55,8 @@ class LimitLoad:
         Resultant of the live loads on the free blocks at a multiplier of 1.
     programs : int
         Linear programs solved.
+    torsion : str
+        Of the faces of blocks in space: that of their contact "points", or under a "uniform" pressure.
     held : State or StoredState, optional
         The limit state: pose, closed contact points, their forces at the limit, and the mechanism as its velocity. In
         memory, or in a file; None where it is kept with the increment that reports the limit load.
@@ -68,6 +70,7 @@ class LimitLoad:
     live_force: float
     programs: int
     held: State | StoredState | None = field(default=None, repr=False, compare=False)
+    torsion: str = "points"
 
     @property
     def state(self) -> State:
@@ -144,7 +147,8 @@ class LimitLoad:
             return f"no equilibrium under the dead load: {moving} blocks fall"
         if self.status is LimitStatus.UNBOUNDED:
             return "unbounded: no live load of this pattern brings the structure down"
-        text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction, bounds differ by {self.gap:.1e})"
+        law = "" if self.torsion == "points" else f", {self.torsion} torsion"
+        text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction{law}, bounds differ by {self.gap:.1e})"
         text += f", {moving} blocks moving" + ("" if self.status is LimitStatus.FOUND else f", {self.status}")
         return f"{text}; {self.caveat}" if self.caveat else text
 

@@ -179,6 +179,7 @@ def test_a_ball_of_tetrahedra_is_no_prism(tmp_path):
         read(tmp_path / "a.vtu", dimension=2)
 
 
+@pytest.mark.thorough
 def test_the_time_grows_with_the_number_of_bodies(tmp_path):
     """Every brick of a row covers every other, seen along the row: comparing all pairs took the square of the time."""
     seconds = []

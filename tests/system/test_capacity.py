@@ -257,6 +257,7 @@ def test_pushover_written_from_python_comes_back(tmp_path):
     assert again.collapse.bracket == run.response.collapse.bracket
 
 
+@pytest.mark.thorough
 def test_pushover_after_a_tilt_starts_at_what_is_left(tmp_path):
     tilt = '[roles]\n"ground" = "moving"\n[settlement]\nrotation_centre = [0.0, 0.0]\nrotation = -1.0\nlimit = 0.1\n'
     _, summary = solved(PUSHED + tilt, tmp_path)

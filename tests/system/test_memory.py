@@ -140,6 +140,7 @@ def test_a_few_small_increments_are_read_once(folder, monkeypatch):
     assert len(numbers) == len(set(numbers)) >= len(response.increments) - 1
 
 
+@pytest.mark.thorough
 def test_stored_increments_are_what_was_told(tmp_path):
     assembly = generators.arch()
     spread = solver.Settlement(direction=(1, 0), increment=0.04, limit=0.5)

@@ -83,7 +83,7 @@ def _made_here(study, folder, runs):
 def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path, scheduler):
     """As in a notebook, where a loop is running; runs that stood up to the limit are no collapse."""
     study = {
-        "study": {"case": TILT, "method": "latin hypercube", "runs": 15, "seed": 5},
+        "study": {"case": TILT, "method": "latin hypercube", "runs": 10, "seed": 5},
         "parameters": {
             "material.friction_coefficient": {"name": "mu", "distribution": "uniform", "lower": 0.2, "upper": 0.7}
         },
@@ -93,13 +93,13 @@ def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path,
         return blockvis.study(study, tmp_path / "out", scheduler=scheduler)
 
     table = asyncio.run(cell())
-    assert len(table) == 15
+    assert len(table) == 10
     limit, mu = 0.44, table["mu"].to_numpy(dtype=float)
     exact = np.arctan(np.minimum(mu, 0.5))
     falls = exact < limit
     assert (table["status"][falls] == "collapsed").all()
     assert (table["status"][~falls] == "limit reached").all()
-    assert 5 < falls.sum() < 11
+    assert 3 < falls.sum() < 8
     np.testing.assert_allclose(table["collapse_displacement"][falls].astype(float), exact[falls], atol=1.1e-4)
     assert (table["bracket_high"] - table["bracket_low"])[falls].max() <= 1.001e-4
     assert table["collapse_displacement"][~falls].isna().all()
@@ -107,14 +107,14 @@ def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path,
     assert table["mechanism_class"][falls].unique().tolist() == ["sliding ground|block 1"]
     curve = fragility_of(table)
     assert curve.n_stood == (~falls).sum()
-    # A run in each of 15 strata: at most one step off the distribution of atan(μ).
+    # A run in each of 10 strata: at most one step off the distribution of atan(μ).
     at = np.linspace(0.21, 0.43, 12)
     found = [curve.probability[curve.settlement <= x].max(initial=0.0) for x in at]
-    np.testing.assert_allclose(found, (np.tan(at) - 0.2) / 0.5, atol=1.001 / 15)
+    np.testing.assert_allclose(found, (np.tan(at) - 0.2) / 0.5, atol=1.001 / 10)
     out = tmp_path / "out"
     stored = pd.read_parquet(out / "table.parquet")
     pd.testing.assert_frame_equal(stored, table, check_dtype=False)
-    assert len(pd.read_csv(out / "table.csv")) == 15
+    assert len(pd.read_csv(out / "table.csv")) == 10
     for name in ("fragility.png", "sensitivity.png", "scatter.png", "mechanisms.png", "summary.json"):
         assert (out / name).stat().st_size > 400
 
@@ -185,6 +185,7 @@ def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tm
     """A run kept as a folder is a run of the table."""
     out, study = tmp_path / "out", STUDY.replace("runs = 24", "runs = 8")
     arches.write_text(study, encoding="utf-8")
+    (tmp_path / "case.toml").write_text(ARCH.replace("increment = 0.02", "increment = 0.05"), encoding="utf-8")
     _made_here(read_study(arches), out, range(3))
     done = (out / "runs.jsonl").read_bytes()
     assert main(["sweep", str(arches), "-o", str(out), "--scheduler", scheduler, "--keep", "5"]) == 0
@@ -204,6 +205,7 @@ def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tm
     )
     kept = json.loads((out / "results" / "run_000005" / "summary.json").read_text(encoding="utf-8"))
     assert kept["collapse_displacement"] == pytest.approx(table.loc[5, "collapse_displacement"], abs=1e-12)
+    assert kept["mechanism"] == table.loc[5, "mechanism"], "one word for the mechanism in table and folder"
     response = blockvis.open_results(out / "results" / "run_000005")
     assert response.interfaces.default.friction_coefficient == pytest.approx(table.loc[5, "friction"])
 

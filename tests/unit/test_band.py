@@ -59,6 +59,7 @@ def test_finds_the_optimum_that_scipy_finds(seed, blocks, degenerate):
     assert found.objective == pytest.approx(known.fun, abs=2e-7 * (1 + abs(known.fun)))
 
 
+@pytest.mark.thorough
 def test_hardly_ever_gives_up():
     """Of 200 programs, half of them with every contact point twice over, all are solved, in 10 to 20 iterations."""
     found = [solved(chain(seed, 2 + seed % 40, seed % 2 == 1)) for seed in range(200)]

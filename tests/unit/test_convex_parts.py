@@ -103,3 +103,31 @@ def test_only_whole_stones_touch_each_other():
     np.testing.assert_allclose(contacts.gaps, 0.0, atol=1e-12)
     assert contacts.areas.sum() == pytest.approx(3.0)
     assert counts.tolist() == [4, 4, 4]
+
+
+def groin_stone(low, high, end=2.6):
+    """Two voussoirs between two angles, of crossing barrels, that are one stone along the groin."""
+    profile = np.array([(r * np.cos(a), r * np.sin(a)) for r, a in ((2, low), (2.3, low), (2.3, high), (2, high))])
+    u, z = profile.T
+    groin, first, second = (np.column_stack(at) for at in ((u, u, z), (u, np.full(4, end), z), (np.full(4, end), u, z)))
+    sides = [[k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
+    others = [[(k + 1) % 4, k, k + 8, (k + 1) % 4 + 8] for k in range(4)]
+    return np.concatenate([groin, first, second]), [*sides, *others, [7, 6, 5, 4], [8, 9, 10, 11]]
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-6, 1e-4, 1e-3])
+def test_the_arm_of_one_groin_stone_does_not_touch_the_cut_of_the_next(shift):
+    """Also where the stones have slid along each other: the only normals are those of the two joint faces."""
+    low, middle, high = 0.5, 0.8, 1.1
+    first, second = groin_stone(low, middle), groin_stone(middle, high)
+    slid = second[0] + np.array([0.0, -1.0, 0.0]) * shift
+    assembly = solver.Assembly.from_solids([first, (slid, second[1])])
+    assert np.bincount(assembly.shapes.parts.block_of_part).tolist() == [2, 2]
+    contacts = solver.find_contacts(assembly, assembly.vertices, 0.05)
+    assert len(contacts) >= 8
+    sense = np.where(contacts.block_a == 1, 1.0, -1.0)[:, None]
+    joint_faces = np.array([[-np.sin(middle), 0.0, np.cos(middle)], [0.0, -np.sin(middle), np.cos(middle)]])
+    along = (sense * contacts.frames[:, 0]) @ joint_faces.T
+    np.testing.assert_allclose(along.max(axis=1), 1.0, atol=1e-6)
+    area = 2 * 0.3 * (2.6 - 2.15 * np.cos(middle))
+    assert contacts.areas.sum() == pytest.approx(area, abs=0.01)

@@ -98,7 +98,7 @@ def test_the_first_push_is_that_of_the_mechanism():
 
 def test_a_free_fall_is_that_of_gravity():
     """A block pushed off nothing: what the time of the frames means."""
-    response = panel()
+    response = shipped_arch()
     engine = fall_module._Engine(response, 0.0)
     highest = int(np.argmax(response.path[-1].pose.positions[:, 1]))
     for k in range(response.assembly.n_blocks):
@@ -112,11 +112,11 @@ def test_a_free_fall_is_that_of_gravity():
 
 
 def test_the_same_bytes_twice(tmp_path):
-    response = panel()
+    response = shipped_arch()
     for name in ("one", "two"):
         write_fall(fall_of(response), response, tmp_path / name)
     files = sorted(path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*") if path.is_file())
-    assert len(files) == len(fallen(panel)) + 2
+    assert len(files) == len(fallen(shipped_arch)) + 2
     for file in files:
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), file
 

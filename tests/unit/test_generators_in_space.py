@@ -1,5 +1,7 @@
 """Layouts in space: dimensions, no overlaps, faces that meet, and the blocks of the references."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -8,12 +10,29 @@ from blockvis import generators
 from blockvis.layout.layout import layout_of
 from blockvis.layout.solids import volume
 
+#: Sizes at which they take a fraction of a second.
+SMALL = {
+    "cross vault": {"voussoirs": 5},
+    "pavilion vault": {"voussoirs": 5},
+    "church bay": {"voussoirs": 5, "pier_stones": 1},
+    "L corner": {"courses": 3},
+    "T corner": {"courses": 3},
+    "two-leaf wall": {"courses": 4},
+}
+
+
+@functools.cache
+def built(name):
+    """Build a layout once."""
+    return generators.build(name, SMALL.get(name))
+
+
 IN_SPACE = [name for name in generators.LAYOUTS if generators.dimension_of(name) == 3]
 
 
 @pytest.mark.parametrize("name", IN_SPACE)
 def test_no_block_overlaps_another_and_each_touches_others(name):
-    assembly = generators.build(name)
+    assembly = built(name)
     assert assembly.dimension == 3
     assert not len(assembly.shapes.overlaps(assembly.vertices, 1e-9)[0])
     contacts = solver.find_contacts(assembly, assembly.vertices, 1e-9)
@@ -24,7 +43,7 @@ def test_no_block_overlaps_another_and_each_touches_others(name):
 
 @pytest.mark.parametrize("name", IN_SPACE)
 def test_every_layout_has_named_blocks_a_material_and_a_ground(name):
-    assembly = generators.build(name)
+    assembly = built(name)
     assert assembly.moving.any()
     for kind, role in zip(assembly.materials, assembly.roles, strict=True):
         assert (kind == "ground") == (role != "free")
@@ -35,7 +54,7 @@ def test_every_layout_has_named_blocks_a_material_and_a_ground(name):
 
 @pytest.mark.parametrize("name", IN_SPACE)
 def test_faces_are_plane_and_seen_counter_clockwise(name):
-    for points, faces in layout_of(generators.build(name)).solids:
+    for points, faces in layout_of(built(name)).solids:
         assert volume(points, faces) > 0
         for face in faces:
             ring = points[face] - points[face].mean(axis=0)
@@ -79,3 +98,43 @@ def test_the_dome_is_what_the_reference_values_are_for():
 def test_impossible_domes(parameters, reason):
     with pytest.raises(ValueError, match=reason):
         generators.dome(**parameters)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", IN_SPACE)
+def test_every_layout_stands(name):
+    assembly = generators.build(name)
+    down = solver.Settlement(direction=(0, 0, -1), increment=1e-7, limit=1e-7)
+    response = solver.settle(assembly, down, friction_coefficient=0.6)
+    assert response.stop == solver.Status.LIMIT_REACHED, response.message
+
+
+def test_stones_cut_along_the_groin_are_convex_and_weigh_the_same():
+    for vault in (generators.cross_vault, generators.pavilion_vault):
+        whole, cut = vault(voussoirs=5), vault(voussoirs=5, bonded=False)
+        assert cut.shapes.volumes.sum() == pytest.approx(whole.shapes.volumes.sum())
+        assert cut.n_blocks == whole.n_blocks + 8
+
+
+def test_headers_tie_both_leaves():
+    wall = generators.two_leaf_wall(bricks=4, courses=3, cavity=0.05)
+    headers = [i for i, name in enumerate(wall.names) if name.startswith("header")]
+    assert len(headers) == 4
+    for i in headers:
+        assert np.ptp(wall.vertices[wall.block_of_vertex == i][:, 1]) == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "reason"),
+    [
+        ("cross vault", {"width": 4.0}, "width is 4 m, but the supports of the vault reach"),
+        ("pavilion vault", {"voussoirs": 6}, "voussoirs is 6; a pavilion vault needs an odd number"),
+        ("church bay", {"pier": 0.3}, "pier is 0.3 m; the vault's supports need"),
+        ("T corner", {"bricks": 3}, "bricks is 3; give an even number"),
+        ("barrel vault", {"stones": 0}, "stones is 0; give a whole number of at least 1"),
+        ("two-leaf wall", {"cavity": -0.1}, "cavity is -0.1"),
+    ],
+)
+def test_impossible_dimensions_are_named(name, parameters, reason):
+    with pytest.raises(ValueError, match=reason):
+        generators.build(name, parameters)

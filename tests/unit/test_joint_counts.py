@@ -105,7 +105,7 @@ def test_curve_names_the_count_it_changes_to(name):
     assert name == "semicircular arch" or events
 
 
-@pytest.mark.parametrize("name", ["portal frame", "semicircular arch"])
+@pytest.mark.parametrize("name", [pytest.param("portal frame", marks=pytest.mark.thorough), "semicircular arch"])
 def test_collapse_has_one_count(name, tmp_path):
     """Of the fall, of the last equilibrium in the motion of the fall, which the picture shows, and in the summary."""
     response = RESPONSES[name]()

@@ -10,7 +10,8 @@ from structures import arch_response, parted, wall
 
 import solver
 from blockvis import generators
-from blockvis.pictures.captions import FAILED_BADGE
+from blockvis.fall import fall_of
+from blockvis.pictures.captions import FAILED_BADGE, FALL_BADGE
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of
 from blockvis.pictures.frame import Sheet
@@ -114,6 +115,20 @@ def test_the_legend_lists_what_is_drawn_and_what_is_too_much():
     assert "hinge" not in keys_of(parted(wall(8, 6), 3, 0))
     # Who asks for none gets none, and no excuse.
     assert not any("forces" in text for text in keys_of(parted(wall(20, 18), 3, 0), forces="none"))
+
+
+def test_the_legend_of_the_fall_names_no_joints_and_no_forces(words):
+    """Dynamics draws the blocks alone; hinges and forces are those of statics."""
+    response = arch_response()
+    fall = fall_of(response)
+    drawer = Drawer(response, Look(colour_by="mechanism"), SMALL, response.path, fall=fall)
+    drawer.picture(response.path[-1])
+    drawer.falling_picture(float(fall.times[-1]) / 2.0)
+    standing, falling = ([key.text for key in said["keys"]] for said in words)
+    assert words[1]["badge"] == FALL_BADGE
+    assert falling == ["parts of the last mechanism"]
+    assert {"hinge", "open joint", *falling} < set(standing)
+    assert any(text.startswith("compression") for text in standing)
 
 
 def test_picture_film_and_page_count_the_last_equilibrium_alike(monkeypatch):

@@ -78,6 +78,7 @@ def test_an_svg_with_layers_of_roles(tmp_path, capsys):
     assert _ran(case, capsys)["initial_reaction"] > 0
 
 
+@pytest.mark.thorough
 def test_a_msh_file_whose_groups_are_springers(tmp_path, capsys):
     shutil.copy(ROOT / "assets" / "semicircular_arch.msh", tmp_path / "arch.msh")
     case, values = _written(tmp_path / "arch.msh")

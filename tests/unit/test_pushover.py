@@ -81,6 +81,7 @@ def test_zero_capacity_does_not_depend_on_the_increment():
     assert coarse.collapse.displacement == pytest.approx(fine.collapse.displacement, rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_a_wall_that_rocks_does_not_depend_on_the_increment():
     outlines = []
     for course in range(4):

@@ -66,7 +66,8 @@ def test_sinking(embrace, ratio, n, collapse, first, last, h_first, h_last):
 
 
 @pytest.mark.parametrize(
-    "increment", [0.02, pytest.param(0.01, **THOROUGH), pytest.param(0.0025, marks=pytest.mark.slow)]
+    "increment",
+    [*(pytest.param(h, **THOROUGH) for h in (0.02, 0.01)), pytest.param(0.0025, marks=pytest.mark.slow)],
 )
 def test_collapse_does_not_depend_on_the_increment(increment):
     """Correctors and the collapse bracket leave no error of the increment: the bracket's width is what remains."""
@@ -87,6 +88,7 @@ def test_relocating_hinge_is_met_at_every_increment(increment):
     assert response.settlement[jump + 1] >= 0.12885 - 1e-4
 
 
+@pytest.mark.thorough
 def test_odd_number_of_voussoirs_follows_the_stable_asymmetric_path():
     response = _settle(180, 0.15, 13, (1, 0))
     assert response.collapse.displacement < 0.17  # the symmetric, unstable path would last to 0.177339

@@ -36,8 +36,8 @@ def flat_arch(height, friction_coefficient=3.0, **settlement):
     return settle(outlines, ["free", "free", "fixed", "moving"], spread, friction_coefficient)
 
 
-@pytest.mark.parametrize("height", [0.25, 0.5])
-@pytest.mark.parametrize("friction_coefficient", [1.001, 3.0])
+@pytest.mark.parametrize("height", [0.25, pytest.param(0.5, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("friction_coefficient", [1.001, pytest.param(3.0, marks=pytest.mark.thorough)])
 def test_flat_arch(height, friction_coefficient):
     """Hinges at the lower corners of the abutments and the upper corner of the middle joint.
 

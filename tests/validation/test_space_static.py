@@ -4,10 +4,14 @@ Limit loads, reactions and whether a structure stands: of a prism on a tilted pl
 a bar on two edges, a cube that is turned, a plug between faces and a stack with the largest overhang.
 """
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 import solver
+from blockvis import generators
+from solver.cones.solve import CUTS, OWN, solve_cones
 from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose
 from solver.program.admissible import admissible
@@ -47,10 +51,10 @@ def on_ground(solids, extent=5.0):
     return solver.Assembly.from_solids([*solids, ground], roles=["free"] * len(solids) + ["fixed"])
 
 
-def limit(assembly, live, friction, flow="associative"):
+def limit(assembly, live, friction, flow="associative", **options):
     """The limit load, proved by its certificate."""
     loads = solver.Loads(solver.self_weight(assembly).dead, live)
-    found = solver.limit_load(assembly, loads=loads, friction_coefficient=friction, flow=flow)
+    found = solver.limit_load(assembly, loads=loads, friction_coefficient=friction, flow=flow, **options)
     assert found.certificate.equilibrium_residual < 1e-8
     assert found.certificate.complementarity < 1e-8
     assert found.certificate.kinematic_violation < 1e-8
@@ -203,3 +207,183 @@ def test_a_harmonic_stack_of_eight_along_the_diagonal(overhang, stands):
         at += overhang / (2.0 * (7 - level)) if level < 7 else 0.0
     assembly = on_ground(solids)
     assert bounds(assembly, 0.6).exists is stands
+
+
+def test_cones_and_cuts_agree_on_a_wall(monkeypatch):
+    """Half of the base sinks: the least and the largest reaction by round cones, and by pyramids and their cuts."""
+    solids = []
+    for level, ends in enumerate([[0.0, 1.0, 2.0, 3.0], [0.0, 0.5, 1.5, 2.5, 3.0], [0.0, 1.0, 2.0, 3.0]]):
+        solids += [box((a, 0.0, 0.4 * level), (b, 0.5, 0.4 * (level + 1))) for a, b in pairwise(ends)]
+    solids += [box((-0.5, -0.5, -0.4), (1.5, 1.0, 0.0)), box((1.5, -0.5, -0.4), (3.5, 1.0, 0.0))]
+    assembly = solver.Assembly.from_solids(solids, roles=["free"] * 10 + ["fixed", "moving"])
+    sinks = np.zeros((assembly.n_blocks, 6))
+    sinks[assembly.moving, :3] = 0.3, 0.2, -1.0
+    round_cones = bounds(assembly, 0.6, sinks)
+    monkeypatch.setattr("solver.program.admissible.solve_cones", lambda program: solve_cones(program, (CUTS,)))
+    cuts = bounds(assembly, 0.6, sinks)
+    monkeypatch.setattr("solver.program.admissible.solve_cones", lambda program: solve_cones(program, (OWN,)))
+    own = bounds(assembly, 0.6, sinks)
+    assert round_cones.exists
+    assert round_cones.low < round_cones.high
+    for other in (cuts, own):
+        assert other.exists
+        np.testing.assert_allclose([other.low, other.high], [round_cones.low, round_cones.high], rtol=EXACT)
+
+
+TURNED = (np.sqrt(2.0) + np.arcsinh(1.0)) / 6.0
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+def test_a_turned_cube_under_a_uniform_pressure(flow):
+    """μ N a (√2 + asinh 1) / 6, a little more than half of what its corners resist; says which law was used."""
+    assembly = on_ground([box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))])
+    live = np.zeros((2, 6))
+    live[0, 5] = assembly.masses[0] * solver.GRAVITY
+    found = limit(assembly, live, 0.5, flow, torsion="uniform")
+    assert pytest.approx(0.191299, abs=1e-6) == 0.5 * TURNED
+    assert found.multiplier == pytest.approx(0.5 * TURNED, rel=EXACT)
+    assert found.torsion == "uniform"
+    assert "uniform torsion" in str(found)
+    # What is reported at the points has the same resultants.
+    on_block = solver.block_forces(found.contacts, found.pose, found.forces)[0]
+    np.testing.assert_allclose(
+        on_block, np.array([0, 0, 1, 0, 0, -found.multiplier]) * live[0, 5], atol=1e-6 * live[0, 5]
+    )
+
+
+@pytest.mark.parametrize("eccentricity", [0.0, 0.2, 1.0])
+def test_a_cube_pushed_beside_its_middle_under_a_uniform_pressure(eccentricity):
+    """Shear and torsion together: α √(1 + (e / r)²) = μ."""
+    assembly = on_ground([box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))])
+    weight = assembly.masses[0] * solver.GRAVITY
+    live = solver.point_load(assembly, 0, (weight, 0.0, 0.0), point=(0.0, eccentricity, 0.0))
+    found = limit(assembly, live, 0.4, torsion="uniform")
+    assert found.multiplier == pytest.approx(0.4 / np.hypot(1.0, eccentricity / TURNED), rel=EXACT)
+
+
+def test_a_turned_triangle_and_a_turned_plate():
+    """Far from the origin of the drawing: μ N times the mean distance from the centroid, here by integration."""
+    outlines = [
+        np.array([[np.cos(t), np.sin(t)] for t in np.radians([90.0, 210.0, 330.0])]),
+        np.array([[-1.5, -0.25], [1.5, -0.25], [1.5, 0.25], [-1.5, 0.25]]),
+    ]
+    for outline in outlines:
+        assembly = on_ground([prism((outline + np.array([0.7, 0.3])).tolist(), 0.0, 0.5)])
+        live = np.zeros((2, 6))
+        live[0, 5] = assembly.masses[0] * solver.GRAVITY
+        found = limit(assembly, live, 0.5, torsion="uniform")
+        assert found.multiplier == pytest.approx(0.5 * mean_distance(outline), rel=1e-5)
+
+
+def mean_distance(outline, cells=400):
+    """Mean distance of a polygon's points from the origin, its centroid, from the middles of many small triangles."""
+    total = area = 0.0
+    s = (np.arange(cells) + 0.5) / cells
+    for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        across = a + s[:, None] * (b - a)
+        # Along a ray the mean of r with weight r is two thirds of its length.
+        part = abs(a[0] * b[1] - a[1] * b[0]) / 2.0
+        total += part * 2.0 / 3.0 * np.linalg.norm(across, axis=1).mean()
+        area += part
+    return total / area
+
+
+@pytest.mark.parametrize("flow", ["associative", "non-associative"])
+def test_cohesion_and_crushing_of_a_face(flow):
+    """Pushed at its base it slides at μ + c A / W; overturns with a toe that crushes at b / h (σ A / W - 1)."""
+    assembly = on_ground([prism(PRISM, 0.0, 2.0)])
+    weight, area = assembly.masses[0] * solver.GRAVITY, 0.6
+    dead = solver.self_weight(assembly).dead
+    at_base = solver.point_load(assembly, 0, (0.6 * weight, 0.8 * weight, 0.0), point=(0.0, 0.0, 0.0))
+    sticky = Interfaces(InterfaceLaw(0.3, cohesion=0.2 * weight / area))
+    found = solver.limit_load(assembly, loads=solver.Loads(dead, at_base), interfaces=sticky, flow=flow)
+    assert found.multiplier == pytest.approx(0.5, rel=EXACT)
+    brittle = Interfaces(InterfaceLaw(2.0, compressive_strength=1.5 * weight / area))
+    found = solver.limit_load(assembly, loads=solver.Loads(dead, push(assembly, 0.0)), interfaces=brittle, flow=flow)
+    assert found.multiplier == pytest.approx(0.5 * (1.5 - 1.0), rel=EXACT)
+
+
+def test_torsion_of_faces_is_for_blocks_in_space():
+    assembly = on_ground([box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))])
+    loads = solver.Loads(solver.self_weight(assembly).dead, push(assembly, 0.0))
+    with pytest.raises(ValueError, match="torsion is 'exact'; it is 'points' or 'uniform'"):
+        solver.limit_load(assembly, loads=loads, torsion="exact")
+    square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+    flat = solver.Assembly.from_outlines([square])
+    with pytest.raises(ValueError, match="blocks in the plane have none"):
+        solver.limit_load(flat, loads=solver.Loads(np.zeros((1, 3)), np.ones((1, 3))), torsion="uniform")
+
+
+@pytest.mark.slow
+def test_a_prism_pushed_over():
+    """0.2 × 0.3 × 1, geometry updated: α = tan(atan 0.2 - asin d) at the displacement d of its top above the edge."""
+    assembly = on_ground([box((0.0, 0.0, 0.0), (0.2, 0.3, 1.0))])
+    loads = solver.Loads(solver.self_weight(assembly).dead, push(assembly, 0.0))
+    control = solver.ControlDisplacement(
+        "block 0", (1.0, 0.0, 0.0), point=(0.2, 0.15, 1.0), increment=0.08, limit=0.3, tolerance=1e-3
+    )
+    response = solver.pushover(assembly, control, loads=loads, friction_coefficient=0.7)
+    assert response.stop is solver.Status.COLLAPSED
+    multiplier = np.array([increment.load_multiplier for increment in response.path])
+    assert multiplier == pytest.approx(np.tan(np.arctan(0.2) - np.arcsin(response.settlement)), abs=EXACT)
+    assert response.collapse.displacement == pytest.approx(np.sin(np.arctan(0.2)), abs=1e-3)
+
+
+@pytest.mark.slow
+def test_a_cube_pushed_along_its_diagonal_slides_and_does_not_lift():
+    assembly = on_ground([box((0.0, 0.0, 0.0), (0.5, 0.5, 0.4))])
+    loads = solver.Loads(solver.self_weight(assembly).dead, push(assembly, 45.0))
+    control = solver.ControlDisplacement("block 0", (1.0, 1.0, 0.0), increment=0.1, limit=0.2)
+    response = solver.pushover(assembly, control, loads=loads, friction_coefficient=0.3)
+    assert response.stop is solver.Status.LIMIT_REACHED
+    assert [increment.load_multiplier for increment in response.path] == pytest.approx(
+        [0.3] * len(response.path), abs=EXACT
+    )
+    last = response.path[-1].pose.displacements(assembly)[0]
+    assert last == pytest.approx([0.2 / np.sqrt(2.0), 0.2 / np.sqrt(2.0), 0.0, 0.0, 0.0, 0.0], abs=1e-7)
+
+
+def test_what_a_limit_load_in_space_can_be():
+    """Pressed onto the ground without limit; leaning over and held by its live load; leaning, and not held."""
+    assembly = on_ground([prism(PRISM, 0.0, 2.0)])
+    dead, weight = solver.self_weight(assembly).dead, assembly.masses[0] * solver.GRAVITY
+    down = solver.weight_fraction(assembly, (0.0, 0.1, -1.0), np.array([0]))
+    found = solver.limit_load(assembly, loads=solver.Loads(dead, down))
+    assert found.status is solver.LimitStatus.UNBOUNDED
+    assert found.multiplier == np.inf
+    leaning = dead + solver.point_load(assembly, 0, moment=(0.0, 0.6 * weight, 0.0))
+    back = solver.point_load(assembly, 0, moment=(0.0, -weight, 0.0))
+    found = solver.limit_load(assembly, loads=solver.Loads(leaning, back), friction_coefficient=0.5)
+    assert found.status is solver.LimitStatus.HELD
+    assert found.multiplier == pytest.approx(1.1, rel=EXACT)
+    found = solver.limit_load(assembly, loads=solver.Loads(leaning, push(assembly, 90.0)), friction_coefficient=0.5)
+    assert found.status is solver.LimitStatus.NO_EQUILIBRIUM
+    # It turns over the edge in its way, which is along y.
+    assert found.mechanism[0, 4] > 0.5 * np.abs(found.mechanism[0]).max()
+
+
+def test_blocks_between_a_support_that_presses_and_one_that_does_not_give_way():
+    """Friction and the thrust of a flat arch bound the reaction from below; from above nothing does."""
+    for count in (1, 10):
+        row = [box((k, 0.0, 0.0), (k + 1.0, 1.0, 1.0)) for k in range(count)]
+        sides = [box((-1.0, -1.0, -1.0), (0.0, 2.0, 2.0)), box((count, -1.0, -1.0), (count + 1.0, 2.0, 2.0))]
+        roles = ["free"] * count + ["fixed", "moving"]
+        assembly = solver.Assembly.from_solids([*row, *sides], roles=roles)
+        presses = np.zeros((count + 2, 6))
+        presses[-1, 0] = -1.0
+        found = bounds(assembly, 0.6, presses)
+        weight = count * assembly.masses[0] * solver.GRAVITY
+        assert found.exists
+        # Friction at both ends takes W = 2 μ R; a flat arch of n cubes thrusts with W n / 8.
+        assert -found.high == pytest.approx(max(weight / 1.2, weight * count / 8.0), rel=EXACT)
+        assert found.low == -np.inf
+
+
+def test_the_thrust_of_a_dome_whose_springers_begin_to_move_out():
+    """A cap of 15° on 8 lunes of 6 stones, t / R 0.12: H / W = 0.1661226, from the statics of a lune."""
+    stones = generators.dome(lunes=8, courses=6, thickness_ratio=0.12, cap=15.0)
+    out = np.zeros((stones.n_blocks, 6))
+    out[stones.moving, :2] = stones.centroids[stones.moving, :2]
+    out[stones.moving] /= np.linalg.norm(out[stones.moving], axis=1)[:, None]
+    weight = stones.masses[stones.free].sum() * solver.GRAVITY
+    assert bounds(stones, 0.7, out).low / weight == pytest.approx(0.1661226, rel=EXACT)

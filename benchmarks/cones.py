@@ -1,0 +1,94 @@
+"""Conic programs of walls in space: processor seconds of each way to a solution, and what its check says.
+
+    python benchmarks/cones.py [BLOCKS ...] [--ways WAY ...]
+
+The program is that of the least reaction as half of the base of a running-bond wall begins to sink: 6 rows per free
+block, a round cone per contact point. Ways are those of ``solver.cones.solve``; by default our own and Clarabel.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from contextlib import suppress
+from itertools import pairwise
+from unittest.mock import patch
+
+import numpy as np
+
+import solver
+import solver.program.admissible as admissible
+from solver.cones.problem import ConicProgram, ConicSolution
+from solver.cones.solve import OWN, solve_cones
+from solver.interfaces import InterfaceLaw, Interfaces
+from solver.kinematics import Pose
+from solver.program.model import Model
+
+LENGTH, HEIGHT, THICKNESS, FRICTION = 0.25, 0.06, 0.12, 0.6
+
+
+def box(low: list[float], high: list[float]) -> tuple[np.ndarray, list[list[int]]]:
+    """Corners and faces."""
+    corners = np.array([[x, y, z] for z in (low[2], high[2]) for y in (low[1], high[1]) for x in (low[0], high[0])])
+    return corners, [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]]
+
+
+def wall(blocks: int) -> solver.Assembly:
+    """About so many bricks in running bond, two as long as high, on two supports of which the right one moves."""
+    courses = max(2, round(np.sqrt(2.0 * blocks)))
+    per_course = max(2, round(blocks / courses))
+    width, solids = per_course * LENGTH, []
+    for course in range(courses):
+        inner = LENGTH * (np.arange(1, per_course) if course % 2 == 0 else np.arange(per_course) + 0.5)
+        ends = [0.0, *inner, width]
+        low, high = course * HEIGHT, (course + 1) * HEIGHT
+        solids += [box([a, 0.0, low], [b, THICKNESS, high]) for a, b in pairwise(ends)]
+    free = len(solids)
+    solids += [
+        box([-LENGTH, -LENGTH, -HEIGHT], [width / 2, LENGTH, 0.0]),
+        box([width / 2, -LENGTH, -HEIGHT], [width + LENGTH, LENGTH, 0.0]),
+    ]
+    return solver.Assembly.from_solids(solids, roles=["free"] * free + ["fixed", "moving"])
+
+
+def program_of(assembly: solver.Assembly) -> tuple[ConicProgram, int]:
+    """The program of the least reaction, and how many contact points it has."""
+    load, length = solver.self_weight(assembly).dead, assembly.block_size
+    force = float(np.abs(load[assembly.free, 2]).mean())
+    model = Model(assembly, Interfaces(InterfaceLaw(FRICTION)), load, length, force, length, length / 4.0)
+    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-6 * length)
+    sinks = np.zeros((assembly.n_blocks, 6))
+    sinks[assembly.moving, 2] = -1.0
+    stated: list[ConicProgram] = []
+
+    def kept(program: ConicProgram) -> ConicSolution:
+        stated.append(program)
+        raise StopIteration
+
+    with patch.object(admissible, "solve_cones", kept), suppress(StopIteration):
+        admissible.admissible(model, Pose.initial(assembly), contacts, np.full(len(contacts), FRICTION), sinks)
+    return stated[0], len(contacts)
+
+
+def main() -> None:
+    """Solve each wall's program by each way."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("blocks", nargs="*", type=int, default=[40, 300, 1000])
+    parser.add_argument("--ways", nargs="*", default=[OWN, "clarabel"])
+    arguments = parser.parse_args()
+    print(f"{'blocks':>7} {'points':>7}  {'way':<10} {'seconds':>8} {'iterations':>10} {'violation':>9} {'gap':>8}")
+    for blocks in arguments.blocks:
+        assembly = wall(blocks)
+        program, points = program_of(assembly)
+        for way in arguments.ways:
+            started = time.process_time()
+            found = solve_cones(program, (way,))
+            seconds = time.process_time() - started
+            print(
+                f"{int(assembly.free.sum()):7} {points:7}  {way:<10} {seconds:8.2f} {found.iterations:10} "
+                f"{found.violation:9.1e} {found.gap:8.1e}   {found.objective:.9g}"
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,236 @@
+"""Walls in space: corners and junctions with bonded bricks, and walls of two leaves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import solver
+from blockvis.layout.solids import Solid, box
+
+from .dimensions import above_zero, at_least_zero, whole
+from .solids import assembled
+
+#: Walls of a corner and a junction stand on strips of ground this fraction of a brick wider to each side.
+GROUND = 0.25
+
+
+def l_corner(
+    *,
+    bricks: int = 4,
+    across: int = 4,
+    courses: int = 8,
+    brick_length: float = 0.25,
+    brick_height: float = 0.08,
+    density: float = 1800.0,
+) -> solver.Assembly:
+    """Build the corner of two walls half a brick thick, whose bricks take turns in the corner.
+
+    Parameters
+    ----------
+    bricks, across : int
+        Lengths of the walls along x and along y in bricks, from the outer corner on.
+    courses : int
+        Number of courses.
+    brick_length, brick_height : float [m]
+        A brick is half as wide as it is long.
+    density : float [kg/m³]
+
+    Returns
+    -------
+    solver.Assembly
+        Bricks "brick 1-1" (course, from the corner along x) and "cross brick 1-1" (along y), "ground" (fixed) under the
+        wall along x and "cross ground" (moving) under the other. The outer corner is x = y = 0.
+
+    Examples
+    --------
+    >>> l_corner(bricks=2, across=2, courses=2).n_blocks
+    10
+    """
+    n, m = whole("bricks", bricks, 2), whole("across", across, 2)
+    length, height, width = _brick(brick_length, brick_height)
+    stones: list[tuple[str, Solid]] = []
+    for course in range(whole("courses", courses, 1)):
+        # In every second course the wall along y has the corner.
+        along = _cuts(width if course % 2 else 0.0, n * length, length, width)
+        beside = _cuts(0.0 if course % 2 else width, m * length, length, width)
+        row = _Row((0.0, width), (course * height, (course + 1) * height))
+        stones += row.along_x(f"brick {course + 1}", along)
+        stones += row.along_y(f"cross brick {course + 1}", beside)
+    wide = GROUND * length
+    grounds = [
+        ("ground", solver.FIXED, box((-wide, -wide, -height), (n * length + wide, width, 0.0))),
+        ("cross ground", solver.MOVING, box((-wide, width, -height), (width + wide, m * length + wide, 0.0))),
+    ]
+    return assembled(stones, grounds, density=above_zero("density", density, "kg/m³"), material="brick")
+
+
+def t_corner(
+    *,
+    bricks: int = 6,
+    across: int = 4,
+    courses: int = 8,
+    brick_length: float = 0.25,
+    brick_height: float = 0.08,
+    density: float = 1800.0,
+) -> solver.Assembly:
+    """Build the junction of a wall with one across, half a brick thick, whose bricks reach through every second course.
+
+    Parameters
+    ----------
+    bricks : int
+        Length of the wall along x in bricks, an even number.
+    across : int
+        Length of the wall along y in bricks, from the face of the other on.
+    courses, brick_length, brick_height, density
+        As in :func:`l_corner`.
+
+    Returns
+    -------
+    solver.Assembly
+        Bricks "brick 1-1" (course, from the left) and "cross brick 1-1" (along y), "ground" (fixed) under the wall
+        along x and "cross ground" (moving) under the other. The middle of the wall along x is x = 0.
+
+    Examples
+    --------
+    >>> t_corner(bricks=2, across=2, courses=2).n_blocks
+    11
+    """
+    n, m = whole("bricks", bricks, 2), whole("across", across, 1)
+    if n % 2:
+        raise ValueError(f"bricks is {n}; give an even number, with the wall across in the middle")
+    length, height, width = _brick(brick_length, brick_height)
+    half, far = n * length / 2.0, width + m * length
+    stones: list[tuple[str, Solid]] = []
+    for course in range(whole("courses", courses, 1)):
+        levels = course * height, (course + 1) * height
+        row, cross = _Row((0.0, width), levels), _Row((-width / 2.0, width / 2.0), levels)
+        # In every second course the wall across reaches through to the outer face.
+        right = _cuts((width if course % 2 else length) / 2.0, half, length, width)
+        left = [-x for x in right[::-1]]
+        if course % 2:
+            stones += row.along_x(f"brick {course + 1}", left)
+            stones += row.along_x(f"brick {course + 1}", right, len(left) - 1)
+        else:
+            stones += row.along_x(f"brick {course + 1}", left + right)
+        beside = _cuts(0.0 if course % 2 else width, far, length, width)
+        stones += cross.along_y(f"cross brick {course + 1}", beside)
+    wide = GROUND * length
+    grounds = [
+        ("ground", solver.FIXED, box((-half - wide, -wide, -height), (half + wide, width, 0.0))),
+        (
+            "cross ground",
+            solver.MOVING,
+            box((-width / 2.0 - wide, width, -height), (width / 2.0 + wide, far + wide, 0.0)),
+        ),
+    ]
+    return assembled(stones, grounds, density=above_zero("density", density, "kg/m³"), material="brick")
+
+
+def two_leaf_wall(
+    *,
+    bricks: int = 6,
+    courses: int = 9,
+    cavity: float = 0.0,
+    header_courses: int = 3,
+    header_spacing: int = 2,
+    brick_length: float = 0.25,
+    brick_height: float = 0.08,
+    density: float = 1800.0,
+) -> solver.Assembly:
+    """Build a wall of two leaves, each half a brick thick, tied by headers through both.
+
+    Parameters
+    ----------
+    bricks : int
+        Length of the wall in bricks.
+    courses : int
+        Number of courses.
+    cavity : float [m]
+        Between the leaves; the headers reach across it.
+    header_courses : int
+        Every so many courses have headers, the first of them at that height.
+    header_spacing : int
+        In these courses every so many bricks are replaced by two headers side by side.
+    brick_length, brick_height : float [m]
+        A brick is half as wide as it is long.
+    density : float [kg/m³]
+
+    Returns
+    -------
+    solver.Assembly
+        Bricks "front 1-1" and "back 1-1" (course, from the left), headers "header 3-1", and the supports "front ground"
+        (fixed) and "back ground" (moving). The wall runs along x, its front is y = 0.
+
+    Examples
+    --------
+    >>> two_leaf_wall(bricks=4, courses=3).roles[-2:].tolist()
+    ['fixed', 'moving']
+    """
+    n, every, spacing = whole("bricks", bricks, 2), whole("header_courses", header_courses, 1), header_spacing
+    spacing = whole("header_spacing", spacing, 1)
+    length, height, width = _brick(brick_length, brick_height)
+    gap = at_least_zero("cavity", cavity)
+    deep = 2.0 * width + gap
+    stones: list[tuple[str, Solid]] = []
+    for course in range(whole("courses", courses, 1)):
+        low, high = course * height, (course + 1) * height
+        cuts = [0.0, *(length * (k + (0.5 if course % 2 else 1.0)) for k in range(n)), n * length]
+        cuts = sorted({round(x, 12) for x in cuts if x <= n * length + 1e-12})
+        pairs = list(pairwise(cuts))
+        tied = (course + 1) % every == 0
+        number = 0
+        for k, (a, b) in enumerate(pairs):
+            whole_brick = b - a > 0.75 * length
+            if tied and whole_brick and k % spacing == 0:
+                middle = (a + b) / 2.0
+                for start, end in ((a, middle), (middle, b)):
+                    number += 1
+                    stones.append((f"header {course + 1}-{number}", box((start, 0.0, low), (end, deep, high))))
+            else:
+                stones.append((f"front {course + 1}-{k + 1}", box((a, 0.0, low), (b, width, high))))
+                stones.append((f"back {course + 1}-{k + 1}", box((a, width + gap, low), (b, deep, high))))
+    wide, middle = GROUND * length, width + gap / 2.0
+    grounds = [
+        ("front ground", solver.FIXED, box((-wide, -wide, -height), (n * length + wide, middle, 0.0))),
+        ("back ground", solver.MOVING, box((-wide, middle, -height), (n * length + wide, deep + wide, 0.0))),
+    ]
+    return assembled(stones, grounds, density=above_zero("density", density, "kg/m³"), material="brick")
+
+
+def _brick(length: float, height: float) -> tuple[float, float, float]:
+    length = above_zero("brick_length", length)
+    return length, above_zero("brick_height", height), length / 2.0
+
+
+def _cuts(start: float, end: float, length: float, least: float) -> list[float]:
+    """Lay out bricks from ``start`` to ``end``; a rest shorter than half a brick belongs to the last."""
+    n = max(math.ceil((end - start) / length - 1e-9), 1)
+    cuts = [start + k * length for k in range(n)]
+    if len(cuts) > 1 and end - cuts[-1] < least - 1e-9:
+        cuts.pop()
+    return [*cuts, end]
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A course of a wall: where it begins and ends across its length, and its levels [m]."""
+
+    across: tuple[float, float]
+    levels: tuple[float, float]
+
+    def along_x(self, name: str, cuts: list[float], begun: int = 0) -> list[tuple[str, Solid]]:
+        """Lay bricks along x between these joints, and number them."""
+        (front, back), (low, high) = self.across, self.levels
+        return [
+            (f"{name}-{begun + k}", box((a, front, low), (b, back, high)))
+            for k, (a, b) in enumerate(pairwise(cuts), start=1)
+        ]
+
+    def along_y(self, name: str, cuts: list[float]) -> list[tuple[str, Solid]]:
+        """Lay bricks along y between these joints, and number them."""
+        (left, right), (low, high) = self.across, self.levels
+        return [
+            (f"{name}-{k}", box((left, a, low), (right, b, high))) for k, (a, b) in enumerate(pairwise(cuts), start=1)
+        ]

@@ -1,0 +1,304 @@
+"""The scene in space: blocks and marks as meshes, drawn by VTK without a window, frame after frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from PIL import Image
+from vtkmodules.vtkCommonCore import vtkLogger
+
+import solver
+
+from . import palette
+from .frame import Frame
+from .solid_view import View
+from .surface import sharp_edges, triangles_of
+
+#: How much of the light comes from all sides, and from the lamp above the left shoulder.
+AMBIENT, DIFFUSE = 0.58, 0.50
+
+#: Where the lamp stands, to the right, up and to the eye.
+LAMP = (-0.45, 0.85, 1.2)
+
+#: Samples of a pixel.
+SAMPLES = 4
+
+#: What is seen lies nearer than this part of the picture's size to the point that is looked for.
+SAME_DEPTH = 0.005
+
+#: Layers by how far in front of what lies at the same place they are drawn; what is in front of all hides nothing.
+IN_FRONT_OF_ALL = 1_000_000.0
+
+
+def _unit_arrow() -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) and triangles (m, 3) of an arrow from the origin along x, of length 1."""
+    arrow = pv.Arrow(tip_length=0.42, tip_radius=0.17, shaft_radius=0.065, tip_resolution=24, shaft_resolution=24)
+    arrow = arrow.triangulate()
+    return np.asarray(arrow.points, dtype=float), np.asarray(arrow.regular_faces)
+
+
+_ARROW = _unit_arrow()
+
+
+class SolidScene:
+    """Blocks in space and their marks, drawn frame after frame.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    view : View
+    frame : Frame
+        What is shown, in the axes of the view, the same in all frames.
+    size : (int, int)
+        Width and height of the pictures in pixels.
+    block_fill : (n_blocks, 3) uint8 array
+        Colours of the blocks.
+    finer : int
+        Pixels are drawn so many times finer along each side and averaged.
+    opacity : float
+        Of the blocks.
+    """
+
+    def __init__(
+        self,
+        assembly: solver.Assembly,
+        view: View,
+        frame: Frame,
+        size: tuple[int, int],
+        block_fill: np.ndarray,
+        *,
+        finer: int = 1,
+        opacity: float = 1.0,
+    ) -> None:
+        self.assembly, self.view, self.size, self.finer = assembly, view, size, finer
+        self.frame = frame.fitted(*size)
+        #: Size of a pixel in the world [m].
+        self.pixel = float(self.frame.size[0]) / size[0]
+        self._plotter = _plotter((size[0] * finer, size[1] * finer))
+        self._layers: dict[str, Any] = {}
+        self._look_at()
+        triangles, self._block = triangles_of(assembly.polyhedra)
+        self._surface = pv.PolyData.from_regular_faces(np.array(assembly.vertices), triangles)
+        self._surface.cell_data["colour"] = block_fill[self._block]
+        self._plotter.add_mesh(
+            self._surface, scalars="colour", rgb=True, ambient=AMBIENT, diffuse=DIFFUSE, specular=0.0,
+            interpolation="flat", opacity=opacity, reset_camera=False, render=False, show_scalar_bar=False,
+        )  # fmt: skip
+        #: (n, 2) int array: vertices at both ends of the edges that are drawn.
+        self.edges = sharp_edges(assembly.polyhedra)
+        self._edges = pv.PolyData(np.array(assembly.vertices), lines=_line_cells(self.edges))
+        width = float(np.clip(assembly.block_size / self.pixel / 40.0, 0.6, size[1] / 700.0))
+        self._add("edges", self._edges, palette.OUTLINE, width=width, forward=1.0)
+
+    def pose(self, shown: solver.Pose, block_fill: np.ndarray | None = None) -> None:
+        """Put the blocks where they are drawn.
+
+        Parameters
+        ----------
+        shown : solver.Pose
+        block_fill : (n_blocks, 3) uint8 array, optional
+            New colours.
+        """
+        corners = solver.moved_vertices(self.assembly, shown)
+        self._surface.points = corners
+        self._edges.points = corners
+        if block_fill is not None:
+            self._surface.cell_data["colour"] = block_fill[self._block]
+
+    def lines(
+        self,
+        layer: str,
+        ends: np.ndarray,
+        colour: tuple[int, int, int] | np.ndarray,
+        width: float,
+        *,
+        forward: float = 2.0,
+        opacity: float = 1.0,
+    ) -> None:
+        """Draw lines, ends (n, 2, 3) [m], ``width`` pixels wide, in one layer, instead of those before.
+
+        Parameters
+        ----------
+        layer : str
+        ends : (n, 2, 3) array [m]
+        colour : (int, int, int), or (n, 2, 3) uint8 array
+            Of all, or of each end.
+        width : float
+            Pixels.
+        forward : float
+            How far they are in front of what lies at the same place.
+        opacity : float
+        """
+        points = np.asarray(ends, dtype=float).reshape(-1, 3)
+        self.clear(layer)
+        if len(points):
+            mesh = pv.PolyData(points, lines=_line_cells(np.arange(len(points)).reshape(-1, 2)))
+            self._add(layer, mesh, colour, width=width, forward=forward, opacity=opacity)
+
+    def polygons(
+        self,
+        layer: str,
+        polygons: Sequence[np.ndarray] | np.ndarray,
+        colour: tuple[int, int, int] | np.ndarray,
+        *,
+        forward: float = 0.0,
+        lit: bool = False,
+        opacity: float = 1.0,
+    ) -> None:
+        """Fill polygons, each (k, 3) [m], in one layer, instead of those before.
+
+        Parameters
+        ----------
+        layer : str
+        polygons : sequence of (k, 3) arrays [m]
+        colour : (int, int, int), or (n_points, 3) uint8 array
+            Of all, or of each corner.
+        forward, opacity : float
+            As of :meth:`lines`.
+        lit : bool
+            Whether the lamp shines on them.
+        """
+        self.clear(layer)
+        if len(polygons):
+            counts = np.array([len(polygon) for polygon in polygons])
+            points = np.concatenate(list(polygons))
+            faces = np.insert(np.arange(len(points)), np.cumsum(counts) - counts, counts)
+            self._add(layer, pv.PolyData(points, faces=faces), colour, forward=forward, lit=lit, opacity=opacity)
+
+    def arrows(
+        self,
+        layer: str,
+        tails: np.ndarray,
+        directions: np.ndarray,
+        lengths: np.ndarray | float,
+        colour: tuple[int, int, int] = palette.SETTLEMENT,
+    ) -> None:
+        """Draw solid arrows from tails (n, 3) [m] along directions (n, 3), in one layer, instead of those before."""
+        self.clear(layer)
+        if len(tails):
+            points, faces = _ARROW
+            across = np.cross(directions, np.where(np.abs(directions[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
+            across /= np.linalg.norm(across, axis=1)[:, None]
+            turns = np.stack([directions, across, np.cross(directions, across)], axis=1)
+            long = np.broadcast_to(lengths, len(tails))[:, None, None]
+            placed = tails[:, None] + long * np.einsum("pi,nij->npj", points, turns)
+            every = faces[None] + len(points) * np.arange(len(tails))[:, None, None]
+            mesh = pv.PolyData.from_regular_faces(placed.reshape(-1, 3), every.reshape(-1, 3))
+            self._add(layer, mesh, colour, lit=True)
+
+    def clear(self, *layers: str) -> None:
+        """Remove layers."""
+        for name in layers:
+            if name in self._layers:
+                self._plotter.remove_actor(self._layers.pop(name), reset_camera=False, render=False)
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """Names of the layers."""
+        return tuple(self._layers)
+
+    def image(self) -> Image.Image:
+        """Draw the picture."""
+        with _quiet():
+            self._plotter.render()
+            pixels = self._plotter.screenshot(return_img=True)
+        return Image.fromarray(np.ascontiguousarray(pixels[..., :3])).reduce(self.finer)
+
+    def at_pixel(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2) array: pixel (column, row) of points (n, 3) [m]."""
+        place = (self.view.projected(np.asarray(points)) - self.frame.low) / self.pixel
+        return np.column_stack([place[:, 0], self.size[1] - place[:, 1]])
+
+    def sees(self, points: np.ndarray) -> np.ndarray:
+        """(n,) bool array: which points (n, 3) [m] on the blocks nothing hides in the last picture."""
+        depth = np.nan_to_num(np.asarray(self._plotter.get_image_depth(reset_camera_clipping_range=False)), nan=-np.inf)
+        column, row = np.floor(self.at_pixel(points) * self.finer).astype(int).T
+        inside = (column >= 0) & (row >= 0) & (column < depth.shape[1]) & (row < depth.shape[0])
+        found = np.full(len(points), -np.inf)
+        found[inside] = depth[row[inside], column[inside]]
+        # VTK counts the depth from the eye backwards.
+        eye = self.view.depth(np.array(self._plotter.camera.position)[None])[0]
+        return np.asarray(np.abs(found - (self.view.depth(points) - eye)) < SAME_DEPTH * self.frame.size.max())
+
+    def close(self) -> None:
+        """Give the memory of the graphics card back."""
+        self._plotter.close()
+
+    def _look_at(self) -> None:
+        axes, camera = self.view.axes, self._plotter.camera
+        middle = (self.frame.low + self.frame.high) / 2.0
+        away = 4.0 * float(max(np.ptp(self.assembly.vertices, axis=0).max(), self.frame.size.max()))
+        depth = float(self.view.depth(self.assembly.vertices).mean())
+        target = middle @ axes[:2] + depth * axes[2]
+        camera.focal_point = tuple(target)
+        camera.position = tuple(target + away * axes[2])
+        camera.up = tuple(axes[1])
+        camera.parallel_projection = True
+        camera.parallel_scale = float(self.frame.size[1]) / 2.0
+        camera.clipping_range = (0.1 * away, 1.9 * away)
+
+    def _add(
+        self,
+        layer: str,
+        mesh: pv.PolyData,
+        colour: tuple[int, int, int] | np.ndarray,
+        *,
+        width: float = 1.0,
+        forward: float = 0.0,
+        lit: bool = False,
+        opacity: float = 1.0,
+    ) -> None:
+        look: dict[str, Any] = {"color": tuple(c / 255.0 for c in colour)} if isinstance(colour, tuple) else {}
+        if not look:
+            mesh.point_data["colour"] = np.asarray(colour, dtype=np.uint8).reshape(-1, 3)
+            look = {"scalars": "colour", "rgb": True, "show_scalar_bar": False}
+        actor = self._plotter.add_mesh(
+            mesh, **look, line_width=width * self.finer, opacity=opacity, lighting=lit, ambient=AMBIENT,
+            diffuse=DIFFUSE, reset_camera=False, render=False,
+        )  # fmt: skip
+        drawn_forward(actor, forward)
+        self._layers[layer] = actor
+
+
+def drawn_forward(actor: Any, by: float) -> None:
+    """Draw lines and polygons in front of what lies at their place, by so many hairs.
+
+    Parameters
+    ----------
+    actor : pyvista.Actor
+    by : float
+    """
+    mapper = actor.mapper
+    mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    # In units of the smallest difference of depth, which is some 1e-5 of the distance to the structure.
+    mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -6.0 * by)
+    mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, -6.0 * by)
+
+
+def _line_cells(ends: np.ndarray) -> np.ndarray:
+    return np.column_stack([np.full(len(ends), 2), ends]).ravel()
+
+
+def _plotter(size: tuple[int, int]) -> pv.Plotter:
+    """Make a plotter without a window: white, one lamp, several samples a pixel."""
+    with _quiet():
+        plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
+        plotter.background_color = "white"
+        plotter.enable_anti_aliasing("msaa", multi_samples=SAMPLES)
+        plotter.add_light(pv.Light(position=LAMP, light_type="camera light", intensity=1.0))
+    return plotter
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep VTK from saying on stderr that there is no display: it draws without one."""
+    before = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    try:
+        yield
+    finally:
+        vtkLogger.SetStderrVerbosity(before)

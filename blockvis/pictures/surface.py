@@ -1,0 +1,79 @@
+"""The surface of blocks in space as it is drawn: triangles, and the edges between faces."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+import solver
+
+#: Edges between faces that differ by less than this cosine are not drawn.
+FLAT = 0.9995
+
+
+def triangles_of(shapes: solver.Polyhedra) -> tuple[np.ndarray, np.ndarray]:
+    """Cut all faces into triangles.
+
+    Parameters
+    ----------
+    shapes : solver.Polyhedra
+
+    Returns
+    -------
+    triangles : (n, 3) int array
+        Vertices, counter-clockwise seen from outside.
+    blocks : (n,) int array
+        The block of each.
+    """
+    first, counts = shapes.face_offsets[:-1], np.diff(shapes.face_offsets)
+    reentrant = _reentrant(shapes)
+    fans = np.flatnonzero(~reentrant)
+    face = np.repeat(fans, counts[fans] - 2)
+    position = np.arange(len(face)) - np.repeat(np.cumsum(counts[fans] - 2) - (counts[fans] - 2), counts[fans] - 2)
+    which = np.stack([first[face], first[face] + position + 1, first[face] + position + 2], axis=1)
+    triangles, blocks = [shapes.corners[which]], [shapes.block_of_face[face]]
+    # A fan would cover what a re-entrant corner leaves out.
+    for number in np.flatnonzero(reentrant).tolist():
+        ring = shapes.corners[shapes.face_offsets[number] : shapes.face_offsets[number + 1]]
+        cut = _cut(shapes.vertices[ring])
+        triangles.append(ring[cut])
+        blocks.append(np.full(len(cut), shapes.block_of_face[number]))
+    return np.concatenate(triangles), np.concatenate(blocks)
+
+
+def _reentrant(shapes: solver.Polyhedra) -> np.ndarray:
+    """(n_faces,) bool array: which faces have a corner that bends the other way."""
+    points = shapes.vertices[shapes.corners]
+    along = points[shapes.next_corner] - points
+    before = points - points[shapes.previous_corner]
+    normals = shapes.faces(shapes.vertices).normals[shapes.face_of_corner]
+    bends = (np.cross(before, along) * normals).sum(axis=1)
+    scale = np.linalg.norm(before, axis=1) * np.linalg.norm(along, axis=1)
+    found = np.zeros(len(shapes.face_offsets) - 1, dtype=bool)
+    found[shapes.face_of_corner[bends < -1e-9 * scale]] = True
+    return found
+
+
+def _cut(corners: np.ndarray) -> np.ndarray:
+    """(m, 3) int array: triangles of a plane polygon (n, 3) [m], in its sense."""
+    arms = corners - corners[0]
+    normal = np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0)
+    keep = [k for k in range(3) if k != int(np.abs(normal).argmax())]
+    flat = corners[:, keep]
+    pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(shapely.Polygon(flat)))
+    rings = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
+    found = np.abs(rings[:, :, None] - flat[None, None]).sum(axis=3).argmin(axis=2)
+    a, b, c = np.moveaxis(corners[found], 1, 0)
+    backwards = (np.cross(b - a, c - a) @ normal) < 0.0
+    found[backwards] = found[backwards][:, ::-1]
+    return np.asarray(found)
+
+
+def sharp_edges(shapes: solver.Polyhedra) -> np.ndarray:
+    """(n, 2) int array: vertices at both ends of each edge between faces that are not in one plane."""
+    normals = shapes.faces(shapes.vertices).normals[shapes.face_of_corner]
+    twins = shapes.twins
+    sharp = (normals * normals[twins]).sum(axis=1) < FLAT
+    once = np.arange(len(twins)) < twins
+    corners = np.flatnonzero(sharp & once)
+    return np.stack([shapes.corners[corners], shapes.corners[shapes.next_corner[corners]]], axis=1)

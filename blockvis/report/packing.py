@@ -1,0 +1,36 @@
+"""Numbers of a page as text: integers that pack well, and the fineness they have."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from typing import Any
+
+import numpy as np
+
+from blockvis.pictures import palette
+
+#: Lengths are stored in this fraction of the extent of the structure, rotations in this many radians.
+FINENESS, TURN_UNIT = 1e-6, 1e-6
+
+#: Forces are stored in this fraction of the largest.
+FORCE_FINENESS = 1e-3
+
+
+def deflated(values: np.ndarray, rows: int) -> dict[str, Any]:
+    """Pack integers: differences along the first axis, split in planes of bytes, deflated, in base 64."""
+    table = np.asarray(values).astype("<i4").reshape(rows, -1) if rows else np.zeros((0, 1), dtype="<i4")
+    steps = np.diff(table, axis=0, prepend=np.zeros((1, table.shape[1]), dtype="<i4"))
+    planes = steps.reshape(-1, 1).view(np.uint8).T
+    data = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
+    return {"rows": rows, "columns": table.shape[1], "data": data}
+
+
+def rounded(values: np.ndarray, unit: float) -> np.ndarray:
+    """Count the units in values, as 32-bit integers."""
+    return np.rint(np.asarray(values, dtype=float) / unit).astype(np.int64).astype(np.int32)
+
+
+def hexadecimals(colours: np.ndarray) -> list[str]:
+    """Write colours, (n, 3), as CSS does."""
+    return [palette.hexadecimal((int(r), int(g), int(b))) for r, g, b in colours]

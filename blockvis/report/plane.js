@@ -1,0 +1,264 @@
+  const vertices = scaled("vertices", q), offsets = raw.offsets, centroids = scaled("centroids", q);
+  const travel = scaled("travel", q), turn = scaled("turn", model.turn_unit);
+  const joints = { blocks: raw.joint_blocks, ends: scaled("joint_ends", q), n: model.packed.joint_blocks.rows };
+  const forces = { place: scaled("force_place", q), vector: scaled("force_vector", model.force_unit), blocks: raw.force_blocks, first: raw.force_first };
+  const live = { tail: scaled("live_tail", q), tip: scaled("live_tip", q), first: raw.live_first };
+  const marks = { place: scaled("mark_place", q), kind: raw.mark_kind, first: raw.mark_first };
+  const jointsOf = Array.from({ length: nBlocks }, () => []);
+  for (let j = 0; j < joints.n; j++) { jointsOf[joints.blocks[2 * j]].push(j); jointsOf[joints.blocks[2 * j + 1]].push(j); }
+  const corners = new Float64Array(vertices.length), pose = new Float64Array(nBlocks * 3), shown = new Float64Array(nBlocks * 3);
+  // pose: true displacements and rotations; shown and corners: those times the magnification.
+  function poseAt(position) {
+    const k = Math.min(Math.floor(position), nFrames - 1), t = position - k, next = Math.min(k + 1, nFrames - 1);
+    for (let b = 0; b < nBlocks; b++) {
+      const i = (k * nBlocks + b), j = (next * nBlocks + b);
+      pose[3 * b] = travel[2 * i] * (1 - t) + travel[2 * j] * t;
+      pose[3 * b + 1] = travel[2 * i + 1] * (1 - t) + travel[2 * j + 1] * t;
+      pose[3 * b + 2] = turn[i] * (1 - t) + turn[j] * t;
+    }
+    for (let i = 0; i < pose.length; i++) shown[i] = state.magnify * pose[i];
+    for (let b = 0; b < nBlocks; b++) {
+      const c = Math.cos(shown[3 * b + 2]), s = Math.sin(shown[3 * b + 2]), x0 = centroids[2 * b], y0 = centroids[2 * b + 1];
+      for (let v = offsets[b]; v < offsets[b + 1]; v++) {
+        const x = vertices[2 * v] - x0, y = vertices[2 * v + 1] - y0;
+        corners[2 * v] = x0 + shown[3 * b] + c * x - s * y;
+        corners[2 * v + 1] = y0 + shown[3 * b + 1] + s * x + c * y;
+      }
+    }
+  }
+
+  // Where a point of the drawing, riding on a block, is at a pose.
+  function carried(at, b, x, y) {
+    const c = Math.cos(at[3 * b + 2]), s = Math.sin(at[3 * b + 2]), dx = x - centroids[2 * b], dy = y - centroids[2 * b + 1];
+    return [centroids[2 * b] + at[3 * b] + c * dx - s * dy, centroids[2 * b + 1] + at[3 * b + 1] + s * dx + c * dy];
+  }
+
+  // The faces of a joint at a pose: ends on both blocks, opening, slip, normal from block b into block a.
+  function faces(at, j) {
+    const a = joints.blocks[2 * j], b = joints.blocks[2 * j + 1], e = joints.ends;
+    const ends = [[e[4 * j], e[4 * j + 1]], [e[4 * j + 2], e[4 * j + 3]]];
+    const [a0, a1] = ends.map((p) => carried(at, a, ...p)), [b0, b1] = ends.map((p) => carried(at, b, ...p));
+    const length = norm(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]);
+    // The outward normal of block b: its face runs from the first end to the second.
+    const nx = (b1[1] - b0[1]) / length, ny = -(b1[0] - b0[0]) / length;
+    const across = [[a0, b0], [a1, b1]].map(([p, r]) => (p[0] - r[0]) * nx + (p[1] - r[1]) * ny);
+    const along = [[a0, b0], [a1, b1]].map(([p, r]) => (p[1] - r[1]) * nx - (p[0] - r[0]) * ny);
+    const closer = Math.abs(across[0]) <= Math.abs(across[1]) ? 0 : 1;
+    const apart = Math.min(norm(a0[0] - b0[0], a0[1] - b0[1]), norm(a1[0] - b1[0], a1[1] - b1[1]));
+    return { a, b, a0, a1, b0, b1, length, nx, ny, opening: Math.max(...across), slip: along[closer], apart, bent: Math.abs(at[3 * a + 2] - at[3 * b + 2]) };
+  }
+
+  // Resultant of a joint on its block a: normal force, compression positive, and shear force; null where there is none.
+  function forceOf(k, face) {
+    if (model.frames[k].falling) return null;
+    const low = Math.min(face.a, face.b), high = Math.max(face.a, face.b);
+    for (let i = forces.first[k]; i < forces.first[k + 1]; i++) {
+      if (forces.blocks[2 * i] !== low || forces.blocks[2 * i + 1] !== high) continue;
+      const sign = face.a === low ? 1 : -1, fx = sign * forces.vector[2 * i], fy = sign * forces.vector[2 * i + 1];
+      return [fx * face.nx + fy * face.ny, -fx * face.ny + fy * face.nx];
+    }
+    return [0, 0];
+  }
+  function fitted(w, h) {
+    const [x0, y0, x1, y1] = model.bounds, scale = Math.min(w / (x1 - x0), (h - MARGIN) / (y1 - y0));
+    return { scale, x: w / 2 - scale * (x0 + x1) / 2, y: (h - MARGIN) / 2 + scale * (y0 + y1) / 2 };
+  }
+  function fit() { state.view = fitted(canvas.clientWidth, canvas.clientHeight); }
+  const px = (x) => state.view.x + state.view.scale * x, py = (y) => state.view.y - state.view.scale * y;
+
+  function ring(pen, points) {
+    pen.beginPath();
+    points.forEach(([x, y], i) => (i ? pen.lineTo(px(x), py(y)) : pen.moveTo(px(x), py(y))));
+    pen.closePath();
+  }
+
+  function outline(pen, points, b) {
+    pen.beginPath();
+    for (let v = offsets[b]; v < offsets[b + 1]; v++) {
+      if (v === offsets[b]) pen.moveTo(px(points[2 * v]), py(points[2 * v + 1])); else pen.lineTo(px(points[2 * v]), py(points[2 * v + 1]));
+    }
+    pen.closePath();
+  }
+
+  function lineBetween(pen, ends) {
+    pen.beginPath();
+    for (const [x0, y0, x1, y1] of ends) { pen.moveTo(px(x0), py(y0)); pen.lineTo(px(x1), py(y1)); }
+    pen.stroke();
+  }
+
+  function hatch() {
+    const tile = document.createElement("canvas"), pen = tile.getContext("2d");
+    tile.width = tile.height = 9;
+    pen.fillStyle = model.colours.support; pen.fillRect(0, 0, 9, 9);
+    pen.strokeStyle = model.colours.hatch; pen.lineWidth = 0.9;
+    pen.beginPath();
+    for (const x of [-9, 0, 9]) { pen.moveTo(x - 1, 10); pen.lineTo(x + 10, -1); }
+    pen.stroke();
+    return canvas.getContext("2d").createPattern(tile, "repeat");
+  }
+  const support = hatch();
+
+  function fillOf(b, vector) {
+    if (model.roles[b]) return vector ? model.colours.support : support;
+    if (state.colours === "mechanism" && model.tints.length) return model.tints[b];
+    if (state.colours === "displacement") {
+      const part = norm(pose[3 * b], pose[3 * b + 1]) / (model.largest_displacement || 1);
+      return mixed(Math.max(0, Math.min(1, part)));
+    }
+    return model.fills[b];
+  }
+  // Fills the open joints; returns the middle lines of those too narrow to be seen as areas.
+  function drawCracks(pen) {
+    const lines = [], [widest, steepest] = model.widest;
+    pen.fillStyle = model.colours.open;
+    for (let j = 0; j < joints.n; j++) {
+      const f = faces(shown, j), m = state.magnify;
+      // Blocks that have parted have no joint any more: what lies between them is air.
+      if (f.opening < model.smallest_opening * m || f.apart > m * Math.min(f.length, widest)) continue;
+      state.cracks++;
+      // A wedge that gapes is open to the room: its faces have the colour.
+      if (f.bent > m * steepest) { lines.push([...f.a0, ...f.a1], [...f.b0, ...f.b1]); continue; }
+      ring(pen, [f.a0, f.a1, f.b1, f.b0]);
+      pen.fill();
+      if (f.opening * state.view.scale < 12) lines.push([(f.a0[0] + f.b0[0]) / 2, (f.a0[1] + f.b0[1]) / 2, (f.a1[0] + f.b1[0]) / 2, (f.a1[1] + f.b1[1]) / 2]);
+    }
+    return lines;
+  }
+
+  // Everything in the picture; pen is that of a canvas, or one that writes SVG.
+  function paint(pen, w, h, colours) {
+    const near = Math.min(Math.round(state.frame), nFrames - 1), falling = model.frames[near].falling;
+    pen.lineJoin = "round"; pen.lineCap = "butt";
+    if (model.ground !== null) {
+      pen.strokeStyle = model.colours.hatch; pen.lineWidth = 1.5;
+      pen.beginPath(); pen.moveTo(0, py(model.ground)); pen.lineTo(w, py(model.ground)); pen.stroke();
+    }
+    if (layers.start) drawStart(pen, colours);
+    state.cracks = 0;
+    const lines = layers.cracks && (!falling || model.joints_of_fall) ? drawCracks(pen) : [];
+    pen.strokeStyle = model.colours.outline;
+    pen.lineWidth = Math.max(0.4, Math.min(1.1, model.block_size * state.view.scale / 25));
+    for (let b = 0; b < nBlocks; b++) {
+      outline(pen, corners, b);
+      pen.fillStyle = fillOf(b, pen instanceof SvgPen);
+      pen.fill(); pen.stroke();
+    }
+    pen.strokeStyle = model.colours.open; pen.lineWidth = 1.6; lineBetween(pen, lines);
+    if (state.hover >= 0) {
+      outline(pen, corners, state.hover);
+      pen.strokeStyle = model.colours.settlement; pen.lineWidth = 3; pen.stroke();
+    }
+    if (layers.start && !falling) drawArrows(pen, near);
+    // Marks stand at true scale; magnified, they would not lie on their blocks.
+    if (state.magnify === 1 && Math.abs(state.frame - near) < 0.5) {
+      if (layers.sliding) drawSliding(pen, near);
+      if (!falling) drawForces(pen, near);
+      if (layers.hinges) drawHinges(pen, near);
+      drawLive(pen, near);
+    }
+    scaleBar(pen, w, h, colours);
+  }
+
+  function drawStart(pen, colours) {
+    pen.strokeStyle = colours.ghost; pen.lineWidth = 1.2; pen.setLineDash([5, 4]);
+    for (let b = 0; b < nBlocks; b++) if (model.roles[b] === 2) { outline(pen, vertices, b); pen.stroke(); }
+    pen.setLineDash([]);
+  }
+  // Which way the supports go in this phase.
+  function drawArrows(pen, k) {
+    for (const [b, x, y, dx, dy] of model.arrows[model.frames[k].phase] || []) {
+      const [cx, cy] = carried(shown, b, x, y), long = 22;
+      arrow(pen, px(cx) - long * dx, py(cy) + long * dy, px(cx) + long * dx, py(cy) - long * dy, model.colours.settlement, 5);
+    }
+  }
+
+  function drawForces(pen, k) {
+    pen.strokeStyle = model.colours.force; pen.lineCap = "round";
+    if (layers.forces) {
+      const bars = [];
+      for (let i = forces.first[k]; i < forces.first[k + 1]; i++) {
+        const x = forces.place[2 * i], y = forces.place[2 * i + 1];
+        const dx = forces.vector[2 * i] * model.force_length / 2, dy = forces.vector[2 * i + 1] * model.force_length / 2;
+        bars.push([x - dx, y - dy, x + dx, y + dy]);
+      }
+      pen.lineWidth = 2; lineBetween(pen, bars);
+    }
+    if (layers.thrust) { pen.lineWidth = 3; lineBetween(pen, thrustLine(k)); }
+  }
+
+  // From joint to joint, where every free block has two at most: an arch, a column.
+  function thrustLine(k) {
+    const met = Array.from({ length: nBlocks }, () => []);
+    for (let i = forces.first[k]; i < forces.first[k + 1]; i++) for (const b of [forces.blocks[2 * i], forces.blocks[2 * i + 1]]) if (!model.roles[b]) met[b].push(i);
+    if (met.some((of) => of.length > 2)) return [];
+    return met.filter((of) => of.length === 2).map(([i, j]) => [forces.place[2 * i], forces.place[2 * i + 1], forces.place[2 * j], forces.place[2 * j + 1]]);
+  }
+
+  function drawHinges(pen, k) {
+    const radius = Math.max(2.2, Math.min(6.5, 0.09 * model.block_size * state.view.scale));
+    for (let i = marks.first[k]; i < marks.first[k + 1]; i++) {
+      if (marks.kind[i] !== 1) continue;
+      pen.beginPath(); pen.arc(px(marks.place[4 * i]), py(marks.place[4 * i + 1]), radius, 0, 2 * Math.PI);
+      pen.fillStyle = model.colours.hinge; pen.strokeStyle = "#fff"; pen.lineWidth = 1.5; pen.stroke(); pen.fill();
+    }
+  }
+
+  function drawSliding(pen, k) {
+    const ends = [];
+    for (let i = marks.first[k]; i < marks.first[k + 1]; i++) if (marks.kind[i] === 2) ends.push([...marks.place.slice(4 * i, 4 * i + 4)]);
+    pen.strokeStyle = model.colours.sliding; pen.lineWidth = 3.5; pen.lineCap = "round"; lineBetween(pen, ends);
+  }
+
+  function drawLive(pen, k) {
+    for (let i = live.first[k]; i < live.first[k + 1]; i++) {
+      arrow(pen, px(live.tail[2 * i]), py(live.tail[2 * i + 1]), px(live.tip[2 * i]), py(live.tip[2 * i + 1]), model.colours.live, 2.5);
+    }
+  }
+  const world = (x, y) => [(x - state.view.x) / state.view.scale, (state.view.y - y) / state.view.scale];
+
+  function blockAt(x, y) {
+    const [wx, wy] = world(x, y);
+    for (let b = nBlocks - 1; b >= 0; b--) {
+      let inside = false;
+      for (let v = offsets[b], w = offsets[b + 1] - 1; v < offsets[b + 1]; w = v++) {
+        const x0 = corners[2 * v], y0 = corners[2 * v + 1], x1 = corners[2 * w], y1 = corners[2 * w + 1];
+        if ((y0 > wy) !== (y1 > wy) && wx < x0 + (x1 - x0) * (wy - y0) / (y1 - y0)) inside = !inside;
+      }
+      if (inside) return b;
+    }
+    return -1;
+  }
+
+  // The joint of a block that is nearest to a place, if it is within reach of a finger.
+  function jointAt(b, x, y) {
+    let best = -1, least = 12;
+    for (const j of jointsOf[b] || []) {
+      const f = faces(shown, j), x0 = px((f.a0[0] + f.b0[0]) / 2), y0 = py((f.a0[1] + f.b0[1]) / 2);
+      const dx = px((f.a1[0] + f.b1[0]) / 2) - x0, dy = py((f.a1[1] + f.b1[1]) / 2) - y0;
+      const t = Math.max(0, Math.min(1, ((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy || 1)));
+      const away = norm(x - x0 - t * dx, y - y0 - t * dy);
+      if (away < least) { least = away; best = j; }
+    }
+    return best;
+  }
+  function jointText(j, b) {
+    const f = faces(pose, j), other = f.a === b ? f.b : f.a;
+    const force = forceOf(Math.min(Math.round(state.frame), nFrames - 1), f);
+    const carries = force === null ? "no equilibrium" : `N ${newtons(force[0])}, T ${newtons(force[1])}`;
+    return `joint with ${model.names[other]}: opening ${millimetres(Math.max(0, f.opening))} mm, slip ${millimetres(Math.abs(f.slip))} mm, ${carries}`;
+  }
+
+  const MOST_JOINTS = 6;
+  function blockText(b) {
+    const size = norm(pose[3 * b], pose[3 * b + 1]);
+    const kind = ["free", "fixed support", "moving support"][model.roles[b]];
+    const own = jointsOf[b].map((j) => [j === state.joint ? Infinity : faces(pose, j).opening, j]).sort((one, two) => two[0] - one[0]).map(([, j]) => j);
+    const more = own.length > MOST_JOINTS ? `\nand ${own.length - MOST_JOINTS} more joints` : "";
+    return `${model.names[b]}${model.materials[b] ? " · " + model.materials[b] : ""} · ${kind}\n` +
+      `displacement ${millimetres(size)} mm (${millimetres(pose[3 * b])}, ${millimetres(pose[3 * b + 1])})\nrotation ${(1000 * pose[3 * b + 2]).toFixed(2)} mrad` +
+      own.slice(0, MOST_JOINTS).map((j) => `\n${jointText(j, b)}`).join("") + more;
+  }
+
+  const placeOf = (b) => { const [x, y] = carried(shown, b, centroids[2 * b], centroids[2 * b + 1]); return [px(x), py(y)]; };
+  function dragged(dx, dy) { state.view.x += dx; state.view.y += dy; }
+  const nudged = dragged;

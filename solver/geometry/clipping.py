@@ -1,0 +1,206 @@
+"""Clipping: the polygons in which two faces cover each other, seen half-way between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.tolerances import CORNER_TOLERANCE
+
+from .convex_parts import ConvexParts
+from .outlines import next_vertices
+from .portions import alike
+from .separations import SMALLEST_SINE
+from .solids import Faces, cross, dot, unit
+from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of
+
+
+@dataclass(frozen=True)
+class ClippedCorners:
+    """Corners of the polygons in which faces cover each other.
+
+    Attributes
+    ----------
+    owner : (n,) int array
+        The pair of faces.
+    features : (n, 4) int array
+    areas : (n,) array [m²]
+        The part of its polygon that each corner stands for.
+    widths : (n,) array [m]
+        How wide the polygon is.
+    """
+
+    owner: np.ndarray
+    features: np.ndarray
+    areas: np.ndarray
+    widths: np.ndarray
+
+
+def clipped_faces(
+    parts: ConvexParts, faces: Faces, vertices: np.ndarray, face_a: np.ndarray, face_b: np.ndarray
+) -> ClippedCorners:
+    """Corners of the polygons in which faces a and faces b, (n,) int arrays, cover each other."""
+    solids = parts.solids
+    sizes = np.diff(solids.face_offsets)
+    owners, features = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 4), dtype=np.int64)]
+    areas, widths = [np.zeros(0)], [np.zeros(0)]
+    for k in alike(sizes[face_a], sizes[face_b]):
+        owner, rows, area, width = _clipped(parts, faces, vertices, face_a[k], face_b[k])
+        owners.append(k[owner])
+        features.append(rows)
+        areas.append(area)
+        widths.append(width)
+    return ClippedCorners(*(np.concatenate(column) for column in (owners, features, areas, widths)))
+
+
+def _clipped(
+    parts: ConvexParts, faces: Faces, vertices: np.ndarray, face_a: np.ndarray, face_b: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Owners, features, areas and widths for faces a that all have as many corners, and faces b likewise."""
+    solids = parts.solids
+    n_a, n_b = (int(solids.face_offsets[face[0] + 1] - solids.face_offsets[face[0]]) for face in (face_a, face_b))
+    # Corners of a run clockwise seen along the normal of b; turned round, both run counter-clockwise. Edge k of either
+    # polygon runs from its corner k to the next, which for a is the edge that starts at the latter.
+    corner_a = solids.face_offsets[face_a][:, None] + np.arange(n_a)[::-1]
+    corner_b = solids.face_offsets[face_b][:, None] + np.arange(n_b)
+    edge_a, edge_b = np.roll(corner_a, -1, axis=1), corner_b
+    normal = unit(faces.normals[face_b] - faces.normals[face_a])
+    x = faces.tangents[face_b]
+    x = unit(x - dot(x, normal)[:, None] * normal)
+    y = cross(normal, x)
+    origin = faces.middles[face_b][:, None]
+    a, b = (
+        np.stack([dot(arms, x[:, None]), dot(arms, y[:, None])], axis=-1)
+        for arms in (vertices[solids.corners[corner]] - origin for corner in (corner_a, corner_b))
+    )
+    along_a, along_b = np.roll(a, -1, axis=1) - a, np.roll(b, -1, axis=1) - b
+    long_a, long_b = (np.maximum(np.hypot(d[..., 0], d[..., 1]), 1e-300) for d in (along_a, along_b))
+    end = CORNER_TOLERANCE * np.minimum(solids.shortest_edges[face_a], solids.shortest_edges[face_b])[:, None]
+
+    # How far each corner is inside each edge of the other polygon: (n, corners, edges).
+    a_in_b = _inside(a, b, along_b / long_b[..., None])
+    b_in_a = _inside(b, a, along_a / long_a[..., None])
+    nearest_b, nearest_a = a_in_b.argmin(axis=2), b_in_a.argmin(axis=2)
+    depth_a = np.take_along_axis(a_in_b, nearest_b[..., None], axis=2)[..., 0]
+    depth_b = np.take_along_axis(b_in_a, nearest_a[..., None], axis=2)[..., 0]
+    used_a, used_b = depth_a >= -end, depth_b >= -end
+    apart = np.abs(a[:, :, None] - b[:, None]).max(axis=3)
+    both = (apart <= 2.0 * end[..., None]) & used_a[:, :, None] & used_b[:, None]
+
+    # Edge k of a crosses edge l of b where the ends of each are on different sides of the other.
+    next_a, next_b = np.roll(a_in_b, -1, axis=1), np.roll(b_in_a, -1, axis=1)
+    crosses = ((a_in_b > 0.0) != (next_a > 0.0)) & np.swapaxes((b_in_a > 0.0) != (next_b > 0.0), 1, 2)
+    tight = end[..., None]
+    crosses &= ~((np.abs(a_in_b) <= tight) & (np.abs(next_a) <= tight))
+    crosses &= ~np.swapaxes((np.abs(b_in_a) <= tight) & (np.abs(next_b) <= tight), 1, 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        on_a = np.where(crosses, a_in_b / (a_in_b - next_a), 0.0)
+        on_b = np.where(crosses, np.swapaxes(b_in_a / (b_in_a - next_b), 1, 2), 0.0)
+    # What crosses at a corner that counts already is that corner.
+    for on, long, used, axis in ((on_a, long_a[:, :, None], used_a, 1), (on_b, long_b[:, None], used_b, 2)):
+        here, there = np.expand_dims(used, 3 - axis), np.expand_dims(np.roll(used, -1, axis=1), 3 - axis)
+        crosses &= ~(here & (on * long <= 2.0 * tight)) & ~(there & ((1.0 - on) * long <= 2.0 * tight))
+
+    pair, p, q = np.nonzero(both)
+    on_corner = (
+        pair,
+        feature_rows(ON_CORNER, corner_a[pair, p], corner_b[pair, q], -1),
+        (a[pair, p] + b[pair, q]) / 2.0,
+    )
+    alone_a, alone_b = used_a & ~both.any(axis=2), used_b & ~both.any(axis=1)
+    pair, p = np.nonzero(alone_a)
+    vertex_a = _on_face(parts, vertices, end, depth_a, nearest_b, pair, p, corner_a, face_b, edge_b), a[pair, p]
+    pair_a = pair
+    pair, q = np.nonzero(alone_b)
+    vertex_b = _on_face(parts, vertices, end, depth_b, nearest_a, pair, q, corner_b, face_a, edge_a), b[pair, q]
+    pair_b = pair
+    pair, p, q = np.nonzero(crosses)
+    u, v = on_a[pair, p, q], on_b[pair, p, q]
+    sine = np.abs(along_a[pair, p, 0] * along_b[pair, q, 1] - along_a[pair, p, 1] * along_b[pair, q, 0]) / (
+        long_a[pair, p] * long_b[pair, q]
+    )
+    # The edge of a runs the other way round in its face: fractions count from the corner it starts at there.
+    places = places_of(1.0 - u, v, sine < SMALLEST_SINE)
+    across = (
+        pair,
+        feature_rows(ACROSS, edge_a[pair, p], edge_b[pair, q], places),
+        a[pair, p] + u[:, None] * along_a[pair, p],
+    )
+    owner, features, points = (
+        np.concatenate(column)
+        for column in zip(on_corner, (pair_a, *vertex_a), (pair_b, *vertex_b), across, strict=True)
+    )
+    areas, wide = corner_areas(owner, points, len(face_a))
+    kept = wide[owner] > end[owner, 0]
+    return owner[kept], features[kept], areas[kept], wide[owner[kept]]
+
+
+def _inside(points: np.ndarray, corners: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """(n, n_points, n_edges) array [m]: how far points are to the left of edges that start at corners."""
+    rest = points[:, :, None] - corners[:, None]
+    way = directions[:, None]
+    return way[..., 0] * rest[..., 1] - way[..., 1] * rest[..., 0]
+
+
+def _on_face(
+    parts: ConvexParts,
+    vertices: np.ndarray,
+    end: np.ndarray,
+    depth: np.ndarray,
+    nearest: np.ndarray,
+    pair: np.ndarray,
+    p: np.ndarray,
+    corner: np.ndarray,
+    face: np.ndarray,
+    edge: np.ndarray,
+) -> np.ndarray:
+    """(n, 4) int array: features of corners on faces, with the edges that cross where they are on the boundary."""
+    solids, cut = parts.solids, parts.cut_edges
+    own = corner[pair, p]
+    other = edge[pair, nearest[pair, p]]
+    start, following = vertices[solids.corners], solids.next_corner
+    along = unit(start[following[other]] - start[other])
+    candidates = np.stack([own, solids.previous_corner[own]], axis=1)
+    crossing = cross(unit(start[following[candidates]] - start[candidates]), along[:, None])
+    sine = np.sqrt(dot(crossing, crossing))
+    best = sine.argmax(axis=1)
+    row = np.arange(len(own))
+    on_boundary = (depth[pair, p] <= end[pair, 0]) & (sine[row, best] >= SMALLEST_SINE)
+    on_boundary &= ~cut[other] & ~cut[candidates[row, best]]
+    code = np.where(on_boundary, other * np.int64(len(solids.corners)) + candidates[row, best], -1)
+    return feature_rows(ON_FACE, solids.corners[own], face[pair], code)
+
+
+def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Part of its convex polygon that each corner stands for, (n,) [m²], and how wide the polygons are, (count,) [m].
+
+    Parameters
+    ----------
+    owner : (n,) int array
+        The polygon of each corner.
+    points : (n, 2) array [m]
+        Corners in any order.
+    count : int
+        Number of polygons.
+    """
+    if len(owner) == 0:
+        return np.zeros(0), np.zeros(count)
+    number = np.bincount(owner, minlength=count)
+    total = np.stack([np.bincount(owner, points[:, k], minlength=count) for k in (0, 1)], axis=1)
+    middle = total / np.maximum(number, 1)[:, None]
+    arms = points - middle[owner]
+    order = np.lexsort((np.arctan2(arms[:, 1], arms[:, 0]), owner))
+    there = number > 0
+    following = next_vertices(np.append(0, np.cumsum(number[there])))
+    ring = arms[order]
+    after = ring[following]
+    triangle = (ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]) / 2.0
+    shares = np.zeros(len(owner))
+    # Half of the triangle before and half of the one behind.
+    np.add.at(shares, order, triangle / 2.0)
+    np.add.at(shares, order[following], triangle / 2.0)
+    area = np.bincount(owner, shares, minlength=count)
+    far = np.zeros(count)
+    np.maximum.at(far, owner, np.hypot(arms[:, 0], arms[:, 1]))
+    return np.maximum(shares, 0.0), area / np.maximum(2.0 * far, 1e-300)

@@ -1,0 +1,192 @@
+"""Faces that near parts turn to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.tolerances import PENETRATION_FRACTION
+
+from .broad_phase import box_pairs, boxes, expand_ranges
+from .portions import alike
+from .separations import face_separations
+from .solids import Faces, Solids, dot
+
+#: Two faces face each other where the cosine between the outward normal of one and the inward normal of the other is
+#: at least this: steep ridges and tips touch a plane with flanks that hardly face it.
+FACING = 0.05
+
+#: Separations that differ by less than this, in widths, are equal: then the faces that oppose each other better count.
+SAME_SEPARATION = 1e-6
+
+#: Others than those that oppose each other best have to do so at least with this cosine: neighbours across a corner,
+#: which touch along an edge alone, open by a right angle in a wall and by a little less in a dome.
+OTHERS_FACING = 0.5
+
+#: Faces of a part that are tried against the one that leads, beside the one that opposes it best.
+OTHERS_TRIED = 6
+
+
+@dataclass(frozen=True)
+class FacingParts:
+    """Pairs of near parts, with the faces they turn to each other.
+
+    Attributes
+    ----------
+    i, j : (n,) int arrays
+        The parts.
+    lead_i, lead_j : (n,) int arrays
+        The face of each from which the other part is farthest.
+    apart_i, apart_j : (n,) array [m]
+        How far; negative where the parts overlap.
+    face_i, face_j : (n,) int arrays
+        The one that leads, because it keeps the parts farther apart, and the face that opposes it best.
+    width : (n,) array [m]
+        Of the thinner of their blocks.
+    cosine : (n,) array
+        Between the two faces; -1 where they oppose each other.
+    """
+
+    i: np.ndarray
+    j: np.ndarray
+    lead_i: np.ndarray
+    lead_j: np.ndarray
+    apart_i: np.ndarray
+    apart_j: np.ndarray
+    face_i: np.ndarray
+    face_j: np.ndarray
+    width: np.ndarray
+    cosine: np.ndarray
+
+    def __len__(self) -> int:
+        """Count the pairs."""
+        return len(self.i)
+
+    def __getitem__(self, chosen: np.ndarray) -> FacingParts:
+        """Choose some of the pairs, by a mask or their numbers."""
+        return FacingParts(*(value[chosen] for value in vars(self).values()))
+
+    @property
+    def apart(self) -> np.ndarray:
+        """(n,) array [m]: how far faces keep the parts apart; negative where they overlap."""
+        return np.maximum(self.apart_i, self.apart_j)
+
+    @property
+    def shallow(self) -> np.ndarray:
+        """(n,) bool array: whether the overlap is that of a contact."""
+        return self.apart >= -PENETRATION_FRACTION * self.width
+
+    @property
+    def face_each_other(self) -> np.ndarray:
+        """(n,) bool array: whether the two faces do."""
+        return self.cosine <= -FACING
+
+    def other_faces(
+        self, solids: Solids, faces: Faces, inner: np.ndarray
+    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Give other faces that face each other, round by round, those that oppose each other better first.
+
+        Yields
+        ------
+        pair, face_i, face_j : (n_round,) int arrays
+        """
+        equal = self.apart - SAME_SEPARATION * self.width
+        tried = []
+        for leads, lead, part, ours in (
+            (self.apart_i >= equal, self.lead_i, self.j, True),
+            (self.apart_j >= equal, self.lead_j, self.i, False),
+        ):
+            k = np.flatnonzero(leads)
+            owner, position = expand_ranges(np.diff(solids.faces_of_block)[part[k]])
+            pair = k[owner]
+            answer, first = solids.faces_of_block[part[pair]] + position, lead[pair]
+            face_i, face_j = (first, answer) if ours else (answer, first)
+            new = (face_i != self.face_i[pair]) | (face_j != self.face_j[pair])
+            cosine = dot(faces.normals[face_i], faces.normals[face_j])
+            new &= (cosine <= -OTHERS_FACING) & ~inner[answer]
+            tried.append((pair[new], face_i[new], face_j[new], cosine[new]))
+        pair, face_i, face_j, cosine = (np.concatenate(column) for column in zip(*tried, strict=True))
+        order = np.lexsort((face_j, face_i, cosine, pair))
+        pair, face_i, face_j = pair[order], face_i[order], face_j[order]
+        rank = np.arange(len(pair)) - np.searchsorted(pair, pair)
+        for number in range(min(OTHERS_TRIED, int(rank.max(initial=-1)) + 1)):
+            now = rank == number
+            yield pair[now], face_i[now], face_j[now]
+
+
+def near_parts(
+    solids: Solids, block_of_part: np.ndarray, vertices: np.ndarray, reach: float, useful: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of parts of different blocks, one of them useful, whose boxes come within reach; lower block first."""
+    low, high = boxes(vertices, solids.offsets)
+    i, j = box_pairs(low - reach / 2.0, high + reach / 2.0)
+    a, b = block_of_part[i], block_of_part[j]
+    chosen = (a != b) & (useful[a] | useful[b])
+    return i[chosen], j[chosen]
+
+
+def _opposed_faces(solids: Solids, faces: Faces, inner: np.ndarray, leading: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """(n,) int array: the face of part j, not inside its block, that opposes the leading face best."""
+    first = solids.faces_of_block
+    counts = np.diff(first)[j]
+    answer = np.empty(len(j), dtype=np.int64)
+    for k in alike(counts):
+        face = first[j[k]][:, None] + np.arange(counts[k[0]])
+        cosine = dot(faces.normals[face], faces.normals[leading[k]][:, None])
+        answer[k] = face[np.arange(len(k)), np.where(inner[face], np.inf, cosine).argmin(axis=1)]
+    return answer
+
+
+def facing_parts(
+    solids: Solids,
+    faces: Faces,
+    vertices: np.ndarray,
+    parts: tuple[np.ndarray, np.ndarray],
+    reach: float,
+    width: np.ndarray,
+    inner: np.ndarray,
+) -> FacingParts:
+    """Choose the faces that near parts turn to each other, where no face keeps them farther apart than ``reach``.
+
+    Parameters
+    ----------
+    solids : Solids
+    faces : Faces
+    vertices : (n_vertices, 3) array [m]
+    parts : two (n,) int arrays
+    reach : float [m]
+    width : (n,) array [m]
+        Of the thinner of their blocks.
+    inner : (n_faces,) bool array
+        Faces inside a block, where it was cut into parts: what they keep apart, touches another part, if any.
+    """
+    i, j = parts
+    apart_i, lead_i, behind_i = face_separations(solids, faces, vertices, i, j, inner)
+    near = np.flatnonzero(np.maximum(apart_i, behind_i) <= reach)
+    i, j, apart_i, lead_i, behind_i, width = (value[near] for value in (i, j, apart_i, lead_i, behind_i, width))
+    apart_j, lead_j, behind_j = face_separations(solids, faces, vertices, j, i, inner)
+    inside = np.maximum(behind_i, behind_j) > np.maximum(apart_i, apart_j) + SAME_SEPARATION * width
+    near = np.flatnonzero((apart_j <= reach) & ~inside)
+    i, j, apart_i, lead_i, apart_j, lead_j, width = (
+        value[near] for value in (i, j, apart_i, lead_i, apart_j, lead_j, width)
+    )
+    answer_j = _opposed_faces(solids, faces, inner, lead_i, j)
+    answer_i = _opposed_faces(solids, faces, inner, lead_j, i)
+    normals = faces.normals
+    cosine_i, cosine_j = dot(normals[lead_i], normals[answer_j]), dot(normals[lead_j], normals[answer_i])
+    equal = np.abs(apart_i - apart_j) <= SAME_SEPARATION * width
+    i_leads = np.where(equal, cosine_i <= cosine_j, apart_i > apart_j)
+    return FacingParts(
+        i=i,
+        j=j,
+        lead_i=lead_i,
+        lead_j=lead_j,
+        apart_i=apart_i,
+        apart_j=apart_j,
+        face_i=np.where(i_leads, lead_i, answer_i),
+        face_j=np.where(i_leads, answer_j, lead_j),
+        width=width,
+        cosine=np.where(i_leads, cosine_i, cosine_j),
+    )

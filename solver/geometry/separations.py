@@ -1,0 +1,117 @@
+"""Separations of convex parts: how far a face, or two edges across each other, keep them apart."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .portions import alike
+from .solids import Faces, Solids, cross, dot, unit
+
+#: Edges nearer to parallel than this sine have no common normal: they are clipped against each other.
+SMALLEST_SINE = 0.05
+
+#: Directions this far beyond a right angle still count as along a face.
+ALONG = 1e-6
+
+
+def face_separations(
+    solids: Solids, faces: Faces, vertices: np.ndarray, i: np.ndarray, j: np.ndarray, inner: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How far faces keep two convex parts apart.
+
+    Parameters
+    ----------
+    solids : Solids
+    faces : Faces
+    vertices : (n_vertices, 3) array [m]
+    i, j : (n,) int arrays
+        Parts.
+    inner : (n_faces,) bool array
+        Faces inside a block.
+
+    Returns
+    -------
+    apart : (n,) array [m]
+        How far part j is in front of the face of part i from which it is farthest; negative behind it.
+    leading : (n,) int array
+        That face.
+    behind : (n,) array [m]
+        How far it is in front of a face of part i inside its block; minus infinity where there is none.
+    """
+    first_face, first_vertex = solids.faces_of_block, solids.offsets
+    n_faces, n_vertices = np.diff(first_face)[i], np.diff(first_vertex)[j]
+    apart, leading, behind = np.empty(len(i)), np.empty(len(i), dtype=np.int64), np.full(len(i), -np.inf)
+    cut = inner.any()
+    for k in alike(n_faces, n_vertices):
+        face = first_face[i[k]][:, None] + np.arange(n_faces[k[0]])
+        vertex = first_vertex[j[k]][:, None] + np.arange(n_vertices[k[0]])
+        # From a corner near by, for the digits of coordinates far from the origin.
+        origin = vertices[first_vertex[i[k]]][:, None]
+        normal, corner = faces.normals[face], vertices[vertex] - origin
+        level = dot(normal, faces.middles[face] - origin)
+        distance = dot(normal[:, :, None], corner[:, None]).min(axis=2) - level
+        if cut:
+            behind[k] = np.where(inner[face], distance, -np.inf).max(axis=1)
+            distance = np.where(inner[face], -np.inf, distance)
+        best = distance.argmax(axis=1)
+        row = np.arange(len(k))
+        apart[k], leading[k] = distance[row, best], face[row, best]
+    return apart, leading, behind
+
+
+def edge_separations(
+    solids: Solids, faces: Faces, vertices: np.ndarray, i: np.ndarray, j: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How far two edges keep two convex parts apart.
+
+    Parameters
+    ----------
+    solids : Solids
+    faces : Faces
+    vertices : (n_vertices, 3) array [m]
+    i, j : (n,) int arrays
+        Parts.
+
+    Returns
+    -------
+    apart : (n,) array [m]
+        Largest separation along the cross product of an edge of i and an edge of j between which both parts lie on the
+        two sides; minus infinity where there are none.
+    own, other : (n,) int arrays
+        The edges.
+    """
+    once = np.flatnonzero(np.arange(len(solids.corners)) < solids.twins)
+    first = np.searchsorted(once, solids.face_offsets[solids.faces_of_block])
+    count = np.diff(first)
+    apart = np.full(len(i), -np.inf)
+    found_own, found_other = np.zeros((2, len(i)), dtype=np.int64)
+    for k in alike(count[i], count[j]):
+        own = once[first[i[k]][:, None] + np.arange(count[i[k[0]]])]
+        other = once[first[j[k]][:, None] + np.arange(count[j[k[0]]])]
+        a, b = vertices[solids.corners[own]], vertices[solids.corners[other]]
+        along_a = unit(vertices[solids.corners[solids.next_corner[own]]] - a)
+        along_b = unit(vertices[solids.corners[solids.next_corner[other]]] - b)
+        normal = cross(along_a[:, :, None], along_b[:, None])
+        holds = dot(normal, normal) > SMALLEST_SINE**2
+        sides = outward(solids, faces, other)[:, None] - outward(solids, faces, own)[:, :, None]
+        sense = np.sign(dot(normal, sides))
+        normal, holds = unit(normal) * sense[..., None], holds & (sense != 0.0)
+        for edges, way, side, axis in ((own, along_a, 1.0, 2), (other, along_b, -1.0, 1)):
+            for face, sense in (
+                (solids.face_of_corner[edges], 1.0),
+                (solids.face_of_corner[solids.twins[edges]], -1.0),
+            ):
+                inward = sense * cross(faces.normals[face], way)
+                holds &= side * dot(np.expand_dims(inward, axis), normal) >= -ALONG
+        distance = np.where(holds, dot(a[:, :, None] - b[:, None], normal), -np.inf).reshape(len(k), -1)
+        best = distance.argmax(axis=1)
+        row = np.arange(len(k))
+        apart[k] = distance[row, best]
+        found_own[k], found_other[k] = own[row, best // other.shape[1]], other[row, best % other.shape[1]]
+    return apart, found_own, found_other
+
+
+def outward(solids: Solids, faces: Faces, edges: np.ndarray) -> np.ndarray:
+    """(n, 3) array: sum of the outward normals of the two faces at each edge."""
+    face = solids.face_of_corner
+    return faces.normals[face[edges]] + faces.normals[face[solids.twins[edges]]]

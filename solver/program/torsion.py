@@ -1,0 +1,190 @@
+"""Faces that turn in their own plane: torsion under a uniform pressure, in place of friction at their corners."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from solver.equilibrium import wrench_matrix
+from solver.geometry.contacts import Contacts
+from solver.kinematics import Pose
+
+#: Laws of torsion of the faces between blocks in space.
+POINTS, UNIFORM = TORSIONS = ("points", "uniform")
+
+#: Contact points of two blocks are of one face where their normals differ by less than this, and where they lie in one
+#: plane to this part of the block size.
+ONE_FACE = 1e-4
+
+
+@dataclass(frozen=True)
+class Faces:
+    """The faces that contact points in space belong to.
+
+    Attributes
+    ----------
+    face : (n_contacts,) int array
+    centres : (n_faces, 3) array [m]
+        Centroids of the polygons that their points span.
+    radii : (n_faces,) array [m]
+        Mean distance of a polygon's points from its centroid: torsional strength over friction and normal force; of
+        two points a quarter of their distance, of one nothing.
+    """
+
+    face: np.ndarray
+    centres: np.ndarray
+    radii: np.ndarray
+
+    @property
+    def first(self) -> np.ndarray:
+        """(n_faces,) int array: first contact point of each."""
+        return np.unique(self.face, return_index=True)[1]
+
+    @classmethod
+    def of(cls, contacts: Contacts, length: float) -> Faces:
+        """Gather contact points of the same two blocks in the same plane.
+
+        Parameters
+        ----------
+        contacts : Contacts
+        length : float [m]
+            Block size.
+        """
+        face = _faces(contacts, length)
+        count = np.bincount(face)
+        order, first = np.argsort(face, kind="stable"), np.cumsum(count) - count
+        centres, radii = np.zeros((len(count), 3)), np.zeros(len(count))
+        for corners in np.unique(count):
+            chosen = np.flatnonzero(count == corners)
+            members = order[first[chosen][:, None] + np.arange(corners)]
+            centres[chosen], radii[chosen] = _measured(contacts.points[members], contacts.frames[members[:, 0]])
+        return cls(face, centres, radii)
+
+
+def face_wrench_matrix(contacts: Contacts, faces: Faces, pose: Pose, length: float) -> sp.csc_array:
+    """Make the matrix of :func:`solver.equilibrium.wrench_matrix` with shear and torsion at the centre of each face.
+
+    Parameters
+    ----------
+    contacts : Contacts
+    faces : Faces
+    pose : Pose
+    length : float [m]
+        Moments are divided by it.
+
+    Returns
+    -------
+    (6 n_blocks, 4 n_contacts) sparse array
+        Columns of each contact point: normal force, there; both shear forces, at the centre of its face; torsion over
+        the radius of the face.
+
+    Notes
+    -----
+    A face limited by |(T, M / r)| ≤ μ N, with N the sum over its points, is the sum of as many cones of four numbers,
+    one for each of its points.
+    """
+    n = len(contacts)
+    # The tangents of a face are those of its first point.
+    frames, centres = contacts.frames[faces.first][faces.face], faces.centres[faces.face]
+    at_points = wrench_matrix(contacts, pose, length)[:, 3 * np.arange(n)]
+    at_centre = wrench_matrix(Contacts(**{**vars(contacts), "points": centres, "frames": frames}), pose, length)
+    shear = at_centre[:, np.setdiff1d(np.arange(3 * n), 3 * np.arange(n))]
+    moment = (faces.radii[faces.face] / length)[:, None] * frames[:, 0]
+    spins = [6 * block[:, None] + np.arange(3, 6) for block in (contacts.block_a, contacts.block_b)]
+    rows = np.concatenate(spins, axis=1)
+    columns = np.broadcast_to(np.arange(n)[:, None], rows.shape)
+    values = np.concatenate([moment, -moment], axis=1)
+    twist = sp.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(at_points.shape[0], n))
+    order = np.stack([np.arange(n), n + 2 * np.arange(n), n + 2 * np.arange(n) + 1, 3 * n + np.arange(n)], axis=1)
+    return sp.csc_array(sp.hstack([at_points, shear, twist], format="csc")[:, order.ravel()])
+
+
+def point_forces(contacts: Contacts, faces: Faces, forces: np.ndarray) -> np.ndarray:
+    """(n_contacts, 3) array: forces at the contact points with the same resultants as those of faces.
+
+    Parameters
+    ----------
+    contacts : Contacts
+    faces : Faces
+    forces : (n_contacts, 4) array
+        As columns of :func:`face_wrench_matrix`; any unit of force.
+    """
+    face, count = faces.face, np.bincount(faces.face)
+    frames = contacts.frames[faces.first]
+    # On the block that is the first one of the face's first point.
+    sign = np.where(contacts.block_a == contacts.block_a[faces.first][face], 1.0, -1.0)
+    totals = np.stack([np.bincount(face, sign * part) for part in forces.T], axis=1)
+    shear = np.einsum("fi,fix->fx", totals[:, 1:3], frames[:, 1:])
+    middle = np.stack([np.bincount(face, part) / count for part in contacts.points.T], axis=1)
+    arms = contacts.points - middle[face]
+    # Shared by the points alike, which moves it from the centre of the face to the middle of its points.
+    moved = np.einsum("fx,fx->f", np.cross(middle - faces.centres, shear), frames[:, 0])
+    spread = np.bincount(face, (arms**2).sum(axis=1))
+    torsion = np.divide(totals[:, 3] * faces.radii - moved, spread, out=np.zeros(len(count)), where=spread > 0.0)
+    shared = (shear / count[:, None])[face] + torsion[face, None] * np.cross(frames[face, 0], arms)
+    shared *= sign[:, None]
+    return np.concatenate([forces[:, :1], np.einsum("kix,kx->ki", contacts.frames[:, 1:], shared)], axis=1)
+
+
+def _faces(contacts: Contacts, length: float) -> np.ndarray:
+    """(n_contacts,) int array: number of the face of each contact point."""
+    n = len(contacts)
+    _, joint = contacts.joints()
+    order, count = np.argsort(joint, kind="stable"), np.bincount(joint)
+    first = np.cumsum(count) - count
+    links = []
+    for points in np.unique(count):
+        members = order[first[count == points][:, None] + np.arange(points)]
+        i, j = np.triu_indices(points, 1)
+        one, other = members[:, i].ravel(), members[:, j].ravel()
+        normal = contacts.frames[one, 0]
+        apart = np.abs(((contacts.points[one] - contacts.points[other]) * normal).sum(axis=1))
+        # Either block may be the first of a contact point.
+        sign = np.where(contacts.block_a[one] == contacts.block_a[other], 1.0, -1.0)
+        lean = np.linalg.norm(normal - sign[:, None] * contacts.frames[other, 0], axis=1)
+        alike = (apart <= ONE_FACE * length) & (lean <= ONE_FACE)
+        links.append(np.stack([one[alike], other[alike]]))
+    pairs = np.concatenate(links, axis=1)
+    graph = sp.coo_array((np.ones(pairs.shape[1]), (pairs[0], pairs[1])), shape=(n, n))
+    return connected_components(graph, directed=False)[1]
+
+
+def _measured(points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Centroids (n, 3) and mean distances (n,) of polygons with corners (n, k, 3) in any order, convex."""
+    middle = points.mean(axis=1)
+    if points.shape[1] < 3:
+        return middle, np.linalg.norm(points[:, 0] - points[:, -1], axis=1) / 4.0
+    flat = np.einsum("nkx,nix->nki", points - middle[:, None], frames[:, 1:])
+    turn = np.argsort(np.arctan2(flat[..., 1], flat[..., 0]), axis=1)
+    flat = np.take_along_axis(flat, turn[..., None], axis=1)
+    centre, area = _centroid(flat)
+    flat = flat - centre[:, None]
+    start, end = flat, np.roll(flat, -1, axis=1)
+    edge = end - start
+    size = np.linalg.norm(edge, axis=2)
+    along = edge / np.where(size > 0.0, size, 1.0)[..., None]
+    # Of the triangle from the centre to an edge at a height h: ∫ |x| dA = h / 6 (t √(t² + h²) + h² asinh (t / h)).
+    height = start[..., 0] * along[..., 1] - start[..., 1] * along[..., 0]
+    mean = np.zeros(len(points))
+    for corner, sign in ((end, 1.0), (start, -1.0)):
+        t = (corner * along).sum(axis=2)
+        over = np.divide(t, height, out=np.zeros_like(t), where=height > 0.0)
+        mean += sign * (height / 6.0 * (t * np.hypot(t, height) + height**2 * np.arcsinh(over))).sum(axis=1)
+    # Points on one line have no area.
+    wide = area > 1e-12 * (flat**2).sum(axis=(1, 2))
+    farthest = np.linalg.norm(flat[:, :, None] - flat[:, None], axis=3).max(axis=(1, 2))
+    radii = np.where(wide, mean / np.where(wide, area, 1.0), farthest / 4.0)
+    return middle + np.einsum("ni,nix->nx", centre, frames[:, 1:]), radii
+
+
+def _centroid(flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Centroids (n, 2) and areas (n,) of polygons (n, k, 2), counter-clockwise."""
+    end = np.roll(flat, -1, axis=1)
+    cross = flat[..., 0] * end[..., 1] - flat[..., 1] * end[..., 0]
+    area = cross.sum(axis=1) / 2.0
+    first = ((flat + end) * cross[..., None]).sum(axis=1) / 6.0
+    wide = area > 1e-12 * (flat**2).sum(axis=(1, 2))
+    return np.where(wide[:, None], first / np.where(wide, area, 1.0)[:, None], 0.0), area

@@ -1,0 +1,136 @@
+"""Blocks in space by round trip through every format that holds them: shapes, names, roles, materials, density."""
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis import generators
+from blockvis.cli import main
+from blockvis.formats.read import read, read_layout, save_layout, write_layout
+from blockvis.layout.solid_layout import SolidLayout
+
+#: What a file cannot say of a block.
+SILENT = {".stl": ("roles", "materials", "density")}
+
+WRITTEN = (".obj", ".stl", ".ply", ".json", ".compas.json", ".vtu", ".vtk")
+
+
+@pytest.fixture(scope="module")
+def vault():
+    """Stones with three to eight faces, re-entrant ones, names with blanks and letters beyond ASCII."""
+    built = generators.cross_vault(voussoirs=3, stone=2.0)
+    names = [name.replace("keystone", 'Schlußstein "K"') for name in built.names]
+    density = 2000.0 + 10.0 * np.arange(built.n_blocks)
+    solids = [
+        (
+            built.vertices[built.block_of_vertex == i],
+            [
+                (ring - built.shapes.offsets[i]).tolist()
+                for ring, block in zip(
+                    np.split(built.shapes.corners, built.shapes.face_offsets[1:-1]),
+                    built.shapes.block_of_face,
+                    strict=True,
+                )
+                if block == i
+            ],
+        )
+        for i in range(built.n_blocks)
+    ]
+    return solver.Assembly.from_solids(
+        solids, names=names, roles=built.roles.tolist(), materials=built.materials, density=density
+    )
+
+
+@pytest.mark.parametrize("suffix", WRITTEN)
+def test_everything_comes_back(vault, suffix, tmp_path):
+    path = tmp_path / f"vault{suffix}"
+    save_layout(vault, path)
+    again = read(path)
+    order = [again.index(name) for name in vault.names]
+    assert again.dimension == 3
+    assert again.n_blocks == vault.n_blocks
+    assert np.allclose(again.shapes.volumes[order], vault.shapes.volumes, rtol=1e-12)
+    assert np.allclose(again.centroids[order], vault.centroids, atol=1e-12)
+    for i, j in enumerate(order):
+        corners, drawn = (a.vertices[a.block_of_vertex == k] for a, k in ((again, j), (vault, i)))
+        assert np.abs(corners[:, None] - drawn[None]).max(axis=2).min(axis=0).max() < 1e-12
+        assert len(corners) == len(drawn)
+    faces = np.bincount(again.shapes.block_of_face)[order]
+    assert faces.tolist() == np.bincount(vault.shapes.block_of_face).tolist()
+    silent = SILENT.get(suffix, ())
+    if "roles" not in silent:
+        assert (again.roles[order] == vault.roles).all()
+    if "materials" not in silent:
+        assert tuple(again.materials[j] for j in order) == vault.materials
+    if "density" not in silent:
+        assert np.allclose(again.density[order], vault.density)
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".compas.json"])
+def test_the_same_joints_are_found(vault, suffix, tmp_path):
+    path = tmp_path / f"vault{suffix}"
+    save_layout(vault, path)
+    again = read(path, roles={"springer *": "fixed"})
+    points = [len(solver.find_contacts(a, a.vertices, 1e-6)) for a in (vault, again)]
+    assert points[0] == points[1]
+
+
+def test_one_file_per_stone(tmp_path):
+    dome = generators.dome(lunes=4, courses=2)
+    for i, name in enumerate(dome.names):
+        layout = read_layout_of(dome).chosen([i])
+        write_layout(layout, tmp_path / f"{name}.stl")
+    again = read(tmp_path, roles={"springer *": "moving"}, dimension=3)
+    assert sorted(again.names) == sorted(dome.names)
+    assert again.shapes.volumes.sum() == pytest.approx(dome.shapes.volumes.sum())
+    assert int(again.moving.sum()) == 4
+
+
+def read_layout_of(assembly):
+    from blockvis.layout.layout import layout_of
+
+    layout = layout_of(assembly)
+    assert isinstance(layout, SolidLayout)
+    return layout
+
+
+def test_formats_of_the_plane_refuse_blocks_in_space(vault, tmp_path):
+    for suffix in (".dxf", ".svg", ".msh", ".vtp"):
+        with pytest.raises(ValueError, match=r"holds no blocks in space; use one of .*\.obj"):
+            save_layout(vault, tmp_path / f"vault{suffix}")
+        assert not (tmp_path / f"vault{suffix}").exists()
+
+
+def test_convert_and_info(tmp_path, capsys):
+    assert main(["layout", "dome", "lunes=4", "courses=2", "-o", str(tmp_path / "dome.obj")]) == 0
+    assert main(["convert", str(tmp_path / "dome.obj"), str(tmp_path / "dome.vtu")]) == 0
+    assert main(["info", str(tmp_path / "dome.vtu")]) == 0
+    said = capsys.readouterr().out
+    assert "blocks in space 13" in said
+    assert "'free' 9, 'moving' 4" in said
+    assert "weight" in said
+    assert "largest block   'stone 1-" in said
+    weight = 9.81 * generators.dome(lunes=4, courses=2).masses[:9].sum()
+    assert f"weight          {weight:.6g} N, supports" in said
+
+
+def test_the_plane_is_asked_for_or_refused(tmp_path, capsys):
+    path = tmp_path / "dome.obj"
+    save_layout(generators.dome(lunes=4, courses=1), path)
+    assert main(["info", str(path), "--dimension", "2"]) == 2
+    assert "dimension = 3 reads the blocks in space" in capsys.readouterr().err
+
+
+def test_an_arch_of_bodies_is_in_the_plane_unless_space_is_asked_for(tmp_path):
+    path = tmp_path / "arch.obj"
+    save_layout(generators.extruded_arch(voussoirs=5), path)
+    assert read_layout(path).dimension == 2
+    assert read(path, dimension=3).shapes.volumes == pytest.approx(generators.extruded_arch(voussoirs=5).shapes.volumes)
+
+
+def test_a_drawing_in_the_plane_stands_upright_in_space(tmp_path):
+    flat = generators.segmental_arch(voussoirs=5, depth=0.4)
+    save_layout(flat, tmp_path / "arch.dxf")
+    deep = read(tmp_path / "arch.dxf", dimension=3, thickness=0.4)
+    assert deep.shapes.volumes == pytest.approx(0.4 * flat.areas)
+    assert deep.centroids == pytest.approx(np.insert(flat.centroids, 1, 0.0, axis=1), abs=1e-9)

@@ -1,0 +1,377 @@
+"""Results, pictures and the page of blocks in space, by what is in them."""
+
+import csv
+import json
+import shutil
+import subprocess
+import warnings
+from dataclasses import fields, is_dataclass
+
+import numpy as np
+import pytest
+import pyvista as pv
+from PIL import Image
+from structures import vault_response
+from test_paraview import PVPYTHON, READ
+from test_report import body_of, browser
+
+import blockvis
+import solver
+from blockvis.cli import main
+from blockvis.pictures import palette
+from blockvis.pictures.drawer import Look
+from blockvis.pictures.frame import framed
+from blockvis.pictures.render import animate, draw_mechanism
+from blockvis.pictures.solid_drawer import SolidDrawer
+from blockvis.pictures.solid_marks import solid_marks
+from blockvis.pictures.solid_view import View, chosen_view
+from blockvis.pictures.surface import sharp_edges, triangles_of
+from blockvis.pictures.swing import swing_of
+from blockvis.report.page import write_report
+from blockvis.results.datasets import block_dataset, contact_dataset, joint_dataset
+from blockvis.results.joint_faces import face_states, joint_faces
+from blockvis.vtk_files import write_vtu
+
+SMALL = (640, 360)
+
+CASE = """
+[geometry]
+layout = "extruded arch"
+parameters = { voussoirs = 6, thickness_ratio = 0.2 }
+[material]
+friction_coefficient = 1.0
+[settlement]
+direction = [1, 0, 0]
+increment = 0.1
+limit = 0.8
+tolerance = 0.05
+[output]
+animation = "collapse.mp4"
+"""
+
+#: An L of unit thickness: its faces at both ends have a re-entrant corner.
+ELL = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 3], [0, 3]], dtype=float)
+
+
+def prism(outline, low=0.0, high=1.0):
+    """Vertices and faces of an outline in x and z, drawn out along y."""
+    n = len(outline)
+    corners = [[x, y, z] for y in (low, high) for x, z in outline]
+    sides = [[(k + 1) % n, k, n + k, n + (k + 1) % n] for k in range(n)]
+    return corners, [list(range(n)), list(range(2 * n - 1, n - 1, -1)), *sides]
+
+
+def same(one, other):
+    """Whether two values have the same fields and arrays, bit for bit."""
+    if is_dataclass(one):
+        return all(same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
+    return one == other
+
+
+def test_polyhedra_come_back_through_pyvista(tmp_path):
+    response = vault_response()
+    last, volumes = response.path[-1], response.assembly.shapes.volumes
+    file = write_vtu(block_dataset(response.assembly, last), tmp_path / "blocks.vtu")
+    back = pv.read(file)
+    np.testing.assert_array_equal(back.points, solver.moved_vertices(response.assembly, last.pose))
+    np.testing.assert_allclose(back.compute_cell_sizes()["Volume"], volumes, rtol=1e-12)
+    assert [str(name) for name in back.cell_data["name"]] == list(response.assembly.names)
+    np.testing.assert_allclose(
+        back.point_data["to_reference"], response.assembly.vertices - back.points, rtol=0, atol=1e-15
+    )
+    np.testing.assert_array_equal(back.cell_data["rotation"], last.pose.rotations)
+    # Programs of before VTK 9.4 know no other arrays of faces.
+    assert b'Name="faceoffsets"' in file.read_bytes()
+
+
+def test_faces_of_joints_are_those_of_the_voussoirs():
+    response = vault_response()
+    joints = joint_faces(response.assembly)
+    # Six voussoirs between two springers: seven joints of 0.2 m × 0.5 m.
+    np.testing.assert_allclose(joints.rings.areas(), np.full(7, 0.1), rtol=1e-9)
+    between = response.assembly.centroids[joints.block_a] - response.assembly.centroids[joints.block_b]
+    assert ((between * joints.normals).sum(axis=1) > 0).all()
+
+
+def test_joints_open_on_one_side_and_carry_the_weight():
+    response = vault_response()
+    assembly, last = response.assembly, response.path[-1]
+    states = face_states(assembly, joint_faces(assembly), last)
+    total = np.zeros((assembly.n_blocks, 3))
+    np.add.at(total, states.block_a, states.force)
+    np.subtract.at(total, states.block_b, states.force)
+    weight = assembly.masses * solver.GRAVITY
+    np.testing.assert_allclose(total[assembly.free, 2], weight[assembly.free], rtol=1e-6)
+    hinges = solver.mechanism_of(assembly, last).hinges
+    pairs = np.sort(np.stack([states.block_a, states.block_b], axis=1), axis=1).tolist()
+    opened = 0
+    for pair in hinges.tolist():
+        here = states.gaps[states.rings.ring == pairs.index(pair)]
+        # Closed along the line about which it turns, open by thickness times angle on the other side.
+        assert np.sort(np.abs(here))[:2].max() < 1e-6
+        a, b = (last.pose.rotations[block, 1] for block in pair)
+        opened = max(opened, here.max())
+        assert here.max() == pytest.approx(0.2 * np.sin(abs(a - b)), abs=1e-4)
+    assert opened > 0.05
+
+
+def test_contact_points_have_forces_and_slip_as_vectors():
+    response = vault_response()
+    assembly, last = response.assembly, response.path[-1]
+    grid = contact_dataset(assembly, last)
+    total = np.zeros((assembly.n_blocks, 3))
+    np.add.at(total, grid.point_data["block_a"], grid.point_data["force"])
+    np.subtract.at(total, grid.point_data["block_b"], grid.point_data["force"])
+    np.testing.assert_allclose(total[assembly.free, 2], (assembly.masses * solver.GRAVITY)[assembly.free], rtol=1e-6)
+    pushed = grid.point_data["normal"] * grid.point_data["normal_force"][:, None]
+    np.testing.assert_allclose(grid.point_data["force"], pushed + grid.point_data["shear"], atol=1e-9)
+    np.testing.assert_allclose((grid.point_data["slip"] * grid.point_data["normal"]).sum(axis=1), 0.0, atol=1e-12)
+
+
+def test_slip_is_what_one_block_has_moved_along_another():
+    plate, brick = [[0, 0], [4, 0], [4, 1], [0, 1]], [[1, 1], [2, 1], [2, 2], [1, 2]]
+    two = solver.Assembly.from_solids([prism(plate), prism(brick)], roles=["fixed", "free"])
+    start = solver.Pose.initial(two)
+    pose = solver.Pose(start.positions + np.array([[0, 0, 0], [0.3, 0.1, 0]]), start.rotations)
+    contacts = solver.find_contacts(two, solver.moved_vertices(two, pose), 0.01)
+    nothing = np.zeros((len(contacts), 3))
+    increment = vault_response().path[0].with_arrays(
+        pose=pose, contacts=contacts, forces=nothing, displacements=nothing, friction=np.ones(len(contacts)),
+        velocity=np.zeros((2, 6)), support_forces=np.zeros((2, 6)),
+    )  # fmt: skip
+    side = np.where(contacts.block_a == 1, 1.0, -1.0)[:, None]
+    np.testing.assert_allclose(
+        contact_dataset(two, increment)["slip"] * side, np.tile([0.3, 0.1, 0.0], (4, 1)), atol=1e-12
+    )
+    joint = joint_dataset(two, increment)
+    assert joint.cell_data["slip"][0] == pytest.approx(np.hypot(0.3, 0.1))
+    assert joint.cell_data["area"][0] == pytest.approx(1.0)
+
+
+def test_results_come_back_bit_for_bit(tmp_path):
+    response = vault_response()
+    folder = blockvis.write(response, tmp_path / "out")
+    back = blockvis.open_results(folder)
+    assert same(back.assembly, response.assembly)
+    assert len(back.increments) == len(response.increments)
+    for one, other in zip(back.increments, response.increments, strict=True):
+        assert same(one.state, other.state)
+        assert (one.parameter, one.reaction, one.status) == (other.parameter, other.reaction, other.status)
+    assert back.collapse.mechanism.shape == (8, 6)
+    assert back.settlements[0].direction == pytest.approx((1, 0, 0))
+    rows = list(csv.DictReader((folder / "joints.csv").open(encoding="utf-8")))
+    assert {row["joint"] for row in rows} >= {"voussoir 3 | voussoir 4"}
+    crown = next(row for row in rows if row["joint"] == "voussoir 3 | voussoir 4")
+    np.testing.assert_allclose([float(crown[name]) for name in ("x [m]", "y [m]", "area [m²]")], [0, 0, 0.1], atol=1e-6)
+    assert float(crown["largest opening [m]"]) > 0.05
+    assert (folder / "increments" / "joints_00000.vtu").is_file()
+
+
+def test_bent_faces_are_cut_into_triangles_that_cover_them():
+    ell = solver.Assembly.from_solids([prism(ELL)]).polyhedra
+    triangles, blocks = triangles_of(ell)
+    a, b, c = np.moveaxis(ell.vertices[triangles], 1, 0)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
+    assert areas.sum() == pytest.approx(ell.surfaces[0])
+    # Each is turned outwards: together they hold the volume.
+    assert (a * np.cross(b, c)).sum() / 6.0 == pytest.approx(4.0)
+    assert (blocks == 0).all()
+    assert len(sharp_edges(ell)) == 18
+
+
+def test_edges_between_faces_in_one_plane_are_not_drawn():
+    square = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [0, 1]], dtype=float)
+    flat = solver.Assembly.from_solids([prism(square)]).polyhedra
+    assert len(sharp_edges(flat)) in (12, 14)
+    ends = flat.vertices[sharp_edges(flat)]
+    across = (ends[:, :, 0] == 1.0).all(axis=1) & (ends[:, 0, 1] != ends[:, 1, 1])
+    assert not across.any()
+
+
+def test_the_view_shows_the_motion_across_it():
+    response = vault_response()
+    n = response.assembly.n_blocks
+    along_x, along_y = np.tile([1.0, 0.0, 0.0], (n, 1)), np.tile([0.0, 1.0, 0.0], (n, 1))
+    made = response.path[:0]
+    still = solver.Response(
+        response.assembly, (), response.interfaces, response.loads, made, solver.Status.LIMIT_REACHED
+    )
+    for motion in (along_x, along_y):
+        seen = np.linalg.norm(motion[0] @ chosen_view(still, motion).axes[:2].T)
+        assert seen > 0.85
+    axes = View(-60.0, 24.0).axes
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+
+
+def alike(colour, wanted, tolerance=12):
+    return np.abs(np.asarray(colour, dtype=int) - np.array(wanted)).max() <= tolerance
+
+
+def test_what_is_where():
+    """Hinge, crack, moving support and paper stand at their places, in their colours."""
+    response = vault_response()
+    assembly, last = response.assembly, response.path[-1]
+    drawer = SolidDrawer(response, Look(), (1280, 720), (last,))
+    picture = np.asarray(drawer.picture(last)).astype(int)
+    left, top = drawer.sheet.inside[:2]
+
+    def colour_at(point):
+        x, y = drawer.scene.at_pixel(np.array([point]))[0].round().astype(int)
+        return picture[top + y, left + x]
+
+    found = solid_marks(assembly, drawer.joints, last, last.pose)
+    crown = found.hinges[found.hinges[:, 0, 2].argmax()]
+    for share in (0.3, 0.5, 0.7):
+        assert alike(colour_at(crown[0] + share * (crown[1] - crown[0])), palette.HINGE, 30)
+    # The crack at the crown is widest below: there its colour is the darkest.
+    front = found.cracks.mean(axis=1)
+    under = np.flatnonzero((np.abs(front[:, 0] - crown[0, 0]) < 0.1) & (front[:, 1] < -0.2))
+    wide = under[found.openings[under].max(axis=1).argmax()]
+    inside = (
+        found.cracks[wide][[0, 3]] if found.openings[wide, 0] > found.openings[wide, 1] else found.cracks[wide][[1, 2]]
+    )
+    assert alike(colour_at(0.9 * inside.mean(axis=0) + 0.1 * found.cracks[wide].mean(axis=0)), palette.CRACKS[2], 60)
+    support = np.flatnonzero(assembly.moving)[0]
+    corner = solver.moved_vertices(assembly, last.pose)[assembly.block_of_vertex == support]
+    face = corner[corner[:, 1] < 0].mean(axis=0)
+    shade = colour_at(face) / np.array(palette.MOVING)
+    assert np.ptp(shade) < 0.05
+    assert 0.5 < shade.mean() <= 1.05
+    assert alike(colour_at([0.0, 0.0, 0.2]), palette.PAPER)
+
+
+def test_nothing_leaves_the_picture_and_all_frames_look_the_same_way(tmp_path):
+    response = vault_response()
+    drawer = SolidDrawer(response, Look(colour_by="mechanism"), SMALL, response.increments)
+    low, high = np.zeros(2), np.array(drawer.scene.size)
+    for increment in response.increments:
+        corners = solver.moved_vertices(response.assembly, increment.pose)
+        free = response.assembly.free[response.assembly.block_of_vertex]
+        pixels = drawer.scene.at_pixel(corners[free])
+        assert (pixels > low).all()
+        assert (pixels < high).all()
+    first, second = (np.asarray(drawer.picture(response.path[k])).astype(int) for k in (0, -1))
+    fixed = response.assembly.centroids[response.assembly.roles == "fixed"]
+    x, y = drawer.scene.at_pixel(fixed)[0].astype(int) + drawer.sheet.inside[:2]
+    window = np.s_[y - 3 : y + 4, x - 3 : x + 4]
+    np.testing.assert_array_equal(first[window], second[window])
+    assert (first != second).any(axis=2).mean() > 0.02
+
+
+def test_mechanism_is_tinted_and_shows_where_it_goes(tmp_path):
+    response = vault_response()
+    picture = np.asarray(Image.open(draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL))).astype(int)
+    parts = int(swing_of(response).parts.max()) + 1
+    assert parts >= 3
+    assert (np.abs(picture - palette.SETTLEMENT).max(axis=2) <= 8).sum() > 60
+    tints = palette.PARTS[:parts]
+    for tint in tints:
+        # A tint in any of the lights that its faces are seen in.
+        hue = picture / np.maximum(picture.sum(axis=2, keepdims=True), 1)
+        near = np.abs(hue - tint / tint.sum()).max(axis=2) < 0.025
+        assert near.sum() > 120
+
+
+@pytest.mark.slow
+def test_the_film_has_the_path_and_the_fall(tmp_path):
+    told = []
+    film = animate(
+        vault_response(),
+        tmp_path / "collapse.gif",
+        size=SMALL,
+        fps=10,
+        seconds=1.0,
+        progress=lambda *of: told.append(of),
+    )
+    assert Image.open(film).n_frames >= 4
+    assert told[-1][0] == told[-1][1] == len(told)
+
+
+def test_page_has_what_its_script_draws(tmp_path):
+    response = vault_response()
+    text = write_report(response, tmp_path / "report.html").read_text(encoding="utf-8")
+    model = json.loads(text.split('<script id="model" type="application/json">')[1].split("</script>")[0])
+    assert model["space"]
+    assert model["packed"]["triangles"]["rows"] == 8 * 12
+    assert model["packed"]["edges"]["rows"] == 8 * 12
+    assert model["packed"]["joint_blocks"]["rows"] == 7
+    assert len(model["arrows"][0]) == 1
+    assert model["arrows"][0][0][4:] == [1.0, 0.0, 0.0]
+    assert "http" not in text.replace("http-equiv", "").replace("http://www.w3.org/2000/svg", "")
+
+
+@browser
+def test_page_unpacks_every_frame_as_it_was(tmp_path):
+    response = vault_response()
+    page = write_report(response, tmp_path / "report.html")
+    k = len(response.path) - 1
+    attributes = body_of(page, tmp_path, f"#frame={k}")
+    poses = [solver.Pose.initial(response.assembly), *(i.pose for i in response.increments)]
+    frame = framed(response.assembly, poses, margin=0.0, supports=0.25)
+    corners = solver.moved_vertices(response.assembly, response.increments[k].pose) - np.round(frame.low, 3)
+    expected = float(corners.ravel() @ (np.arange(corners.size) % 97 + 1))
+    assert float(attributes["corners"]) == pytest.approx(expected, abs=0.02)
+
+
+@pytest.mark.paraview
+@pytest.mark.skipif(PVPYTHON is None, reason="pvpython is not installed (Debian: python3-paraview)")
+def test_paraview_reads_polyhedra_faces_and_contacts(tmp_path):
+    response = vault_response()
+    folder = blockvis.write(response, tmp_path / "out")
+    script = tmp_path / "read.py"
+    script.write_text(READ, encoding="utf-8")
+    done = subprocess.run([PVPYTHON, script, folder], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    told = json.loads(done.stdout.split("TOLD")[1])
+    for part, dataset in (("blocks", block_dataset), ("contacts", contact_dataset), ("joints", joint_dataset)):
+        for (_, cells, names), increment in zip(told[part], response.increments, strict=True):
+            ours = dataset(response.assembly, increment)
+            assert cells == ours.n_cells
+            assert set(names["Point"]) == set(ours.point_data.keys())
+            assert set(names["Cell"]) == set(ours.cell_data.keys())
+
+
+@pytest.mark.slow
+def test_one_command_from_case_to_pictures_and_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arch.toml").write_text(CASE, encoding="utf-8")
+    assert main(["run", "arch.toml", "-o", "out"]) == 0
+    out = tmp_path / "out"
+    for name in ("mechanism.png", "curve.png", "collapse.mp4", "report.html", "paraview_colours.py", "summary.json"):
+        assert (out / name).stat().st_size > 1000
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["status"] == "collapsed"
+    capsys.readouterr()
+    assert main(["render", "out", "--animation", "none", "--colour-by", "displacement", "--forces", "thrust"]) == 0
+    assert (out / "last.png").stat().st_size > 1000
+    # A run that was stopped goes on to the same end.
+    (out / "summary.json").unlink()
+    before = (out / "response.csv").read_text(encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert main(["run", "--resume", "out", "--no-pictures"]) == 0
+    assert [row.rsplit(",", 1)[0] for row in (out / "response.csv").read_text(encoding="utf-8").splitlines()] == [
+        row.rsplit(",", 1)[0] for row in before.splitlines()
+    ]
+
+
+def test_what_a_layout_in_space_holds_is_drawn(tmp_path, capsys):
+    file = tmp_path / "arch.obj"
+    blockvis.save_layout(vault_response().assembly, file)
+    assert main(["info", str(file), "--picture", str(tmp_path / "arch.png"), "--dimension", "3"]) == 0
+    picture = np.asarray(Image.open(tmp_path / "arch.png").convert("RGB")).astype(int)
+    hue = picture / np.maximum(picture.sum(axis=2, keepdims=True), 1)
+    for colour in (palette.MOVING, palette.SUPPORT):
+        assert (np.abs(hue - np.array(colour) / sum(colour)).max(axis=2) < 0.012).sum() > 3000
+    # Names are written in ink.
+    assert (picture[120:900].max(axis=2) < 60).sum() > 300
+
+
+def test_notebooks_show_blocks_in_space():
+    written = vault_response().assembly._repr_html_()
+    assert 'src="data:image/png;base64,' in written
+    assert "2.4 m × 0.5 m × 1.375 m" in written or " m × 0.5 m × " in written
+    assert shutil.which("python") is None or vault_response().mesh(-1).n_cells == vault_response().assembly.n_blocks

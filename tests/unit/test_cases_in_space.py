@@ -1,0 +1,141 @@
+"""Case files in space: two numbers or three, supports, generators by name, blockvis new."""
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis import generators
+from blockvis.cases.build import case_assembly, case_loads
+from blockvis.cases.case import parse_case
+from blockvis.cli import main
+from blockvis.formats.read import save_layout, write_layout
+from blockvis.layout.assemble import assemble
+from blockvis.layout.layout import layout_of
+from blockvis.layout.solid_layout import SolidLayout
+from blockvis.layout.solids import box
+
+DOME = '[geometry]\nlayout = "dome"\nparameters = {lunes = 4, courses = 1}\n'
+ARCH = '[geometry]\nlayout = "arch"\nparameters = {voussoirs = 5}\n'
+DOWN = "[settlement]\ndirection = [0, 0, -1]\n"
+
+
+def case(text, tmp_path):
+    return parse_case(text, tmp_path / "case.toml")
+
+
+def test_a_layout_in_space_by_its_name(tmp_path):
+    found = case(DOME + "[settlement]\nradial_from = [0, 0]\n", tmp_path)
+    assert found.settlements == (solver.Settlement(radial_from=(0.0, 0.0)),)
+    assembly = case_assembly(found)
+    assert assembly.dimension == 3
+    assert assembly.n_blocks == 9
+    corner = case_assembly(case('[geometry]\nlayout = "L-corner"\n' + DOWN, tmp_path))
+    assert corner.n_blocks == generators.l_corner().n_blocks
+
+
+def test_the_density_of_the_case_replaces_that_of_a_layout(tmp_path):
+    assembly = case_assembly(case(DOME + DOWN + "[material]\ndensity = 2400\n", tmp_path))
+    assert (assembly.density == 2400.0).all()
+
+
+@pytest.mark.filterwarnings("ignore:.*was extruded")
+def test_a_layout_of_the_plane_in_space(tmp_path):
+    deep = case_assembly(case(ARCH.replace("\n", "\ndimension = 3\nthickness = 0.4\n", 1) + DOWN, tmp_path))
+    assert deep.shapes.volumes == pytest.approx(0.4 * generators.arch(voussoirs=5).areas)
+
+
+def test_rotations_and_loads_have_three_numbers(tmp_path):
+    text = DOME + (
+        "[settlement]\nrotation_centre = [1, 0, 0]\nrotation_axis = [0, 2, 0]\nrotation = -1\n"
+        '[[loads]]\nblocks = "cap"\nforce = [0, 0, -500]\npoint = [0.1, 0, 1]\nmoment = [1, 2, 3]\n'
+    )
+    found = case(text, tmp_path)
+    assert found.settlements[0].rotation_axis == (0.0, 1.0, 0.0)
+    assembly = case_assembly(found)
+    load = case_loads(found, assembly).dead[assembly.index("cap")]
+    weight = assembly.masses[assembly.index("cap")] * solver.GRAVITY
+    assert load == pytest.approx([0, 0, -500 - weight, 1, 2 + 50, 3])
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (DOME + "[settlement]\ndirection = [0, -1]", r"\[settlement\] direction has 2 numbers, but the blocks are in "
+         r"space; give three numbers \[x, y, z\]"),
+        (ARCH + DOWN, r"\[settlement\] direction has 3 numbers, but the blocks are in the plane; give two numbers"),
+        (ARCH + "[settlement]\nradial_from = [0, 0]", r"radial_from belongs to blocks in space"),
+        (DOME + "[settlement]\ndirection = [0]", r"is \[0\]; give two numbers \[x, y\], or in space three \[x, y, z\]"),
+        (DOME + "[settlement]\nrotation_axis = [0, 1]", r"rotation_axis is \[0, 1\]; give three numbers \[x, y, z\]"),
+        (DOME + "[settlement]\nrotation_centre = [0, 1, 0]", r"in space a rotation needs .* rotation_axis"),
+        (DOME + DOWN + "[[loads]]\nforce = [1, 0]", r"\[loads\] force has 2 numbers"),
+        (DOME + DOWN + "[[loads]]\nmoment = 3.0", r"\[loads\] moment: the blocks are in space; give three numbers"),
+        (ARCH + DOWN.replace("0, 0", "0") + "[[loads]]\nmoment = [1, 2, 3]", r"are in the plane; give one number"),
+        (DOME + DOWN + "[[loads]]\npressure = 3.0", r"pressure belongs to blocks in the plane; in space give forces"),
+        (DOME.replace("\n", "\ndimension = 2\n", 1) + DOWN, r"dimension is 2, but the layout 'dome' is in space"),
+        (DOME.replace("\n", "\ndimension = 4\n", 1) + DOWN, r'dimension is 4; give 2, 3 or "auto"'),
+        (DOME.replace("\n", '\nclosing = "faces"\n', 1) + DOWN, r"closing belongs to outlines in the plane"),
+        (DOME + DOWN + '[[imperfections]]\nkind = "vertices"\ndistribution = "normal"\nmean = 0\ndeviation = 0.01\n',
+         r"kind 'vertices' belongs to blocks in the plane"),
+        (DOME + DOWN + '[[supports]]\noutline = [[0, 0], [1, 0], [1, 1]]\n', r"levels = \[bottom, top\] in m"),
+        (DOME + DOWN + '[roles]\n"sprinter 1" = "fixed"\n', r"roles: 'sprinter 1' matches no block"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_named(text, reason, tmp_path):
+    with pytest.raises(ValueError, match=reason):
+        case_assembly(case(text, tmp_path))
+
+
+def test_supports_of_a_drawing_without_them(tmp_path):
+    bricks = generators.l_corner(bricks=2, across=2, courses=1)
+    write_layout(layout_of(bricks).chosen(np.flatnonzero(bricks.free)), tmp_path / "a.obj")
+    text = f"""
+[geometry]
+file = "a.obj"
+dimension = 3
+[[supports]]
+name = "ground"
+outline = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+levels = [-0.2, 0]
+role = "moving"
+{DOWN}"""
+    assembly = case_assembly(case(text, tmp_path))
+    assert assembly.names[-1] == "ground"
+    assert assembly.shapes.volumes[-1] == pytest.approx(0.8)
+    assert assembly.moving.tolist() == [False] * 4 + [True]
+
+
+def test_stones_that_overlap_are_refused_with_the_place(tmp_path):
+    layout = SolidLayout((box((0, 0, 0), (1, 1, 1)), box((0, 0, 0.9), (1, 1, 2))), ("low", "high"))
+    with pytest.raises(
+        ValueError,
+        match=r"block 0 \('low'\) overlaps block 1 \('high'\) by 0.1 m near \(0.5, 0.5, 0.95\); move them apart",
+    ):
+        assemble(layout)
+    with pytest.warns(UserWarning, match="they overlapped by up to 0.1 m"):
+        faced = assemble(layout, overlap_tolerance=0.11)
+    assert faced.vertices[:8, 2].max() == pytest.approx(0.95)
+
+
+def test_new_writes_a_case_in_space(tmp_path, capsys):
+    bricks = generators.build("L corner", {"bricks": 2, "across": 2, "courses": 2})
+    write_layout(layout_of(bricks).chosen(np.flatnonzero(bricks.free)), tmp_path / "corner.obj")
+    assert main(["new", str(tmp_path / "corner.obj"), "-o", str(tmp_path / "corner.toml")]) == 0
+    assert "refuses it" not in capsys.readouterr().err
+    text = (tmp_path / "corner.toml").read_text(encoding="utf-8")
+    assert "dimension = 3" in text
+    assert "direction = [0.0, 0.0, -1.0]" in text
+    assert "8 blocks in space" in text
+    assembly = case_assembly(parse_case(text, tmp_path / "corner.toml"))
+    assert assembly.names[-2:] == ("ground left", "ground right")
+    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-9)
+    assert (contacts.block_b == assembly.index("ground right")).any() or (
+        contacts.block_a == assembly.index("ground right")
+    ).any()
+
+
+def test_new_names_the_supports_of_a_drawing(tmp_path):
+    save_layout(generators.dome(lunes=4, courses=1), tmp_path / "dome.stl")
+    assert main(["new", str(tmp_path / "dome.stl"), "-o", str(tmp_path / "dome.toml")]) == 0
+    text = (tmp_path / "dome.toml").read_text(encoding="utf-8")
+    found = case_assembly(parse_case(text, tmp_path / "dome.toml"))
+    assert int((~found.free).sum()) == 4

@@ -1,0 +1,137 @@
+"""Joints in space that do not quite meet, and warped faces: one plane each, what is moved is counted."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis import generators
+from blockvis.formats.read import read_layout, write_layout
+from blockvis.layout.assemble import assemble
+from blockvis.layout.faces import with_plane_faces
+from blockvis.layout.facing import faced
+from blockvis.layout.layout import layout_of
+from blockvis.layout.solids import box, triangles_of, volume
+
+SMALL = {
+    "barrel vault": {"voussoirs": 5, "stones": 2},
+    "dome": {"lunes": 5, "courses": 2},
+    "cross vault": {"voussoirs": 3, "stone": 2.0},
+    "pavilion vault": {"voussoirs": 3, "bonded": False},
+    "L corner": {"bricks": 2, "across": 2, "courses": 2},
+}
+
+
+def shaken(layout, amount, seed=3):
+    """Move every corner of every block by itself, up to an amount [m] along each axis."""
+    random = np.random.default_rng(seed)
+    moved = tuple((points + amount * random.uniform(-1, 1, points.shape), faces) for points, faces in layout.solids)
+    return replace(layout, solids=moved)
+
+
+def joints(assembly, least):
+    """Pairs of blocks with at least so many contact points."""
+    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-5 * assembly.block_size)
+    pairs = Counter(map(frozenset, zip(contacts.block_a.tolist(), contacts.block_b.tolist(), strict=True)))
+    return {pair for pair, count in pairs.items() if count >= least}
+
+
+@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.filterwarnings("ignore")
+def test_a_shaken_drawing_is_faced(name, tmp_path):
+    drawn = generators.build(name, SMALL[name])
+    amount = 1e-3 * drawn.block_size
+    write_layout(shaken(layout_of(drawn), amount), tmp_path / "a.obj")
+    layout = read_layout(tmp_path / "a.obj", dimension=3)
+    assert any("planes were fitted to warped faces of" in note for note in layout.notes)
+    assembly = assemble(layout)
+    assert assembly.names == drawn.names
+    assert not len(assembly.shapes.overlaps(assembly.vertices, 1e-5 * drawn.block_size)[0])
+    # Stones that touch along an edge, with two points, may do so no longer.
+    assert joints(drawn, 3) <= joints(assembly, 3)
+    assert assembly.shapes.volumes == pytest.approx(drawn.shapes.volumes, rel=0.02)
+    assert np.abs(assembly.centroids - drawn.centroids).max() < 4.0 * amount
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["barrel vault", "dome", "cross vault", "L corner"])
+@pytest.mark.filterwarnings("ignore")
+def test_a_shaken_drawing_stands_again(name, tmp_path):
+    drawn = generators.build(name, SMALL[name])
+    write_layout(shaken(layout_of(drawn), 1e-3 * drawn.block_size), tmp_path / "a.obj")
+    assembly = assemble(read_layout(tmp_path / "a.obj"))
+    down = solver.Settlement(direction=(0, 0, -1), increment=1e-6, limit=1e-6)
+    response = solver.settle(assembly, down, friction_coefficient=0.7)
+    assert response.stop == solver.Status.LIMIT_REACHED, response.message
+
+
+def test_exact_joints_stay_bit_for_bit():
+    layout = layout_of(generators.dome(lunes=5, courses=2))
+    facing = faced(layout.solids, layout.names)
+    assert facing.note == ""
+    for (points, _), (drawn, _) in zip(facing.solids, layout.solids, strict=True):
+        assert (points == drawn).all()
+
+
+def test_what_is_moved_is_counted_and_named():
+    stones = [box((0, 0, 0), (1, 1, 1)), box((0, 0, 1.004), (1, 1, 2)), box((0, 0, 1.998), (1, 1, 3))]
+    facing = faced(stones, ["low", "middle", "high"])
+    assert facing.n_joints == 2
+    assert facing.note.startswith(
+        "2 joints between faces were not plane: they were open by up to 0.004 m ('low' and 'middle')"
+    )
+    tops = [points[:, 2].max() for points, _ in facing.solids]
+    feet = [points[:, 2].min() for points, _ in facing.solids]
+    assert tops[:2] == pytest.approx([1.002, 1.999])
+    assert feet[1:] == pytest.approx([1.002, 1.999])
+
+
+def test_wider_joints_are_closed_if_asked_for():
+    stones = [box((0, 0, 0), (1, 1, 1)), box((0, 0, 1.05), (1, 1, 2))]
+    assert faced(stones, ["a", "b"]).note == ""
+    closed = faced(stones, ["a", "b"], 0.06)
+    assert closed.solids[0][0][:, 2].max() == closed.solids[1][0][:, 2].min() == pytest.approx(1.025)
+
+
+def test_blocks_that_are_anchored_keep_their_faces():
+    stones = [box((0, 0, 0), (1, 1, 1)), box((0, 0, 1.004), (1, 1, 2))]
+    facing = faced(stones, ["a", "b"], anchored=np.array([True, False]))
+    assert (facing.solids[0][0] == stones[0][0]).all()
+    assert facing.solids[1][0][:, 2].min() == pytest.approx(1.0)
+
+
+def test_triangles_become_plane_faces():
+    solid = generators.cross_vault(voussoirs=3, stone=2.0)
+    for points, faces in layout_of(solid).solids:
+        found = with_plane_faces(points, triangles_of(points, faces))
+        assert found.warp == 0.0
+        assert sorted(map(len, found.solid[1])) == sorted(map(len, faces))
+        assert volume(*found.solid) == pytest.approx(volume(points, faces), rel=1e-12)
+
+
+def test_a_fan_around_a_re_entrant_corner_is_one_face():
+    ring = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], dtype=float)
+    low, high = (np.column_stack([ring, np.full(6, z)]) for z in (0.0, 1.0))
+    fan = [[0, k, k + 1] for k in range(1, 5)]
+    sides = [[k, (k + 1) % 6, (k + 1) % 6 + 6] for k in range(6)] + [[k, (k + 1) % 6 + 6, k + 6] for k in range(6)]
+    faces = [[a, c, b] for a, b, c in fan] + [[6 + k for k in face] for face in fan] + sides
+    found = with_plane_faces(np.vstack([low, high]), np.array(faces))
+    assert sorted(map(len, found.solid[1])) == [4] * 6 + [6, 6]
+    assert volume(*found.solid) == pytest.approx(3.0)
+
+
+def test_a_face_warped_beyond_the_tolerance_stays_two_triangles():
+    points, faces = box((0, 0, 0), (1, 1, 1))
+    top = int(np.flatnonzero((points == [1, 1, 1]).all(axis=1))[0])
+    raised = points.copy()
+    raised[top, 2] += 0.2
+    found = with_plane_faces(raised, triangles_of(raised, faces))
+    assert found.warp == 0.0
+    assert len(found.solid[1]) == 7
+    raised[top, 2] = 1.004
+    found = with_plane_faces(raised, triangles_of(raised, faces))
+    assert 0.0009 < found.warp < 0.0011
+    assert len(found.solid[1]) == 6
+    assert found.place == pytest.approx(raised[top], abs=1.1)

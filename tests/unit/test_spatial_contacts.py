@@ -1,0 +1,249 @@
+"""Contact points in space where it is difficult: other descriptions, tips and ridges, drawings a little off."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+import solver
+from solver.kinematics import rotation_matrices
+
+
+def box(low, high):
+    (x, y, z), (u, v, w) = low, high
+    corners = [[x, y, z], [u, y, z], [u, v, z], [x, v, z], [x, y, w], [u, y, w], [u, v, w], [x, v, w]]
+    return np.array(corners, dtype=float), [
+        [3, 2, 1, 0],
+        [4, 5, 6, 7],
+        [0, 1, 5, 4],
+        [1, 2, 6, 5],
+        [2, 3, 7, 6],
+        [3, 0, 4, 7],
+    ]
+
+
+def hull_of(points):
+    """Closed surface of the convex hull of points, in triangles."""
+    hull = ConvexHull(points)
+    faces = []
+    for corners, plane in zip(hull.simplices, hull.equations, strict=True):
+        a, b, c = hull.points[corners]
+        faces.append((corners if np.cross(b - a, c - a) @ plane[:3] > 0.0 else corners[::-1]).tolist())
+    return hull.points, faces
+
+
+def corner_of_walls(bricks=3, courses=4, length=0.25, height=0.08):
+    """Two walls that meet at a corner where headers and stretchers alternate, on one slab."""
+    t = length / 2
+    long = bricks * length
+    solids = [box((-0.1, -0.1, -height), (long + 0.1, long + 0.1, 0.0))]
+    for course in range(courses):
+        z, w = course * height, (course + 1) * height
+        first, second = (0.0, t) if course % 2 == 0 else (t, 0.0)
+        for start, across in ((first, True), (second, False)):
+            joints = [start, *(start + length * k for k in range(1, bricks) if start + length * k < long - 1e-9), long]
+            for a, b in pairwise(joints):
+                solids.append(box((a, 0, z), (b, t, w)) if across else box((0, a, z), (t, b, w)))
+    return solids
+
+
+def dome(lunes=10, courses=5, thickness=0.15):
+    """A hemisphere of stones under a polygonal cap, on a ring of supports."""
+    inner, outer = 1 - thickness / 2, 1 + thickness / 2
+    polar, around = np.radians(np.linspace(15, 90, courses + 1)), 2 * np.pi * np.arange(lunes) / lunes
+
+    def place(radius, k, m):
+        direction = [
+            np.sin(polar[k]) * np.cos(around[m % lunes]),
+            np.sin(polar[k]) * np.sin(around[m % lunes]),
+            np.cos(polar[k]),
+        ]
+        return radius * np.array(direction)
+
+    solids = [hull_of(np.array([place(r, 0, m) for r in (inner, outer) for m in range(lunes)]))]
+    for k in range(courses):
+        for m in range(lunes):
+            solids.append(
+                hull_of(np.array([place(r, k + p, m + q) for r in (inner, outer) for p in (0, 1) for q in (0, 1)]))
+            )
+    for m in range(lunes):
+        ring = np.array([place(r, courses, m + q) for r in (inner, outer) for q in (0, 1)])
+        solids.append(hull_of(np.concatenate([ring, ring - [0, 0, 0.1]])))
+    return solids
+
+
+def found(solids, reach=0.01):
+    assembly = solver.Assembly.from_solids(solids)
+    return solver.find_contacts(assembly, assembly.vertices, reach)
+
+
+def table(contacts, number=None, turn=None):
+    """Blocks, place, normal into the lower number and gap of each point, sorted."""
+    number = np.arange(1000) if number is None else number
+    turn = np.eye(3) if turn is None else turn
+    a, b = number[contacts.block_a], number[contacts.block_b]
+    sense = np.where(a > b, -1.0, 1.0)[:, None]
+    rows = np.column_stack(
+        [
+            np.minimum(a, b),
+            np.maximum(a, b),
+            contacts.points @ turn,
+            sense * contacts.frames[:, 0] @ turn,
+            contacts.gaps,
+        ]
+    )
+    return rows[np.lexsort(np.round(rows[:, ::-1], 5).T)]
+
+
+STRUCTURES = {"corner": corner_of_walls, "dome": dome}
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+@pytest.mark.parametrize("change", ["turned", "mirrored", "renumbered", "far away", "drawn otherwise"])
+def test_the_same_structure_has_the_same_points(structure, change):
+    random = np.random.default_rng(5)
+    solids = STRUCTURES[structure]()
+    expected = table(found(solids))
+    assert len(expected) > 200
+    number, turn, shift = np.arange(len(solids)), np.eye(3), np.zeros(3)
+    if change == "turned":
+        turn = rotation_matrices(np.array([[0.3, -1.1, 0.6]]))[0]
+    if change == "mirrored":
+        turn = np.diag([-1.0, 1.0, 1.0])
+    if change == "far away":
+        shift = np.array([4e5, 5e6, 300.0])
+    other = [(corners @ turn.T + shift, faces) for corners, faces in solids]
+    if change == "renumbered":
+        number = random.permutation(len(solids))
+        other = [other[k] for k in number]
+    if change == "drawn otherwise":
+        other = []
+        for corners, faces in solids:
+            order = random.permutation(len(corners))
+            place = np.argsort(order)
+            other.append((corners[order], [np.roll(place[face], random.integers(9)).tolist() for face in faces[::-1]]))
+    contacts = found(other)
+    rows = table(contacts, number, turn)
+    rows[:, 2:5] -= shift
+    loose = 1e-7 if change == "far away" else 1e-9
+    np.testing.assert_allclose(rows, expected, atol=loose)
+
+
+def test_every_joint_of_a_dome_has_its_four_corners():
+    contacts = found(dome())
+    lunes, courses = 10, 5
+    pairs, joint = contacts.joints()
+    # In the meridians, those of the supports too; between courses; under the cap and on the supports.
+    assert len(pairs) == lunes * (courses + 1) + lunes * (courses - 1) + 2 * lunes
+    assert set(np.bincount(joint)) == {4}
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.2, 0.6, 0.95])
+def test_a_ridge_stands_on_a_plane(lean):
+    """A roof upside down, its ridge on a slab, its flanks from flat to steep, leaning to one side."""
+    for half in (0.05, 0.3, 0.8, 1.4):
+        ring = np.array([[0, -0.5], [0, 0.5]])
+        ends = np.column_stack([np.zeros(2), ring[:, 1], np.zeros(2)])
+        flank = np.array([np.sin(half), 0.0, np.cos(half)])
+        points = np.concatenate([ends, ends + flank, ends + flank * [-1, 1, 1]])
+        turn = rotation_matrices(np.array([[0.0, lean * (np.pi / 2 - half), 0.0]]))[0]
+        contacts = found([box((-2, -2, -1), (2, 2, 0)), hull_of(points @ turn.T)], 1e-6)
+        closed = contacts[np.abs(contacts.gaps) < 1e-9]
+        np.testing.assert_allclose(closed.points[np.argsort(closed.points[:, 1])][[0, -1]], ends, atol=1e-9)
+        normals = closed.frames[:, 0] * np.where(closed.block_a == 1, 1.0, -1.0)[:, None]
+        np.testing.assert_allclose(normals, [[0.0, 0.0, 1.0]] * len(closed), atol=1e-9)
+
+
+@pytest.mark.parametrize("half", [0.02, 0.3, 0.8, 1.4])
+def test_a_tip_stands_on_a_plane(half):
+    around = 2 * np.pi * np.arange(5) / 5
+    ring = np.column_stack([np.sin(half) * np.cos(around), np.sin(half) * np.sin(around), np.full(5, np.cos(half))])
+    contacts = found([box((-2, -2, -1), (2, 2, 0)), hull_of(np.concatenate([[[0.0, 0.0, 0.0]], ring]))], 1e-6)
+    np.testing.assert_allclose(contacts.points, [[0.0, 0.0, 0.0]], atol=1e-9)
+    np.testing.assert_allclose(contacts.gaps, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.02, 0.049, 0.051, 0.2, 1.0, np.pi / 4])
+@pytest.mark.parametrize("shift", [0.0, 1e-7, 1e-3, 0.1])
+def test_a_brick_turned_on_a_brick_bears_on_all_of_both(angle, shift):
+    """No corner of the polygon is lost, whichever way corners and edges lie on each other."""
+    import shapely
+
+    corners, faces = box((0, 0, 0), (1, 0.4, 0.2))
+    turn = rotation_matrices(np.array([[0.0, 0.0, angle]]))[0]
+    above = corners @ turn.T + [shift, 0.0, 0.2]
+    contacts = found([(corners, faces), (above, faces)])
+    first, second = shapely.Polygon(corners[:4, :2]), shapely.Polygon(above[:4, :2])
+    assert contacts.areas.sum() == pytest.approx((first & second).area, rel=1e-4)
+    hull = shapely.MultiPoint(contacts.points[:, :2]).convex_hull
+    assert hull.area == pytest.approx((first & second).area, rel=1e-4)
+    np.testing.assert_allclose(contacts.gaps, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("off", [1e-4, 1e-3])
+@pytest.mark.parametrize("structure", STRUCTURES)
+def test_drawings_a_little_off_keep_their_joints(structure, off):
+    """Each stone larger or smaller, shifted and turned by a thousandth: every joint keeps its area and three points."""
+    random = np.random.default_rng(8)
+    solids = STRUCTURES[structure]()
+    expected = found(solids)
+    pairs, joint = expected.joints()
+    area = np.bincount(joint, expected.areas)
+    size = 0.1
+    other = []
+    for corners, faces in solids:
+        middle = corners.mean(axis=0)
+        turn = rotation_matrices(random.normal(size=(1, 3)) * off)[0]
+        grown = (corners - middle) * (1.0 + random.uniform(-off, off)) @ turn.T
+        other.append((middle + grown + random.uniform(-1, 1, 3) * off * size, faces))
+    contacts = found(other)
+    for (i, j), expected_area in zip(pairs, area, strict=True):
+        here = (np.minimum(contacts.block_a, contacts.block_b) == i) & (
+            np.maximum(contacts.block_a, contacts.block_b) == j
+        )
+        assert here.sum() >= 3, (i, j)
+        assert contacts.areas[here].sum() == pytest.approx(expected_area, rel=0.05), (i, j)
+
+
+@pytest.mark.parametrize("scene", range(40))
+def test_overlaps_are_those_that_share_volume(scene):
+    manifold = pytest.importorskip("manifold3d")
+    random = np.random.default_rng(scene)
+    stones = [random.normal(size=(10, 3)) * 0.5 + shift for shift in ([0, 0, 0], random.normal(size=3) * 0.9)]
+    shapes = solver.Assembly.from_solids([hull_of(stone) for stone in stones]).shapes
+    one, two = (manifold.Manifold.hull_points(stone) for stone in stones)
+    shared = (one ^ two).volume()
+    _, _, depth = shapes.overlaps(shapes.vertices, 1e-4)
+    if len(depth) == 0:
+        assert shared < 1e-6
+        return
+    assert shared > 0.0
+    # Moved apart by the depth, and a little more, along some direction they no longer share anything.
+    directions = random.normal(size=(2000, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    ways = min(
+        (np.max(stones[0] @ direction) - np.min(stones[1] @ direction))
+        for direction in np.concatenate([directions, -directions])
+    )
+    assert depth[0] <= ways + 1e-9
+
+
+def test_a_joint_that_is_a_little_warped_is_closed_at_its_corners():
+    lower, faces = box((0, 0, 0), (1, 0.8, 0.5))
+    upper, _ = box((0, 0, 0.5), (1, 0.8, 1.0))
+    lower[6, 2] = upper[2, 2] = 0.5 + 2e-4
+    contacts = found([(lower, faces), (upper, faces)])
+    assert len(contacts) == 4
+    np.testing.assert_allclose(contacts.gaps, 0.0, atol=1e-12)
+
+
+def test_edges_across_each_other_are_one_point():
+    """Two roofs, ridge across ridge, so flat that their flanks cover each other too."""
+    ends = np.array([[-1.0, 0, 0], [1, 0, 0]])
+    flank = np.array([0.0, 1.0, -0.3])
+    lower = np.concatenate([ends, ends + flank, ends + flank * [1, -1, 1]])
+    upper = lower[:, [1, 0, 2]] * [1, 1, -1]
+    contacts = found([hull_of(lower), hull_of(upper)], 1e-6)
+    np.testing.assert_allclose(contacts.points, [[0.0, 0.0, 0.0]], atol=1e-9)
+    np.testing.assert_allclose(np.abs(contacts.frames[:, 0, 2]), 1.0)

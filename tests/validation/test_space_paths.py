@@ -1,0 +1,137 @@
+"""Settlements and pushovers of blocks in space against closed forms, and against the plane where they are its own.
+
+A plug between leaning supports sinks by d / tan β under ΣR = W / tan (β + φ). A block that is pushed over along any
+azimuth has no capacity left when its centroid is above the edge it turns about. Extruded arches are those of the
+plane. The dome's values are those of its lune, which is an arch: 8 lunes of 6 stones under a cap of 15°, t/R = 0.12.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from test_space_static import box
+
+import solver
+from blockvis.generators.arches import arch
+from blockvis.generators.domes import dome
+from blockvis.generators.vaults import extruded_arch
+
+pytestmark = pytest.mark.path
+
+LEAN, FRICTION = math.radians(20.0), 0.3
+
+
+def leaning_plug(sides, turned=0.0, scale=1.0, mirrored=False):
+    """Make a plug, wider above than below, whose sides stand on as many supports: a frustum and boards behind it."""
+    azimuths = turned + 2.0 * math.pi * np.arange(sides) / sides
+    bottom, top, board = 0.42, 0.6, 0.4
+
+    def ring(apothem, z):
+        radius, corners = apothem / math.cos(math.pi / sides), azimuths - math.pi / sides
+        return np.column_stack([radius * np.cos(corners), radius * np.sin(corners), np.full(sides, z)])
+
+    height = (top - bottom) / math.tan(LEAN)
+    sides_of = [[k, (k + 1) % sides, sides + (k + 1) % sides, sides + k] for k in range(sides)]
+    faces = [list(range(sides))[::-1], list(range(sides, 2 * sides)), *sides_of]
+    solids = [(np.vstack([ring(bottom, 0.0), ring(top, height)]), faces)]
+    for azimuth in azimuths:
+        away, along = np.array([math.cos(azimuth), math.sin(azimuth), 0]), [-math.sin(azimuth), math.cos(azimuth), 0]
+        face = []
+        for z, side in ((-0.3, -1), (-0.3, 1), (height + 0.3, 1), (height + 0.3, -1)):
+            apothem = bottom + z * math.tan(LEAN)
+            half = 0.98 * apothem * math.tan(math.pi / sides)
+            face.append(apothem * away + side * half * np.array(along) + [0.0, 0.0, z])
+        corners = np.array(face + [corner + board * away for corner in face])
+        solids.append((corners, [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]))
+    sense = np.array([-1.0 if mirrored else 1.0, 1.0, 1.0]) * scale
+    solids = [(corners * sense, [face[::-1] if mirrored else face for face in faces]) for corners, faces in solids]
+    roles = ["free"] + ["moving"] * sides
+    return solver.Assembly.from_solids(solids, names=["plug"] + [f"board {k}" for k in range(sides)], roles=roles)
+
+
+@pytest.mark.parametrize(
+    ("sides", "turned", "scale", "mirrored"),
+    [(3, 0.0, 1.0, False), (6, 0.0, 1.0, False), (3, 0.7, 1.0, True), (6, 0.1, 10.0, False)],
+)
+def test_a_plug_sinks_between_supports_that_move_away(sides, turned, scale, mirrored):
+    plug = leaning_plug(sides, turned, scale, mirrored)
+    away = solver.Settlement(radial_from=(0.0, 0.0), increment=0.04 * scale, limit=0.08 * scale)
+    response = solver.settle(plug, away, friction_coefficient=FRICTION)
+    assert response.stop is solver.Status.LIMIT_REACHED, response.message
+    expected = 1.0 / math.tan(LEAN + math.atan(FRICTION))
+    assert response.reaction / response.total_weight == pytest.approx(expected, rel=1e-6)
+    sunk = plug.centroids[0, 2] - response.path[-1].pose.positions[0, 2]
+    assert sunk == pytest.approx(0.08 * scale / math.tan(LEAN), rel=1e-6)
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 0.6])
+def test_a_block_is_pushed_over_along_any_azimuth(azimuth):
+    width, height = 0.4, 1.0
+    solids = [box((-1, -1, -0.5), (2, 2, 0)), box((0, 0, 0), (width, width, height))]
+    blocks = solver.Assembly.from_solids(solids, names=["ground", "block"], roles=["fixed", "free"])
+    along = (math.cos(azimuth), math.sin(azimuth), 0.0)
+    loads = solver.Loads(solver.self_weight(blocks).dead, solver.weight_fraction(blocks, along, np.array([1])))
+    control = solver.ControlDisplacement("block", direction=along, increment=0.05, limit=1.0, tolerance=1e-4)
+    response = solver.pushover(blocks, control, loads=loads, friction_coefficient=0.9)
+    assert response.load_multiplier[0] == pytest.approx(width / height / math.cos(azimuth), rel=1e-6)
+    low, high = response.collapse.bracket
+    assert low - 1e-4 <= width / 2.0 * math.cos(azimuth) <= high + 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("voussoirs", "direction", "expected"),
+    [(12, (1, 0), 0.1410498), (13, (1, 0), 0.1591076), (12, (0, -1), 0.3300394)],
+)
+def test_extruded_arches_are_those_of_the_plane(voussoirs, direction, expected):
+    in_plane, in_space = arch(voussoirs=voussoirs), extruded_arch(voussoirs=voussoirs)
+    assert in_space.n_blocks == in_plane.n_blocks
+    steps = {"increment": 0.05, "limit": 0.5, "tolerance": 1e-5}
+    flat = solver.settle(in_plane, solver.Settlement(direction=direction, **steps), friction_coefficient=2.0)
+    x, up = direction
+    solid = solver.settle(in_space, solver.Settlement(direction=(x, 0, up), **steps), friction_coefficient=2.0)
+    assert solid.collapse.displacement == pytest.approx(expected, rel=1e-4)
+    shared = [i.parameter for i in flat.path if any(i.parameter == j.parameter for j in solid.path)]
+    assert len(shared) > 3
+    per_metre = solid.total_weight / flat.total_weight
+    for s in shared:
+        one, other = (next(i for i in r.path if i.parameter == s) for r in (flat, solid))
+        assert other.reaction / per_metre == pytest.approx(one.reaction, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_dome_spreads_to_the_collapse_of_its_lunes():
+    stones = dome(lunes=8, courses=6, thickness_ratio=0.12, cap=15.0)
+    spreading = solver.Settlement(radial_from=(0.0, 0.0), increment=0.04, limit=0.5, tolerance=2e-5)
+    response = solver.settle(stones, spreading, friction_coefficient=0.7)
+    assert response.reaction[0] / response.total_weight == pytest.approx(0.1661226, rel=1e-6)
+    assert response.collapse.displacement == pytest.approx(0.1721334, rel=1e-4)
+    assert response.collapse.reaction / response.total_weight == pytest.approx(0.369815, rel=1e-4)
+
+
+def test_numbers_for_the_plane_are_refused_in_space():
+    plug = leaning_plug(3)
+    with pytest.raises(ValueError, match=r"in space: give .* as \[x, y, z\]"):
+        solver.settle(plug, solver.Settlement(direction=(1, 0)))
+    with pytest.raises(ValueError, match="in the plane"):
+        solver.settle(arch(), solver.Settlement(direction=(1, 0, 0)))
+    with pytest.raises(ValueError, match="rotation_axis"):
+        solver.Settlement(rotation_centre=(0, 0, 0), rotation=1.0)
+
+
+def test_supports_turn_about_an_axis_in_space():
+    blocks = solver.Assembly.from_solids(
+        [box((0, 0, -1), (1, 1, 0)), box((0, 0, 0), (1, 1, 1))], names=["ground", "block"], roles=["moving", "free"]
+    )
+    tilting = solver.Settlement(
+        rotation_centre=(1.0, 0.0, 0.0), rotation_axis=(0, 1, 0), rotation=1.0, increment=0.05, limit=0.2
+    )
+    response = solver.settle(blocks, tilting, friction_coefficient=0.6)
+    assert response.stop is solver.Status.LIMIT_REACHED, response.message
+    pose = response.path[-1].pose
+    # The block rides on the ground: both have turned by 0.2 about the axis, clockwise seen along -y.
+    assert pose.rotations == pytest.approx(np.array([[0.0, 0.2, 0.0]] * 2), abs=1e-6)
+    arm = np.array([-0.5, 0.5])
+    c, s = math.cos(0.2), math.sin(0.2)
+    x, z = 1.0 + c * arm[0] + s * arm[1], -s * arm[0] + c * arm[1]
+    assert pose.positions[1] == pytest.approx([x, 0.5, z], abs=1e-6)
