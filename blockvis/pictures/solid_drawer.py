@@ -99,7 +99,7 @@ class SolidDrawer:
         poses = chain([solver.Pose.initial(assembly)], self._surveyed(), extra)
         frame = framed(assembly, poses, margin=0.05, supports=0.3, axes=self.view.axes[:2])
         self._arrow = ARROW * float(frame.size.max())
-        frame = frame.holding(self._arrow_tips())
+        frame = frame.holding(self._arrow_tips(extra))
         self.largest = self._largest
         bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
         beside = round(0.36 * size[0]) if curve else 0
@@ -333,16 +333,17 @@ class SolidDrawer:
         phases = self.response.settlements
         return phases[min(increment.phase, len(phases) - 1)] if phases else None
 
-    def _arrow_tips(self) -> np.ndarray:
-        """(n, 2) array [m]: where the arrows at the supports end in the picture, first and last."""
+    def _arrow_tips(self, extra: tuple[solver.Pose, ...]) -> np.ndarray:
+        """(n, 2) array [m]: where the arrows end in the picture: first, last, and at the extra poses."""
         tips = [np.zeros((0, 3))]
-        for increment in (self.increments[0], self.increments[-1]) if self.increments else ():
+        first, last = (self.increments[k] for k in (0, -1))
+        for increment, pose in ((first, first.pose), (last, last.pose), *((last, pose) for pose in extra)):
             settlement = self._settlement(increment)
             if settlement is not None:
-                _, places, directions = settlement_arrows_in_space(self.assembly, settlement, increment.pose)
+                _, places, directions = settlement_arrows_in_space(self.assembly, settlement, pose)
                 tips.append(places + self._arrow * directions)
             if self._strongest_live > 0.0:
-                ends, along, _ = live_arrows(self.assembly, self.response.loads, _multiplier(increment), increment.pose)
+                ends, along, _ = live_arrows(self.assembly, self.response.loads, _multiplier(increment), pose)
                 tips.append(ends - self._arrow * along)
         return self.view.projected(np.concatenate(tips))
 
