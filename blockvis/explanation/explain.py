@@ -14,6 +14,7 @@ import solver
 from blockvis.cases.build import case_assembly
 from blockvis.cases.case import Case, case_file_text, case_of, parsed_toml
 from blockvis.runs.kind import needs_dry_joints
+from blockvis.runs.kinds import KINDS
 from blockvis.runs.progress import StudyProgress
 
 from .candidates import (
@@ -147,7 +148,9 @@ def read_explained(path: str | Path) -> Case:
     text = case_file_text(path)
     values = parsed_toml(text, path)
     kind = values.get("analysis", {})
-    if isinstance(kind, Mapping) and kind.get("kind", "settlement") != "settlement":
+    # The first kind is the one that a case file follows which names none.
+    followed = next(iter(KINDS))
+    if isinstance(kind, Mapping) and kind.get("kind", followed) != followed:
         raise ValueError(f'{path}: explain follows settlements, but [analysis] kind is "{kind["kind"]}"; leave it out')
     values["settlement"] = values.get("settlement", {"direction": [0.0, -1.0]})
     return replace(case_of(values, path, text), settlements=(), profiles=())

@@ -1,0 +1,23 @@
+"""
+Cross vault on a sinking corner
+===============================
+
+One of the four supports of a cross vault sinks by 90 mm: joints open along the groins and between the webs, and the
+vault finds its way. Stones on the groins reach into both barrels; they are not convex and are cut for contact only.
+"""
+
+import blockvis
+import solver
+from blockvis import generators
+
+vault = generators.cross_vault(span=4.0, rise=1.5, thickness=0.3, voussoirs=7, stone=1.4)
+sink = solver.Settlement(direction=(0, 0, -1), increment=0.03, limit=0.09)
+response = solver.settle(vault, sink, friction_coefficient=0.7)
+print(response)
+assert response.stop is solver.Status.LIMIT_REACHED
+assert response.path[-1].certificate.equilibrium_residual < 1e-8
+first, last = response.reaction[[0, -1]] / response.total_weight
+print(f"reaction {first:.3f} W at first, {last:.3f} W in the end")
+assert 0.12 < first < 0.125
+
+blockvis.draw_still(response, len(response.path) - 1, "vault.png")
