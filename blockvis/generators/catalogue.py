@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import re
+import textwrap
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -117,18 +118,14 @@ def help_text(name: str) -> str:
       width = 0.5  [m]
     """
     layout = _layout(name)
-    purpose, _, rest = (inspect.getdoc(layout) or "").partition("\n\nParameters\n----------\n")
+    purpose = (inspect.getdoc(layout) or "").partition("\n\nParameters\n----------\n")[0]
     defaults, lines = parameters_of(name), [purpose, "", "parameters:"]
-    for line in rest.partition("\n\n")[0].splitlines():
-        if line.startswith(" "):
-            lines.append(f"      {line.strip()}")
-            continue
-        names, _, kind = line.partition(" : ")
+    for one, (kind, meaning) in described(name).items():
         kind = _KINDS.get(kind, kind[kind.index("[") :] if "[" in kind else kind)
-        for one in names.split(", "):
-            default = "" if defaults[one] is None else f" = {json.dumps(defaults[one], ensure_ascii=False)}"
-            lines.append(f"  {one}{default}  {kind}".rstrip())
-    return re.sub(r":\w+:`~?[\w.]*?(\w+)`|``", r"\1", "\n".join(lines))
+        default = "" if defaults[one] is None else f" = {json.dumps(defaults[one], ensure_ascii=False)}"
+        lines.append(f"  {one}{default}  {kind}".rstrip())
+        lines += textwrap.wrap(meaning, 120, initial_indent=6 * " ", subsequent_indent=6 * " ")
+    return _LINK.sub(r"\1", "\n".join(lines)).replace("``", "").replace("`", "")
 
 
 def build(name: str, parameters: Mapping[str, Any] | None = None) -> solver.Assembly:

@@ -95,7 +95,7 @@ def t_corner(
     Examples
     --------
     >>> t_corner(bricks=2, across=2, courses=2).n_blocks
-    11
+    12
     """
     n, m = whole("bricks", bricks, 2), whole("across", across, 1)
     if n % 2:

@@ -134,6 +134,7 @@ def test_a_hatch_with_an_island_is_a_hole(tmp_path):
         read(saved(tmp_path, draw))
 
 
+@pytest.mark.thorough
 def test_a_small_file_cannot_ask_for_a_million_blocks(tmp_path):
     def draw(document, space):
         document.blocks.new("b0").add_lwpolyline(SQUARE, close=True)

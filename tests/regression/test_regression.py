@@ -34,13 +34,28 @@ LOOSER = dict.fromkeys(
         "wall_pushed",
     ),
     1e-5,
-) | {"wall_with_arch": 2e-3, "panel_settlement_friction": 2e-3, "facade": 0.03}
+) | {
+    "wall_with_arch": 2e-3,
+    "panel_settlement_friction": 2e-3,
+    "facade": 0.03,
+    # In space: where many joints slide, a step may be halved or not as rounding decides.
+    "corner_of_walls": 0.05,
+    "cross_vault_corner": 0.02,
+    "dome_spreading": 1e-4,
+}
 
 #: Before anything has moved there is nothing to choose but where an interior solution stops: 1.5e-9 was measured.
 START = 1e-8
 
 #: Half a minute to two minutes each.
-SLOW = {"facade", "panel_settlement_friction", "wall_with_arch"}
+SLOW = {
+    "facade",
+    "panel_settlement_friction",
+    "wall_with_arch",
+    "corner_of_walls",
+    "cross_vault_corner",
+    "dome_spreading",
+}
 
 #: How each ends, and the first reaction over the weight of the free blocks, as measured; they guard against change.
 ENDS = {
@@ -53,6 +68,9 @@ ENDS = {
     "arch_moving_load": (solver.Status.COLLAPSED, None),
     "wall_horizontal_acceleration": (solver.Status.COLLAPSED, 0.509956),
     "wall_horizontal_after_settlement": (solver.Status.COLLAPSED, 0.509956),
+    "corner_of_walls": (solver.Status.COLLAPSED, 0.164516),
+    "cross_vault_corner": (solver.Status.LIMIT_REACHED, 0.121656),
+    "dome_spreading": (solver.Status.COLLAPSED, 0.166123),
 }
 
 
@@ -107,7 +125,7 @@ def test_every_increment_of_an_example_proves_itself(name, example):
     assert response.stop is ending, response.message
     if first is not None:
         assert response.reaction[0] / response.total_weight == pytest.approx(first, abs=1e-4)
-    smallest = response.assembly.areas.min() ** 0.5
+    smallest = response.assembly.shapes.sizes.min()
     for increment in response.path:
         certificate = increment.certificate
         assert certificate.equilibrium_residual < 1e-8

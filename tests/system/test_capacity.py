@@ -152,6 +152,7 @@ def test_live_load_is_drawn_where_it_acts_at_each_position(tmp_path):
     assert places[1] - places[0] > 100
 
 
+@pytest.mark.thorough
 def test_capacity_after_a_tilt_follows_the_closed_form(tmp_path, capsys):
     """On a support tilted by θ a block overturns downhill at tan(atan(b/h) - θ)."""
     text = (
@@ -185,6 +186,7 @@ animation = false
     assert response.load_multiplier == pytest.approx(np.tan(np.arctan(0.2) - response.settlement), rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_capacity_up_to_where_the_settlement_alone_collapses(tmp_path, capsys):
     text = """
 [geometry]
@@ -248,6 +250,7 @@ def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
     assert "control displacement [m]" in page
 
 
+@pytest.mark.thorough
 def test_pushover_written_from_python_comes_back(tmp_path):
     case = parse_case(PUSHED, tmp_path / "case.toml")
     run = blockvis.run_case(replace(case, animation=None), tmp_path / "out")

@@ -50,6 +50,7 @@ def _run(*arguments):
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
 
 
+@pytest.mark.thorough
 def test_full_disk_leaves_what_is_there_and_the_run_goes_on(case, tmp_path):
     disk = tmp_path / "disk"
     with _mounted(disk, "size=100k"):

@@ -181,6 +181,7 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
+@pytest.mark.thorough
 def test_run_killed_by_the_signal_goes_on(whole, tmp_path):
     out = tmp_path / "out"
     process = _command(tmp_path, "run", whole / "case.toml", "-o", out, code=_killed_at(74))

@@ -80,6 +80,7 @@ def _made_here(study, folder, runs):
     return records
 
 
+@pytest.mark.thorough
 def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path, scheduler):
     """As in a notebook, where a loop is running; runs that stood up to the limit are no collapse."""
     study = {
@@ -181,6 +182,7 @@ def test_a_study_that_is_killed_and_interrupted_goes_on(arches, tmp_path):
     assert rows.count(b"\n") == runs, "finished runs are not made again"
 
 
+@pytest.mark.thorough
 def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tmp_path, capsys, scheduler):
     """A run kept as a folder is a run of the table."""
     out, study = tmp_path / "out", STUDY.replace("runs = 24", "runs = 8")
@@ -227,6 +229,7 @@ def test_a_folder_that_is_no_study_is_refused(arches, tmp_path, capsys):
     assert (tmp_path / "out" / "thesis.tex").read_text(encoding="utf-8") == "precious"
 
 
+@pytest.mark.thorough
 def test_a_row_half_written_is_made_again(arches, tmp_path):
     study = read_study(arches)
     _made_here(study, tmp_path / "out", [0, 1])

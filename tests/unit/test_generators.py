@@ -32,7 +32,7 @@ def _shapes(assembly: solver.Assembly) -> list[shapely.Polygon]:
 
 
 def _assert_no_overlap(assembly: solver.Assembly) -> None:
-    i, j, depth = solver.overlap_depths(assembly.vertices, assembly.offsets, 1e-9)
+    i, j, depth = assembly.shapes.overlaps(assembly.vertices, 1e-9)
     assert not len(i), [(assembly.names[a], assembly.names[b], d) for a, b, d in zip(i, j, depth, strict=True)]
 
 

@@ -126,6 +126,7 @@ def test_factors_of_joints_follow_their_distribution():
     assert abs(np.corrcoef(scatter.factors(a, b), other)[0, 1]) < 0.025
 
 
+@pytest.mark.thorough
 def test_friction_of_a_joint_is_kept_while_contact_points_come_and_go():
     """A block on a tilting support slides when the angle reaches the friction of its own joint."""
     block, ground = [[0, 0], [2, 0], [2, 1], [0, 1]], [[-5, -1], [7, -1], [7, 0], [-5, 0]]

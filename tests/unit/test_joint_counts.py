@@ -117,6 +117,7 @@ def test_collapse_has_one_count(name, tmp_path):
     assert (summary["hinges"], summary["sliding_joints"]) == expected
 
 
+@pytest.mark.thorough
 def test_console_and_summary_count_what_the_picture_shows(tmp_path):
     """Not the first frame of the fall, whose contact points and forces are others."""
     response = portal()

@@ -263,6 +263,7 @@ def test_the_film_has_the_tints_and_dots_of_the_mechanism(tmp_path):
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="asks Linux for the memory of a process")
+@pytest.mark.thorough
 def test_drawing_takes_little_memory_at_any_size(tmp_path):
     """In a process of its own: what the libraries of the pictures hold, Python does not see."""
     code = f"""
