@@ -14,7 +14,7 @@ forces answer to movements, as in plasticity: an elastic trial, taken back onto 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,10 @@ from .step import (
 #: Starts: least forces in mean block weights, least distances in parts of a step and an elastic give, and whether steps
 #: are kept short.
 STARTS = ((0.1, 1.0, False), (1.0, 3.0, True))
+
+#: Joints that give so many times as much, at first by what factor they become stiffer, the least such factor, and how
+#: often at most.
+SOFTEST, STIFFER, LEAST_STIFFER, STIFFENINGS = 1e4, 4.0, 1.1, 40
 
 #: Newton's iterations on the answers of the contact points, and how often a change may be halved that leads away.
 TRIALS, HALVINGS = 25, 6
@@ -77,7 +81,11 @@ def solve_in_space(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: f
             pass
     lean = (step.shear / np.maximum(step.friction, 1e-12)[:, None]).T
     failed = NotSolved("no start")
-    for force, distance, careful in STARTS:
+    for number, (force, distance, careful) in enumerate(STARTS):
+        if number == 1:
+            found = _from_soft_joints(step, pattern, gone, multiplier)
+            if found is not None:
+                return found
         start = _within(step.normal, lean, force), _apart(step.gap, step.slip.T, distance * scale)
         try:
             return _followed(step, pattern, gone, multiplier, *start, careful)
@@ -88,6 +96,25 @@ def solve_in_space(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: f
     if found is None:
         raise failed
     return found
+
+
+def _from_soft_joints(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float) -> Moved | None:
+    """Solve a step with joints that give far more, and follow its solution while they become as stiff as they are."""
+    soft = reached = SOFTEST
+    ratio, motion = STIFFER, None
+    for _ in range(STIFFENINGS):
+        across, along = step.give
+        found = _in_answers(replace(step, give=(across * soft, along * soft)), pattern, gone, multiplier, motion)
+        if found is None:
+            if motion is None or ratio < LEAST_STIFFER:
+                return None
+            ratio = float(np.sqrt(ratio))
+        else:
+            if soft == 1.0:
+                return found
+            reached, motion, multiplier = soft, found.motion, found.multiplier
+        soft = max(reached / ratio, 1.0)
+    return None
 
 
 def _within(normal: np.ndarray, lean: np.ndarray, least: float) -> np.ndarray:
