@@ -97,7 +97,7 @@ def test_extruded_arches_are_those_of_the_plane(voussoirs, direction, expected):
     solid = solver.settle(in_space, solver.Settlement(direction=(x, 0, up), **steps), friction_coefficient=2.0)
     assert solid.collapse.displacement == pytest.approx(expected, rel=1e-4)
     shared = [i.parameter for i in flat.path if any(i.parameter == j.parameter for j in solid.path)]
-    assert len(shared) > 3
+    assert len(shared) >= 3
     per_metre = solid.total_weight / flat.total_weight
     for s in shared:
         one, other = (next(i for i in r.path if i.parameter == s) for r in (flat, solid))
