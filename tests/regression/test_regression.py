@@ -24,7 +24,8 @@ EXACT = os.environ.get("BLOCKVIS_EXACT", "") not in ("", "0")
 TIGHT = 1e-9
 
 #: Where many joints slide. A collapse is enclosed to a tolerance, and rounding may choose among the places within it:
-#: 8e-4 between two computers, and 4e-3 in the reaction at the last of them, which grows fast there. The façade is followed by linear programs, whose solutions rounding chooses: 8e-3.
+#: 8e-4 between two computers, and 4e-3 in the reaction at the last of them, which grows fast there. The façade is
+#: followed by linear programs, whose solutions rounding chooses: 8e-3.
 LOOSER = dict.fromkeys(
     (
         "panel_with_opening",
