@@ -136,7 +136,8 @@ class Table:
         """Refuse keys that were not read, naming the most similar one that was."""
         for key in self.values:
             if key not in self.known:
-                raise self.error(key, f"is not a key here{nearest(key, self.known)}; keys are {', '.join(self.known)}")
+                keys = ", ".join(dict.fromkeys(self.known))
+                raise self.error(key, f"is not a key here{nearest(key, self.known)}; keys are {keys}")
 
 
 def toml_value(text: str) -> Any:
