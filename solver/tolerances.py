@@ -68,6 +68,11 @@ IMPERFECTION = 1e-7
 #: give of the joints chooses between the hinges of the portal in ``examples``; reactions of walls stay the same.
 DRAG = 1e-2
 
+#: Movement of the supports, in block sizes, over which what moves on as before comes to be held back no more by the
+#: drag, which resists changes of the velocity only: no longer than the steps in which events are followed. With none,
+#: the drag of a step would depend on its length, and with it which of several mechanisms is taken.
+MEMORY = 1e-2
+
 # Of positions: fractions of the block size.
 
 #: Elastic give of a contact point under the mean block weight, across the joint and along it: what makes the forces of
@@ -88,6 +93,10 @@ PENETRATION_LEFT = 5e-7
 
 #: Largest gap of a closed contact point at a computed pose: a hundred times the accuracy of the geometry.
 COMPUTED_GAP = 1e-6
+
+#: Largest gap of a contact point that may carry in an equilibrium along the path: blocks that close a joint slowly are
+#: held back by the drag until then. Where a collapse is enclosed, with less drag, it is that of a computed pose.
+CLOSING_GAP = 1e-5
 
 #: A pose is an equilibrium when a program at rest moves no block by more than this: friction leaves a little freedom at
 #: the edge of its cone, a structure that has to find another equilibrium moves much further.

@@ -23,7 +23,18 @@ from solver.results.certificate import Certificate
 from solver.results.increment import Increment, State, Status
 from solver.results.mechanism import mechanism_of
 from solver.results.response import Collapse
-from solver.tolerances import COMPUTED_GAP, DRAG, FARTHEST_FALL, GIVE, GIVE_ACROSS, IMPERFECTION, JUMP, USED_UP
+from solver.tolerances import (
+    CLOSING_GAP,
+    COMPUTED_GAP,
+    DRAG,
+    FARTHEST_FALL,
+    GIVE,
+    GIVE_ACROSS,
+    IMPERFECTION,
+    JUMP,
+    MEMORY,
+    USED_UP,
+)
 
 from .checkpoint import ProgramCheckpoint
 from .controls import Ending
@@ -130,7 +141,8 @@ class Place:
     multiplier : float
         Of the live load.
     velocity : (n_blocks, n_dof) array, optional
-        In the step that led here, per unit of the parameter; None where nothing moved with it.
+        In the steps that led here, per unit of the parameter, those within :data:`MEMORY` above all; None where nothing
+        moved with it.
     """
 
     s: float
@@ -309,7 +321,7 @@ class Path:
         load = (model.scaled_load + self.imperfection)[free].ravel()
         drag = DRAG * self.care / size * self.drag[free].ravel()
         if place.velocity is not None and not still:
-            # The drag resists changes of the velocity: what moves on as before is not held back.
+            # The drag resists changes of the velocity: what moves on as before is soon not held back.
             load = load + drag * (place.velocity / scales * length)[free].ravel()
         live, live_size = model.scaled_live
         gone = np.zeros(len(load))
@@ -360,8 +372,12 @@ class Path:
         if size > (SHORTEST_FALL if still else SLIP_OFF) and np.abs(gone).max(initial=0.0) > SLIP_OFF:
             self._refuse_beyond(contacts, normal, pose)
         forces = np.column_stack([normal, shear])
+        velocity = None
+        if not still:
+            before = np.zeros_like(motion) if place.velocity is None else place.velocity
+            velocity = before + (motion - length * before) / (length + MEMORY * model.length / self.lever)
         return (
-            Place(s, pose, contacts, forces, multiplier / (live_size or 1.0), None if still else motion / length),
+            Place(s, pose, contacts, forces, multiplier / (live_size or 1.0), velocity),
             motion / scales,
         )
 
@@ -535,7 +551,9 @@ class Path:
         contacts = self._around(place.pose)
         friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
         rate = None if model.live is not None else self.driver.rate(place.s)
-        bounds = admissible(model, place.pose, contacts, friction, rate, vertex=place.s == 0.0)
+        bounds = admissible(
+            model, place.pose, contacts, friction, rate, vertex=place.s == 0.0, gap=self._closed_gap(place)
+        )
         self.programs += bounds.programs
         remembered = self._remembered(place, contacts)
         if not bounds.exists:
@@ -549,6 +567,10 @@ class Path:
             multiplier = float((self._on_supports(contacts, place.pose, forces) * self.driver.rate(place.s)).sum())
         return Proved(place, contacts, friction, bounds, forces, multiplier)
 
+    def _closed_gap(self, place: Place) -> float:
+        """Largest gap of contact points that may carry in an equilibrium at a place, in block sizes."""
+        return COMPUTED_GAP if place.s == 0.0 or place.s < self.careful_until else CLOSING_GAP
+
     def _on_supports(self, contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarray:
         """(n_blocks, n_dof) array [N, N, N·m]: what the structure does to each support; zero for free blocks."""
         model = self.model
@@ -560,7 +582,7 @@ class Path:
     ) -> tuple[np.ndarray, float]:
         """Forces in equilibrium without the drag, near those remembered; open points carry none."""
         model, free = self.model, self.model.assembly.free
-        closed = np.flatnonzero(contacts.gaps <= COMPUTED_GAP * model.length)
+        closed = np.flatnonzero(contacts.gaps <= self._closed_gap(place) * model.length)
         d = model.dimension
         columns = (d * closed[:, None] + np.arange(d)).ravel()
         live, live_size = model.scaled_live

@@ -62,6 +62,7 @@ def admissible(
     rate: np.ndarray | None = None,
     *,
     vertex: bool = True,
+    gap: float = COMPUTED_GAP,
 ) -> Admissible:
     """Whether an equilibrium within friction exists at a pose, and what it leaves free.
 
@@ -78,6 +79,8 @@ def admissible(
     vertex : bool
         In the plane: forces at a vertex of the program, as few as there are; otherwise, in larger models, those found
         fastest. Round cones have no such vertices.
+    gap : float
+        Of contact points that carry at most, in block sizes.
 
     Raises
     ------
@@ -91,7 +94,7 @@ def admissible(
     """
     d = model.dimension
     free = np.repeat(model.assembly.free, model.n_dof)
-    closed = np.flatnonzero(contacts.gaps <= COMPUTED_GAP * model.length)
+    closed = np.flatnonzero(contacts.gaps <= gap * model.length)
     matrix = sp.csr_array(wrench_matrix(contacts, pose, model.length))
     # In the plane the two rays of a cone are its forces; in space its three numbers are.
     forces_of = friction_rays(friction) if d == 2 else sp.eye_array(3 * len(contacts), format="csc")

@@ -1,22 +1,28 @@
 """One step of the path: Coulomb friction without lift, at a linearised geometry, by an interior method.
 
-Over the movements q of the free blocks in a step h of the supports, with the contact forces N (compression) and T::
+Over the movements q of the free blocks in a step h of the supports, with the contact forces N (compression) and
+T = μ τ, one shear force in the plane, two in space::
 
     balance     f + Aᵀ (N, T) = (η / h) W q                      the drag W: weights, and weights times radius squared
     normal      0 ≤ N  ⊥  y = gap + c (N - N⁰) ≥ 0              the gap after the movement
-    friction    T = μ (λ⁺ - λ⁻), N = λ⁺ + λ⁻, 0 ≤ λ± ⊥ σ± ≥ 0     with  σ⁺ - σ⁻ = slip + c (T - T⁰)
+    friction    (N, τ) and (γ, σ) in the round cone and orthogonal     with  σ = slip + c (T - T⁰)
 
-N⁰ and T⁰ are the forces of the step before: joints give a little, elastically, and remember what they carried. A point
-that slides takes all of its friction and does not lift. Without the give the forces of a wall are not unique, without
-the drag its motion is not; both are small, see :mod:`solver.tolerances`.
+N⁰ and T⁰ are the forces of the step before: joints give a little, elastically, and remember what they carried. γ, which
+nothing else holds, comes to |σ|: a point that slides takes all of its friction, against the slip, and does not lift. In
+the plane the cone is its two rays. Without the give the forces of a wall are not unique, without the drag its motion is
+not; both are small, see :mod:`solver.tolerances`.
 
-The complementarity problem is linear, but friction without lift makes it no convex program. An interior method follows
-its central path all the same: λσ = yN = β with β to zero, Newton's method with one sparse factorisation an iteration,
-predictor and corrector (Mehrotra 1992, https://doi.org/10.1137/0802028). Where long steps leave the path, a second try
-takes short ones; where that fails, too, the caller takes a smaller step of the supports, for which the drag dominates.
+The complementarity problem is that of De Saxcé's cone, and friction without lift makes it no convex program. An
+interior method follows its central path all the same: yN = β and the product of the cone's algebra 2β (1, 0), β to 0,
+Newton's method with one sparse factorisation an iteration, scaled as Nesterov & Todd (1997),
+https://doi.org/10.1287/moor.22.1.1, for what Andersen, Roos & Terlaky (2003),
+https://doi.org/10.1007/s10107-002-0349-3, call the quadratic cone, predictor and corrector (Mehrotra 1992,
+https://doi.org/10.1137/0802028). Once the path shows which points are open, stick or slide, Newton's method on the
+states takes over, as in plasticity. Where the path is lost, the solution is followed from soft joints to stiff ones;
+where that fails, too, the caller takes a smaller step of the supports, for which the drag dominates.
 
-The friction law is the linear complementarity form of Stewart & Trinkle (1996) and of Anitescu & Potra (1997),
-https://doi.org/10.1023/A:1008292328909, here for quasi-static steps.
+In the plane the friction law is the linear complementarity form of Stewart & Trinkle (1996) and of Anitescu & Potra
+(1997), https://doi.org/10.1023/A:1008292328909, here for quasi-static steps.
 """
 
 from __future__ import annotations
@@ -25,33 +31,53 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .coulomb_in_space import solve_in_space
-from .factors import factorised
-from .step import (
-    BALANCE,
-    CAREFUL,
-    CORRECTION,
-    EQUATIONS,
-    FIRST_DISTANCE,
-    FIRST_FORCE,
-    FRACTION,
-    ITERATIONS,
-    LOOK_BACK,
-    LOST,
-    NEAR,
-    PRODUCT,
-    PRODUCT_LEFT,
-    SHORT,
-    Moved,
-    NotSolved,
-    Pattern,
-    Step,
-    paired,
-)
+from .step import Moved, NotSolved, Pattern, Step, paired
 
-#: Newton's method on the points' states: part of a force that counts as none, and changes of states after which it is
-#: given up.
+#: Iterations, and part of the way to the nearest bound that is gone, in the plane and in space, where shear forces that
+#: turn about a round cone soon leave it close to its edge.
+ITERATIONS, FRACTION, FRACTION_IN_SPACE = 60, 0.99, 0.9
+
+#: The solution counts when balance, the linear equations in parts of a step and an elastic give, and the largest
+#: product in elastic gives across are below these. A point that neither carries nor is open keeps a force of the last
+#: one's root.
+BALANCE, EQUATIONS, PRODUCT = 1e-9, 1e-8, 1e-9
+
+#: Mean product of force and distance, in block weights and sizes, at which a solution that converges no further counts.
+PRODUCT_LEFT = 1e-9
+
+#: Start: least forces in mean block weights, least distances in parts of a step and an elastic give.
+FIRST_FORCE, FIRST_DISTANCE = 0.1, 0.3
+
+#: Start near a known solution: product of each force and its distance, in parts of a step and an elastic give. A
+#: hundred times or a hundredth of it cost a tenth more iterations.
+CENTRED = 1e-3
+
+#: A step this short calls for centring.
+SHORT = 0.2
+
+#: Part of the mean product that is left after so many steps, from which on the path leads nowhere.
+STALLED, LOOK_BACK = 0.8, 8
+
+#: Corrections of second order are cut off at so many times the mean product.
+CORRECTION = 30.0
+
+#: Centring at least of the second try, which also leaves corrections of second order out.
+CAREFUL = 0.5
+
+#: Newton's method on the points' states: part of a force that counts as none, and iterations after which it is given
+#: up. Where more points change their state than the time before it goes round, and is left at once.
 STATES, STATE_CHANGES = 1e-9, 12
+
+#: Mean product, in elastic gives across, from which on the states at a point of the central path are tried as those of
+#: the solution; where they are not, again after the mean product has fallen by the second number.
+STATES_SEEN, AGAIN = 1e-3, 100.0
+
+#: Joints that give so many times as much, at first by what factor they become stiffer, the least such factor, and how
+#: often at most.
+SOFTEST, STIFFER, LEAST_STIFFER, STIFFENINGS = 1e4, 4.0, 1.1, 40
+
+#: Nearest that a point comes to the boundary of its cone, squared, as a part of its axis: keeps the scaling finite.
+INSIDE = 1e-20
 
 
 def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Moved | None = None) -> Moved:
@@ -76,92 +102,207 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
         none = np.zeros((3, 0))
         return Moved(step.load / step.drag - gone, none[0], step.shear, multiplier, 0, none, none)
     pattern = Pattern(step) if near is None or near.pattern is None else near.pattern.fill(step)
-    if step.shear.shape[1] > 1:
-        return solve_in_space(step, pattern, gone, multiplier, near)
-    flat = replace(step, slip=step.slip[:, 0], shear=step.shear[:, 0])
-    found = _solve_in_plane(flat, pattern, gone, multiplier, near and replace(near, shear=near.shear[:, 0]))
-    return replace(found, shear=found.shear[:, None])
-
-
-def _solve_in_plane(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float, near: Moved | None) -> Moved:
-    """Solve a step whose slips and shear forces are (n_contacts,) arrays."""
     scale = step.size + step.give[1]
+    remembered = _as_remembered(step, multiplier)
     if near is not None:
-        found = _in_states(step, pattern, gone, multiplier, near)
+        found = _in_states(step, pattern, gone, near)
         if found is not None:
             return found
-        rays = np.maximum(near.forces[1:], NEAR)
-        distances = np.maximum(near.distances, NEAR * scale)
         try:
-            return _followed(step, pattern, gone, multiplier, np.stack([rays[0] + rays[1], *rays]), distances)
+            return _followed(step, pattern, gone, multiplier, *_centred(near, scale))
         except NotSolved:
             pass
-    # Rows of forces: N, λ⁺, λ⁻; of distances: y, σ⁺, σ⁻.
-    steep = np.maximum(step.friction, 1e-12)
-    rays = [np.maximum(0.5 * (step.normal + side * step.shear / steep), FIRST_FORCE) for side in (1.0, -1.0)]
-    forces = np.stack([rays[0] + rays[1], *rays])
-    distances = np.stack([np.maximum(x, 0.0) + FIRST_DISTANCE * scale for x in (step.gap, step.slip, -step.slip)])
+    elif (step.normal > 0.0).any() and not _slides(step, step.normal, step.shear):
+        # What hinges only has no other solution than the one in which everything goes on as it did.
+        found = _in_states(step, pattern, gone, remembered)
+        if found is not None and not _slides(step, found.normal, found.shear):
+            return found
+    lean = remembered.forces[1:]
+    start = _within(step.normal, lean, FIRST_FORCE), _apart(step.gap, step.slip.T, FIRST_DISTANCE * scale)
     try:
-        return _followed(step, pattern, gone, multiplier, forces, distances)
+        return _followed(step, pattern, gone, multiplier, *start)
+    except NotSolved as error:
+        failed = error
+    found = _from_soft_joints(step, pattern, gone, remembered)
+    if found is not None:
+        return found
+    try:
+        return _followed(step, pattern, gone, multiplier, *start, careful=True)
     except NotSolved:
         pass
-    try:
-        return _followed(step, pattern, gone, multiplier, forces, distances, careful=True)
-    except NotSolved:
-        # In steps so short that nothing moves all is as it was.
-        remembered = np.stack([step.normal, *rays]), np.maximum(np.stack([step.gap, step.slip, -step.slip]), 0.0)
-        before = Moved(np.zeros(len(gone)), step.normal, step.shear, multiplier, 0, *remembered)
-        found = _in_states(step, pattern, gone, multiplier, before)
+    # In steps so short that nothing moves all is as it was.
+    found = _in_states(step, pattern, gone, remembered)
+    if found is None:
+        raise failed
+    return found
+
+
+def _from_soft_joints(step: Step, pattern: Pattern, gone: np.ndarray, start: Moved) -> Moved | None:
+    """Solve a step with joints that give far more, and follow its solution while they become as stiff as they are."""
+    soft = reached = SOFTEST
+    ratio, followed = STIFFER, False
+    for _ in range(STIFFENINGS):
+        across, along = step.give
+        found = _in_states(replace(step, give=(across * soft, along * soft)), pattern, gone, start, patient=True)
         if found is None:
-            raise
-        return found
+            if not followed or ratio < LEAST_STIFFER:
+                return None
+            ratio = float(np.sqrt(ratio))
+        else:
+            if soft == 1.0:
+                return found
+            reached, start, followed = soft, found, True
+        soft = max(reached / ratio, 1.0)
+    return None
 
 
-def _in_states(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float, near: Moved) -> Moved | None:
-    """Newton's method on which points are open, stick or slide, from a solution near; None where that goes round."""
+def _within(normal: np.ndarray, lean: np.ndarray, least: float) -> np.ndarray:
+    """(d, n) array: N and τ of each point, inside the cone by at least so much."""
+    size = np.sqrt((lean**2).sum(axis=0))
+    lean = lean * np.minimum(1.0, np.maximum(normal, 0.0) / np.maximum(size, 1e-300))
+    size = np.sqrt((lean**2).sum(axis=0))
+    return np.stack([np.maximum(normal, size + least), *lean])
+
+
+def _apart(gap: np.ndarray, slip: np.ndarray, least: float) -> np.ndarray:
+    """(d + 1, n) array: y, γ and σ of each point, positive and inside the cone by at least so much."""
+    size = np.sqrt((slip**2).sum(axis=0))
+    return np.stack([np.maximum(gap, 0.0) + least, size + 2.0 * least, *slip])
+
+
+def _centred(near: Moved, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """Forces and distances near those of a solution whose products are all the same."""
+    normal, lean = near.forces[0], near.forces[1:]
+    gap, cone, slip = near.distances[0], near.distances[1], near.distances[2:]
+    # Along the direction of shear forces and slips the round cone is its two rays.
+    size = np.sqrt((lean**2).sum(axis=0))
+    slipped = np.sqrt((slip**2).sum(axis=0))
+    way = np.where(size > 0.0, lean / np.maximum(size, 1e-300), -slip / np.maximum(slipped, 1e-300))
+    way = np.where((size > 0.0) | (slipped > 0.0), way, 0.0)
+    way[0] = np.where((way**2).sum(axis=0) > 0.0, way[0], 1.0)
+    along = (way * slip).sum(axis=0)
+    rays = 0.5 * np.stack([normal + size, normal - size])
+    apart = np.stack([cone + along, cone - along])
+    forces = _between(np.stack([normal, *rays]), np.stack([gap, *apart]), scale)
+    forces[1:] *= forces[0] / (forces[1] + forces[2])
+    distances = CENTRED * scale / forces
+    return (
+        np.stack([forces[0], *(way * (forces[1] - forces[2]))]),
+        np.stack([distances[0], 0.5 * (distances[1] + distances[2]), *(way * 0.5 * (distances[1] - distances[2]))]),
+    )
+
+
+def _between(forces: np.ndarray, distances: np.ndarray, scale: float) -> np.ndarray:
+    lean = forces - distances / scale
+    found = 0.5 * (lean + np.hypot(lean, 2.0 * np.sqrt(CENTRED)))
+    # Of what is wide open rounding has left nothing.
+    return np.maximum(found, CENTRED * scale / (10.0 * scale + np.abs(distances)))
+
+
+def _slides(step: Step, normal: np.ndarray, shear: np.ndarray) -> bool:
+    """Whether the friction of any contact point that carries is used up."""
+    size = np.sqrt((shear**2).sum(axis=1))
+    return bool(((size >= (1.0 - STATES) * step.friction * normal) & (normal > STATES)).any())
+
+
+def _as_remembered(step: Step, multiplier: float) -> Moved:
+    """The forces that a step remembers, as a solution near its own: all sticks and slides as it did."""
+    lean = (step.shear / np.maximum(step.friction, 1e-12)[:, None]).T
+    forces = _within(step.normal, lean, 0.0)
+    return Moved(
+        np.zeros(len(step.load)), step.normal, step.shear, multiplier, 0, forces, _apart(step.gap, step.slip.T, 0.0)
+    )
+
+
+def _in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved, *, patient: bool = False) -> Moved | None:
+    """Newton's method on which points are open, stick or slide, and where to; None where it goes round.
+
+    On the central path nothing is at its bound: there the larger of a force and its distance says which of them stays.
+    """
     mu, (across, along) = step.friction, step.give
-    steep = (1.0 - STATES) * mu * near.normal
-    # Open, or the direction in which friction acts on what slides; 0 for what sticks.
-    is_open = near.forces[0] * along <= near.distances[0]
-    way = np.where(np.abs(near.shear) >= steep, np.sign(near.shear), 0.0)
+    n, d = near.forces.shape[1], len(near.forces)
+    normal, lean = near.forces[0], near.forces[1:]
+    size = np.sqrt((lean**2).sum(axis=0))
+    way = lean / np.maximum(size, 1e-300)
+    closed = normal * along > near.distances[0]
+    short = 0.5 * (near.distances[1] - (way * near.distances[2:]).sum(axis=0))
+    slides = (0.5 * (normal - size) * along <= short) & (size > 0.0)
+    way, turn = way.T, mu * normal / (mu * normal + near.distances[1] / along + 1e-300)
     no_force, no_way = STATES * max(float(near.normal.max(initial=0.0)), 1.0), EQUATIONS * (step.size + along)
-    for iteration in range(STATE_CHANGES):
-        closed, sticks = ~is_open, ~is_open & (way == 0.0)
-        local = np.zeros((len(mu), 2, 2))
+    trial_before, multiplier = step.shear - step.slip / along, near.multiplier
+    changes, out = n, np.inf
+    eye = np.eye(d - 1)
+    for iteration in range((1 + patient) * STATE_CHANGES):
+        slides &= closed
+        sticks = closed & ~slides
+        # Across the way that a point slides it is held by its friction, the less the farther it slides.
+        held = (sticks[:, None, None] * eye) + (slides * turn)[:, None, None] * (
+            eye - way[:, :, None] * way[:, None, :]
+        )
+        pushed = (slides * mu)[:, None] * way
+        local = np.zeros((n, d, d))
         local[:, 0, 0] = closed / across
-        local[:, 1, 0] = closed * way * mu / across
-        local[:, 1, 1] = sticks / along
+        local[:, 1:, 0] = pushed / across
+        local[:, 1:, 1:] = held / along
         first = np.where(closed, step.normal - step.gap / across, 0.0)
-        second = np.where(sticks, step.shear - step.slip / along, way * mu * first)
-        solve = factorised(pattern.stiffness(local))
+        second = pushed * first[:, None] + np.matmul(held, trial_before[:, :, None])[:, :, 0]
+        try:
+            solve = pattern.factorised(local)
+        except NotSolved:
+            return None
         motion = solve(step.load + pattern.to_blocks @ paired(first, second) - step.drag * gone)
-        found_multiplier = multiplier
         if step.live is not None and step.control is not None:
             by_live = solve(step.live)
             moved = float(step.control @ by_live)
             if moved == 0.0:
                 return None
-            found_multiplier = (step.wanted - float(step.control @ motion)) / moved
-            motion = motion + found_multiplier * by_live
-        gap, slip = (pattern.to_contacts @ motion).reshape(-1, 2).T
-        normal = first - local[:, 0, 0] * gap
-        shear = second - local[:, 1, 0] * gap - local[:, 1, 1] * slip
-        distance = step.gap + gap + across * (normal - step.normal)
-        slipped = step.slip + slip + along * (shear - step.shear)
-        opens, closes = closed & (normal < -no_force), is_open & (distance < -no_way)
-        starts = sticks & (np.abs(shear) > mu * normal + no_force) & ~opens
-        stops = closed & (way * slipped > no_way)
-        if not (opens | closes | starts | stops).any():
+            multiplier = (step.wanted - float(step.control @ motion)) / moved
+            motion = motion + multiplier * by_live
+        relative = (pattern.to_contacts @ motion).reshape(-1, d)
+        normal = first - local[:, 0, 0] * relative[:, 0]
+        distance = step.gap + relative[:, 0] + across * (normal - step.normal)
+        trial = trial_before - relative[:, 1:] / along
+        size, most = np.sqrt((trial**2).sum(axis=1)), mu * np.maximum(normal, 0.0)
+        opens, closes = closed & (normal < -no_force), ~closed & (distance < -no_way)
+        starts = sticks & (size > most + no_force) & ~opens
+        # How far a point has slid the way that it was held to slide.
+        slid = (way * trial).sum(axis=1) - most
+        stops = slides & (slid < -no_way / along)
+        changed = opens | closes | starts | stops
+        if not changed.any():
             normal = np.maximum(normal, 0.0)
-            lean = np.divide(shear, mu, out=np.zeros_like(shear), where=mu > 0.0)
-            forces = np.maximum(np.stack([normal, 0.5 * (normal + lean), 0.5 * (normal - lean)]), 0.0)
-            distances = np.maximum(np.stack([distance, slipped, -slipped]), 0.0)
-            return Moved(motion, normal, shear, found_multiplier, iteration, forces, distances, pattern)
-        is_open = (is_open | opens) & ~closes
-        way = np.where(starts, np.sign(shear), np.where(stops | closes, 0.0, way))
+            over = slides & (size > most)
+            shear = np.where(
+                slides[:, None],
+                np.where(over[:, None], trial * (most / np.maximum(size, 1e-300))[:, None], most[:, None] * way),
+                trial * sticks[:, None],
+            )
+            unbalanced = step.load + pattern.to_blocks @ paired(normal, shear) - step.drag * (gone + motion)
+            if step.live is not None:
+                unbalanced = unbalanced + multiplier * step.live
+            if np.abs(unbalanced).max() < BALANCE:
+                slipped = step.slip + relative[:, 1:] + along * (shear - step.shear)
+                slipped = np.where(sticks[:, None], 0.0, slipped)
+                cone = np.sqrt((slipped**2).sum(axis=1))
+                tau = np.divide(shear, mu[:, None], out=np.zeros_like(shear), where=mu[:, None] > 0.0)
+                forces = np.stack([normal, *tau.T])
+                distances = np.stack([np.maximum(distance, 0.0), cone, *slipped.T])
+                return Moved(motion, normal, shear, multiplier, iteration, forces, distances, pattern)
+            if np.abs(unbalanced).max() > 0.5 * out:
+                # Rounding: next to nothing holds what moves.
+                return None
+            out = float(np.abs(unbalanced).max())
+        before, changes = changes, int(changed.sum())
+        if iteration > 0 and changes > before and not patient:
+            return None
+        closed = (closed | closes) & ~opens
+        slides = starts | (slides & ~stops) | (closes & (size > most))
+        way = np.where((slides & (size > 0.0))[:, None], trial / np.maximum(size, 1e-300)[:, None], 0.0)
+        turn = np.minimum(most / np.maximum(size, 1e-300), 1.0)
     return None
 
 
+@np.errstate(all="ignore")  # A step that leaves the numbers is seen by what it gives.
 def _followed(
     step: Step,
     pattern: Pattern,
@@ -172,62 +313,103 @@ def _followed(
     careful: bool = False,
 ) -> Moved:
     mu, (across, along) = step.friction, step.give
-    scale = step.size + along
-    gap, slip = step.gap, step.slip
-    motion, short, recent, lost = np.zeros(len(step.load)), False, [1.0] * LOOK_BACK, 0
+    scale, no_slip = step.size + along, step.shear.T
+    gap, slip, to_try = step.gap, step.slip.T, STATES_SEEN * across
+    motion, short = np.zeros(len(step.load)), False
+    means: list[float] = []
     for iteration in range(ITERATIONS):
-        normal, shear = forces[0], mu * (forces[1] - forces[2])
+        normal, shear = forces[0], mu * forces[1:]
         gap_error = distances[0] - (gap + across * (normal - step.normal))
-        slip_error = distances[1] - distances[2] - (slip + along * (shear - step.shear))
-        unbalanced = step.load + pattern.to_blocks @ paired(normal, shear) - step.drag * (gone + motion)
+        slip_error = distances[2:] - (slip + along * (shear - no_slip))
+        unbalanced = step.load + pattern.to_blocks @ paired(normal, shear.T) - step.drag * (gone + motion)
         behind = 0.0
         if step.live is not None and step.control is not None:
             unbalanced = unbalanced + multiplier * step.live
             behind = step.wanted - float(step.control @ motion)
-        products = forces * distances
-        mean = float(products.mean())
+        across_products, along_products = normal * distances[0], (forces * distances[1:]).sum(axis=0)
+        mean = float(across_products.mean() + along_products.mean()) / 3.0
+        largest = max(float(across_products.max()), float(along_products.max()))
         out = float(np.abs(unbalanced).max())
         wrong = max(float(np.abs(gap_error).max()), float(np.abs(slip_error).max()), abs(behind))
-        if out < BALANCE and wrong < EQUATIONS * scale and float(products.max(initial=0.0)) < PRODUCT * across:
-            return Moved(motion, normal, shear, multiplier, iteration, forces, distances, pattern)
-        if sum(part < SHORT for part in recent[-LOOK_BACK:]) >= LOST:
-            lost, recent = lost + 1, [1.0] * LOOK_BACK
-            if lost > 1:
-                break
+        here = Moved(motion, normal, shear.T, multiplier, iteration, forces, distances, pattern)
+        if out < BALANCE and wrong < EQUATIONS * scale and largest < PRODUCT * across:
+            return here
+        if mean < to_try:
+            to_try = mean / AGAIN
+            found = _in_states(step, pattern, gone, here)
+            if found is not None:
+                return replace(found, iterations=iteration + found.iterations)
+        means.append(mean)
+        if len(means) > LOOK_BACK and mean > STALLED * means[-1 - LOOK_BACK]:
+            break
         newton = _Newton(step, pattern, forces, distances)
         errors = (gap_error, slip_error, unbalanced, behind)
-        found = newton.direction(-products, *errors)
-        part = _longest(forces, distances, found)
-        after = float(((forces + part * found.forces) * (distances + part * found.distances)).mean())
+        change = newton.direction(-across_products, -_product(newton.middle, newton.middle), *errors)
+        part = newton.longest(change)
+        after = _mean(forces + part * change.forces, distances + part * change.distances)
         centring = min(max((after / mean) ** 3, 1e-3), 0.8)
         most = CORRECTION * mean
-        second = np.minimum(np.maximum(found.forces * found.distances, -most), most)
+        second = np.clip(change.forces[0] * change.distances[0], -most, most)
+        third = _product(newton.scaled(change.forces), newton.unscaled(change.distances[1:]))
+        third *= np.minimum(1.0, most / np.maximum(np.abs(third[0]) + np.sqrt((third[1:] ** 2).sum(axis=0)), 1e-300))
         if careful or short:
-            centring, second = 1.0 if short else max(centring, CAREFUL), 0.0
-        found = newton.direction(centring * mean - products - second, *errors)
-        part = FRACTION * _longest(forces, distances, found)
+            centring, second, third = (1.0 if short else max(centring, CAREFUL)), 0.0 * second, 0.0 * third
+        aims = -_product(newton.middle, newton.middle)
+        aims[0] += 2.0 * centring * mean
+        change = newton.direction(centring * mean - across_products - second, aims - third, *errors)
+        part = newton.longest(change)
+        part *= FRACTION if len(forces) == 2 else FRACTION_IN_SPACE
+        if not (part > 0.0 and np.isfinite(change.motion).all()):
+            break
         short = part < SHORT and not short
-        recent.append(part)
-        motion, multiplier = motion + part * found.motion, multiplier + part * found.multiplier
-        gap, slip = gap + part * found.relative[:, 0], slip + part * found.relative[:, 1]
-        forces, distances = forces + part * found.forces, distances + part * found.distances
-        forces[0] = forces[1] + forces[2]
+        motion, multiplier = motion + part * change.motion, multiplier + part * change.multiplier
+        gap, slip = gap + part * change.relative[0], slip + part * change.relative[1:]
+        forces, distances = forces + part * change.forces, distances + part * change.distances
     if out < BALANCE and wrong < EQUATIONS * scale and mean < PRODUCT_LEFT:
         # Points that neither carry nor are open converge slowly: by their states at once, or as they are.
-        reached = Moved(motion, normal, shear, multiplier, iteration, forces, distances, pattern)
-        return _in_states(step, pattern, gone, multiplier, reached) or reached
+        return _in_states(step, pattern, gone, here) or here
     raise NotSolved(f"balance {out:.1e}, distances {wrong:.1e}, product {mean:.1e} after {iteration} iterations")
 
 
-def _longest(forces: np.ndarray, distances: np.ndarray, change: _Direction) -> float:
-    """Largest part of a change that keeps all forces and distances positive, at most 1."""
-    steepest = max(-float((change.forces / forces).min()), -float((change.distances / distances).min()))
-    return 1.0 / max(steepest, 1.0)
+def _mean(forces: np.ndarray, distances: np.ndarray) -> float:
+    """Mean product: a round cone counts twice."""
+    return float((forces[0] * distances[0]).mean() + (forces * distances[1:]).sum(axis=0).mean()) / 3.0
+
+
+def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(d, n) array: the product of the round cone's algebra, (a·b, a₀ b + b₀ a)."""
+    return np.concatenate([(a * b).sum(axis=0)[None], a[0] * b[1:] + b[0] * a[1:]])
+
+
+def _divided(c: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """(d, n) array: what a has to be multiplied by to give c."""
+    inside = _inside(a)
+    first = (a[0] * c[0] - (a[1:] * c[1:]).sum(axis=0)) / inside
+    return np.concatenate([first[None], (c[1:] - first * a[1:]) / a[0]])
+
+
+def _inside(a: np.ndarray) -> np.ndarray:
+    """(n,) array: a₀² - |a|², written so that little cancels."""
+    size = np.sqrt((a[1:] ** 2).sum(axis=0))
+    return np.maximum((a[0] - size) * (a[0] + size), INSIDE * a[0] ** 2)
+
+
+def _longest_in_cone(a: np.ndarray, change: np.ndarray) -> float:
+    """Largest part of a change that stays inside the cone, infinite where nothing stops it."""
+    square = change[0] ** 2 - (change[1:] ** 2).sum(axis=0)
+    half = a[0] * change[0] - (a[1:] * change[1:]).sum(axis=0)
+    inside = _inside(a)
+    root = np.sqrt(np.maximum(half**2 - square * inside, 0.0))
+    # The smallest positive root of square t² + 2 half t + inside, where there is one.
+    meets = (half**2 >= square * inside) & ((square < 0.0) | (half < 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = np.where(half < 0.0, inside / (root - half), (-half - root) / square)
+    return float(np.where(meets & (part >= 0.0), part, np.inf).min(initial=np.inf))
 
 
 @dataclass(frozen=True)
 class _Direction:
-    """A change of everything: (3, n_contacts) arrays of forces and distances, (n_contacts, 2) of relative movement."""
+    """A change: (d, n) forces N and τ, (d + 1, n) distances y, γ and σ, (d, n) relative movements."""
 
     motion: np.ndarray
     relative: np.ndarray
@@ -241,27 +423,73 @@ class _Newton:
 
     def __init__(self, step: Step, pattern: Pattern, forces: np.ndarray, distances: np.ndarray) -> None:
         self.step, self.pattern, self.forces, self.distances = step, pattern, forces, distances
-        mu, n = step.friction, len(step.friction)
-        self.k_normal = distances[0] / forces[0] + step.give[0]
-        self.k_plus, self.k_minus = distances[1:] / forces[1:] + step.give[1] * mu
-        self.k_shear = self.k_plus + self.k_minus
-        # What a contact point answers: normal force to gap; shear force to gap, through friction, and to slip.
-        through = mu * (self.k_minus - self.k_plus) / (self.k_shear * self.k_normal)
-        local = np.zeros((n, 2, 2))
-        local[:, 0, 0], local[:, 1, 0], local[:, 1, 1] = 1.0 / self.k_normal, through, 2.0 * mu / self.k_shear
-        self.solve = factorised(pattern.stiffness(local))
+        mu, (across, along) = step.friction, step.give
+        u, v = forces, distances[1:]
+        inside_u, inside_v = np.sqrt(_inside(u)), np.sqrt(_inside(v))
+        a, b = u / inside_u, v / inside_v
+        half = np.sqrt(0.5 * (1.0 + (a * b).sum(axis=0)))
+        self.w = np.concatenate([(b[0] + a[0])[None], b[1:] - a[1:]]) / (2.0 * half)
+        self.size = np.sqrt(inside_v / inside_u)
+        self.middle = self.scaled(u)
+        self.k_normal = distances[0] / forces[0] + across
+        square = self.size**2
+        self.h_normal = 2.0 * square * self.w[0] * self.w[1:]
+        d = len(forces)
+        # τ that slips take: the inverse of even I + steep w wᵀ, along w and across, so that nothing cancels.
+        even, lean = square + along * mu, self.w[1:]
+        size = np.sqrt((lean**2).sum(axis=0))
+        way = np.divide(lean, size, out=np.zeros_like(lean), where=size > 0.0)
+        both = way[:, None] * way[None]
+        self.answer = (np.eye(d - 1)[:, :, None] - both) / even + both / (even + 2.0 * square * size**2)
+        local = np.zeros((len(mu), d, d))
+        local[:, 0, 0] = 1.0 / self.k_normal
+        local[:, 1:, 0] = -(mu * self._lean(self.h_normal) / self.k_normal).T
+        local[:, 1:, 1:] = np.moveaxis(mu * self.answer, 2, 0)
+        self.solve = pattern.factorised(local)
         self.by_live = None if step.live is None else self.solve(step.live)
 
+    def _lean(self, slips: np.ndarray) -> np.ndarray:
+        return np.einsum("ijn,jn->in", self.answer, slips)
+
+    def scaled(self, u: np.ndarray) -> np.ndarray:
+        """(d, n) array: forces in the scaling in which they and the distances are alike."""
+        along = (self.w[1:] * u[1:]).sum(axis=0)
+        rest = u[1:] + (u[0] + along / (1.0 + self.w[0])) * self.w[1:]
+        return np.concatenate([(self.w[0] * u[0] + along)[None], rest]) * self.size
+
+    def unscaled(self, v: np.ndarray) -> np.ndarray:
+        """(d, n) array: distances in that scaling."""
+        along = (self.w[1:] * v[1:]).sum(axis=0)
+        rest = v[1:] + (along / (1.0 + self.w[0]) - v[0]) * self.w[1:]
+        return np.concatenate([(self.w[0] * v[0] - along)[None], rest]) / self.size
+
+    def longest(self, change: _Direction) -> float:
+        """Largest part of a change that keeps everything inside its cone, at most 1."""
+        part = min(
+            _longest_in_cone(self.forces, change.forces), _longest_in_cone(self.distances[1:], change.distances[1:])
+        )
+        steepest = max(
+            -float((change.forces[0] / self.forces[0]).min()), -float((change.distances[0] / self.distances[0]).min())
+        )
+        return min(1.0 / max(steepest, 1.0), part)
+
     def direction(
-        self, aims: np.ndarray, gap_error: np.ndarray, slip_error: np.ndarray, unbalanced: np.ndarray, behind: float
+        self,
+        across_aims: np.ndarray,
+        along_aims: np.ndarray,
+        gap_error: np.ndarray,
+        slip_error: np.ndarray,
+        unbalanced: np.ndarray,
+        behind: float,
     ) -> _Direction:
         """The change that alters each product by its aim and takes the errors away."""
-        step, (normal, plus, minus) = self.step, self.forces
-        for_normal = aims[0] / normal + gap_error
-        for_shear = aims[1] / plus - aims[2] / minus + slip_error
+        step, normal = self.step, self.forces[0]
+        for_normal = across_aims / normal + gap_error
+        aimed = self.scaled(_divided(along_aims, self.middle))
+        for_shear = aimed[1:] + slip_error
         at_once = for_normal / self.k_normal
-        shear = step.friction * ((self.k_minus - self.k_plus) * at_once + 2.0 * for_shear) / self.k_shear
-        motion = self.solve(unbalanced + self.pattern.to_blocks @ paired(at_once, shear))
+        shear = step.friction * self._lean(for_shear - self.h_normal * at_once)
+        motion = self.solve(unbalanced + self.pattern.to_blocks @ paired(at_once, shear.T))
         multiplier = 0.0
         if self.by_live is not None and step.control is not None:
             moved = float(step.control @ self.by_live)
@@ -269,10 +497,15 @@ class _Newton:
                 raise NotSolved("the live load does not move the control point")
             multiplier = (behind - float(step.control @ motion)) / moved
             motion = motion + multiplier * self.by_live
-        relative = (self.pattern.to_contacts @ motion).reshape(-1, 2)
-        d_normal = (for_normal - relative[:, 0]) / self.k_normal
-        rest = for_shear - relative[:, 1]
-        forces = np.empty_like(self.forces)
-        forces[0], forces[1], forces[2] = d_normal, self.k_minus * d_normal + rest, self.k_plus * d_normal - rest
-        forces[1:] /= self.k_shear
-        return _Direction(motion, relative, multiplier, forces, (aims - self.distances * forces) / self.forces)
+        relative = (self.pattern.to_contacts @ motion).reshape(-1, len(self.forces)).T
+        d_normal = (for_normal - relative[0]) / self.k_normal
+        lean = self._lean(for_shear - self.h_normal * d_normal - relative[1:])
+        forces = np.concatenate([d_normal[None], lean])
+        # Distances by the equations that they are linear in: through the scaling, which is steep at what slides, they
+        # would lose their digits. γ by the product alone.
+        across, along = step.give
+        d_gap = relative[0] + across * d_normal - gap_error
+        d_slip = relative[1:] + along * step.friction * lean - slip_error
+        lean_now, apart = self.forces[1:], self.distances[1:]
+        d_cone = (along_aims[0] - (apart * forces).sum(axis=0) - (lean_now * d_slip).sum(axis=0)) / normal
+        return _Direction(motion, relative, multiplier, forces, np.stack([d_gap, d_cone, *d_slip]))

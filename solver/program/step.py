@@ -1,4 +1,4 @@
-"""A step of the path: what it is made of, what it gives, and the matrix that both of its methods factorise."""
+"""A step of the path: what it is made of, what it gives, and the matrix that its method factorises."""
 
 from __future__ import annotations
 
@@ -7,35 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-#: Iterations, and part of the way to the nearest bound that is gone.
-ITERATIONS, FRACTION = 60, 0.99
-
-#: The solution counts when balance, the linear equations in parts of a step and an elastic give, and the largest
-#: product in elastic gives across are below these. A point that neither carries nor is open keeps a force of the last
-#: one's root.
-BALANCE, EQUATIONS, PRODUCT = 1e-9, 1e-8, 1e-9
-
-#: Mean product of force and distance, in block weights and sizes, at which a solution that converges no further counts.
-PRODUCT_LEFT = 1e-9
-
-#: Start: distances in parts of a step and an elastic give, forces in mean block weights.
-FIRST_DISTANCE, FIRST_FORCE = 0.1, 0.05
-
-#: Start near a known solution: least forces, and least distances in parts of a step and an elastic give.
-NEAR = 1e-3
-
-#: A step this short calls for centring; so many of them within the last few, twice over, and the path is lost.
-SHORT, LOST, LOOK_BACK = 0.2, 4, 8
-
-#: Corrections of second order are cut off at so many times the mean product.
-CORRECTION = 10.0
-
-#: Centring at least of the second try, which also leaves corrections of second order out.
-CAREFUL = 0.5
-
-
-#: Up to so many freedoms a dense factorisation is the faster.
-DENSE = 150
+from .factors import Coupling, Singular, Solve
 
 
 class NotSolved(Exception):
@@ -95,8 +67,8 @@ class Step:
 class Moved:
     """The solution of a :class:`Step`: further movement of the free blocks, forces, and the live load's multiplier.
 
-    Forces and distances are those of the method, to start from again: in the plane N, λ⁺, λ⁻ and y, σ⁺, σ⁻; in space
-    N, τ and y, γ, σ.
+    Forces N and τ and distances y, γ and σ are those of the method, to start from again: (d, n_contacts) and
+    (d + 1, n_contacts) arrays.
     """
 
     motion: np.ndarray
@@ -113,43 +85,37 @@ class Pattern:
     """Where the contact points' stiffness goes in the matrix of a step: worked out once, filled at every iteration."""
 
     def __init__(self, step: Step) -> None:
-        n, n_dof = len(step.gap), len(step.load)
-        number = np.full(len(step.free), -1)
-        number[step.free] = np.arange(n_dof)
         # A column holds the rows of the two blocks, the same for a point's normal and shear forces.
-        dof = number[step.matrix.indices.reshape(n, step.matrix.shape[1] // n, -1)[:, 0]]
-        self.both = (dof[:, :, None] >= 0) & (dof[:, None, :] >= 0)
-        row, column = (
-            np.broadcast_to(dof[:, :, None], self.both.shape),
-            np.broadcast_to(dof[:, None, :], self.both.shape),
-        )
-        diagonal = np.arange(n_dof)
-        place = np.concatenate([column[self.both] * n_dof + row[self.both], diagonal * n_dof + diagonal])
-        filled, self.place = np.unique(place, return_inverse=True)
-        self.dense = n_dof <= DENSE
-        self.raw = place
-        self.indices, counts = filled % n_dof, np.bincount(filled // n_dof, minlength=n_dof)
-        self.pointers = np.concatenate([[0], np.cumsum(counts)])
-        self.drag = step.drag
+        n = len(step.gap)
+        rows = step.matrix.indices.reshape(n, step.matrix.shape[1] // n, 2, -1)[:, 0]
+        dof = rows.shape[2]
+        number = np.where(step.free, np.cumsum(step.free) - 1, -1)
+        self.coupling = Coupling(number[rows[:, :, 0]] // dof, len(step.load) // dof, dof)
         self.fill(step)
 
     def fill(self, step: Step) -> Pattern:
         """Take the numbers of a step with the same contact points; gives itself."""
+        self.drag = step.drag
         n = len(step.gap)
         self.blocks = step.matrix.data.reshape(n, step.matrix.shape[1] // n, -1)
         to_blocks = sp.csr_array(sp.csr_array(step.matrix)[step.free])
-        self.to_blocks = to_blocks.toarray() if self.dense else to_blocks
-        self.to_contacts = np.ascontiguousarray(self.to_blocks.T) if self.dense else sp.csr_array(to_blocks.T)
+        dense = self.coupling.dense
+        self.to_blocks = to_blocks.toarray() if dense else to_blocks
+        self.to_contacts = np.ascontiguousarray(self.to_blocks.T) if dense else sp.csr_array(to_blocks.T)
         return self
 
-    def stiffness(self, local: np.ndarray) -> np.ndarray | sp.csc_array:
-        """The matrix with the drag, for (n_contacts, d, d) answers of the contact points."""
+    def factorised(self, local: np.ndarray) -> Solve:
+        """What solves with the stiffness and the drag, for (n_contacts, d, d) answers of the contact points.
+
+        Raises
+        ------
+        NotSolved
+        """
         each = np.matmul(self.blocks.transpose(0, 2, 1), np.matmul(local, self.blocks))
-        n = len(self.drag)
-        if self.dense:
-            return np.bincount(self.raw, np.concatenate([each[self.both], self.drag]), n * n).reshape(n, n).T
-        data = np.bincount(self.place, np.concatenate([each[self.both], self.drag]), len(self.indices))
-        return sp.csc_array((data, self.indices, self.pointers), shape=(n, n))
+        try:
+            return self.coupling.factorised(each, self.drag)
+        except Singular as error:
+            raise NotSolved(str(error)) from None
 
 
 def paired(normal: np.ndarray, shear: np.ndarray) -> np.ndarray:
