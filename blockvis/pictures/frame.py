@@ -34,12 +34,15 @@ class Key:
     colour : (int, int, int)
     length : float
         Pixels, of a bar drawn to scale.
+    layers : tuple of str
+        Of the scene that it explains; none of what is in every picture.
     """
 
     kind: str
     text: str
     colour: tuple[int, int, int]
     length: float = 0.0
+    layers: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class Sheet:
         #: Left, top, right, bottom of the blocks' picture, in pixels.
         self.inside = (0, self.header, width - right, height - self.footer)
         self.beside = (width - beside_width, self.header, width, height - self.footer)
-        self._shared: tuple[tuple[Key, ...], float, Image.Image] | None = None
+        self._shared: dict[tuple[tuple[Key, ...], tuple[Key, ...], float], Image.Image] = {}
 
     @property
     def inside_size(self) -> tuple[int, int]:
@@ -94,6 +97,7 @@ class Sheet:
         detail: str,
         badge: str = "",
         keys: Sequence[Key] = (),
+        places: Sequence[Key] | None = None,
         pixel: float,
         beside: Image.Image | None = None,
     ) -> Image.Image:
@@ -108,12 +112,15 @@ class Sheet:
         badge : str
             A warning at the upper right.
         keys : sequence of Key
+            The legend.
+        places : sequence of Key, optional
+            All keys of a film, so that each keeps its place where others come and go; those of the picture by default.
         pixel : float [m]
             Size of a pixel, for the scale bar.
         beside : PIL.Image.Image, optional
             The picture to the right, as large as :attr:`beside`.
         """
-        page = self._sheet(tuple(keys), pixel).copy()
+        page = self._sheet(tuple(keys), tuple(keys if places is None else places), pixel).copy()
         page.paste(picture, self.inside[:2])
         if beside is not None:
             page.paste(beside, self.beside[:2])
@@ -121,17 +128,19 @@ class Sheet:
         self._caption(draw, title, detail, badge)
         return page
 
-    def _sheet(self, keys: tuple[Key, ...], pixel: float) -> Image.Image:
-        """Draw what all pictures of a film share: scale bar, legend, colour bar."""
-        if self._shared is None or self._shared[:2] != (keys, pixel):
+    def _sheet(self, keys: tuple[Key, ...], places: tuple[Key, ...], pixel: float) -> Image.Image:
+        """Draw what many pictures of a film share: scale bar, legend, colour bar."""
+        shared = keys, places, pixel
+        if shared not in self._shared:
             page = Image.new("RGB", self.size, palette.PAPER)
             draw = ImageDraw.Draw(page)
             end = self._scale_bar(draw, pixel)
-            self._legend(draw, keys, end + 2 * self.pad)
+            self._legend(draw, keys, places, end + 2 * self.pad)
             if self.colour_bar is not None:
                 self._colour_bar(page, draw, self.colour_bar)
-            self._shared = keys, pixel, page
-        return self._shared[2]
+            # One at a time: joints open and slide now and then, and a page at any size is memory.
+            self._shared = {shared: page}
+        return self._shared[shared]
 
     def _caption(self, draw: ImageDraw.ImageDraw, title: str, detail: str, badge: str) -> None:
         right = self.size[0] - self.pad
@@ -163,15 +172,16 @@ class Sheet:
         draw.text((x + pixels / 2, y - tick - 0.15 * self.text), label, palette.INK, font, anchor="mb")
         return int(max(x + pixels, x + pixels / 2 + draw.textlength(label, font) / 2))
 
-    def _legend(self, draw: ImageDraw.ImageDraw, keys: Sequence[Key], left: int) -> None:
+    def _legend(self, draw: ImageDraw.ImageDraw, keys: Sequence[Key], places: Sequence[Key], left: int) -> None:
+        """Draw those of the keys that are in the picture, each where it stands among all."""
         if not keys:
             return
         size = round(0.9 * self.text)
         swatch, space, gap = 1.5 * self.text, 0.45 * self.text, 1.4 * self.text
 
         def width(font: ImageFont.FreeTypeFont) -> float:
-            each = (draw.textlength(k.text, font) + (max(swatch, k.length) + space) * bool(k.kind) for k in keys)
-            return sum(each) + gap * (len(keys) - 1)
+            each = (draw.textlength(k.text, font) + (max(swatch, k.length) + space) * bool(k.kind) for k in places)
+            return sum(each) + gap * (len(places) - 1)
 
         room = self.size[0] - self.pad - left
         font = _font(size)
@@ -180,12 +190,15 @@ class Sheet:
             gap *= 0.93
             font = _font(size)
         x, y = self.size[0] - self.pad - width(font), self.size[1] - self.pad - 0.35 * self.text
-        for key in keys:
+        for key in places:
+            there = key in keys
             if key.kind:
                 wide = max(swatch, key.length)
-                _swatch(draw, key, x, y, wide, self.text)
+                if there:
+                    _swatch(draw, key, x, y, wide, self.text)
                 x += wide + space
-            draw.text((x, y), key.text, palette.INK, font, anchor="lm")
+            if there:
+                draw.text((x, y), key.text, palette.INK, font, anchor="lm")
             x += draw.textlength(key.text, font) + gap
 
     def _colour_bar(self, page: Image.Image, draw: ImageDraw.ImageDraw, bar: ColourBar) -> None:
