@@ -7,7 +7,7 @@ import time
 import warnings
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,11 +18,12 @@ import solver
 from blockvis.atomic_files import PARTIAL
 from blockvis.cases.build import case_assembly
 from blockvis.cases.case import Case, parse_case, read_case
-from blockvis.fall import fall_of
+from blockvis.fall import Fall, fall_of
 from blockvis.formats.files import checksum_of_files
 from blockvis.results.fall_files import remove_fall, stored_fall, write_fall
-from blockvis.results.folder import ResultsFolder, refuse_results, restore_grids
+from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
+from blockvis.results.viewer_files import restore_grids
 
 from .kind import AnalysisRun
 from .kinds import KINDS
@@ -251,8 +252,16 @@ def _drawn_results(
 def _followed(case: Case, results: ResultsFolder, run: AnalysisRun, drawing: Drawing, clock: Clock) -> Run:
     """Follow the increments of a run and draw, the film in a process of its own."""
     process = started_film(case, film=drawing.film, pictures=drawing.pictures)
+    if process is not None:
+        # It has time until there is something to draw.
+        process.follow(results.path, results.assembly, results.shape, len(results.increments))
+        results.viewer = process
     try:
         return _solved(case, results, run, drawing, clock, process)
+    except OSError as error:
+        if process is not None:
+            process.close()
+        raise _given_up(results.path, error) from None
     finally:
         if process is not None:
             process.close()
@@ -290,23 +299,18 @@ def _solved(
             progress.increment(increment)
     except KeyboardInterrupt:
         run.steps.close()
-    except OSError as error:
-        raise _given_up(folder, error) from None
     finally:
         progress.done()
     response = run.response(results.increments, ending)
     missing: tuple[str, ...] = ()
-    try:
-        with clock.counting("write"):
-            summary = finish(results, response)
-        # Waiting for the disk takes no processor: it goes on while the pictures are drawn.
-        with ThreadPoolExecutor(1) as waiting:
-            flushed = waiting.submit(results.flush)
-            if ending.stop is not solver.Status.INTERRUPTED:
-                missing = _drawn_results(case, response, folder, drawing, clock, process)
-            flushed.result()
-    except OSError as error:
-        raise _given_up(folder, error) from None
+    with clock.counting("write"):
+        summary = finish(results, response)
+    # Waiting for the disk takes no processor: it goes on while the pictures are drawn.
+    with ThreadPoolExecutor(1) as waiting:
+        flushed = waiting.submit(results.flush)
+        if ending.stop is not solver.Status.INTERRUPTED:
+            missing = _drawn_results(case, response, folder, drawing, clock, process)
+        flushed.result()
     return Run(response, folder, summary, missing, stages=dict(clock.seconds))
 
 
@@ -381,38 +385,35 @@ def draw_results(
     if not response.increments:
         return ()
     progress = DrawingProgress()
+    stored = stored_fall(folder)
+    apart = film if animation is not None else None
+    if apart is not None:
+        # It works out the fall as well, and what needs none is drawn here meanwhile.
+        apart.draw(response, folder / str(animation), stored, falls=stored is None)
+    if pictures:
+        _draw_stills(response, folder, clock)
     with clock.counting("fall"):
-        stored = stored_fall(folder)
-        fall = fall_of(response, progress.fall) if stored is None else stored
+        fall = _fall(response, apart, progress) if stored is None else stored
         progress.done()
-    if film is not None and animation is not None:
-        film.draw(response, folder / animation, fall)
-    if fall is not None and stored is None:
-        with clock.counting("fall"):
+        if fall is not None and stored is None:
             write_fall(fall, response, folder)
     if not pictures:
         return ()
-    from blockvis.pictures.film_process import FilmFailed
-    from blockvis.pictures.paraview import write_paraview_macro
-    from blockvis.pictures.render import animate, draw_mechanism
-    from blockvis.report.page import write_report
-
     with clock.counting("report"):
+        from blockvis.pictures.paraview import write_paraview_macro
+        from blockvis.report.page import write_report
+
         write_paraview_macro(folder)
         write_report(response, folder / "report.html", case_text, fall=fall)
-    if response.path:
-        from blockvis.pictures.curves import draw_curve
-
-        with clock.counting("curve"):
-            draw_curve(response, folder / "curve.png")
-    with clock.counting("mechanism"):
-        draw_mechanism(response, folder / "mechanism.png")
     if animation is None:
         return ()
+    from blockvis.pictures.film_process import FilmFailed
+    from blockvis.pictures.render import animate
+
     try:
         with clock.counting("film"):
-            if film is not None:
-                film.wait(progress.frame)
+            if apart is not None:
+                apart.wait(progress.frame)
             else:
                 animate(response, folder / animation, fall=fall, progress=progress.frame)
     except FilmFailed as error:
@@ -420,3 +421,27 @@ def draw_results(
     finally:
         progress.done()
     return ()
+
+
+def _draw_stills(response: solver.Response, folder: Path, clock: Clock) -> None:
+    """Draw the pictures that need no fall."""
+    if response.path:
+        with clock.counting("curve"):
+            from blockvis.pictures.curves import draw_curve
+
+            draw_curve(response, folder / "curve.png")
+    with clock.counting("mechanism"):
+        from blockvis.pictures.render import draw_mechanism
+
+        draw_mechanism(response, folder / "mechanism.png")
+
+
+def _fall(response: solver.Response, film: FilmProcess | None, progress: DrawingProgress) -> Fall | None:
+    """Find the fall of a response: that of the process that draws the film, or worked out here."""
+    if film is not None:
+        from blockvis.pictures.film_process import FilmFailed
+
+        # What became of the process is told where the film is waited for.
+        with suppress(FilmFailed):
+            return film.fall(progress.fall)
+    return fall_of(response, progress.fall)
