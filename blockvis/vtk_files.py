@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import base64
+import html
 import os
 import re
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -119,7 +119,7 @@ def write_pvd(
         '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
         "  <Collection>",
         *(
-            f'    <DataSet timestep="{time:.12g}" group="" part="0" file={quoteattr(Path(file).as_posix())}/>'
+            f'    <DataSet timestep="{time:.12g}" group="" part="0" file="{html.escape(Path(file).as_posix())}"/>'
             for time, file in entries
         ),
         "  </Collection>",

@@ -1,4 +1,4 @@
-"""A process of its own, on another core: files for viewers while the first one solves, then the fall and the film."""
+"""A process of its own, on another core: files for viewers while the first one solves, then fall, curve and film."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PATIENCE = 5.0
 LOOK = 0.2
 
 #: What drawing needs, loaded by the process while the first one solves.
-_LOADED = ("blockvis.pictures.render", "pymunk")
+_LOADED = ("blockvis.pictures.render", "blockvis.pictures.curves", "pymunk")
 
 
 class FilmFailed(RuntimeError):
@@ -93,7 +93,7 @@ class FilmProcess:
         return True
 
     def draw(self, response: solver.Response, path: Path, fall: Fall | None = None, *, falls: bool = False) -> None:
-        """Begin to draw the film; returns at once.
+        """Begin to draw the curve, where there is one, as ``curve.png`` beside the film, and the film; returns at once.
 
         Parameters
         ----------
@@ -123,7 +123,7 @@ class FilmProcess:
         return found
 
     def wait(self, progress: Callable[[int, int], None]) -> None:
-        """Wait for the film.
+        """Wait for curve and film.
 
         Parameters
         ----------
@@ -282,12 +282,15 @@ def _drawn(
     say: Callable[[str, Any], None], response: solver.Response, path: Path, fall: Fall | None, falls: bool
 ) -> tuple[str, Exception | None]:
     """Draw a film, its fall worked out here where it is asked for; tells what came of it."""
+    from .curves import draw_curve
     from .render import animate
 
     try:
         if falls:
             fall = fall_of(response, lambda seconds: say("falling", seconds))
             say("fall", fall)
+        if response.path:
+            draw_curve(response, path.with_name("curve.png"))
         animate(response, path, fall=fall, progress=lambda done, total: say("drawing", (done, total)))
     except Exception as error:
         if isinstance(error, OSError) and is_broken_pipe(error):

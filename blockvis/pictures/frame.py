@@ -57,6 +57,17 @@ class ColourBar:
     largest: float
 
 
+@dataclass(frozen=True)
+class _Shared:
+    """What many pictures of a film have in common; of a :meth:`Sheet.composed` picture."""
+
+    keys: tuple[Key, ...]
+    places: tuple[Key, ...]
+    pixel: float
+    detail: str
+    badge: str
+
+
 class Sheet:
     """Where the picture of the blocks goes, and the words around it.
 
@@ -81,7 +92,7 @@ class Sheet:
         #: Left, top, right, bottom of the blocks' picture, in pixels.
         self.inside = (0, self.header, width - right, height - self.footer)
         self.beside = (width - beside_width, self.header, width, height - self.footer)
-        self._shared: dict[tuple[tuple[Key, ...], tuple[Key, ...], float], Image.Image] = {}
+        self._shared: dict[_Shared, Image.Image] = {}
 
     @property
     def inside_size(self) -> tuple[int, int]:
@@ -120,42 +131,50 @@ class Sheet:
         beside : PIL.Image.Image, optional
             The picture to the right, as large as :attr:`beside`.
         """
-        page = self._sheet(tuple(keys), tuple(keys if places is None else places), pixel).copy()
+        shared = _Shared(tuple(keys), tuple(keys if places is None else places), pixel, detail, badge)
+        page = self._sheet(shared).copy()
         page.paste(picture, self.inside[:2])
         if beside is not None:
             page.paste(beside, self.beside[:2])
-        draw = ImageDraw.Draw(page)
-        self._caption(draw, title, detail, badge)
+        self._title(ImageDraw.Draw(page), title, badge)
         return page
 
-    def _sheet(self, keys: tuple[Key, ...], places: tuple[Key, ...], pixel: float) -> Image.Image:
-        """Draw what many pictures of a film share: scale bar, legend, colour bar."""
-        shared = keys, places, pixel
+    def _sheet(self, shared: _Shared) -> Image.Image:
+        """Draw what many pictures of a film share: scale bar, legend, colour bar, all of the caption but its title."""
         if shared not in self._shared:
             page = Image.new("RGB", self.size, palette.PAPER)
             draw = ImageDraw.Draw(page)
-            end = self._scale_bar(draw, pixel)
-            self._legend(draw, keys, places, end + 2 * self.pad)
+            end = self._scale_bar(draw, shared.pixel)
+            self._legend(draw, shared.keys, shared.places, end + 2 * self.pad)
             if self.colour_bar is not None:
                 self._colour_bar(page, draw, self.colour_bar)
+            self._detail(draw, shared.detail)
+            if shared.badge:
+                self._badge(draw, shared.badge)
             # One at a time: joints open and slide now and then, and a page at any size is memory.
             self._shared = {shared: page}
         return self._shared[shared]
 
-    def _caption(self, draw: ImageDraw.ImageDraw, title: str, detail: str, badge: str) -> None:
-        right = self.size[0] - self.pad
-        if badge:
-            font = _font(round(0.9 * self.text), bold=True)
-            width, half = draw.textlength(badge, font), 0.75 * self.text
-            box = (right - width - 1.2 * self.text, self.pad, right, self.pad + 2 * half)
-            draw.rounded_rectangle(box, radius=half * 0.5, fill=palette.WARNING)
-            draw.text((box[0] + 0.6 * self.text, self.pad + half), badge, palette.PAPER, font, anchor="lm")
-            right = round(box[0] - self.pad)
-        room = right - self.pad
+    def _title(self, draw: ImageDraw.ImageDraw, title: str, badge: str) -> None:
+        room = (self._badge_box(badge)[0] if badge else self.size[0]) - 2 * self.pad
         font = _fitting(title, round(1.15 * self.text), room, bold=True)
         draw.text((self.pad, self.pad + 0.72 * self.text), title, palette.INK, font, anchor="lm")
+
+    def _detail(self, draw: ImageDraw.ImageDraw, detail: str) -> None:
         font = _fitting(detail, round(0.9 * self.text), self.size[0] - 2 * self.pad)
         draw.text((self.pad, self.pad + 2.15 * self.text), detail, palette.FAINT, font, anchor="lm")
+
+    def _badge(self, draw: ImageDraw.ImageDraw, badge: str) -> None:
+        box, half = self._badge_box(badge), 0.75 * self.text
+        draw.rounded_rectangle(box, radius=half * 0.5, fill=palette.WARNING)
+        place = box[0] + 0.6 * self.text, self.pad + half
+        draw.text(place, badge, palette.PAPER, _font(round(0.9 * self.text), bold=True), anchor="lm")
+
+    def _badge_box(self, badge: str) -> tuple[float, float, float, float]:
+        """Left, top, right and bottom of a warning, in pixels."""
+        right = self.size[0] - self.pad
+        width = _font(round(0.9 * self.text), bold=True).getlength(badge)
+        return right - width - 1.2 * self.text, self.pad, right, self.pad + 1.5 * self.text
 
     def _scale_bar(self, draw: ImageDraw.ImageDraw, pixel: float) -> int:
         """Draw the scale bar; returns its right end in pixels."""

@@ -143,23 +143,24 @@ def run_case(
     folder = Path(f"{case.source.stem}-results") if folder is None else Path(folder)
     refuse_results(folder, overwrite)
     drawing = Drawing(film=film, pictures=pictures)
-    with clock.counting("read"):
-        assembly = case_assembly(case)
-    with clock.counting("solve"):
-        run = planned(case, assembly)
-    try:
-        results = ResultsFolder(
-            folder,
-            assembly,
-            record=record_of(case),
-            overwrite=overwrite,
-            parameter=run.course.parameter,
-            shape=case.vtu,
-        )
-    except OSError as error:
-        raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
-    remove_fall(folder)
-    return _followed(case, results, run, drawing, clock)
+    with _film_apart(case, drawing) as process:
+        with clock.counting("read"):
+            assembly = case_assembly(case)
+        with clock.counting("solve"):
+            run = planned(case, assembly)
+        try:
+            results = ResultsFolder(
+                folder,
+                assembly,
+                record=record_of(case),
+                overwrite=overwrite,
+                parameter=run.course.parameter,
+                shape=case.vtu,
+            )
+        except OSError as error:
+            raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
+        remove_fall(folder)
+        return _followed(case, results, run, drawing, clock, process)
 
 
 def resume_run(folder: str | Path, *, film: bool = True, pictures: bool = True) -> Run:
@@ -204,10 +205,11 @@ def resume_run(folder: str | Path, *, film: bool = True, pictures: bool = True) 
     for note in record.changes(checksum_of_files):
         warnings.warn(note, stacklevel=2)
     kind = KINDS[case.analysis]
-    results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint, case.vtu)
-    remove_fall(folder)
-    run = planned(case, results.assembly, checkpoint, tuple(results.increments))
-    return _followed(case, results, run, drawing, Clock())
+    with _film_apart(case, drawing) as process:
+        results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint, case.vtu)
+        remove_fall(folder)
+        run = planned(case, results.assembly, checkpoint, tuple(results.increments))
+        return _followed(case, results, run, drawing, Clock(), process)
 
 
 def _finished(folder: Path) -> dict[str, Any] | None:
@@ -249,22 +251,36 @@ def _drawn_results(
         ) from None
 
 
-def _followed(case: Case, results: ResultsFolder, run: AnalysisRun, drawing: Drawing, clock: Clock) -> Run:
-    """Follow the increments of a run and draw, the film in a process of its own."""
+@contextmanager
+def _film_apart(case: Case, drawing: Drawing) -> Iterator[FilmProcess | None]:
+    """Start the process that draws the film, if there is one to draw: it has time until the case is solved."""
     process = started_film(case, film=drawing.film, pictures=drawing.pictures)
+    try:
+        yield process
+    finally:
+        if process is not None:
+            process.close()
+
+
+def _followed(
+    case: Case,
+    results: ResultsFolder,
+    run: AnalysisRun,
+    drawing: Drawing,
+    clock: Clock,
+    process: FilmProcess | None,
+) -> Run:
+    """Follow the increments of a run and draw; what only viewers open is written by the film's process meanwhile."""
     if process is not None:
-        # It has time until there is something to draw.
         process.follow(results.path, results.assembly, results.shape, len(results.increments))
         results.viewer = process
     try:
         return _solved(case, results, run, drawing, clock, process)
     except OSError as error:
         if process is not None:
+            # It may have a half-written file, too.
             process.close()
         raise _given_up(results.path, error) from None
-    finally:
-        if process is not None:
-            process.close()
 
 
 def _solved(
@@ -391,7 +407,10 @@ def draw_results(
         # It works out the fall as well, and what needs none is drawn here meanwhile.
         apart.draw(response, folder / str(animation), stored, falls=stored is None)
     if pictures:
-        _draw_stills(response, folder, clock)
+        with clock.counting("mechanism"):
+            from blockvis.pictures.render import draw_mechanism
+
+            draw_mechanism(response, folder / "mechanism.png")
     with clock.counting("fall"):
         fall = _fall(response, apart, progress) if stored is None else stored
         progress.done()
@@ -405,35 +424,37 @@ def draw_results(
 
         write_paraview_macro(folder)
         write_report(response, folder / "report.html", case_text, fall=fall)
-    if animation is None:
-        return ()
-    from blockvis.pictures.film_process import FilmFailed
-    from blockvis.pictures.render import animate
-
-    try:
-        with clock.counting("film"):
-            if apart is not None:
-                apart.wait(progress.frame)
-            else:
-                animate(response, folder / animation, fall=fall, progress=progress.frame)
-    except FilmFailed as error:
-        return (str(error),)
-    finally:
-        progress.done()
-    return ()
-
-
-def _draw_stills(response: solver.Response, folder: Path, clock: Clock) -> None:
-    """Draw the pictures that need no fall."""
-    if response.path:
+    problem = ""
+    if apart is not None:
+        problem = _awaited(apart, progress, clock)
+    if response.path and (apart is None or problem):
         with clock.counting("curve"):
             from blockvis.pictures.curves import draw_curve
 
             draw_curve(response, folder / "curve.png")
-    with clock.counting("mechanism"):
-        from blockvis.pictures.render import draw_mechanism
+    if animation is not None and apart is None:
+        with clock.counting("film"):
+            from blockvis.pictures.render import animate
 
-        draw_mechanism(response, folder / "mechanism.png")
+            try:
+                animate(response, folder / animation, fall=fall, progress=progress.frame)
+            finally:
+                progress.done()
+    return (problem,) if problem else ()
+
+
+def _awaited(film: FilmProcess, progress: DrawingProgress, clock: Clock) -> str:
+    """Wait for the process that draws curve and film; returns why it has ended without them, or nothing."""
+    from blockvis.pictures.film_process import FilmFailed
+
+    try:
+        with clock.counting("film"):
+            film.wait(progress.frame)
+    except FilmFailed as error:
+        return str(error)
+    finally:
+        progress.done()
+    return ""
 
 
 def _fall(response: solver.Response, film: FilmProcess | None, progress: DrawingProgress) -> Fall | None:
