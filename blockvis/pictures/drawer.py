@@ -49,8 +49,8 @@ OF_STATICS = (
     *("arrow rim", "arrow top", "live rim", "live top"),
 )
 
-#: Most crack lines whose width is written.
-MOST_WIDTHS = 6
+#: Most crack lines whose width is written, and the least part of the widest that is worth a word.
+MOST_WIDTHS, LEAST_WIDTH = 6, 0.05
 
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
@@ -389,6 +389,7 @@ class Drawer:
     def _write_widths(self, picture: Image.Image, pose: solver.Pose, shown: solver.Pose) -> None:
         """Write the widths of the widest crack lines at a pose beside them, where there is room."""
         cracks = cracks_of(self.assembly, pose, self.joints)[: 2 * MOST_WIDTHS]
+        cracks = [crack for crack in cracks if crack.width >= LEAST_WIDTH * cracks[0].width]
         on_a, on_b, _ = faces_at(self.assembly, self.joints, shown)
         widest = [int(crack.joints[0]) for crack in cracks]
         places = self.scene.at_pixel((on_a + on_b)[widest].mean(axis=1) / 2.0)

@@ -16,6 +16,7 @@ from blockvis.pictures.captions import FAILED_BADGE, FALL_BADGE
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of
 from blockvis.pictures.frame import Sheet
+from blockvis.pictures.render import draw_mechanism
 from blockvis.studies import pictures
 from blockvis.studies.run_one import _shape
 
@@ -158,6 +159,18 @@ def test_every_frame_names_what_it_draws_and_nothing_else(monkeypatch):
             drawn = bool((np.abs(pixels - np.array(colour)) <= 12).all(axis=2).any())
             assert (text in texts) == drawn, (said["title"], text)
     assert not [said for said in pseudo if "compression" in " ".join(key.text for key in said["keys"])]
+
+
+def test_widths_are_written_of_cracks_that_count(monkeypatch, tmp_path):
+    from blockvis.pictures import drawer as drawing
+
+    written, response = [], arch_response()
+    monkeypatch.setattr(drawing, "write_labels", lambda picture, places, words, *_: written.extend(words))
+    widest = drawing.cracks_of(response.assembly, response.path[-1].pose)[0]
+    cracks = [replace(widest, width=width) for width in (0.04, 0.004, 0.0004)]
+    monkeypatch.setattr(drawing, "cracks_of", lambda *_: cracks)
+    draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL)
+    assert written == ["40 mm", "4 mm"]
 
 
 def test_picture_film_and_page_count_the_last_equilibrium_alike(monkeypatch):
