@@ -195,30 +195,32 @@ class Sheet:
         """Draw those of the keys that are in the picture, each where it stands among all."""
         if not keys:
             return
-        size = round(0.9 * self.text)
-        swatch, space, gap = 1.5 * self.text, 0.45 * self.text, 1.4 * self.text
 
-        def width(font: ImageFont.FreeTypeFont) -> float:
-            each = (draw.textlength(k.text, font) + (max(swatch, k.length) + space) * bool(k.kind) for k in places)
-            return sum(each) + gap * (len(places) - 1)
+        def width(size: int, gap: float) -> float:
+            each = (
+                _font(size).getlength(key.text) + (max(1.7 * size, key.length) + 0.5 * size) * bool(key.kind)
+                for key in places
+            )
+            return sum(each) + gap * size * (len(places) - 1)
 
-        room = self.size[0] - self.pad - left
-        font = _font(size)
-        while width(font) > room and size > 8:
+        # Small letters are harder to read than near ones.
+        room, size, gap = self.size[0] - self.pad - left, round(0.9 * self.text), 1.5
+        while width(size, gap) > room and gap > 0.9:
+            gap -= 0.1
+        while width(size, gap) > room and size > 8:
             size -= 1
-            gap *= 0.93
-            font = _font(size)
-        x, y = self.size[0] - self.pad - width(font), self.size[1] - self.pad - 0.35 * self.text
+        font, y = _font(size), self.size[1] - self.pad - 0.35 * self.text
+        x = self.size[0] - self.pad - width(size, gap)
         for key in places:
             there = key in keys
             if key.kind:
-                wide = max(swatch, key.length)
+                wide = max(1.7 * size, key.length)
                 if there:
-                    _swatch(draw, key, x, y, wide, self.text)
-                x += wide + space
+                    _swatch(draw, key, x, y, wide, size / 0.9)
+                x += wide + 0.5 * size
             if there:
                 draw.text((x, y), key.text, palette.INK, font, anchor="lm")
-            x += draw.textlength(key.text, font) + gap
+            x += font.getlength(key.text) + gap * size
 
     def _colour_bar(self, page: Image.Image, draw: ImageDraw.ImageDraw, bar: ColourBar) -> None:
         left, top, bottom = self.inside[2] + self.text, self.inside[1], self.inside[3]
