@@ -162,8 +162,9 @@ class FilmProcess:
         assert self._process.stdin is not None
         # A process that has ended says why where it is waited for.
         with _unread():
-            pickle.dump((what, about), self._process.stdin)
-            self._process.stdin.flush()
+            if not self._process.stdin.closed:
+                pickle.dump((what, about), self._process.stdin)
+                self._process.stdin.flush()
 
     def _listen(self) -> None:
         assert self._process.stdout is not None
@@ -199,9 +200,6 @@ def _unread() -> Iterator[None]:
     """Go on where the other process reads no more."""
     try:
         yield
-    except ValueError:
-        # The pipe is closed.
-        pass
     except OSError as error:
         if not is_broken_pipe(error):
             raise
@@ -261,13 +259,16 @@ class _Followed:
 
     def __init__(self, folder: Path, assembly: solver.Assembly, shape: str, count: int) -> None:
         self._stored, self._count = StoredIncrements(folder), count
-        self._files = ViewerFiles(folder, assembly, shape, [self._stored.opened(k) for k in range(count)])
+        self._start = folder, assembly, shape
+        self._files: ViewerFiles | None = None
         self._failed: Exception | None = None
 
     def add(self) -> None:
         """Write the files of the next increment; what goes wrong is told at the end."""
         if self._failed is None:
             try:
+                if self._files is None:
+                    self._files = ViewerFiles(*self._start, [self._stored.opened(k) for k in range(self._count)])
                 self._files.add(self._stored.opened(self._count))
             except Exception as error:  # noqa: BLE001 - it is the caller's, who raises it again
                 self._failed = error

@@ -67,8 +67,8 @@ class Run:
     had_finished : bool
         Whether there was nothing left to solve when it was asked to go on.
     stages : dict from str to float [s]
-        Wall-clock seconds of each part: read, solve, write, fall, report, curve, mechanism, film (the wait for it,
-        where another process draws it meanwhile).
+        Wall-clock seconds of each part: read, solve, write, fall, report, curve, mechanism, film. What another process
+        works out meanwhile, VTU files, fall, curve and film, counts as the wait for it only.
     """
 
     response: solver.Response
