@@ -216,7 +216,7 @@ class Sheet:
             if key.kind:
                 wide = max(1.7 * size, key.length)
                 if there:
-                    _swatch(draw, key, x, y, wide, size / 0.9)
+                    _swatch(draw, key, x, y, wide, self.text)
                 x += wide + 0.5 * size
             if there:
                 draw.text((x, y), key.text, palette.INK, font, anchor="lm")
