@@ -428,10 +428,7 @@ def test_same_input_twice_gives_the_same_arrays():
     spread = solver.Settlement(direction=(1, 0), increment=0.05, limit=0.5, tolerance=1e-3)
     few = solver.Controls(falling_frames=5)
     first, second = (
-        solver.settle(
-            generators.arch(voussoirs=8), spread, friction_coefficient=0.6, controls=solver.Controls(falling_frames=5)
-        )
-        for _ in range(2)
+        solver.settle(generators.arch(voussoirs=8), spread, friction_coefficient=0.6, controls=few) for _ in range(2)
     )
     assert first.collapse.bracket == second.collapse.bracket
     assert len(first.increments) == len(second.increments)
