@@ -22,6 +22,8 @@ from blockvis.fall import Fall, fall_of
 from blockvis.results.increments import StoredIncrements
 from blockvis.results.viewer_files import ViewerFiles
 
+from .video import find_encoder
+
 #: Seconds that a process has to remove its half-written film.
 PATIENCE = 5.0
 
@@ -233,19 +235,19 @@ def main() -> None:
                 say(*viewer.finished())
             elif what == "draw":
                 loading.join()
+                find_encoder()
                 say(*_drawn(say, *about))
                 # The film is whole: taking this interpreter down piece by piece would only keep the first one waiting.
                 os._exit(0)
 
 
 def _load() -> None:
-    """Load what drawing needs; what is missing is missed where it is used."""
+    """Load what drawing needs; what fails fails again where it is used."""
     for module in _LOADED:
-        with contextlib.suppress(ImportError):
+        with contextlib.suppress(Exception):
             importlib.import_module(module)
-    from .video import find_encoder
-
-    find_encoder()
+    with contextlib.suppress(Exception):
+        find_encoder()
 
 
 class _Followed:
