@@ -51,7 +51,10 @@ class FilmProcess:
     def __init__(self) -> None:
         start = f"import sys; sys.path[:] = {sys.path!r}; from blockvis.pictures.film_process import main; main()"
         self._path: Path | None = None
-        self._process = subprocess.Popen([sys.executable, "-c", start], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        with _deaf():
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", start], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            )
         self._said: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
         # What it says is read at once: it never waits for this process.
         threading.Thread(target=self._listen, daemon=True).start()
@@ -198,6 +201,21 @@ class FilmProcess:
 
 
 @contextlib.contextmanager
+def _deaf() -> Iterator[None]:
+    """Start processes that do not hear Ctrl-C, which reaches all of a terminal: the first decides, and ends them."""
+    if threading.current_thread() is not threading.main_thread():
+        # Signals are set by the main thread alone.
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        # None where a program around Python has set what happens.
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+
+
+@contextlib.contextmanager
 def _unread() -> Iterator[None]:
     """Go on where the other process reads no more."""
     try:
@@ -209,7 +227,7 @@ def _unread() -> Iterator[None]:
 
 def main() -> None:
     """Do what comes in; what there is to say goes out."""
-    # Ctrl-C reaches all processes of a terminal: the first decides, and ends this one.
+    # Where it was not started deaf, as on Windows.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     out, sys.stdout = sys.stdout.buffer, sys.stderr

@@ -78,6 +78,16 @@ def test_the_process_writes_what_viewers_open_and_says_what_fails(arch, arch_res
     assert not process.finish()
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no signal to one process")
+def test_ctrl_c_is_for_the_first_process_even_before_the_other_has_loaded(arch, arch_results, capfd):
+    process = FilmProcess()
+    process.follow(arch_results, arch.assembly, "moved", 0)
+    process._process.send_signal(signal.SIGINT)
+    assert process.finish()
+    process.close()
+    assert "KeyboardInterrupt" not in capfd.readouterr().err
+
+
 @pytest.mark.pictures
 def test_a_process_that_is_ended_leaves_all_but_the_film(case, tmp_path, monkeypatch, capsys):
     def killed():
