@@ -569,7 +569,7 @@ class Path:
 
     def _closed_gap(self, place: Place) -> float:
         """Largest gap of contact points that may carry in an equilibrium at a place, in block sizes."""
-        return COMPUTED_GAP if place.s == 0.0 or place.s < self.careful_until else CLOSING_GAP
+        return COMPUTED_GAP if place.s == 0.0 else CLOSING_GAP
 
     def _on_supports(self, contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarray:
         """(n_blocks, n_dof) array [N, N, N·m]: what the structure does to each support; zero for free blocks."""
@@ -714,7 +714,9 @@ class Path:
                 crept = self._settles(new, CREEPS, JUMP)
             if self._holds(crept):
                 assert crept is not None
-                proved, reported, without, spent = crept, not self._is_stop(new.s), None, None
+                proved, reported = crept, not self._is_stop(new.s)
+                if np.isinf(self.barrier):
+                    without, spent = None, None
             else:
                 length = new.s - place.s
                 step = min(step, 0.5 * length)
