@@ -431,7 +431,10 @@ def _separate(piece: _Piece, normal: np.ndarray, origin: np.ndarray, near: float
     # Two bodies that the cut has left may still meet along the edge through which it went.
     on_plane = np.abs((points - origin) @ normal) <= near
     in_cut = on_plane & on_plane[_following(owner)]
-    order = np.flatnonzero(~in_cut)[np.argsort(keys[~in_cut], kind="stable")]
+    # Edges of a face in the plane bind it to the body that it bounds.
+    flat = np.logical_and.reduceat(on_plane, np.searchsorted(owner, np.arange(len(piece.polygons))))[owner]
+    apart = in_cut & ~np.isin(keys, keys[flat])
+    order = np.flatnonzero(~apart)[np.argsort(keys[~apart], kind="stable")]
     same = np.flatnonzero(np.diff(keys[order]) == 0)
     links = (np.ones(len(same)), (owner[order[same]], owner[order[same + 1]]))
     n = len(piece.polygons)
