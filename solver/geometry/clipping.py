@@ -119,12 +119,12 @@ def _clipped(
         np.concatenate(column)
         for column in zip(on_corner, (pair_a, *vertex_a), (pair_b, *vertex_b), across, strict=True)
     )
-    areas, wide = corner_areas(owner, points, len(face_a))
+    areas, wide, long = corner_areas(owner, points, len(face_a))
     kept = wide[owner] > end[owner, 0]
     found = owner[kept], features[kept], areas[kept], wide[owner[kept]]
     if parts.whole:
         return found
-    narrow = (wide <= end[:, 0])[:, None]
+    narrow = ((wide <= end[:, 0]) & (long > 4.0 * end[:, 0]))[:, None]
     return _with_reentrant_corners(
         parts,
         found,
@@ -139,8 +139,8 @@ _Corners = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 def _with_reentrant_corners(parts: ConvexParts, found: _Corners, *sides: tuple[np.ndarray, ...]) -> _Corners:
     """Add the corners, of those used, at the end of a face at which its block was cut: they touch it, and cover none.
 
-    Where a face ends at an edge of its block, what only touches that edge may leave it; in a re-entrant corner it
-    may not.
+    Where a face ends at an edge of its block, an edge that only lies along that one may leave it; in a re-entrant
+    corner it may not.
     """
     owners, features = [found[0]], [found[1]]
     for used, on_edge, corner, face, edge in sides:
@@ -212,8 +212,8 @@ def _on_face(
     return feature_rows(ON_FACE, solids.corners[own], face[pair], code)
 
 
-def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Part of its convex polygon that each corner stands for, (n,) [m²], and how wide the polygons are, (count,) [m].
+def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Part of its convex polygon that each corner stands for, (n,) [m²], and width and length of all, (count,) [m].
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.
         Number of polygons.
     """
     if len(owner) == 0:
-        return np.zeros(0), np.zeros(count)
+        return np.zeros(0), np.zeros(count), np.zeros(count)
     number = np.bincount(owner, minlength=count)
     total = np.stack([np.bincount(owner, points[:, k], minlength=count) for k in (0, 1)], axis=1)
     middle = total / np.maximum(number, 1)[:, None]
@@ -243,4 +243,4 @@ def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.
     area = np.bincount(owner, shares, minlength=count)
     far = np.zeros(count)
     np.maximum.at(far, owner, np.hypot(arms[:, 0], arms[:, 1]))
-    return np.maximum(shares, 0.0), area / np.maximum(2.0 * far, 1e-300)
+    return np.maximum(shares, 0.0), area / np.maximum(2.0 * far, 1e-300), 2.0 * far

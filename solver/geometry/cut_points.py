@@ -85,7 +85,7 @@ def without_points_of_cuts(parts: ConvexParts, contacts: Contacts, planes: np.nd
     total = np.bincount(where, contacts.areas[chosen])
     left = np.ones(len(chosen), dtype=bool)
     left[between] = False
-    shares, _ = corner_areas(where[left], places[left], len(total))
+    shares, _, _ = corner_areas(where[left], places[left], len(total))
     whole = np.bincount(where[left], shares, minlength=len(total))
     areas = contacts.areas.copy()
     areas[chosen[left]] = shares * (total / np.maximum(whole, 1e-300))[where[left]]
