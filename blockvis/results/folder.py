@@ -21,7 +21,6 @@ from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .cracks import MOST_LISTED, cracks_of
 from .increments import StoredIncrements, packed_increment
-from .joint_faces import JointFaces, LargestMovementsInSpace
 from .joints import InitialJoints, LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
@@ -224,8 +223,7 @@ class ResultsFolder:
         self._rows = io.StringIO()
         self._table = csv.writer(self._rows, lineterminator="\n")
         self._table.writerow((*COLUMNS, *own_columns(self.parameter)))
-        kind = LargestMovements if self.assembly.dimension == 2 else LargestMovementsInSpace
-        self._movements = kind(self.assembly, self.parameter)
+        self._movements = LargestMovements(self.assembly, self.parameter)
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:
@@ -286,7 +284,7 @@ def _write_grids(
     assembly: solver.Assembly,
     increment: solver.Increment,
     shape: str,
-    joints: InitialJoints | JointFaces | None = None,
+    joints: InitialJoints | None = None,
 ) -> None:
     """Write the VTU files of an increment."""
     from blockvis.vtk_files import write_vtu

@@ -30,7 +30,7 @@ from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import swing_of
 from blockvis.report.page import write_report
 from blockvis.results.datasets import block_dataset, contact_dataset, joint_dataset
-from blockvis.results.joint_faces import face_states, joint_faces
+from blockvis.results.joints import initial_joints, joint_states
 from blockvis.vtk_files import write_vtu
 
 SMALL = (640, 360)
@@ -89,7 +89,7 @@ def test_polyhedra_come_back_through_pyvista(tmp_path):
 
 def test_faces_of_joints_are_those_of_the_voussoirs():
     response = vault_response()
-    joints = joint_faces(response.assembly)
+    joints = initial_joints(response.assembly)
     # Six voussoirs between two springers: seven joints of 0.2 m × 0.5 m.
     np.testing.assert_allclose(joints.rings.areas(), np.full(7, 0.1), rtol=1e-9)
     between = response.assembly.centroids[joints.block_a] - response.assembly.centroids[joints.block_b]
@@ -99,7 +99,7 @@ def test_faces_of_joints_are_those_of_the_voussoirs():
 def test_joints_open_on_one_side_and_carry_the_weight():
     response = vault_response()
     assembly, last = response.assembly, response.path[-1]
-    states = face_states(assembly, joint_faces(assembly), last)
+    states = joint_states(assembly, initial_joints(assembly), last)
     total = np.zeros((assembly.n_blocks, 3))
     np.add.at(total, states.block_a, states.force)
     np.subtract.at(total, states.block_b, states.force)
