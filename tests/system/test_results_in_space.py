@@ -362,6 +362,10 @@ def test_one_command_from_case_to_pictures_and_again(tmp_path, monkeypatch, caps
         assert (out / name).stat().st_size > 1000
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert summary["status"] == "collapsed"
+    widest = summary["cracks"][0]
+    assert widest["width_mm"] > 1.0
+    assert len(widest["at"]) == len(widest["to"]) == 3
+    assert widest["widest_joint"] in (out / "report.html").read_text(encoding="utf-8")
     capsys.readouterr()
     assert main(["render", "out", "--animation", "none", "--colour-by", "displacement", "--forces", "thrust"]) == 0
     assert (out / "last.png").stat().st_size > 1000
