@@ -7,12 +7,13 @@ import shutil
 import subprocess
 import warnings
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 import pyvista as pv
 from PIL import Image
-from structures import vault_response
+from structures import arch_response, vault_response
 from test_paraview import PVPYTHON, READ
 from test_report import browser, visited
 
@@ -85,6 +86,26 @@ def test_polyhedra_come_back_through_pyvista(tmp_path):
     np.testing.assert_array_equal(back.cell_data["rotation"], last.pose.rotations)
     # Programs of before VTK 9.4 know no other arrays of faces.
     assert b'Name="faceoffsets"' in file.read_bytes()
+
+
+@pytest.mark.parametrize("response", [arch_response, vault_response], ids=["plane", "space"])
+def test_results_reach_meshio_as_the_manual_says(response, tmp_path, monkeypatch):
+    """Numbers, cells and, beside them, names: of polygons and of polyhedra, which meshio sorts by their corners."""
+    pytest.importorskip("meshio")
+    manual = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(import meshio.*?)```", manual, re.S)
+    assembly, increment = response().assembly, response().path[-1]
+    monkeypatch.chdir(tmp_path)
+    write_vtu(block_dataset(assembly, increment), tmp_path / "out" / "increments" / "blocks_00000.vtu")
+    read = {}
+    exec(code, read)
+    mesh = read["mesh"]
+    np.testing.assert_array_equal(mesh.points[:, : assembly.dimension], solver.moved_vertices(assembly, increment.pose))
+    assert sum(len(cells.data) for cells in mesh.cells) == assembly.n_blocks
+    numbers = np.concatenate(mesh.cell_data["block_id"])
+    assert [read["names"][k] for k in numbers] == [assembly.names[k] for k in numbers]
+    moved = np.concatenate(mesh.cell_data["displacement"])[np.argsort(numbers), : assembly.dimension]
+    np.testing.assert_allclose(moved, increment.pose.positions - assembly.centroids, atol=1e-15)
 
 
 def test_faces_of_joints_are_those_of_the_voussoirs():
