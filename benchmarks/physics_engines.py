@@ -138,20 +138,7 @@ def mujoco_path(
             f'<body name="b{i}" pos="{x:.17g} {y:.17g} 0"{gravity}>{joints}'
             f'<geom type="mesh" mesh="m{i}" contype="1" conaffinity="{meets}"/></body>'
         )
-    density = float(np.unique(assembly.density)[0])
-    # hard friction keeps the arch from creeping (with 10 it falls 1 % early); a panel of bricks it throws apart
-    impratio = 100 if assembly.n_blocks < 50 else 10
-    model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco>
-        <option timestep="{time_step}" gravity="0 {-solver.GRAVITY} 0" cone="elliptic" impratio="{impratio}"
-                solver="Newton" iterations="200" tolerance="1e-12" integrator="implicitfast">
-          <flag nativeccd="enable"/></option>
-        <default><geom condim="3" friction="{friction} 0 0" density="{density}"
-                 solref="{2 * time_step} 1" solimp="0.99 0.9999 1e-5"/></default>
-        <asset>{"".join(meshes)}</asset><worldbody>{"".join(bodies)}</worldbody></mujoco>"""
-    )
-    # several contact points where faces meet: to be asked for up to some version, the default in later ones
-    model.opt.enableflags |= int(getattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD", 0))
+    model = _mujoco_model(assembly, meshes, bodies, f"0 {-solver.GRAVITY} 0", time_step, friction)
     data = mujoco.MjData(model)
     moving = np.flatnonzero(assembly.moving)
     drives = [model.joint(f"drive{i}") for i in moving]
@@ -178,6 +165,28 @@ def mujoco_path(
         positions = data.xpos[ids, :2].copy()
         displacement = float(data.qpos[drives[0].qposadr[0]])
         yield Sample(clock + per_sample * time_step, displacement, positions, force / per_sample)
+
+
+def _mujoco_model(
+    assembly: solver.Assembly, meshes: list[str], bodies: list[str], gravity: str, time_step: float, friction: float
+) -> Any:
+    import mujoco
+
+    density = float(np.unique(assembly.density)[0])
+    # hard friction keeps an arch from creeping (with 10 it falls 1 % early); a panel of bricks it throws apart
+    impratio = 100 if assembly.n_blocks < 50 else 10
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco>
+        <option timestep="{time_step}" gravity="{gravity}" cone="elliptic" impratio="{impratio}"
+                solver="Newton" iterations="200" tolerance="1e-12" integrator="implicitfast">
+          <flag nativeccd="enable"/></option>
+        <default><geom condim="3" friction="{friction} 0 0" density="{density}"
+                 solref="{2 * time_step} 1" solimp="0.99 0.9999 1e-5"/></default>
+        <asset>{"".join(meshes)}</asset><worldbody>{"".join(bodies)}</worldbody></mujoco>"""
+    )
+    # several contact points where faces meet: to be asked for up to some version, the default in later ones
+    model.opt.enableflags |= int(getattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD", 0))
+    return model
 
 
 def _strips(outline: np.ndarray, width: float, gap: float) -> list[np.ndarray]:
@@ -328,16 +337,7 @@ def mujoco_path_in_space(
             f'<body name="b{i}" pos="{place}"{gravity}>{joints}'
             f'<geom type="mesh" mesh="m{i}" contype="1" conaffinity="{1 if assembly.free[i] else 0}"/></body>'
         )
-    model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco>
-        <option timestep="{time_step}" gravity="0 0 {-solver.GRAVITY}" cone="elliptic" impratio="10"
-                solver="Newton" iterations="200" tolerance="1e-12" integrator="implicitfast">
-          <flag nativeccd="enable"/></option>
-        <default><geom condim="3" friction="{friction} 0 0" density="{float(np.unique(assembly.density)[0])}"
-                 solref="{2 * time_step} 1" solimp="0.99 0.9999 1e-5"/></default>
-        <asset>{"".join(meshes)}</asset><worldbody>{"".join(bodies)}</worldbody></mujoco>"""
-    )
-    model.opt.enableflags |= int(getattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD", 0))
+    model = _mujoco_model(assembly, meshes, bodies, f"0 0 {-solver.GRAVITY}", time_step, friction)
     data = mujoco.MjData(model)
     moving = np.flatnonzero(assembly.moving)
     drives = [model.joint(f"drive{i}") for i in moving]

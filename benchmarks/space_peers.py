@@ -25,17 +25,15 @@ import os
 os.environ["OMP_NUM_THREADS"] = "1"  # before numpy starts its threads, whose waiting would count as work
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
-import importlib.metadata
 import math
 import multiprocessing
 import multiprocessing.connection
-import platform
 import time
 
 import equilibrium_peers
 import numpy as np
 import physics_engines
-from peers import FALLING_RATE, Drive, compared, loaded, row
+from peers import FALLING_RATE, Drive, compared, installed, row
 
 import solver
 from blockvis import generators
@@ -200,22 +198,7 @@ def main() -> None:
     options.add_argument("--questions", type=int, nargs="+", choices=(1, 2, 3), default=(1, 2, 3))
     options.add_argument("--seconds", type=float, default=300.0, help="processor time given to a run of an engine")
     given = options.parse_args()
-    engines: list[str] = []
-    tools: dict[str, Drive] = {"blockvis": equilibrium_peers.limit_load}
-    if not given.quick:
-        for name in (*physics_engines.IN_SPACE, "compas_cra"):
-            if not loaded(name):
-                print(f"{name}: not installed")
-                continue
-            print(f"{name} {importlib.metadata.version(name)}")
-            if name == "compas_cra":
-                tools["compas_cra RBE"] = equilibrium_peers.rigid_block_equilibrium
-                tools["compas_cra CRA"] = equilibrium_peers.coupled_analysis
-            else:
-                engines.append(name)
-    print(f"blockvis {importlib.metadata.version('blockvis')}, Python {platform.python_version()}\n")
-    row("tool", "case", "quantity", "reference", "found", "difference", "seconds")
-    row("---", "---", "---", "---", "---", "---", "---")
+    engines, tools = installed(() if given.quick else (*physics_engines.IN_SPACE, "compas_cra"))
     if 1 in given.questions:
         equilibrium(tools, given.seconds)
     if 2 in given.questions:
