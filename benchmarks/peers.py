@@ -90,7 +90,7 @@ def loaded(module: str) -> bool:
 
 
 def installed(names: tuple[str, ...]) -> tuple[list[str], dict[str, Drive]]:
-    """The engines, and with ours the tools for equilibrium that are there; prints versions and the head of the table."""
+    """The engines, and with ours the tools for equilibrium that are there; prints versions and the table's head."""
     engines: list[str] = []
     tools: dict[str, Drive] = {"blockvis": equilibrium_peers.limit_load}
     for name in names:
