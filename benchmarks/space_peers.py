@@ -1,6 +1,6 @@
 """Blocks in space beside other tools, in one run: the same stones, the same machine, one table.
 
-    python benchmarks/space_peers.py [--quick] [--questions 1 2 3] [--seconds 300]
+    python benchmarks/space_peers.py [--quick] [--questions 1 2 3] [--seconds 300] [--speeds 0.02]
 
 Peers are whatever is installed of compas_cra, compas_lmgc90 and mujoco, as for ``peers.py``; seconds are processor
 time.
@@ -42,8 +42,8 @@ from blockvis import generators
 COLLAPSE, FIRST, LAST = 0.1721334, 0.1661226, 0.369815
 DOME_FRICTION, WALL_FRICTION = 0.7, 0.6
 
-#: Time step [s] and speed of the supports [m/s] of the runs of an engine.
-RUNS = ((1e-3, 0.02), (1e-3, 0.005))
+#: Time step of the engines [s], and speeds of the supports [m/s].
+TIME_STEP, SPEEDS = 1e-3, (0.02, 0.005)
 
 #: Settlements at which the corner is looked at [m], and how fast it gets there in engines [m/s].
 LOOKS, SINKING_SPEED = (0.02, 0.06, 0.1), 0.01
@@ -73,6 +73,8 @@ def asked(ask: Drive, assembly: solver.Assembly, friction: float, budget: float)
     child.start()
     there.close()
     try:
+        if not here.poll(120.0 + budget):
+            return None
         here.recv()
         return here.recv() if here.poll(budget) else None
     except EOFError:
@@ -108,7 +110,7 @@ def equilibrium(tools: dict[str, Drive], budget: float) -> None:
             row(tool, case, "equilibrium", expected, found + note, right, f"{verdict.seconds:.3f}")
 
 
-def spreading_dome(engines: list[str], budget: float) -> None:
+def spreading_dome(engines: list[str], speeds: list[float], budget: float) -> None:
     """Spreads the supports of the dome with every tool."""
     stones, radial = dome(0.12), {"radial_from": (0.0, 0.0)}
     started = time.process_time()
@@ -130,9 +132,9 @@ def spreading_dome(engines: list[str], budget: float) -> None:
     slope = float(np.diff(kinematic[-3:, 1])[0] / np.diff(kinematic[-3:, 0])[0])
     ways = spread.rate(stones, solver.Pose.initial(stones), 0.0)[:, :3]
     for name in engines:
-        for time_step, speed in RUNS:
+        for speed in speeds:
             samples, spent, fallen = [], 0.0, False
-            path = physics_engines.in_a_process(name, stones, ways, speed, time_step, DOME_FRICTION, budget=budget)
+            path = physics_engines.in_a_process(name, stones, ways, speed, TIME_STEP, DOME_FRICTION, budget=budget)
             for so_far, sample in path:
                 spent, d = so_far, sample.displacement
                 sunk = stones.centroids[cap, 2] - float(sample.positions[cap, 2])
@@ -143,7 +145,7 @@ def spreading_dome(engines: list[str], budget: float) -> None:
                 if fallen or d > 0.4:
                     break
             path.close()
-            setting = f"dome, steps of {1e3 * time_step:g} ms, {1e3 * speed:g} mm/s"
+            setting = f"dome, steps of {1e3 * TIME_STEP:g} ms, {1e3 * speed:g} mm/s"
             if not fallen:
                 reached = f"given up at {samples[-1][0]:.4f}" if samples else "nothing"
                 row(name, setting, "d_c/R", COLLAPSE, reached, "–", f"{spent:.1f}")
@@ -176,7 +178,7 @@ def sinking_corner(engines: list[str], budget: float) -> None:
     ways = sink.rate(walls, solver.Pose.initial(walls), 0.0)[:, :3]
     for name in engines:
         samples, spent = [], 0.0
-        path = physics_engines.in_a_process(name, walls, ways, SINKING_SPEED, 1e-3, WALL_FRICTION, budget=budget)
+        path = physics_engines.in_a_process(name, walls, ways, SINKING_SPEED, TIME_STEP, WALL_FRICTION, budget=budget)
         for so_far, sample in path:
             spent = so_far
             samples.append((sample.displacement, float(sample.force[0]) / weight))
@@ -197,12 +199,13 @@ def main() -> None:
     options.add_argument("--quick", action="store_true", help="blockvis alone")
     options.add_argument("--questions", type=int, nargs="+", choices=(1, 2, 3), default=(1, 2, 3))
     options.add_argument("--seconds", type=float, default=300.0, help="processor time given to a run of an engine")
+    options.add_argument("--speeds", type=float, nargs="+", default=list(SPEEDS), help="of the dome's supports [m/s]")
     given = options.parse_args()
     engines, tools = installed(() if given.quick else (*physics_engines.IN_SPACE, "compas_cra"))
     if 1 in given.questions:
         equilibrium(tools, given.seconds)
     if 2 in given.questions:
-        spreading_dome(engines, given.seconds)
+        spreading_dome(engines, given.speeds, given.seconds)
     if 3 in given.questions:
         sinking_corner(engines, given.seconds)
 
