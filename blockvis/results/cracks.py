@@ -113,11 +113,13 @@ def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
     """Name and say in words the widest crack lines, for a table."""
     rows = []
     for number, crack in enumerate(cracks[:most], start=1):
-        first, last = (f"({', '.join(f'{x + 0.0:.3g}' for x in np.round(end, 6))})" for end in crack.ends)
-        words = (
-            f"{1e3 * crack.width:.3g} mm at {crack.widest}; {crack.size:.3g} {'m' if len(crack.at) == 2 else 'm²'}, "
-        )
-        words += f"{crack.inclination:.0f}°, from {first} to {last} m"
+        # To a thousandth of the crack: the last digits of a zero are no place.
+        longest = float(np.linalg.norm(crack.ends[1] - crack.ends[0]))
+        ends = np.round(crack.ends, 3 - int(np.floor(np.log10(longest)))) + 0.0
+        first, last = (f"({', '.join(f'{x:.3g}' for x in end)})" for end in ends)
+        size = f"{crack.size:.3g} {'m' if len(crack.at) == 2 else 'm²'}"
+        words = f"{1e3 * crack.width:.3g} mm at {crack.widest}; {size}, {crack.inclination:.0f}°, "
+        words += f"from {first} to {last} m"
         rows.append((f"crack {number}", words))
     if len(cracks) > most:
         rows.append(("and", f"{len(cracks) - most} narrower ones"))
