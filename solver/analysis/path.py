@@ -562,7 +562,8 @@ class Path:
             # Nothing has moved: what the first movement has to overcome, least reaction or largest multiplier.
             forces, multiplier = bounds.forces, bounds.high
         else:
-            forces, multiplier = self._balanced(place, contacts, friction, remembered)
+            # Where none near those of the path are found, those of the bounds are in equilibrium, too.
+            forces, multiplier = self._balanced(place, contacts, friction, remembered) or (bounds.forces, bounds.high)
         if model.live is None:
             multiplier = float((self._on_supports(contacts, place.pose, forces) * self.driver.rate(place.s)).sum())
         return Proved(place, contacts, friction, bounds, forces, multiplier)
@@ -579,8 +580,8 @@ class Path:
 
     def _balanced(
         self, place: Place, contacts: Contacts, friction: np.ndarray, remembered: np.ndarray
-    ) -> tuple[np.ndarray, float]:
-        """Forces in equilibrium without the drag, near those remembered; open points carry none."""
+    ) -> tuple[np.ndarray, float] | None:
+        """Forces in equilibrium without the drag, near those remembered, or none; open points carry nothing."""
         model, free = self.model, self.model.assembly.free
         closed = np.flatnonzero(contacts.gaps <= self._closed_gap(place) * model.length)
         d = model.dimension
@@ -609,7 +610,7 @@ class Path:
             live=live[free].ravel() if model.live is not None else None,
             control=live[free].ravel() if model.live is not None else None,
         )
-        forces = remembered.copy()
+        forces = np.zeros_like(remembered)
         for step in (still, replace(still, slip=np.zeros_like(on))):
             try:
                 found = solve_step(step, np.zeros(len(load)), place.multiplier * live_size)
@@ -617,8 +618,7 @@ class Path:
             except NotSolved:
                 continue
         else:
-            return forces, place.multiplier
-        forces[:] = 0.0
+            return None
         forces[closed] = np.column_stack([found.normal, found.shear])
         return forces, found.multiplier / (live_size or 1.0)
 
