@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -99,7 +100,10 @@ def explain(
         case = replace(case, settlements=(), profiles=())
         drawn = case_assembly(case)
         if drawn.dimension != 2:
-            raise ValueError(f"{case.source}: explain knows structures in the plane only; this one is in space")
+            raise ValueError(
+                f"{case.source}: explain follows structures in the plane, and this one is in space; explain a section "
+                "of it that is drawn in the plane, or follow each settlement that may be the cause with blockvis run"
+            )
         needs_dry_joints(case)
         solver.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)
@@ -112,14 +116,14 @@ def explain(
     if not len(observations.points):
         first = [one for one in first if opens_cracks(ground.assembly, one)]
     about = 3 * len(first)
-    with workers_for(about, workers, scheduler) as client:
-        search.follow(first, (search.frictions[1],), client, progress)
+    with workers_for(about, workers, scheduler) as processes:
+        search.follow(first, (search.frictions[1],), processes, progress)
         worth = [c for c in search.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
         around = refined(ground, [cause.best.candidate for cause in worth], first)
-        search.follow(around, (search.frictions[1],), client, progress)
+        search.follow(around, (search.frictions[1],), processes, progress)
         worth = [c for c in search.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
         closer = [one for cause in worth for one in _closest(cause)]
-        search.follow(closer, (search.frictions[0], search.frictions[2]), client, progress)
+        search.follow(closer, (search.frictions[0], search.frictions[2]), processes, progress)
     causes = search.ranked()
     by_best = by_any = np.zeros(0, dtype=bool)
     if causes:
@@ -201,7 +205,9 @@ class _Search:
         """Whether the observations tell movements apart that differ by a translation of everything."""
         return len(self.observations.points) > 0
 
-    def follow(self, candidates: Sequence[Candidate], frictions: Sequence[float], client: Any, progress: bool) -> None:
+    def follow(
+        self, candidates: Sequence[Candidate], frictions: Sequence[float], processes: Executor | None, progress: bool
+    ) -> None:
         """Follow candidates at some frictions, and compare them with the observations."""
         new = [one for one in candidates if one not in self.candidates]
         self.candidates += new
@@ -226,13 +232,13 @@ class _Search:
                     )
         bar = StudyProgress(len(orders), shown=None if progress else False)
         try:
-            found = all_followed(list(orders.values()), client, bar)
+            found = all_followed(list(orders.values()), processes, bar)
         finally:
             bar.done()
         self.runs.update(zip(orders, found, strict=True))
         for one, friction in wanted:
             twin = twins[self.candidates.index(one)]
-            factor, unit = per_amount(one)
+            factor, unit = per_amount(self.ground.assembly, one)
             twin = replace(twin, scale=twin.scale * factor, travel=twin.travel / factor)
             shared = self.candidates[twin.of]
             order = ordered(

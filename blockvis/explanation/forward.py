@@ -2,34 +2,37 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 
 import solver
 from blockvis.cases.build import case_interfaces, case_loads
 from blockvis.cases.contents import Case
-from blockvis.extras import MissingExtra, require
+from blockvis.extras import require
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.runs.progress import StudyProgress
 
-if TYPE_CHECKING:
-    from distributed import Client
-
-#: Increments up to the largest amount of a candidate.
-INCREMENTS = 12
-
-#: The first of them is divided, where hinges form: parts of it that have an increment of their own.
-STOPS = (0.125, 0.25, 0.5)
+#: Increments up to the largest amount of a candidate, each longer than the one before by this factor: what an amount
+#: does is known within the same fraction of it, whatever cracks a movement opens.
+INCREMENTS, LONGER = 16, 1.35
 
 #: A run stops where a joint is open by so many times the widest observed crack, rounded up to a power of two.
-ENOUGH = 1.5
+ENOUGH = 2.0
 
-#: The largest displacement of a support, in such cracks, where the case gives none.
-FARTHEST = 10.0
+#: The largest displacement of a support, in such cracks, where the case gives none. A springer goes down by ten times
+#: the width of the cracks that this opens.
+FARTHEST = 25.0
+
+#: A collapse is found within this fraction of the largest amount.
+COLLAPSE = 2e-3
 
 #: With fewer runs than this, processes cost more than they save.
 FEWEST_FOR_PROCESSES = 8
@@ -131,9 +134,10 @@ def ordered(
     moving = assembly.with_roles(roles)
     lever = lever_of(moving, solver.Settlement(profile=motions))
     farthest = (FARTHEST * widest if limit is None else limit) / lever
-    step = farthest / INCREMENTS
-    stops = tuple(part * step for part in STOPS)
-    settlement = solver.Settlement(profile=motions, increment=step, limit=farthest, stops=stops)
+    stops = tuple(farthest / LONGER**k for k in range(1, INCREMENTS))
+    settlement = solver.Settlement(
+        profile=motions, increment=farthest, limit=farthest, stops=stops, tolerance=COLLAPSE * farthest
+    )
     factor = friction / case.friction_coefficient if case.friction_coefficient > 0.0 else 1.0
     laws = {
         pair: replace(law, friction_coefficient=factor * law.friction_coefficient)
@@ -179,65 +183,80 @@ def followed(order: Order) -> Run:
 
 
 @contextmanager
-def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterator[Client | None]:
-    """Start or find the Dask workers of the runs; None where this process makes them.
+def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterator[Executor | None]:
+    """Start or find the processes of the runs; None where this process makes them.
 
     Parameters
     ----------
     runs : int
         About so many there will be.
     workers : int, optional
-        Processes of this machine; one per core where the extra ``studies`` is installed and the runs are many.
+        Processes of this machine; one per core where the runs are many.
     scheduler : str, optional
         Address of a Dask scheduler that exists.
     """
     if workers is not None and workers < 1:
         raise ValueError(f"workers is {workers}; give at least 1")
-    from blockvis.studies import campaign
-
     if scheduler is not None:
         require("studies", "explain on a Dask cluster")
+        from blockvis.studies import campaign
+
         with campaign.existing_cluster(scheduler, "") as client:
-            yield client
+            yield client.get_executor(pure=False)
         return
-    if workers == 1 or (workers is None and runs < FEWEST_FOR_PROCESSES):
+    count = min(workers or cores(), runs)
+    if count < 2 or (workers is None and runs < FEWEST_FOR_PROCESSES):
         yield None
         return
+    # Processes that are forked would share the locks of this one's threads.
+    processes = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
     try:
-        require("studies", "explain with several processes")
-    except MissingExtra:
-        if workers is not None:
-            raise
-        yield None
-        return
-    count = min(workers or campaign.cores(), runs)
-    if count < 2:
-        yield None
-        return
-    with campaign.local_cluster(count) as client:
-        yield client
+        yield processes
+    finally:
+        processes.shutdown(cancel_futures=True)
 
 
-def all_followed(orders: Sequence[Order], client: Client | None, progress: StudyProgress | None = None) -> list[Run]:
-    """Carry out runs, on the workers of a Dask client or here.
+def cores() -> int:
+    """Count the cores that processes of this machine may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _ignore_interrupts() -> None:
+    """Let the first process alone answer Ctrl-C of their terminal; it stops the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def all_followed(
+    orders: Sequence[Order], processes: Executor | None, progress: StudyProgress | None = None
+) -> list[Run]:
+    """Carry out runs, in other processes or here.
 
     Parameters
     ----------
     orders : sequence of Order
-    client : distributed.Client, optional
+    processes : concurrent.futures.Executor, optional
     progress : StudyProgress, optional
         Counts them.
+
+    Raises
+    ------
+    ValueError
+        Where processes cannot be started, or are ended by the system.
     """
     count: Callable[[], None] = (lambda: None) if progress is None else progress.finished
-    if client is None:
-        found = []
+    found = []
+    if processes is None:
         for order in orders:
             found.append(followed(order))
             count()
         return found
-    futures = client.map(followed, orders, pure=False)
-    found = []
-    for future in futures:
-        found.append(future.result())
-        count()
+    try:
+        for future in [processes.submit(followed, order) for order in orders]:
+            found.append(future.result())
+            count()
+    except BrokenExecutor as error:
+        raise ValueError(
+            f"the processes of the runs have ended ({error}), perhaps for want of memory; ask for fewer with "
+            '--workers 1, and call blockvis.explain in a script under if __name__ == "__main__":'
+        ) from None
     return found

@@ -158,11 +158,9 @@ def _computed(
     )
     middles = (on_a + on_b).mean(axis=1) / 2.0
     if len(given.widths):
-        compared = found.comparison
-        along = np.nan_to_num(compared.along, nan=0.5)
-        there = ends[None, :, 0] * (1.0 - along) + ends[None, :, 1] * along
-        joint = (compared.nearness * (there + 1e-6 * given.largest)).argmax(axis=1)
-        share = along[np.arange(len(joint)), joint][:, None]
+        pairs = cause.best.pairs[cause.at]
+        joint = found.comparison.joint[pairs]
+        share = np.nan_to_num(found.comparison.along[pairs], nan=0.5)[:, None]
         faces = (on_a + on_b)[joint] / 2.0
         places = faces[:, 0] * (1.0 - share) + faces[:, 1] * share
         _labels(panel, places, cause.best.widths[cause.at], found, given.places, sizes=given.widths)
