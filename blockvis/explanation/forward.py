@@ -20,22 +20,44 @@ from blockvis.extras import require
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.runs.progress import StudyProgress
 
+from .observations import Observations
+
 #: Increments up to the largest amount of a candidate, each longer than the one before by this factor: what an amount
 #: does is known within the same fraction of it, whatever cracks a movement opens.
 INCREMENTS, LONGER = 16, 1.35
 
-#: A run stops where a joint is open by so many times the widest observed crack, rounded up to a power of two.
+#: A run stops where a joint is open by so many times the widest observed crack.
 ENOUGH = 2.0
 
-#: The largest displacement of a support, in such cracks, where the case gives none. A springer goes down by ten times
-#: the width of the cracks that this opens.
-FARTHEST = 25.0
+#: The largest displacement of a support where the case gives none: in widest cracks, for a springer goes down by ten
+#: times the width of those that this opens, and in largest displacements that were observed.
+FARTHEST, AS_FAR = 25.0, 3.0
+
+#: What is drawn symmetric has several paths, and what is built has taken one: stones are heavier by up to this fraction
+#: towards one side, and lighter towards the other.
+LEANING = 0.02
 
 #: A collapse is found within this fraction of the largest amount.
 COLLAPSE = 2e-3
 
 #: With fewer runs than this, processes cost more than they save.
 FEWEST_FOR_PROCESSES = 8
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What a run assumes besides the movement of the supports.
+
+    Attributes
+    ----------
+    friction : float
+        Coefficient of [material]; those of pairs of materials follow in proportion.
+    lean : {-1, 0, 1}
+        Whether stones are a little heavier towards the left, nowhere, or towards the right.
+    """
+
+    friction: float
+    lean: int = 0
 
 
 @dataclass(frozen=True)
@@ -93,6 +115,26 @@ class Run:
         return np.asarray(values[place] * (1.0 - rest) + values[following] * rest)
 
 
+def reach_of(observations: Observations, limit: float | None) -> tuple[float, float]:
+    """Say how far runs go: the largest displacement of a support, and the opening at which they may stop [m].
+
+    Parameters
+    ----------
+    observations : Observations
+    limit : float, optional [m]
+        Largest displacement of a support, where the case gives it.
+    """
+
+    def rounded(length: float) -> float:
+        # Runs that go a little farther serve other observations of the same structure, too.
+        return float(2.0 ** np.ceil(np.log2(length))) if length > 0.0 else 0.0
+
+    widest = rounded(observations.widths.max(initial=0.0))
+    moved = rounded(np.hypot(*observations.displacements.T).max(initial=0.0)) if len(observations.points) else 0.0
+    farthest = max(FARTHEST * widest, AS_FAR * moved) if limit is None else limit
+    return farthest, ENOUGH * widest if widest > 0.0 else np.inf
+
+
 def lever_of(assembly: solver.Assembly, settlement: solver.Settlement) -> float:
     """Largest movement of a support where it carries something, per unit of the settlement [m or m/rad]."""
     reach = 2e-3 * assembly.block_size
@@ -110,9 +152,8 @@ def ordered(
     case: Case,
     assembly: solver.Assembly,
     motions: Any,
-    friction: float,
-    widest: float,
-    limit: float | None,
+    variant: Variant,
+    reach: tuple[float, float],
 ) -> Order:
     """State the run of a candidate.
 
@@ -122,22 +163,20 @@ def ordered(
     assembly : solver.Assembly
         Every support fixed.
     motions : mapping of str to (float, float, float)
-    friction : float
-        Coefficient of [material]; those of pairs of materials follow in proportion.
-    widest : float [m]
-        Of the observed cracks.
-    limit : float, optional [m]
-        Largest displacement of a support.
+    variant : Variant
+    reach : (float, float) [m]
+        Largest displacement of a support, and opening of a joint at which the run may stop.
     """
     roles = assembly.roles.astype("<U6").copy()
     roles[[assembly.index(name) for name in motions]] = solver.MOVING
     moving = assembly.with_roles(roles)
     lever = lever_of(moving, solver.Settlement(profile=motions))
-    farthest = (FARTHEST * widest if limit is None else limit) / lever
+    farthest = reach[0] / lever
     stops = tuple(farthest / LONGER**k for k in range(1, INCREMENTS))
     settlement = solver.Settlement(
         profile=motions, increment=farthest, limit=farthest, stops=stops, tolerance=COLLAPSE * farthest
     )
+    friction = variant.friction
     factor = friction / case.friction_coefficient if case.friction_coefficient > 0.0 else 1.0
     laws = {
         pair: replace(law, friction_coefficient=factor * law.friction_coefficient)
@@ -145,7 +184,12 @@ def ordered(
     }
     varied = replace(case, friction_coefficient=friction, interfaces=laws)
     controls = replace(case.controls, falling_frames=0)
-    return Order(moving, settlement, case_interfaces(varied), case_loads(case, moving), controls, ENOUGH * widest)
+    loads = case_loads(case, moving)
+    x = moving.centroids[:, 0]
+    middle, half = (x.max() + x.min()) / 2.0, max(float(np.ptp(x)) / 2.0, 1e-300)
+    heavier = 1.0 + LEANING * variant.lean * (x - middle) / half
+    loads = replace(loads, dead=loads.dead * heavier[:, None])
+    return Order(moving, settlement, case_interfaces(varied), loads, controls, reach[1])
 
 
 def followed(order: Order) -> Run:

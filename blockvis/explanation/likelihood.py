@@ -12,20 +12,18 @@ import solver
 from blockvis.results.joints import InitialJoints, end_openings, initial_joints
 
 from .candidates import Candidate, Twin
-from .forward import Run
+from .forward import Run, Variant
 from .observations import Observations, block_at
 
-#: Amounts at which the likelihood is worked out, evenly from 0 to the largest.
-AMOUNTS = 480
+#: Amounts at which the likelihood is worked out, each larger than the one before by the same factor: from this fraction
+#: of the largest on.
+AMOUNTS, LEAST_AMOUNT = 320, 2e-3
 
 #: An observation may be of a joint that lies about so many blocks farther than its place is certain.
 NEIGHBOURHOOD = 0.5
 
 #: Joints with a smaller chance than this, against that of the nearest, are not compared.
 LEAST_CHANCE = 0.02
-
-#: Factors of the model's standard deviation among which the observations themselves choose.
-ERRORS = (1.0,)
 
 #: What the model may show where nothing was observed, as a fraction of the root mean square of what was.
 ELSEWHERE = 0.7
@@ -102,6 +100,8 @@ class Comparison:
         )
         #: (n_widths,) and (m, 2) arrays [m]: sizes of which the model's errors are fractions.
         self.scales = _error_scales(given.widths), _error_scales(given.displacements)
+        # How supports move is what a cause says, not what the model makes of it.
+        self.scales[1][~assembly.free[self.blocks]] = 0.0
 
     def openings(self, moved: np.ndarray) -> np.ndarray:
         """(n, n_joints, 2) array [m]: at both ends of the joints, where blocks move by (n, n_blocks, 3)."""
@@ -134,45 +134,36 @@ class Comparison:
         Notes
         -----
         Each observation is normally distributed about what the model shows, with the variances of the measurement and
-        of the model added, or, with the probability of an outlier, evenly over twice the largest observed width. How
-        far the model errs is not known: its standard deviations are averaged over :data:`ERRORS`. Observations beyond
-        :data:`INDEPENDENT` sharpen nothing: all of them weigh less.
+        of the model added, or, with the probability of an outlier, evenly over twice the largest observed width.
+        Observations beyond :data:`INDEPENDENT` sharpen nothing: all of them weigh less.
         """
         given = self.observations
         count = len(given.widths) + 2 * len(given.points)
         weight = min(1.0, INDEPENDENT / count)
         span = 2.0 * given.largest
         strays = np.log(self.trust.outliers / span)
-        levels = []
-        for factor in ERRORS:
-            total = np.zeros(len(widths))
-            sigma, spread = self.deviations(factor)
-            if len(self.seen):
-                terms = _log_normal(widths - given.widths[self.seen], sigma[self.seen]) + self.log_chance
-                fits = _log_sums(terms, self.first) + np.log1p(-self.trust.outliers)
-                total += np.logaddexp(fits, strays).sum(axis=1)
-            if len(given.points):
-                fits = _log_normal(displacements - given.displacements, spread) + np.log1p(-self.trust.outliers)
-                total += np.logaddexp(fits, strays).sum(axis=(1, 2))
-            levels.append(weight * total)
-        return np.asarray(logsumexp(levels, axis=0)) - np.log(len(ERRORS))
+        total = np.zeros(len(widths))
+        sigma, spread = self.deviations
+        if len(self.seen):
+            terms = _log_normal(widths - given.widths[self.seen], sigma[self.seen]) + self.log_chance
+            fits = _log_sums(terms, self.first) + np.log1p(-self.trust.outliers)
+            total += np.logaddexp(fits, strays).sum(axis=1)
+        if len(given.points):
+            fits = _log_normal(displacements - given.displacements, spread) + np.log1p(-self.trust.outliers)
+            total += np.logaddexp(fits, strays).sum(axis=(1, 2))
+        return weight * total
 
-    def deviations(self, factor: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """Work out standard deviations of observed minus computed widths (n_widths,) and points (n_points, 2) [m].
-
-        Parameters
-        ----------
-        factor : float
-            Of the errors of the model.
-        """
-        given, model = self.observations, factor * self.trust.model
+    @property
+    def deviations(self) -> tuple[np.ndarray, np.ndarray]:
+        """Standard deviations of observed minus computed widths (n_widths,) and displacements (n_points, 2) [m]."""
+        given, model = self.observations, self.trust.model
         # By the observed sizes, not the computed ones: else a smaller amount would always look more certain.
         sigma = np.hypot(given.uncertainties, model * self.scales[0])
         return sigma, np.hypot(given.point_uncertainties[:, None], model * self.scales[1])
 
     def likeliest(self, widths: np.ndarray) -> np.ndarray:
         """(n, n_widths) int array: the pair of each observation that fits best, of pairs with widths (n, n_pairs)."""
-        sigma, _ = self.deviations()
+        sigma, _ = self.deviations
         terms = _log_normal(widths - self.observations.widths[self.seen], sigma[self.seen]) + self.log_chance
         last = np.append(self.first, len(self.seen))[1:]
         best = [start + terms[:, start:end].argmax(axis=1) for start, end in zip(self.first, last, strict=True)]
@@ -186,7 +177,7 @@ class Comparison:
         widths : (n, n_widths) array [m]
         displacements : (n, n_points, 2) array [m]
         """
-        sigma, spread = self.deviations()
+        sigma, spread = self.deviations
         over = (displacements - self.observations.displacements) / spread
         return (widths - self.observations.widths) / sigma, np.hypot(over[..., 0], over[..., 1])
 
@@ -228,7 +219,7 @@ class Trial:
     Attributes
     ----------
     candidate : Candidate
-    friction : float
+    variant : Variant
     run : Run
         Of the candidate itself, or of its twin.
     twin : Twin
@@ -238,7 +229,7 @@ class Trial:
     unit : str
         Of the amounts.
     amounts : (n,) array [m or rad]
-        Of the candidate, evenly spaced up to the largest that is looked at.
+        Of the candidate, each larger than the one before by the same factor, up to the largest that is looked at.
     log_likelihood : (n,) array
         -inf where the structure has fallen, or where the run was not followed.
     widths : (n, n_widths) array [m]
@@ -250,7 +241,7 @@ class Trial:
     """
 
     candidate: Candidate
-    friction: float
+    variant: Variant
     run: Run
     twin: Twin
     shared: Candidate
@@ -261,10 +252,21 @@ class Trial:
     pairs: np.ndarray
     ends: np.ndarray
 
+    @property
+    def friction(self) -> float:
+        """Coefficient of friction of [material]."""
+        return self.variant.friction
+
     @cached_property
     def log_evidence(self) -> float:
         """Logarithm of the likelihood, averaged over the amounts."""
-        return float(logsumexp(self.log_likelihood) - np.log(len(self.amounts)))
+        return float(logsumexp(self.log_mass))
+
+    @property
+    def log_mass(self) -> np.ndarray:
+        """(n,) array: logarithm of the likelihood of each amount times its prior, evenly spread up to the largest."""
+        # Each stands for those around it, which are as many as it is large.
+        return np.asarray(self.log_likelihood + np.log(self.amounts / self.amounts.sum()))
 
     @property
     def best(self) -> int:
@@ -285,7 +287,7 @@ class Trial:
 def tried(
     comparison: Comparison,
     candidate: Candidate,
-    friction: float,
+    variant: Variant,
     run: Run,
     twin: Twin,
     shared: Candidate,
@@ -298,7 +300,7 @@ def tried(
     ----------
     comparison : Comparison
     candidate : Candidate
-    friction : float
+    variant : Variant
     run : Run
     twin : Twin
     shared : Candidate
@@ -308,12 +310,12 @@ def tried(
     largest : float [m or rad]
         Largest amount of the candidate that is looked at.
     """
-    amounts = largest * np.arange(1, AMOUNTS + 1) / AMOUNTS
+    amounts = largest * np.geomspace(LEAST_AMOUNT, 1.0, AMOUNTS)
     if len(run.amounts) < 2:
         widths = np.zeros((AMOUNTS, len(comparison.observations.widths)))
         ends = np.zeros((1, len(comparison.joints.ends), 2))
         none = np.full(AMOUNTS, -np.inf)
-        return Trial(candidate, friction, run, twin, shared, unit, amounts, none, widths, widths.astype(int), ends)
+        return Trial(candidate, variant, run, twin, shared, unit, amounts, none, widths, widths.astype(int), ends)
     own = amounts / twin.scale
     # At the increments the pictures are exact; between them joints open evenly.
     ends = comparison.openings(run.moved)
@@ -323,4 +325,4 @@ def tried(
     found[own > run.amounts[-1] * (1.0 + 1e-9)] = -np.inf
     chosen = comparison.likeliest(pairs)
     widths = np.take_along_axis(pairs, chosen, axis=1)
-    return Trial(candidate, friction, run, twin, shared, unit, amounts, found, widths, chosen, ends)
+    return Trial(candidate, variant, run, twin, shared, unit, amounts, found, widths, chosen, ends)

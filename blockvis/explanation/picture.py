@@ -183,7 +183,8 @@ def _computed(
         _arrows(panel, _tops(assembly, moving, shown), moved, assembly)
     amount = amount_text(float(cause.best.amounts[cause.at]), cause.unit)
     panel.set_title(
-        f"{number}  {cause.name}: {amount}, {percent(cause.probability)}\nwidths [mm]; displacements × {factor:g}",
+        f"{number}  {cause.name}, {percent(cause.probability)}\n"
+        f"best fit: {amount}; widths [mm]; displacements × {factor:g}",
         loc="left",
         fontsize=TEXT + 1,
         color=_rgb(palette.INK),

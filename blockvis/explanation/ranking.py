@@ -169,7 +169,7 @@ def _range_of(own: Sequence[Trial], share: np.ndarray) -> tuple[float, float, fl
     """Quantiles of the amount over the trials of a cause."""
     amounts = np.concatenate([trial.amounts for trial in own])
     mass = np.concatenate(
-        [s * np.exp(t.log_likelihood - logsumexp(t.log_likelihood)) for s, t in zip(share, own, strict=True) if s > 0.0]
+        [s * np.exp(t.log_mass - logsumexp(t.log_mass)) for s, t in zip(share, own, strict=True) if s > 0.0]
         or [np.ones(1)]
     )
     amounts = np.concatenate([t.amounts for s, t in zip(share, own, strict=True) if s > 0.0] or [amounts[:1]])
@@ -213,7 +213,7 @@ def unexplained(
         possible = np.isfinite(trial.log_likelihood)
         if possible.any():
             reached = np.maximum(reached, trial.widths[possible].max(axis=0, initial=0.0))
-    slack = EXPLAINED * comparison.deviations()[0]
+    slack = EXPLAINED * comparison.deviations[0]
     # What is within what is left of the model's own width is no sign of another cause.
     by_any = (widths > 0.0) & (reached < np.maximum(widths - slack, 0.25 * widths))
     return by_best & (widths > 0.0) | by_any, by_any
@@ -264,7 +264,7 @@ def _expected(cause: Cause) -> tuple[np.ndarray, np.ndarray]:
     for trial, share in zip(cause.trials, cause.weights, strict=True):
         if share < 1e-3:
             continue
-        mass = share * np.exp(trial.log_likelihood - logsumexp(trial.log_likelihood))
+        mass = share * np.exp(trial.log_mass - logsumexp(trial.log_mass))
         heavy = np.flatnonzero(mass > 1e-3 * mass.max())
         openings = trial.openings(heavy).max(axis=2)
         first, second = mass[heavy] @ openings, mass[heavy] @ openings**2

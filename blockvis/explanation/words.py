@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from .ranking import Cause, Measurement
     from .result import Explanation
 
+#: An amount is left open where the end of its range is so many times the beginning.
+OPEN = 4.0
+
 #: Causes that the command line lists.
 LISTED = 6
 
@@ -42,6 +45,15 @@ def range_text(cause: Cause) -> str:
     low, middle, high = cause.amount
     ends = f"{1e3 * low:.3g} to {1e3 * high:.3g}"
     return f"{amount_text(middle, cause.unit)} ({ends})"
+
+
+def how_far(cause: Cause) -> str:
+    """Name a cause with its amount, or say that the observations leave this open."""
+    low, middle, high = cause.amount
+    if high > OPEN * low:
+        range_of = f"{1e3 * low:.3g} to {amount_text(high, cause.unit)}"
+        return f"{cause_text(cause)} by {range_of} (the observations leave the amount open)"
+    return f"{cause_text(cause)} by {amount_text(middle, cause.unit)}"
 
 
 def percent(probability: float) -> str:
@@ -79,8 +91,8 @@ def verdict(found: Explanation) -> str:
         return "No candidate makes any of the observed cracks"
     if others:
         more = " or ".join(cause_text(cause) for cause in others)
-        return f"{_capital(cause_text(best))}, or else {more}: the observations cannot tell these apart"
-    return f"{_capital(cause_text(best))} by {amount_text(best.amount[1], best.unit)}"
+        return f"{_capital(how_far(best))}, or else {more}: the observations cannot tell these apart"
+    return _capital(how_far(best))
 
 
 def in_words(found: Explanation) -> str:
@@ -162,7 +174,8 @@ def values_of(found: Explanation) -> dict[str, Any]:
             ],
         },
         "assumed": {
-            "prior": "causes alike, amounts evenly up to the largest looked at, frictions and places of troughs alike",
+            "prior": "causes alike, amounts evenly up to the largest looked at, frictions and places of troughs alike, "
+            "stones heavier towards the left or right alike",
             "model_uncertainty": settings.model_uncertainty,
             "place_uncertainty": found.comparison.trust.place,
             "outliers": settings.outliers,
