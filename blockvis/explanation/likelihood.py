@@ -39,7 +39,7 @@ class Trust:
     Attributes
     ----------
     model : float
-        Standard deviation of computed widths, as a fraction of them.
+        Standard deviation of computed widths, as a fraction of the observed ones.
     place : float [m]
         Within which a crack at x, y may be another joint.
     outliers : float

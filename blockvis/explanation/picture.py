@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import solver
 from blockvis.atomic_files import whole_file
@@ -57,22 +58,24 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     drawn = solver.Pose.initial(assembly)
     poses = [_pose(assembly, cause) for cause in causes]
     free = assembly.free
-    moved = [pose.displacements(assembly)[:, :2] for pose in poses]
-    largest = max((float(np.hypot(*m.T).max()) for m in moved), default=0.0)
+    largest = [float(np.hypot(*pose.displacements(assembly)[:, :2].T).max()) for pose in poses]
     extent = float(np.ptp(assembly.vertices[free[assembly.block_of_vertex]], axis=0).max())
-    factor = max(1.0, rounded_length(SHOWN * extent / largest)) if largest > 0.0 else 1.0
-    shown = [_magnified(assembly, pose, factor) for pose in poses]
+    # Each cause by its own: what one makes by going far, another may make by going a little.
+    factors = [max(1.0, rounded_length(SHOWN * extent / most)) if most > 0.0 else 1.0 for most in largest]
+    shown = [_magnified(assembly, pose, factor) for pose, factor in zip(poses, factors, strict=True)]
     frame = framed(assembly, [drawn, *shown])
     count = 1 + len(causes)
     aspect = float(frame.size[0] / frame.size[1])
     rows, columns = (count, 1) if aspect > WIDE else (1, count)
     width = PANEL * (2.0 if aspect > WIDE else 1.0)
     height = min(width / aspect, 1.4 * PANEL) + HEAD
-    figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
+    figure = Figure(figsize=(width * columns, height * rows), layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06))
     FigureCanvasAgg(figure)
     axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False).ravel())
     _observed(axes[0], found)
-    for number, (panel, cause, pose, there) in enumerate(zip(axes[1:], causes, poses, shown, strict=True), start=1):
+    for number, (panel, cause, pose, there, factor) in enumerate(
+        zip(axes[1:], causes, poses, shown, factors, strict=True), start=1
+    ):
         _computed(panel, found, cause, pose, there, number, factor)
     for panel in axes:
         panel.set_xlim(frame.low[0], frame.high[0])

@@ -50,10 +50,11 @@ def range_text(cause: Cause) -> str:
 def how_far(cause: Cause) -> str:
     """Name a cause with its amount, or say that the observations leave this open."""
     low, middle, high = cause.amount
+    words = f"{cause_text(cause)}{',' if cause.detail else ''} by"
     if high > OPEN * low:
         range_of = f"{1e3 * low:.3g} to {amount_text(high, cause.unit)}"
-        return f"{cause_text(cause)} by {range_of} (the observations leave the amount open)"
-    return f"{cause_text(cause)} by {amount_text(middle, cause.unit)}"
+        return f"{words} {range_of} (the observations leave the amount open)"
+    return f"{words} {amount_text(middle, cause.unit)}"
 
 
 def percent(probability: float) -> str:

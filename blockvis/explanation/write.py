@@ -197,8 +197,8 @@ def _assumed(found: Explanation) -> list[str]:
         f"with stones heavier by up to {100.0 * LEANING:g} % towards the left, and towards the right.",
         f"Computed widths are trusted to {100.0 * trust.model:.3g} % of what was observed there, and of "
         f"{100.0 * ELSEWHERE:.2g} % of the root mean square of all, besides the uncertainty of each observation; a "
-        f"crack at x, y may be in another joint within {1e3 * trust.place:.3g} mm and, less probably, beyond; an observation "
-        f"has another cause with a probability of {100.0 * trust.outliers:.3g} %.",
+        f"crack at x, y may be in another joint within {1e3 * trust.place:.3g} mm and, less probably, beyond; an "
+        f"observation has another cause with a probability of {100.0 * trust.outliers:.3g} %.",
         f"Observations share the errors of the model: more than {INDEPENDENT} do not count as independent.",
         f"Coefficients of friction: {', '.join(f'{value:.3g}' for value in frictions) or 'none'}; {len(runs)} runs.",
         "Probabilities are among the causes that were looked at: a cause that is not in the list has none.",
