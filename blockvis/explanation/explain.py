@@ -127,7 +127,7 @@ def explain(
         search.follow([pair for one in around for pair in search.usual(one)], processes, progress)
         search.follow([pair for one in _likeliest(search.ranked()) for pair in search.others(one)], processes, progress)
     causes = search.ranked()
-    by_best = by_any = np.zeros(0, dtype=bool)
+    by_best = by_any = observations.widths > 0.0
     if causes:
         by_best, by_any = unexplained(search.comparison, causes, search.trials)
     found = Explanation(

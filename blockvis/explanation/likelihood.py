@@ -28,6 +28,9 @@ LEAST_CHANCE = 0.02
 #: What the model may show where nothing was observed, as a fraction of the root mean square of what was.
 ELSEWHERE = 0.7
 
+#: A crack is made where the model opens by more than this fraction of its width.
+MADE = 0.25
+
 #: Observations of one structure share the errors of its model: more than this do not count as independent.
 INDEPENDENT = 20
 
@@ -169,6 +172,22 @@ class Comparison:
         best = [start + terms[:, start:end].argmax(axis=1) for start, end in zip(self.first, last, strict=True)]
         return np.array(best, dtype=int).reshape(-1, len(widths)).T
 
+    def made(self, widths: np.ndarray, displacements: np.ndarray) -> np.ndarray:
+        """(n,) bool array: whether any of the cracks, or displacements, that were observed is made at all.
+
+        Else a movement that moves nothing would be the likeliest cause of what no movement makes, at any amount.
+
+        Parameters
+        ----------
+        widths : (n, n_widths) array [m]
+        displacements : (n, n_points, 2) array [m]
+        """
+        given = self.observations
+        opened = given.widths > 0.0
+        makes = (widths[:, opened] > MADE * given.widths[opened]).any(axis=1)
+        along = (displacements * given.displacements).sum(axis=2)
+        return np.asarray(makes | (along > MADE * (given.displacements**2).sum(axis=1)).any(axis=1))
+
     def misfits(self, widths: np.ndarray, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Differences from the observed widths and points, in standard deviations: (n, n_widths), (n, n_points).
 
@@ -231,7 +250,7 @@ class Trial:
     amounts : (n,) array [m or rad]
         Of the candidate, each larger than the one before by the same factor, up to the largest that is looked at.
     log_likelihood : (n,) array
-        -inf where the structure has fallen, or where the run was not followed.
+        -inf where the structure has fallen, where the run was not followed, and where nothing observed is made.
     widths : (n, n_widths) array [m]
         What it shows of the observations: in the joint near each of them that fits best.
     pairs : (n, n_widths) int array
@@ -325,4 +344,5 @@ def tried(
     found[own > run.amounts[-1] * (1.0 + 1e-9)] = -np.inf
     chosen = comparison.likeliest(pairs)
     widths = np.take_along_axis(pairs, chosen, axis=1)
+    found[~comparison.made(widths, displacements)] = -np.inf
     return Trial(candidate, variant, run, twin, shared, unit, amounts, found, widths, chosen, ends)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from .likelihood import Comparison, Trial
+from .likelihood import MADE, Comparison, Trial
 from .observations import LEAST_UNCERTAINTY
 
 #: Causes less probable than the best by more than this factor are told apart from it.
@@ -215,7 +215,7 @@ def unexplained(
             reached = np.maximum(reached, trial.widths[possible].max(axis=0, initial=0.0))
     slack = EXPLAINED * comparison.deviations[0]
     # What is within what is left of the model's own width is no sign of another cause.
-    by_any = (widths > 0.0) & (reached < np.maximum(widths - slack, 0.25 * widths))
+    by_any = (widths > 0.0) & (reached < np.maximum(widths - slack, MADE * widths))
     return by_best & (widths > 0.0) | by_any, by_any
 
 

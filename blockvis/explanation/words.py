@@ -85,7 +85,9 @@ def measurement_text(measurement: Measurement) -> str:
 def verdict(found: Explanation) -> str:
     """Say what the observations point at, in one sentence."""
     if not found.causes:
-        return "No candidate stands at any amount: the structure does not stand as drawn"
+        if not found.stands:
+            return "No candidate stands at any amount: the structure does not stand as drawn"
+        return "No candidate makes any of the observed cracks"
     best, others = found.causes[0], found.alike[1:]
     none = set(found.made_by_none)
     if none and len(none) == int((found.observations.widths > 0.0).sum()) and not len(found.observations.points):
