@@ -33,8 +33,8 @@ ENOUGH = 2.0
 #: times the width of those that this opens, and in largest displacements that were observed.
 FARTHEST, AS_FAR = 25.0, 3.0
 
-#: What is drawn alike on both sides has several paths, and what is built has taken one: stones are heavier by up to this
-#: fraction towards one side, and lighter towards the other. The joints of two sides differ by more than that in friction.
+#: What is drawn alike on both sides has several paths, and what is built has taken one: stones are heavier by up to
+#: this fraction towards one side, and lighter towards the other. In friction two sides differ by more.
 LEANING = 0.1
 
 #: A collapse is found within this fraction of the largest amount.

@@ -193,8 +193,8 @@ def _assumed(found: Explanation) -> list[str]:
         + (f" up to {amount_text(largest, found.causes[0].unit)} (first cause)" if found.causes else "")
         + ", frictions and places of troughs as equally probable. The amount of a trough or slope is how much more the "
         "ground goes down at one foot of the structure than at another.",
-        "A structure that is alike on both sides has taken one of several paths: every movement of a support is followed "
-        f"with stones heavier by up to {100.0 * LEANING:g} % towards the left, and towards the right.",
+        "A structure that is alike on both sides has taken one of several paths: every movement of a support is "
+        f"followed with stones heavier by up to {100.0 * LEANING:g} % towards the left, and towards the right.",
         f"Computed widths are trusted to {100.0 * trust.model:.3g} % of what was observed there, and of "
         f"{100.0 * ELSEWHERE:.2g} % of the root mean square of all, besides the uncertainty of each observation; a "
         f"crack at x, y may be in another joint within {1e3 * trust.place:.3g} mm and, less probably, beyond; an "
