@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from typing import Any
 
 import numpy as np
@@ -254,10 +254,17 @@ def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterat
         return
     # Processes that are forked would share the locks of this one's threads.
     processes = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
+    before = active_children()
     try:
         yield processes
-    finally:
-        processes.shutdown(cancel_futures=True)
+    except BaseException:
+        # Whoever interrupts does not wait for the runs that are under way.
+        processes.shutdown(wait=False, cancel_futures=True)
+        for child in active_children():
+            if child not in before:
+                child.terminate()
+        raise
+    processes.shutdown()
 
 
 def cores() -> int:

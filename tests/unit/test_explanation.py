@@ -1,5 +1,6 @@
 """Candidates that open the same cracks, the comparison with observations, and Bayes' rule over what is left open."""
 
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,7 +20,7 @@ from blockvis.explanation.candidates import (
     trough,
     twins_of,
 )
-from blockvis.explanation.forward import AS_FAR, ENOUGH, FARTHEST, LEANING, Variant, ordered, reach_of
+from blockvis.explanation.forward import AS_FAR, ENOUGH, FARTHEST, LEANING, Variant, ordered, reach_of, workers_for
 from blockvis.explanation.likelihood import Comparison, Trust
 from blockvis.explanation.observations import read_observations
 from blockvis.explanation.ranking import ranked
@@ -226,6 +227,17 @@ def test_stones_lean_to_a_side():
     assert ratio[x.argmax()] == pytest.approx(1.0 + LEANING)
     assert ratio[x.argmin()] == pytest.approx(1.0 - LEANING)
     np.testing.assert_allclose(orders[-1].loads.dead[:, 1] / orders[0].loads.dead[:, 1], 2.0 - ratio)
+
+
+@pytest.mark.slow
+def test_whoever_interrupts_does_not_wait_for_runs():
+    started = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt), workers_for(8, 2, None) as processes:
+        futures = [processes.submit(time.sleep, 0.01), *(processes.submit(time.sleep, 300.0) for _ in range(4))]
+        futures[0].result()
+        raise KeyboardInterrupt
+    assert time.perf_counter() - started < 100.0
+    assert futures[-1].cancelled()
 
 
 def test_the_amount_of_a_trough_is_how_far_it_lowers_one_foot_below_another():
