@@ -231,11 +231,18 @@ def test_stones_lean_to_a_side():
 
 @pytest.mark.slow
 def test_whoever_interrupts_does_not_wait_for_runs():
+    futures = []
+
+    def interrupted():
+        with workers_for(8, 2, None) as processes:
+            futures.append(processes.submit(time.sleep, 0.01))
+            futures.extend(processes.submit(time.sleep, 300.0) for _ in range(4))
+            futures[0].result()
+            raise KeyboardInterrupt
+
     started = time.perf_counter()
-    with pytest.raises(KeyboardInterrupt), workers_for(8, 2, None) as processes:
-        futures = [processes.submit(time.sleep, 0.01), *(processes.submit(time.sleep, 300.0) for _ in range(4))]
-        futures[0].result()
-        raise KeyboardInterrupt
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
     assert time.perf_counter() - started < 100.0
     assert futures[-1].cancelled()
 
