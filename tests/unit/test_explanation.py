@@ -1,6 +1,7 @@
 """Candidates that open the same cracks, the comparison with observations, and Bayes' rule over what is left open."""
 
 import time
+from concurrent.futures import BrokenExecutor, CancelledError
 from types import SimpleNamespace
 
 import numpy as np
@@ -244,7 +245,8 @@ def test_whoever_interrupts_does_not_wait_for_runs():
     with pytest.raises(KeyboardInterrupt):
         interrupted()
     assert time.perf_counter() - started < 100.0
-    assert futures[-1].cancelled()
+    with pytest.raises((CancelledError, BrokenExecutor)):
+        futures[-1].result(timeout=100.0)
 
 
 def test_the_amount_of_a_trough_is_how_far_it_lowers_one_foot_below_another():
