@@ -2,8 +2,9 @@
 
     python benchmarks/command.py [CASE.toml ...] [--repeat N]
 
-Of N runs the fastest is shown. "start" is what Python and the imports take before the case is read, "film" the wait for
-the process that draws it meanwhile, "rest" what belongs to no part. Memory is the most of the first process, and of the
+Of N runs the fastest is shown. "start" is what Python and the imports take before the case is read, "write" has no VTU
+files and "curve" is nothing where the process that draws the film makes them, "fall" and "film" are the wait for it and
+the files of the fall, "rest" what belongs to no part. Memory is the most of the first process, and of the
 largest of the others (the film's, its encoder); both in MiB. The second line has the processor seconds of the first
 process in each part, and of the first and the others in all: they tell a slow command from a busy machine.
 """

@@ -8,7 +8,6 @@ from importlib.util import find_spec
 EXTRAS: dict[str, tuple[str, ...]] = {
     "studies": ("dask", "distributed", "pandas", "pyarrow", "SALib", "tomli_w"),
     "cad": ("gmsh",),
-    "fall": ("pymunk",),
 }
 
 
@@ -62,10 +61,17 @@ def missing_packages(extra: str) -> list[str]:
     extra : str
         A key of :data:`EXTRAS`.
     """
-    return [name for name in EXTRAS[extra] if not _is_installed(name)]
+    return [name for name in EXTRAS[extra] if not is_installed(name)]
 
 
-def _is_installed(name: str) -> bool:
+def is_installed(name: str) -> bool:
+    """Whether a package is installed, without importing it.
+
+    Parameters
+    ----------
+    name : str
+        As it is imported.
+    """
     try:
         return find_spec(name) is not None
     except ImportError:

@@ -14,7 +14,7 @@ import numpy as np
 
 import solver
 
-from .extras import missing_packages
+from .extras import is_installed
 from .layout.triangulation import cells_of_ring
 
 if TYPE_CHECKING:
@@ -93,8 +93,8 @@ class Fall:
 
 
 def engine_installed() -> bool:
-    """Whether the engine of the extra ``fall`` is there."""
-    return not missing_packages("fall")
+    """Whether the engine is there: where pymunk has no wheel, blockvis does without."""
+    return is_installed("pymunk")
 
 
 def fall_of(response: solver.Response, progress: Callable[[float], None] | None = None) -> Fall | None:

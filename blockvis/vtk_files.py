@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import base64
+import html
 import os
 import re
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from typing import TYPE_CHECKING
 
 import numpy as np
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
-from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 from .atomic_files import write_whole
+
+if TYPE_CHECKING:
+    # VTK is loaded where its files are written: lists of files need none.
+    from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
 
 #: Arrays of polyhedra as VTK 9.4 and later write them.
 _FACES = re.compile(r'<DataArray [^>]*Name="face_connectivity".*Name="polyhedron_offsets"[^>]*>.*?</DataArray>', re.S)
@@ -45,6 +47,8 @@ def write_vtu(
     Appended raw data, VTK's default, fails in ParaView 5.11 above some 10 kB. Faces of polyhedra stand in the arrays
     ``faces`` and ``faceoffsets`` of version 1.0: those that VTK writes since 9.4 older ParaViews do not know.
     """
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(dataset)
     # Written into memory first: on a full disk VTK's own writer ends the process.
@@ -63,6 +67,8 @@ def write_vtu(
 
 def _face_arrays(dataset: vtkUnstructuredGrid) -> str:
     """Write the faces of polyhedra as streams: of each the number of its faces, of each face its points."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
     points, starts, _, cells = (
         vtk_to_numpy(array).astype(np.int64)
         for of in (dataset.GetPolyhedronFaces(), dataset.GetPolyhedronFaceLocations())
@@ -113,7 +119,7 @@ def write_pvd(
         '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
         "  <Collection>",
         *(
-            f'    <DataSet timestep="{time:.12g}" group="" part="0" file={quoteattr(Path(file).as_posix())}/>'
+            f'    <DataSet timestep="{time:.12g}" group="" part="0" file="{html.escape(Path(file).as_posix())}"/>'
             for time, file in entries
         ),
         "  </Collection>",

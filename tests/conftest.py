@@ -1,9 +1,14 @@
 """What tests share: solved structures, their results folders, a Dask cluster; and pictures only where a test looks."""
 
+import os
 import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+
+# pytest-xdist has a worker for each core: threads of the linear algebra, which is loaded below, would wait for cores
+# that other workers have.
+os.environ.update({"OPENBLAS_NUM_THREADS": "1"} if "PYTEST_XDIST_WORKER" in os.environ else {})
 
 import pytest
 import structures

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomlkit
 
 import solver
 from blockvis import generators
@@ -91,6 +90,8 @@ def changed_text(text: str, source: Path, changes: Sequence[str]) -> str:
     ValueError
         For broken TOML, a change without "=", and a key that leads nowhere; names the key.
     """
+    import tomlkit
+
     parse_case(text, source)
     document: Any = tomlkit.parse(text)
     for change in changes:

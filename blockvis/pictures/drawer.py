@@ -49,8 +49,8 @@ OF_STATICS = (
     *("arrow rim", "arrow top", "live rim", "live top"),
 )
 
-#: Most crack lines whose width is written.
-MOST_WIDTHS = 6
+#: Most crack lines whose width is written, and the least part of the widest that is worth a word.
+MOST_WIDTHS, LEAST_WIDTH = 6, 0.05
 
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
@@ -254,7 +254,8 @@ class Drawer:
             title=title or head,
             detail=note or detail,
             badge=badge or (badge_of(self.response) if falling else FAILED_BADGE if failed else ""),
-            keys=self._keys_of_tints() if blocks_only else self.keys(),
+            keys=self._keys_drawn(increment),
+            places=self.keys(),
             pixel=self.scene.pixel,
             beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, parameter=s)),
         )
@@ -302,15 +303,15 @@ class Drawer:
         self._arrows("motion", tails, tips, 0.6)
 
     def keys(self) -> list[Key]:
-        """Return the legend: what is marked in any of the increments, so that it is the same in all pictures."""
+        """Return what is marked in any of the increments, each with its place in the legends of all pictures."""
         if self._keys is None:
             keys = self._keys_of_tints()
             if self.look.joints:
                 seen = self._seen
-                keys += [Key("area", "open joint", palette.OPEN)] if seen.cracks else []
+                keys += [Key("area", "open joint", palette.OPEN, layers=("crack", "crack edge"))] if seen.cracks else []
                 marked = [
-                    *([Key("line", "sliding joint", palette.SLIDING)] if seen.sliding else []),
-                    *([Key("dot", "hinge", palette.HINGE)] if seen.hinges else []),
+                    *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if seen.sliding else []),
+                    *([Key("dot", "hinge", palette.HINGE, layers=("hinge",))] if seen.hinges else []),
                 ]
                 # They would hide the cracks: in a wall of many blocks nearly every brick turns or slides a little.
                 hidden = " and ".join(f"{key.text}s" for key in marked[::-1])
@@ -320,18 +321,28 @@ class Drawer:
                     self.force_shown
                 )
                 length = self.force_shown * self.force_scale / self.scene.pixel
-                keys.append(Key("bar", text, palette.FORCE, length))
+                keys.append(Key("bar", text, palette.FORCE, length, ("force",)))
             if self._forces_hidden:
                 keys.append(Key("", "forces not shown", palette.FAINT))
             if self.live.largest > 0.0:
-                keys.append(Key("line", self.live.words, palette.LIVE))
-            if any(layer.startswith("motion") for layer in self.scene.layers):
-                keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT))
+                keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
+            motion = "motion outline", "motion top"
+            if self.scene.holds(*motion):
+                keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT, layers=motion))
             self._keys = keys
         return self._keys
 
+    def _keys_drawn(self, increment: solver.Increment) -> list[Key]:
+        """Return the legend of the picture that the scene holds; what was left out is told where statics has it."""
+        falling = increment.status == solver.Status.FALLING
+        return [
+            key
+            for key in self.keys()
+            if (self.scene.holds(*key.layers) if key.layers else bool(key.kind) or not falling)
+        ]
+
     def _keys_of_tints(self) -> list[Key]:
-        """Return what the legend says of the colours of the blocks: all of it where only they are drawn."""
+        """Return what the legend says of the colours of the blocks."""
         if self._swing is None or not self._swing.moves:
             return []
         together = int(self._swing.parts.max(initial=-1)) + 1 <= MOST_PARTS
@@ -378,6 +389,7 @@ class Drawer:
     def _write_widths(self, picture: Image.Image, pose: solver.Pose, shown: solver.Pose) -> None:
         """Write the widths of the widest crack lines at a pose beside them, where there is room."""
         cracks = cracks_of(self.assembly, pose, self.joints)[: 2 * MOST_WIDTHS]
+        cracks = [crack for crack in cracks if crack.width >= LEAST_WIDTH * cracks[0].width]
         on_a, on_b, _ = faces_at(self.assembly, self.joints, shown)
         widest = [int(crack.joints[0]) for crack in cracks]
         places = self.scene.at_pixel((on_a + on_b)[widest].mean(axis=1) / 2.0)

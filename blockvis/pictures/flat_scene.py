@@ -71,6 +71,10 @@ class Scene:
         """Names of the layers drawn so far."""
         return tuple(self._layers)
 
+    def holds(self, *layers: str) -> bool:
+        """Whether anything is drawn in one of the layers, parts of them (after a "/") included."""
+        return any(len(layer.corners) for name, layer in self._layers.items() if name.split("/")[0] in layers)
+
     def pose(self, shown: solver.Pose, block_fill: np.ndarray | None = None) -> None:
         """Put the blocks where they are drawn.
 

@@ -34,12 +34,15 @@ class Key:
     colour : (int, int, int)
     length : float
         Pixels, of a bar drawn to scale.
+    layers : tuple of str
+        Of the scene that it explains; none of what is in every picture.
     """
 
     kind: str
     text: str
     colour: tuple[int, int, int]
     length: float = 0.0
+    layers: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,17 @@ class ColourBar:
     """
 
     largest: float
+
+
+@dataclass(frozen=True)
+class _Shared:
+    """What many pictures of a film have in common; of a :meth:`Sheet.composed` picture."""
+
+    keys: tuple[Key, ...]
+    places: tuple[Key, ...]
+    pixel: float
+    detail: str
+    badge: str
 
 
 class Sheet:
@@ -78,7 +92,7 @@ class Sheet:
         #: Left, top, right, bottom of the blocks' picture, in pixels.
         self.inside = (0, self.header, width - right, height - self.footer)
         self.beside = (width - beside_width, self.header, width, height - self.footer)
-        self._shared: tuple[tuple[Key, ...], float, Image.Image] | None = None
+        self._shared: dict[_Shared, Image.Image] = {}
 
     @property
     def inside_size(self) -> tuple[int, int]:
@@ -94,6 +108,7 @@ class Sheet:
         detail: str,
         badge: str = "",
         keys: Sequence[Key] = (),
+        places: Sequence[Key] | None = None,
         pixel: float,
         beside: Image.Image | None = None,
     ) -> Image.Image:
@@ -108,45 +123,58 @@ class Sheet:
         badge : str
             A warning at the upper right.
         keys : sequence of Key
+            The legend.
+        places : sequence of Key, optional
+            All keys of a film, so that each keeps its place where others come and go; those of the picture by default.
         pixel : float [m]
             Size of a pixel, for the scale bar.
         beside : PIL.Image.Image, optional
             The picture to the right, as large as :attr:`beside`.
         """
-        page = self._sheet(tuple(keys), pixel).copy()
+        shared = _Shared(tuple(keys), tuple(keys if places is None else places), pixel, detail, badge)
+        page = self._sheet(shared).copy()
         page.paste(picture, self.inside[:2])
         if beside is not None:
             page.paste(beside, self.beside[:2])
-        draw = ImageDraw.Draw(page)
-        self._caption(draw, title, detail, badge)
+        self._title(ImageDraw.Draw(page), title, badge)
         return page
 
-    def _sheet(self, keys: tuple[Key, ...], pixel: float) -> Image.Image:
-        """Draw what all pictures of a film share: scale bar, legend, colour bar."""
-        if self._shared is None or self._shared[:2] != (keys, pixel):
+    def _sheet(self, shared: _Shared) -> Image.Image:
+        """Draw what many pictures of a film share: scale bar, legend, colour bar, all of the caption but its title."""
+        if shared not in self._shared:
             page = Image.new("RGB", self.size, palette.PAPER)
             draw = ImageDraw.Draw(page)
-            end = self._scale_bar(draw, pixel)
-            self._legend(draw, keys, end + 2 * self.pad)
+            end = self._scale_bar(draw, shared.pixel)
+            self._legend(draw, shared.keys, shared.places, end + 2 * self.pad)
             if self.colour_bar is not None:
                 self._colour_bar(page, draw, self.colour_bar)
-            self._shared = keys, pixel, page
-        return self._shared[2]
+            self._detail(draw, shared.detail)
+            if shared.badge:
+                self._badge(draw, shared.badge)
+            # One at a time: joints open and slide now and then, and a page at any size is memory.
+            self._shared = {shared: page}
+        return self._shared[shared]
 
-    def _caption(self, draw: ImageDraw.ImageDraw, title: str, detail: str, badge: str) -> None:
-        right = self.size[0] - self.pad
-        if badge:
-            font = _font(round(0.9 * self.text), bold=True)
-            width, half = draw.textlength(badge, font), 0.75 * self.text
-            box = (right - width - 1.2 * self.text, self.pad, right, self.pad + 2 * half)
-            draw.rounded_rectangle(box, radius=half * 0.5, fill=palette.WARNING)
-            draw.text((box[0] + 0.6 * self.text, self.pad + half), badge, palette.PAPER, font, anchor="lm")
-            right = round(box[0] - self.pad)
-        room = right - self.pad
+    def _title(self, draw: ImageDraw.ImageDraw, title: str, badge: str) -> None:
+        room = (self._badge_box(badge)[0] if badge else self.size[0]) - 2 * self.pad
         font = _fitting(title, round(1.15 * self.text), room, bold=True)
         draw.text((self.pad, self.pad + 0.72 * self.text), title, palette.INK, font, anchor="lm")
+
+    def _detail(self, draw: ImageDraw.ImageDraw, detail: str) -> None:
         font = _fitting(detail, round(0.9 * self.text), self.size[0] - 2 * self.pad)
         draw.text((self.pad, self.pad + 2.15 * self.text), detail, palette.FAINT, font, anchor="lm")
+
+    def _badge(self, draw: ImageDraw.ImageDraw, badge: str) -> None:
+        box, half = self._badge_box(badge), 0.75 * self.text
+        draw.rounded_rectangle(box, radius=half * 0.5, fill=palette.WARNING)
+        place = box[0] + 0.6 * self.text, self.pad + half
+        draw.text(place, badge, palette.PAPER, _font(round(0.9 * self.text), bold=True), anchor="lm")
+
+    def _badge_box(self, badge: str) -> tuple[float, float, float, float]:
+        """Left, top, right and bottom of a warning, in pixels."""
+        right = self.size[0] - self.pad
+        width = _font(round(0.9 * self.text), bold=True).getlength(badge)
+        return right - width - 1.2 * self.text, self.pad, right, self.pad + 1.5 * self.text
 
     def _scale_bar(self, draw: ImageDraw.ImageDraw, pixel: float) -> int:
         """Draw the scale bar; returns its right end in pixels."""
@@ -163,30 +191,36 @@ class Sheet:
         draw.text((x + pixels / 2, y - tick - 0.15 * self.text), label, palette.INK, font, anchor="mb")
         return int(max(x + pixels, x + pixels / 2 + draw.textlength(label, font) / 2))
 
-    def _legend(self, draw: ImageDraw.ImageDraw, keys: Sequence[Key], left: int) -> None:
+    def _legend(self, draw: ImageDraw.ImageDraw, keys: Sequence[Key], places: Sequence[Key], left: int) -> None:
+        """Draw those of the keys that are in the picture, each where it stands among all."""
         if not keys:
             return
-        size = round(0.9 * self.text)
-        swatch, space, gap = 1.5 * self.text, 0.45 * self.text, 1.4 * self.text
 
-        def width(font: ImageFont.FreeTypeFont) -> float:
-            each = (draw.textlength(k.text, font) + (max(swatch, k.length) + space) * bool(k.kind) for k in keys)
-            return sum(each) + gap * (len(keys) - 1)
+        def width(size: int, gap: float) -> float:
+            each = (
+                _font(size).getlength(key.text) + (max(1.7 * size, key.length) + 0.5 * size) * bool(key.kind)
+                for key in places
+            )
+            return sum(each) + gap * size * (len(places) - 1)
 
-        room = self.size[0] - self.pad - left
-        font = _font(size)
-        while width(font) > room and size > 8:
+        # Small letters are harder to read than near ones.
+        room, size, gap = self.size[0] - self.pad - left, round(0.9 * self.text), 1.5
+        while width(size, gap) > room and gap > 0.9:
+            gap -= 0.1
+        while width(size, gap) > room and size > 8:
             size -= 1
-            gap *= 0.93
-            font = _font(size)
-        x, y = self.size[0] - self.pad - width(font), self.size[1] - self.pad - 0.35 * self.text
-        for key in keys:
+        font, y = _font(size), self.size[1] - self.pad - 0.35 * self.text
+        x = self.size[0] - self.pad - width(size, gap)
+        for key in places:
+            there = key in keys
             if key.kind:
-                wide = max(swatch, key.length)
-                _swatch(draw, key, x, y, wide, self.text)
-                x += wide + space
-            draw.text((x, y), key.text, palette.INK, font, anchor="lm")
-            x += draw.textlength(key.text, font) + gap
+                wide = max(1.7 * size, key.length)
+                if there:
+                    _swatch(draw, key, x, y, wide, self.text)
+                x += wide + 0.5 * size
+            if there:
+                draw.text((x, y), key.text, palette.INK, font, anchor="lm")
+            x += font.getlength(key.text) + gap * size
 
     def _colour_bar(self, page: Image.Image, draw: ImageDraw.ImageDraw, bar: ColourBar) -> None:
         left, top, bottom = self.inside[2] + self.text, self.inside[1], self.inside[3]

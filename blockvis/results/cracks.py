@@ -103,7 +103,8 @@ def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
     """Name and say in words the widest crack lines, for a table."""
     rows = []
     for number, crack in enumerate(cracks[:most], start=1):
-        (x, y), (to_x, to_y) = crack.ends
+        # To a thousandth of the crack: the last digits of a zero are no place.
+        (x, y), (to_x, to_y) = np.round(crack.ends, 3 - int(np.floor(np.log10(crack.length)))) + 0.0
         words = f"{1e3 * crack.width:.3g} mm at {crack.widest}; {crack.length:.3g} m, {crack.inclination:.0f}°, "
         words += f"from ({x:.3g}, {y:.3g}) to ({to_x:.3g}, {to_y:.3g}) m"
         rows.append((f"crack {number}", words))

@@ -7,7 +7,7 @@ is given one of pyvista's.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -269,33 +269,6 @@ def contact_grid(
     _describe(grid, increment)
     _state_units(grid)
     return grid
-
-
-def output_times(increments: Sequence[solver.Increment]) -> list[float]:
-    """Strictly increasing times, one per increment, for readers that sort or merge by time.
-
-    Parameters
-    ----------
-    increments : sequence of solver.Increment
-
-    Returns
-    -------
-    list of float [m or rad]
-        The parameter in equilibrium, phases one after another. Frames of the fall share one parameter: their times
-        grow by a hundredth of it each.
-    """
-    times: list[float] = []
-    before, phase, last = 0.0, 0, 0.0
-    for increment in increments:
-        if increment.phase != phase:
-            before, phase = last, increment.phase
-        time = before + increment.parameter
-        if (times and time <= times[-1]) or increment.status == solver.Status.FALLING:
-            time = last + 0.01 * (abs(last) or 1.0) if not times else times[-1] + 0.01 * (abs(last) or 1.0)
-        else:
-            last = time
-        times.append(float(time))
-    return times
 
 
 def _as_dataset(grid: vtkUnstructuredGrid) -> pv.UnstructuredGrid:

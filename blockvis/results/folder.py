@@ -21,17 +21,15 @@ from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .cracks import MOST_LISTED, cracks_of
 from .increments import StoredIncrements, packed_increment
-from .joint_faces import JointFaces, LargestMovementsInSpace
-from .joints import InitialJoints, LargestMovements
+from .joint_faces import LargestMovementsInSpace
+from .joints import LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
+from .viewer_files import ViewerFiles, ViewerWriter, restore_grids, write_lists
 
 #: Where a run can go on from, beside the increments it belongs to.
 CHECKPOINT = "checkpoint.npz"
-
-#: The VTU files of an increment.
-GRIDS = ("blocks", "contacts", "joints")
 
 #: What a run holds locked on Windows.
 LOCK = ".lock"
@@ -82,6 +80,11 @@ class ResultsFolder:
     shape : {"moved", "undeformed"}
         Of the blocks in the VTU files; see :func:`blockvis.results.datasets.block_dataset`.
 
+    Attributes
+    ----------
+    viewer : ViewerWriter
+        Who writes the VTU files and their lists: this process, or another that is put in its place.
+
     Raises
     ------
     ResultsExist
@@ -119,6 +122,7 @@ class ResultsFolder:
         write_whole(self.path / "assembly.npz", compressed(flat(assembly)))
         write_whole(self.path / RECORD, self.record.text())
         self._start_table()
+        self.viewer = self.own_viewer()
 
     @classmethod
     def reopened(
@@ -167,22 +171,24 @@ class ResultsFolder:
         for number, increment in enumerate(results.increments):
             results._add_row(number, increment)
         restore_grids(results.path, results.assembly, results.increments, shape)
-        results._write_lists()
+        results._write_table()
+        write_lists(results.path, results.increments)
         results._remove_from(count)
+        results.viewer = results.own_viewer()
         return results, checkpoint
 
     def add(self, increment: solver.Increment) -> None:
-        """Write one increment: its VTU files, its row, PVD files that list everything so far, and the checkpoint.
+        """Write one increment: its state, its row, what viewers open, and the checkpoint.
 
         Afterwards the folder keeps the numbers of the increment, not its arrays; see
         :mod:`blockvis.results.increments`.
         """
         number = len(self.increments)
-        _write_grids(self.path, number, self.assembly, increment, self.shape, self._movements.joints)
         write_whole(self._files.file(number), packed_increment(increment))
         self.increments.append(self._files.without_arrays(number, increment))
         self._add_row(number, increment)
-        self._write_lists()
+        self.viewer.add(self.increments[-1])
+        self._write_table()
         if increment.checkpoint is not None:
             write_whole(self.path / CHECKPOINT, packed(increment.checkpoint, increments=number + 1))
 
@@ -206,7 +212,10 @@ class ResultsFolder:
         tables : mapping from file name to text, optional
             Tables of the kind of analysis.
         """
-        self._write_lists(durable=True)
+        if not self.viewer.finish():
+            restore_grids(self.path, self.assembly, self.increments, self.shape)
+        self._write_table(durable=True)
+        write_lists(self.path, self.increments, durable=True)
         write_whole(self.path / "joints.csv", self._movements.table())
         for name, text in (tables or {}).items():
             write_whole(self.path / name, text)
@@ -220,6 +229,10 @@ class ResultsFolder:
         self._release()
         return summary
 
+    def own_viewer(self) -> ViewerWriter:
+        """Make what writes the files for viewers in this process."""
+        return ViewerFiles(self.path, self.assembly, self.shape, self.increments, self._movements.joints)
+
     def _start_table(self) -> None:
         self._rows = io.StringIO()
         self._table = csv.writer(self._rows, lineterminator="\n")
@@ -232,23 +245,14 @@ class ResultsFolder:
             self._table.writerow(row_of_increment(number, increment, self.assembly, self.parameter))
             self._movements.add(increment)
 
+    def _write_table(self, *, durable: bool = False) -> None:
+        write_whole(self.path / "response.csv", self._rows.getvalue(), last=False, durable=durable)
+
     def flush(self) -> None:
         """Flush the VTU files to the disk: each increment waits for its state only, of which they are made."""
         for file in sorted((self.path / "increments").glob("*.vtu")):
             flush(file)
         flush(self.path / "increments")
-
-    def _write_lists(self, *, durable: bool = False) -> None:
-        """Write the table and the lists of files, of everything so far."""
-        from blockvis.vtk_files import write_pvd
-
-        from .datasets import output_times
-
-        write_whole(self.path / "response.csv", self._rows.getvalue(), last=False, durable=durable)
-        times = output_times(self.increments)
-        for kind in GRIDS:
-            entries = [(t, f"increments/{kind}_{i:05d}.vtu") for i, t in enumerate(times)]
-            write_pvd(self.path / f"{kind}.pvd", entries, last=False, durable=durable)
 
     def _remove_from(self, count: int) -> None:
         """Remove the files of increments from a number on, and files that a killed run has left half written."""
@@ -259,50 +263,6 @@ class ResultsFolder:
                 old.unlink()
         for half in (*self.path.glob(PARTIAL), *folder.glob(PARTIAL)):
             remove(half)
-
-
-def restore_grids(folder: Path, assembly: solver.Assembly, increments: Sequence[solver.Increment], shape: str) -> None:
-    """Make the VTU files again that a power cut has left empty, or half there.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the results.
-    assembly, increments
-        Of the results.
-    shape : {"moved", "undeformed"}
-        As of the folder.
-    """
-    from blockvis.vtk_files import is_whole
-
-    for number, increment in enumerate(increments):
-        if not all(is_whole(_grid_file(folder, kind, number)) for kind in GRIDS):
-            _write_grids(folder, number, assembly, increment, shape)
-
-
-def _write_grids(
-    folder: Path,
-    number: int,
-    assembly: solver.Assembly,
-    increment: solver.Increment,
-    shape: str,
-    joints: InitialJoints | JointFaces | None = None,
-) -> None:
-    """Write the VTU files of an increment."""
-    from blockvis.vtk_files import write_vtu
-
-    from .datasets import block_grid, contact_grid, joint_grid
-
-    for kind, grid in (
-        ("blocks", block_grid(assembly, increment, shape=shape)),
-        ("contacts", contact_grid(assembly, increment, shape=shape)),
-        ("joints", joint_grid(assembly, increment, shape=shape, joints=joints)),
-    ):
-        write_vtu(grid, _grid_file(folder, kind, number), durable=False)
-
-
-def _grid_file(folder: Path, kind: str, number: int) -> Path:
-    return folder / "increments" / f"{kind}_{number:05d}.vtu"
 
 
 def _held(owner: ResultsFolder, folder: Path) -> Callable[[], None]:

@@ -7,7 +7,7 @@ import time
 import warnings
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,11 +18,12 @@ import solver
 from blockvis.atomic_files import PARTIAL
 from blockvis.cases.build import case_assembly
 from blockvis.cases.case import Case, parse_case, read_case
-from blockvis.fall import fall_of
+from blockvis.fall import Fall, fall_of
 from blockvis.formats.files import checksum_of_files
 from blockvis.results.fall_files import remove_fall, stored_fall, write_fall
-from blockvis.results.folder import ResultsFolder, refuse_results, restore_grids
+from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
+from blockvis.results.viewer_files import restore_grids
 
 from .kind import AnalysisRun
 from .kinds import KINDS
@@ -66,8 +67,8 @@ class Run:
     had_finished : bool
         Whether there was nothing left to solve when it was asked to go on.
     stages : dict from str to float [s]
-        Wall-clock seconds of each part: read, solve, write, fall, report, curve, mechanism, film (the wait for it,
-        where another process draws it meanwhile).
+        Wall-clock seconds of each part: read, solve, write, fall, report, curve, mechanism, film. What another process
+        works out meanwhile, VTU files, fall, curve and film, counts as the wait for it only.
     """
 
     response: solver.Response
@@ -142,23 +143,24 @@ def run_case(
     folder = Path(f"{case.source.stem}-results") if folder is None else Path(folder)
     refuse_results(folder, overwrite)
     drawing = Drawing(film=film, pictures=pictures)
-    with clock.counting("read"):
-        assembly = case_assembly(case)
-    with clock.counting("solve"):
-        run = planned(case, assembly)
-    try:
-        results = ResultsFolder(
-            folder,
-            assembly,
-            record=record_of(case),
-            overwrite=overwrite,
-            parameter=run.course.parameter,
-            shape=case.vtu,
-        )
-    except OSError as error:
-        raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
-    remove_fall(folder)
-    return _followed(case, results, run, drawing, clock)
+    with _film_apart(case, drawing) as process:
+        with clock.counting("read"):
+            assembly = case_assembly(case)
+        with clock.counting("solve"):
+            run = planned(case, assembly)
+        try:
+            results = ResultsFolder(
+                folder,
+                assembly,
+                record=record_of(case),
+                overwrite=overwrite,
+                parameter=run.course.parameter,
+                shape=case.vtu,
+            )
+        except OSError as error:
+            raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
+        remove_fall(folder)
+        return _followed(case, results, run, drawing, clock, process)
 
 
 def resume_run(folder: str | Path, *, film: bool = True, pictures: bool = True) -> Run:
@@ -203,10 +205,11 @@ def resume_run(folder: str | Path, *, film: bool = True, pictures: bool = True) 
     for note in record.changes(checksum_of_files):
         warnings.warn(note, stacklevel=2)
     kind = KINDS[case.analysis]
-    results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint, case.vtu)
-    remove_fall(folder)
-    run = planned(case, results.assembly, checkpoint, tuple(results.increments))
-    return _followed(case, results, run, drawing, Clock())
+    with _film_apart(case, drawing) as process:
+        results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint, case.vtu)
+        remove_fall(folder)
+        run = planned(case, results.assembly, checkpoint, tuple(results.increments))
+        return _followed(case, results, run, drawing, Clock(), process)
 
 
 def _finished(folder: Path) -> dict[str, Any] | None:
@@ -248,14 +251,36 @@ def _drawn_results(
         ) from None
 
 
-def _followed(case: Case, results: ResultsFolder, run: AnalysisRun, drawing: Drawing, clock: Clock) -> Run:
-    """Follow the increments of a run and draw, the film in a process of its own."""
+@contextmanager
+def _film_apart(case: Case, drawing: Drawing) -> Iterator[FilmProcess | None]:
+    """Start the process that draws the film, if there is one to draw: it has time until the case is solved."""
     process = started_film(case, film=drawing.film, pictures=drawing.pictures)
     try:
-        return _solved(case, results, run, drawing, clock, process)
+        yield process
     finally:
         if process is not None:
             process.close()
+
+
+def _followed(
+    case: Case,
+    results: ResultsFolder,
+    run: AnalysisRun,
+    drawing: Drawing,
+    clock: Clock,
+    process: FilmProcess | None,
+) -> Run:
+    """Follow the increments of a run and draw; what only viewers open is written by the film's process meanwhile."""
+    if process is not None:
+        process.follow(results.path, results.assembly, results.shape, len(results.increments))
+        results.viewer = process
+    try:
+        return _solved(case, results, run, drawing, clock, process)
+    except OSError as error:
+        if process is not None:
+            # It may have a half-written file, too.
+            process.close()
+        raise _given_up(results.path, error) from None
 
 
 def _solved(
@@ -290,23 +315,18 @@ def _solved(
             progress.increment(increment)
     except KeyboardInterrupt:
         run.steps.close()
-    except OSError as error:
-        raise _given_up(folder, error) from None
     finally:
         progress.done()
     response = run.response(results.increments, ending)
     missing: tuple[str, ...] = ()
-    try:
-        with clock.counting("write"):
-            summary = finish(results, response)
-        # Waiting for the disk takes no processor: it goes on while the pictures are drawn.
-        with ThreadPoolExecutor(1) as waiting:
-            flushed = waiting.submit(results.flush)
-            if ending.stop is not solver.Status.INTERRUPTED:
-                missing = _drawn_results(case, response, folder, drawing, clock, process)
-            flushed.result()
-    except OSError as error:
-        raise _given_up(folder, error) from None
+    with clock.counting("write"):
+        summary = finish(results, response)
+    # Waiting for the disk takes no processor: it goes on while the pictures are drawn.
+    with ThreadPoolExecutor(1) as waiting:
+        flushed = waiting.submit(results.flush)
+        if ending.stop is not solver.Status.INTERRUPTED:
+            missing = _drawn_results(case, response, folder, drawing, clock, process)
+        flushed.result()
     return Run(response, folder, summary, missing, stages=dict(clock.seconds))
 
 
@@ -381,42 +401,68 @@ def draw_results(
     if not response.increments:
         return ()
     progress = DrawingProgress()
+    stored = stored_fall(folder)
+    apart = film if animation is not None else None
+    if apart is not None:
+        # It works out the fall as well, and what needs none is drawn here meanwhile.
+        apart.draw(response, folder / str(animation), stored, falls=stored is None)
+    if pictures:
+        with clock.counting("mechanism"):
+            from blockvis.pictures.render import draw_mechanism
+
+            draw_mechanism(response, folder / "mechanism.png")
     with clock.counting("fall"):
-        stored = stored_fall(folder)
-        fall = fall_of(response, progress.fall) if stored is None else stored
+        fall = _fall(response, apart, progress) if stored is None else stored
         progress.done()
-    if film is not None and animation is not None:
-        film.draw(response, folder / animation, fall)
-    if fall is not None and stored is None:
-        with clock.counting("fall"):
+        if fall is not None and stored is None:
             write_fall(fall, response, folder)
     if not pictures:
         return ()
-    from blockvis.pictures.film_process import FilmFailed
-    from blockvis.pictures.paraview import write_paraview_macro
-    from blockvis.pictures.render import animate, draw_mechanism
-    from blockvis.report.page import write_report
-
     with clock.counting("report"):
+        from blockvis.pictures.paraview import write_paraview_macro
+        from blockvis.report.page import write_report
+
         write_paraview_macro(folder)
         write_report(response, folder / "report.html", case_text, fall=fall)
-    if response.path:
-        from blockvis.pictures.curves import draw_curve
-
+    problem = ""
+    if apart is not None:
+        problem = _awaited(apart, progress, clock)
+    if response.path and (apart is None or problem):
         with clock.counting("curve"):
+            from blockvis.pictures.curves import draw_curve
+
             draw_curve(response, folder / "curve.png")
-    with clock.counting("mechanism"):
-        draw_mechanism(response, folder / "mechanism.png")
-    if animation is None:
-        return ()
+    if animation is not None and apart is None:
+        with clock.counting("film"):
+            from blockvis.pictures.render import animate
+
+            try:
+                animate(response, folder / animation, fall=fall, progress=progress.frame)
+            finally:
+                progress.done()
+    return (problem,) if problem else ()
+
+
+def _awaited(film: FilmProcess, progress: DrawingProgress, clock: Clock) -> str:
+    """Wait for the process that draws curve and film; returns why it has ended without them, or nothing."""
+    from blockvis.pictures.film_process import FilmFailed
+
     try:
         with clock.counting("film"):
-            if film is not None:
-                film.wait(progress.frame)
-            else:
-                animate(response, folder / animation, fall=fall, progress=progress.frame)
+            film.wait(progress.frame)
     except FilmFailed as error:
-        return (str(error),)
+        return str(error)
     finally:
         progress.done()
-    return ()
+    return ""
+
+
+def _fall(response: solver.Response, film: FilmProcess | None, progress: DrawingProgress) -> Fall | None:
+    """Find the fall of a response: that of the process that draws the film, or worked out here."""
+    if film is not None:
+        from blockvis.pictures.film_process import FilmFailed
+
+        # What became of the process is told where the film is waited for.
+        with suppress(FilmFailed):
+            return film.fall(progress.fall)
+    return fall_of(response, progress.fall)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 #: Methods of sampling; "saltelli" is for Sobol' indices of first order and total.
 METHODS = ("grid", "latin hypercube", "sobol", "random", "saltelli")
@@ -91,11 +90,16 @@ def designed(method: str, runs: int, levels: Sequence[int], repeats: int, seed: 
         return _saltelli(runs, n, random, seed, scattered)
     if n == 0 or method == "random":
         return Design(_inside(random.random((runs, n))), _seeds(seed, runs))
+    # Loaded where it is used: it takes longer than all else that a study needs.
+    from scipy.stats import qmc
+
     sampler = qmc.LatinHypercube(n, rng=random) if method == "latin hypercube" else qmc.Sobol(n, rng=random)
     return Design(_inside(sampler.random(runs)), _seeds(seed, runs))
 
 
 def _saltelli(runs: int, n: int, random: np.random.Generator, seed: int, scattered: bool) -> Design:
+    from scipy.stats import qmc
+
     both = _inside(qmc.Sobol(2 * n, rng=random).random(runs)) if n else np.zeros((runs, 0))
     first, second = both[:, :n], both[:, n:]
     first_seed, second_seed = _seeds(seed, runs), _seeds(seed, runs, stream=1)

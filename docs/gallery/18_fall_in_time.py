@@ -2,8 +2,8 @@
 The fall in time
 ================
 
-Behind the last equilibrium statics has nothing to say; where pymunk is installed, rigid-body dynamics without
-restitution goes on from there.
+Behind the last equilibrium statics has nothing to say; rigid-body dynamics without restitution, by pymunk,
+goes on from there.
 """
 
 import shutil

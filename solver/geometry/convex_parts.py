@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError
 
 from solver.tolerances import DRAWN_GAP
 
@@ -17,6 +17,9 @@ from .flat_faces import ONE_WAY, merged_faces
 from .outlines import next_vertices
 from .portions import alike
 from .solids import Solids, dot
+
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
 
 #: An edge is re-entrant where the outward normals of its faces turn against each other by more than this sine.
 REENTRANT = 1e-4
@@ -324,6 +327,9 @@ def _is_convex(piece: _Piece, flatness: float) -> bool:
 
 def _hull(points: np.ndarray) -> ConvexHull | None:
     """Convex hull; None of points in a plane."""
+    # Loaded where it is used: blocks in the plane need none, and it takes a tenth of all imports.
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         return ConvexHull(points)
     except (QhullError, ValueError):

@@ -8,7 +8,6 @@ from itertools import chain
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
@@ -243,6 +242,8 @@ def _slivers(
 
 def _once(contacts: Contacts, twice: np.ndarray, near: float) -> Contacts:
     """Keep one of several points of two blocks at one place with one normal, among those chosen, (n,) bool."""
+    from scipy.spatial import cKDTree
+
     chosen = np.flatnonzero(twice)
     pairs = (
         cKDTree(contacts.points[chosen]).query_pairs(near, output_type="ndarray") if len(chosen) else np.zeros((0, 2))

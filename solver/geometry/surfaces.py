@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from solver.tolerances import DRAWN_GAP
 
@@ -121,6 +120,8 @@ def _checked(solid: Surface, name: str) -> tuple[np.ndarray, list[list[int]]]:
 
 def _welded(vertices: np.ndarray, faces: list[list[int]]) -> tuple[np.ndarray, list[list[int]]]:
     """Make one corner of those at the same place, and drop corners of no face and faces that have shrunk to a line."""
+    from scipy.spatial import cKDTree
+
     near = WELDED * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     pairs = cKDTree(vertices).query_pairs(near, output_type="ndarray")
     if len(pairs):

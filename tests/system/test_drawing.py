@@ -59,6 +59,35 @@ def test_what_fails_in_the_process_is_raised_here(tmp_path):
         process.wait(lambda *_: None)
 
 
+def test_the_process_writes_what_viewers_open_and_says_what_fails(arch, arch_results):
+    written = {path: path.read_bytes() for path in [*arch_results.rglob("*.vtu"), *arch_results.glob("*.pvd")]}
+    assert len(written) == 3 * len(arch.increments) + 3
+    for path in written:
+        path.unlink()
+    process = FilmProcess()
+    process.follow(arch_results, arch.assembly, "moved", 0)
+    for increment in arch.increments:
+        process.add(increment)
+    assert process.finish()
+    assert {path: path.read_bytes() for path in written} == written
+    # An increment more than there are states.
+    process.add(arch.increments[-1])
+    with pytest.raises(ValueError, match=rf"state_{len(arch.increments):05d}\.npz' cannot be read"):
+        process.finish()
+    process.close()
+    assert not process.finish()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no signal to one process")
+def test_ctrl_c_is_for_the_first_process_even_before_the_other_has_loaded(arch, arch_results, capfd):
+    process = FilmProcess()
+    process.follow(arch_results, arch.assembly, "moved", 0)
+    process._process.send_signal(signal.SIGINT)
+    assert process.finish()
+    process.close()
+    assert "KeyboardInterrupt" not in capfd.readouterr().err
+
+
 @pytest.mark.pictures
 def test_a_process_that_is_ended_leaves_all_but_the_film(case, tmp_path, monkeypatch, capsys):
     def killed():

@@ -24,6 +24,8 @@ from blockvis.results.increments import AT_LEAST, StoredIncrements
 ARCH = """
 [geometry]
 layout = "arch"
+[geometry.parameters]
+voussoirs = 6
 [material]
 friction_coefficient = 0.7
 [output]

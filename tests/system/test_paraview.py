@@ -10,7 +10,8 @@ import pytest
 from structures import arch_response
 
 from blockvis.pictures.paraview import write_paraview_macro
-from blockvis.results.datasets import block_dataset, contact_dataset, joint_dataset, output_times
+from blockvis.results.datasets import block_dataset, contact_dataset, joint_dataset
+from blockvis.results.viewer_files import output_times
 from blockvis.vtk_files import write_pvd, write_vtu
 
 PVPYTHON, XVFB = shutil.which("pvpython"), shutil.which("xvfb-run")

@@ -102,8 +102,8 @@ def test_what_a_run_goes_on_from_is_on_the_disk_before_the_checkpoint_and_the_re
     results.add(next(_steps(arch)))
     placed = [path.name for what, path in done if what == "replace"]
     files = [f"{kind}_00000.vtu" for kind in ("blocks", "contacts", "joints")]
-    lists = ["response.csv", "blocks.pvd", "contacts.pvd", "joints.pvd"]
-    assert placed == [*files, "state_00000.npz", *lists, "checkpoint.npz"]
+    lists = ["blocks.pvd", "contacts.pvd", "joints.pvd", "response.csv"]
+    assert placed == ["state_00000.npz", *files, *lists, "checkpoint.npz"]
     flushed = [path.name for what, path in done if what == "flush"]
     assert flushed == [".state_00000.part.npz", "increments", ".checkpoint.part.npz", "out"]
     last = done.index(("replace", tmp_path / "out" / "checkpoint.npz"))

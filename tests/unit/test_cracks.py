@@ -1,6 +1,7 @@
 """Crack lines: which joints they hold, how wide, how steep and from where to where."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -76,6 +77,8 @@ def test_the_cracks_of_an_arch_are_its_hinges(tmp_path):
     stored = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["cracks"]
     assert [c["width_mm"] for c in stored] == pytest.approx([1e3 * c.width for c in cracks], abs=1e-3)
     assert stored[0]["widest_joint"] == cracks[0].widest
+    # Places are numbers that can be read: 0, not 5.66e-17.
+    assert not re.search(r"\de-\d", " ".join(words for _, words in crack_rows(cracks, len(cracks))))
     page = report_html(arch)
     assert f"{1e3 * cracks[0].width:.3g} mm at {cracks[0].widest}" in page
 

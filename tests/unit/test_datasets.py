@@ -8,7 +8,8 @@ import pyvista as pv
 from structures import BENT, arch_response, parted, wall
 
 import solver
-from blockvis.results.datasets import block_dataset, contact_dataset, output_times
+from blockvis.results.datasets import block_dataset, contact_dataset
+from blockvis.results.viewer_files import output_times
 from blockvis.vtk_files import write_pvd, write_vtu
 
 

@@ -1,6 +1,7 @@
 """The import graph: which module may know which, lazy imports inside functions included."""
 
 import ast
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -88,6 +89,7 @@ def _name(path: Path) -> str:
 FILES = {_name(path): path for top in ("solver", "blockvis") for path in sorted((ROOT / top).rglob("*.py"))}
 
 
+@cache
 def _imported(module: str) -> set[str]:
     """Modules of the two packages, and other packages, that a module imports anywhere."""
     path, found = FILES[module], set()

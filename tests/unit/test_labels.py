@@ -11,14 +11,16 @@ from structures import arch_response, parted, wall
 import solver
 from blockvis import generators
 from blockvis.fall import fall_of
+from blockvis.pictures import palette
 from blockvis.pictures.captions import FAILED_BADGE, FALL_BADGE
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of
 from blockvis.pictures.frame import Sheet
+from blockvis.pictures.render import draw_mechanism
 from blockvis.studies import pictures
 from blockvis.studies.run_one import _shape
 
-SMALL = (320, 180)
+SMALL, LARGE = (320, 180), (960, 540)
 
 
 @pytest.fixture
@@ -35,8 +37,8 @@ def words(monkeypatch):
     return told
 
 
-def filmed(response, fps=4.0, seconds=4.0):
-    drawer = Drawer(response, Look(colour_by="mechanism"), SMALL, response.increments)
+def filmed(response, fps=4.0, seconds=4.0, size=SMALL):
+    drawer = Drawer(response, Look(colour_by="mechanism"), size, response.increments)
     _, pictures_of = film_of(drawer, fps, seconds)
     return list(pictures_of)
 
@@ -129,6 +131,46 @@ def test_the_legend_of_the_fall_names_no_joints_and_no_forces(words):
     assert falling == ["parts of the last mechanism"]
     assert {"hinge", "open joint", *falling} < set(standing)
     assert any(text.startswith("compression") for text in standing)
+
+
+def test_every_frame_names_what_it_draws_and_nothing_else(monkeypatch):
+    """Statics, pseudo-time and fall: an entry stands in the legend where its colour is in the picture."""
+    frames = []
+    composed = Sheet.composed
+
+    def noted(self, picture, **said):
+        frames.append((said, np.asarray(picture).astype(np.int16)))
+        return composed(self, picture, **said)
+
+    monkeypatch.setattr(Sheet, "composed", noted)
+    response = arch_response()
+    filmed(response, fps=1.0, size=LARGE)
+    fall = fall_of(response)
+    Drawer(response, Look(colour_by="mechanism"), LARGE, response.path, fall=fall).falling_picture(1.0)
+    filmed(parted(wall(6, 5), 4, 3), fps=1.0, size=LARGE)
+    pseudo = [said for said, _ in frames if said["badge"] == "FALLING · pseudo-time"]
+    assert len(frames) > len(pseudo) > 5
+    for said, pixels in frames:
+        texts = " ".join(key.text for key in said["keys"])
+        for text, colour in (
+            *(("compression", palette.FORCE), ("open joint", palette.OPEN)),
+            *(("sliding joint", palette.SLIDING), ("hinge", palette.HINGE)),
+        ):
+            drawn = bool((np.abs(pixels - np.array(colour)) <= 12).all(axis=2).any())
+            assert (text in texts) == drawn, (said["title"], text)
+    assert not [said for said in pseudo if "compression" in " ".join(key.text for key in said["keys"])]
+
+
+def test_widths_are_written_of_cracks_that_count(monkeypatch, tmp_path):
+    from blockvis.pictures import drawer as drawing
+
+    written, response = [], arch_response()
+    monkeypatch.setattr(drawing, "write_labels", lambda picture, places, words, *_: written.extend(words))
+    widest = drawing.cracks_of(response.assembly, response.path[-1].pose)[0]
+    cracks = [replace(widest, width=width) for width in (0.04, 0.004, 0.0004)]
+    monkeypatch.setattr(drawing, "cracks_of", lambda *_: cracks)
+    draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL)
+    assert written == ["40 mm", "4 mm"]
 
 
 def test_picture_film_and_page_count_the_last_equilibrium_alike(monkeypatch):

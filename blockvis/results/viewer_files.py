@@ -1,0 +1,170 @@
+"""Files for viewers in a results folder: a VTU file of each kind per increment, and the lists of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+import solver
+from blockvis.vtk_files import is_whole, write_pvd, write_vtu
+
+from .joint_faces import JointFaces, joint_faces
+from .joints import InitialJoints, initial_joints
+
+#: The VTU files of an increment.
+GRIDS = ("blocks", "contacts", "joints")
+
+
+class ViewerWriter(Protocol):
+    """Who writes the files for viewers while a run goes on."""
+
+    def add(self, increment: solver.Increment) -> None:
+        """Take the next increment, whose state is in the folder."""
+
+    def finish(self) -> bool:
+        """Wait until all is written; False where that will not be, because a process has ended."""
+
+
+class ViewerFiles:
+    """The files for viewers of a results folder, written increment by increment.
+
+    Parameters
+    ----------
+    folder : Path
+    assembly : solver.Assembly
+    shape : {"moved", "undeformed"}
+        Of the blocks; see :func:`blockvis.results.datasets.block_dataset`.
+    increments : sequence of solver.Increment
+        Whose files are there already.
+    joints : InitialJoints or JointFaces, optional
+        Of the assembly, where they are at hand.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        assembly: solver.Assembly,
+        shape: str,
+        increments: Sequence[solver.Increment] = (),
+        joints: InitialJoints | JointFaces | None = None,
+    ) -> None:
+        if joints is None:
+            joints = initial_joints(assembly) if assembly.dimension == 2 else joint_faces(assembly)
+        self.folder, self.assembly, self.shape, self.joints = folder, assembly, shape, joints
+        self._listed = list(increments)
+
+    def add(self, increment: solver.Increment) -> None:
+        """Write the files of the next increment, then the lists that name them.
+
+        Parameters
+        ----------
+        increment : solver.Increment
+            Kept: its arrays had better be in a file.
+        """
+        write_grids(self.folder, len(self._listed), self.assembly, increment, self.shape, self.joints)
+        self._listed.append(increment)
+        write_lists(self.folder, self._listed)
+
+    def finish(self) -> bool:
+        """Nothing is left to write."""
+        return True
+
+
+def write_lists(folder: Path, increments: Sequence[solver.Increment], *, durable: bool = False) -> None:
+    """Write the lists of the VTU files of all increments, for which the parameter is the time.
+
+    Parameters
+    ----------
+    folder : Path
+    increments : sequence of solver.Increment
+    durable : bool
+        As of :func:`blockvis.atomic_files.whole_file`.
+    """
+    times = output_times(increments)
+    for kind in GRIDS:
+        entries = [(t, f"increments/{kind}_{i:05d}.vtu") for i, t in enumerate(times)]
+        write_pvd(folder / f"{kind}.pvd", entries, last=False, durable=durable)
+
+
+def restore_grids(folder: Path, assembly: solver.Assembly, increments: Sequence[solver.Increment], shape: str) -> None:
+    """Make the VTU files again that a power cut has left empty, or half there.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    assembly, increments
+        Of the results.
+    shape : {"moved", "undeformed"}
+        As of the folder.
+    """
+    for number, increment in enumerate(increments):
+        if not all(is_whole(grid_file(folder, kind, number)) for kind in GRIDS):
+            write_grids(folder, number, assembly, increment, shape)
+
+
+def write_grids(
+    folder: Path,
+    number: int,
+    assembly: solver.Assembly,
+    increment: solver.Increment,
+    shape: str,
+    joints: InitialJoints | JointFaces | None = None,
+) -> None:
+    """Write the VTU files of an increment.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    number : int
+        Of the increment.
+    assembly : solver.Assembly
+    increment : solver.Increment
+    shape : {"moved", "undeformed"}
+        As of the folder.
+    joints : InitialJoints or JointFaces, optional
+        Of the assembly, where they are at hand.
+    """
+    # VTK is loaded where its files are written: another process may do that.
+    from .datasets import block_grid, contact_grid, joint_grid
+
+    for kind, grid in (
+        ("blocks", block_grid(assembly, increment, shape=shape)),
+        ("contacts", contact_grid(assembly, increment, shape=shape)),
+        ("joints", joint_grid(assembly, increment, shape=shape, joints=joints)),
+    ):
+        write_vtu(grid, grid_file(folder, kind, number), durable=False)
+
+
+def grid_file(folder: Path, kind: str, number: int) -> Path:
+    """Path of a VTU file of an increment."""
+    return folder / "increments" / f"{kind}_{number:05d}.vtu"
+
+
+def output_times(increments: Sequence[solver.Increment]) -> list[float]:
+    """Strictly increasing times, one per increment, for readers that sort or merge by time.
+
+    Parameters
+    ----------
+    increments : sequence of solver.Increment
+
+    Returns
+    -------
+    list of float [m or rad]
+        The parameter in equilibrium, phases one after another. Frames of the fall share one parameter: their times
+        grow by a hundredth of it each.
+    """
+    times: list[float] = []
+    before, phase, last = 0.0, 0, 0.0
+    for increment in increments:
+        if increment.phase != phase:
+            before, phase = last, increment.phase
+        time = before + increment.parameter
+        if (times and time <= times[-1]) or increment.status == solver.Status.FALLING:
+            time = last + 0.01 * (abs(last) or 1.0) if not times else times[-1] + 0.01 * (abs(last) or 1.0)
+        else:
+            last = time
+        times.append(float(time))
+    return times
