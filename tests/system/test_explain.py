@@ -11,6 +11,7 @@ from PIL import Image
 import blockvis
 import solver
 from blockvis import cli, generators
+from blockvis.explanation.explain import read_explained
 from blockvis.formats.read import save_layout
 from blockvis.results.joints import end_openings, initial_joints
 
@@ -138,7 +139,7 @@ def test_one_crack_leaves_causes_open_and_a_joint_to_measure(folder, tmp_path):
 
 @pytest.mark.slow
 def test_a_crack_that_no_candidate_makes_is_said_to_be_unexplained(folder):
-    case = blockvis.explanation.explain.read_explained(folder / "arch.toml")
+    case = read_explained(folder / "arch.toml")
     runs = {}
     seen = [
         dict(zip(("x", "y", "width [mm]"), row.split(","), strict=True))
