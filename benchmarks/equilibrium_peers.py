@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import solver
+from blockvis.layout.layout import layout_of, standing
 
 __all__ = ["Verdict", "coupled_analysis", "limit_load", "rigid_block_equilibrium"]
 
@@ -48,7 +49,8 @@ TENSION = 1e-6
 def limit_load(assembly: solver.Assembly, friction: float) -> Verdict:
     """Ours: the limit load for a horizontal live load, which says also whether the dead load is carried."""
     started = time.process_time()
-    loads = solver.Loads(solver.self_weight(assembly).dead, solver.weight_fraction(assembly, (1.0, 0.0)))
+    along = (1.0, 0.0, 0.0)[: assembly.dimension]
+    loads = solver.Loads(solver.self_weight(assembly).dead, solver.weight_fraction(assembly, along))
     found = solver.limit_load(assembly, loads=loads, friction_coefficient=friction)
     seconds = time.process_time() - started
     if found.status is solver.LimitStatus.NO_EQUILIBRIUM:
@@ -61,17 +63,13 @@ def _cra_assembly(assembly: solver.Assembly):
     from compas_cra.algorithms import assembly_interfaces_numpy
     from compas_cra.datastructures import CRA_Assembly
 
-    half = float(np.max(assembly.thickness)) / 2.0
+    sketch = layout_of(assembly)
+    solids = sketch.solids if assembly.dimension == 3 else standing(sketch, 1.0).solids  # gravity is along -z
     blocks = CRA_Assembly()
-    for i in range(assembly.n_blocks):
-        outline = assembly.outline(i)
-        n = len(outline)
-        vertices = [[float(x), y, float(z)] for y in (half, -half) for x, z in outline]  # gravity is along -z
-        sides = [[k, (k + 1) % n, n + (k + 1) % n, n + k] for k in range(n)]
-        faces = [list(range(n))[::-1], list(range(n, 2 * n)), *sides]
-        blocks.add_block(Block.from_vertices_and_faces(vertices, faces), node=i)
+    for i, (vertices, faces) in enumerate(solids):
+        blocks.add_block(Block.from_vertices_and_faces(vertices.tolist(), faces), node=i)
     blocks.set_boundary_conditions(np.flatnonzero(~assembly.free).tolist())
-    smallest = 1e-3 * float(assembly.widths.min()) * 2.0 * half  # m²; the default of 0.1 m² would drop joints of bricks
+    smallest = 1e-3 * float(assembly.widths.min()) ** 2  # m²; the default of 0.1 m² would drop joints of bricks
     assembly_interfaces_numpy(blocks, nmax=assembly.n_blocks, tmax=1e-6, amin=smallest)
     return blocks
 

@@ -89,6 +89,26 @@ def loaded(module: str) -> bool:
     return True
 
 
+def installed(names: tuple[str, ...]) -> tuple[list[str], dict[str, Drive]]:
+    """The engines, and with ours the tools for equilibrium that are there; prints versions and the table's head."""
+    engines: list[str] = []
+    tools: dict[str, Drive] = {"blockvis": equilibrium_peers.limit_load}
+    for name in names:
+        if not loaded(name):
+            print(f"{name}: not installed")
+            continue
+        print(f"{name} {importlib.metadata.version(name)}")
+        if name == "compas_cra":
+            tools["compas_cra RBE"] = equilibrium_peers.rigid_block_equilibrium
+            tools["compas_cra CRA"] = equilibrium_peers.coupled_analysis
+        else:
+            engines.append(name)
+    print(f"blockvis {importlib.metadata.version('blockvis')}, Python {platform.python_version()}\n")
+    row("tool", "case", "quantity", "reference", "found", "difference", "seconds")
+    row("---", "---", "---", "---", "---", "---", "---")
+    return engines, tools
+
+
 def crown(assembly: solver.Assembly, positions: np.ndarray) -> float:
     """How far the two voussoirs at the crown have sunk [m]."""
     middle = int(assembly.free.sum()) // 2
@@ -239,22 +259,7 @@ def main() -> None:
     options.add_argument("--questions", type=int, nargs="+", choices=(1, 2, 3), default=(1, 2, 3))
     options.add_argument("--seconds", type=float, default=300.0, help="processor time given to a run of an engine")
     given = options.parse_args()
-    engines: list[str] = []
-    tools: dict[str, Drive] = {"blockvis": equilibrium_peers.limit_load}
-    if not given.quick:
-        for name in (*physics_engines.ENGINES, "compas_cra"):
-            if not loaded(name):
-                print(f"{name}: not installed")
-                continue
-            print(f"{name} {importlib.metadata.version(name)}")
-            if name == "compas_cra":
-                tools["compas_cra RBE"] = equilibrium_peers.rigid_block_equilibrium
-                tools["compas_cra CRA"] = equilibrium_peers.coupled_analysis
-            else:
-                engines.append(name)
-    print(f"blockvis {importlib.metadata.version('blockvis')}, Python {platform.python_version()}\n")
-    row("tool", "case", "quantity", "reference", "found", "difference", "seconds")
-    row("---", "---", "---", "---", "---", "---", "---")
+    engines, tools = installed(() if given.quick else (*physics_engines.ENGINES, "compas_cra"))
     if 1 in given.questions:
         spreading_arch(engines, given.seconds)
     if 2 in given.questions:

@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 
 import solver
+from blockvis.layout.layout import layout_of
 
-__all__ = ["ENGINES", "Sample", "in_a_process"]
+__all__ = ["ENGINES", "IN_SPACE", "Sample", "in_a_process"]
 
 #: Time at rest before the supports move, and between two samples [s]; forces are means between samples.
 REST = 0.3
@@ -137,20 +138,7 @@ def mujoco_path(
             f'<body name="b{i}" pos="{x:.17g} {y:.17g} 0"{gravity}>{joints}'
             f'<geom type="mesh" mesh="m{i}" contype="1" conaffinity="{meets}"/></body>'
         )
-    density = float(np.unique(assembly.density)[0])
-    # hard friction keeps the arch from creeping (with 10 it falls 1 % early); a panel of bricks it throws apart
-    impratio = 100 if assembly.n_blocks < 50 else 10
-    model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco>
-        <option timestep="{time_step}" gravity="0 {-solver.GRAVITY} 0" cone="elliptic" impratio="{impratio}"
-                solver="Newton" iterations="200" tolerance="1e-12" integrator="implicitfast">
-          <flag nativeccd="enable"/></option>
-        <default><geom condim="3" friction="{friction} 0 0" density="{density}"
-                 solref="{2 * time_step} 1" solimp="0.99 0.9999 1e-5"/></default>
-        <asset>{"".join(meshes)}</asset><worldbody>{"".join(bodies)}</worldbody></mujoco>"""
-    )
-    # several contact points where faces meet: to be asked for up to some version, the default in later ones
-    model.opt.enableflags |= int(getattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD", 0))
+    model = _mujoco_model(assembly, meshes, bodies, f"0 {-solver.GRAVITY} 0", time_step, friction)
     data = mujoco.MjData(model)
     moving = np.flatnonzero(assembly.moving)
     drives = [model.joint(f"drive{i}") for i in moving]
@@ -177,6 +165,28 @@ def mujoco_path(
         positions = data.xpos[ids, :2].copy()
         displacement = float(data.qpos[drives[0].qposadr[0]])
         yield Sample(clock + per_sample * time_step, displacement, positions, force / per_sample)
+
+
+def _mujoco_model(
+    assembly: solver.Assembly, meshes: list[str], bodies: list[str], gravity: str, time_step: float, friction: float
+) -> Any:
+    import mujoco
+
+    density = float(np.unique(assembly.density)[0])
+    # hard friction keeps an arch from creeping (with 10 it falls 1 % early); a panel of bricks it throws apart
+    impratio = 100 if assembly.n_blocks < 50 else 10
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco>
+        <option timestep="{time_step}" gravity="{gravity}" cone="elliptic" impratio="{impratio}"
+                solver="Newton" iterations="200" tolerance="1e-12" integrator="implicitfast">
+          <flag nativeccd="enable"/></option>
+        <default><geom condim="3" friction="{friction} 0 0" density="{density}"
+                 solref="{2 * time_step} 1" solimp="0.99 0.9999 1e-5"/></default>
+        <asset>{"".join(meshes)}</asset><worldbody>{"".join(bodies)}</worldbody></mujoco>"""
+    )
+    # several contact points where faces meet: to be asked for up to some version, the default in later ones
+    model.opt.enableflags |= int(getattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD", 0))
+    return model
 
 
 def _strips(outline: np.ndarray, width: float, gap: float) -> list[np.ndarray]:
@@ -262,14 +272,14 @@ def _report(pipe: multiprocessing.connection.Connection, name: str, given: tuple
     importlib.import_module(name)
     pipe.send((0.0, None))
     started = time.process_time()
-    for sample in ENGINES[name](*given, sampling):
+    for sample in (ENGINES if given[0].dimension == 2 else IN_SPACE)[name](*given, sampling):
         pipe.send((time.process_time() - started, sample))
 
 
 def in_a_process(
     name: str,
     assembly: solver.Assembly,
-    direction: tuple[float, float],
+    direction: tuple[float, float] | np.ndarray,
     speed: float,
     time_step: float,
     friction: float,
@@ -302,4 +312,93 @@ def in_a_process(
         child.join()
 
 
+def _corners(assembly: solver.Assembly, block: int) -> np.ndarray:
+    first, last = assembly.polyhedra.offsets[block : block + 2]
+    return assembly.vertices[first:last]
+
+
+def mujoco_path_in_space(
+    assembly: solver.Assembly, directions: np.ndarray, speed: float, time_step: float, friction: float, sampling: float
+) -> Iterator[Sample]:
+    """MuJoCo with free bodies, the convex hulls of the blocks; each support moves along its row of (n_blocks, 3)."""
+    import mujoco
+
+    meshes, bodies = [], []
+    for i in range(assembly.n_blocks):
+        corners = (_corners(assembly, i) - assembly.centroids[i]).ravel()
+        meshes.append(f'<mesh name="m{i}" inertia="exact" vertex="{" ".join(f"{c:.17g}" for c in corners)}"/>')
+        joints = "<freejoint/>" if assembly.free[i] else ""
+        if assembly.moving[i]:
+            axis = " ".join(f"{c:.17g}" for c in directions[i])
+            joints = f'<joint name="drive{i}" type="slide" axis="{axis}" armature="1e8"/>'
+        place = " ".join(f"{c:.17g}" for c in assembly.centroids[i])
+        gravity = "" if assembly.free[i] else ' gravcomp="1"'
+        bodies.append(
+            f'<body name="b{i}" pos="{place}"{gravity}>{joints}'
+            f'<geom type="mesh" mesh="m{i}" contype="1" conaffinity="{1 if assembly.free[i] else 0}"/></body>'
+        )
+    model = _mujoco_model(assembly, meshes, bodies, f"0 0 {-solver.GRAVITY}", time_step, friction)
+    data = mujoco.MjData(model)
+    moving = np.flatnonzero(assembly.moving)
+    drives = [model.joint(f"drive{i}") for i in moving]
+    ids = np.array([model.body(f"b{i}").id for i in range(assembly.n_blocks)])
+    ways = np.zeros((model.nbody, 3))
+    ways[ids[moving]] = directions[moving]
+    per_sample, wrench = max(1, round(sampling / time_step)), np.zeros(6)
+    for sample in range(10**9):
+        clock = sample * per_sample * time_step - REST
+        now, work = speed if clock > -1e-9 else 0.0, 0.0
+        for step in range(per_sample):
+            for joint in drives:
+                data.qpos[joint.qposadr[0]] = now * (max(clock, 0.0) + step * time_step)
+                data.qvel[joint.dofadr[0]] = now
+            mujoco.mj_step(model, data)
+            first, second = ways[model.geom_bodyid[data.contact.geom]].transpose(1, 0, 2)
+            for k in np.flatnonzero((np.abs(first) + np.abs(second)).any(axis=1)):
+                mujoco.mj_contactForce(model, data, k, wrench)
+                work += float((second[k] - first[k]) @ (data.contact.frame[k].reshape(3, 3).T @ wrench[:3]))
+        displacement = float(data.qpos[drives[0].qposadr[0]])
+        yield Sample(clock + per_sample * time_step, displacement, data.xpos[ids].copy(), np.array([work / per_sample]))
+
+
+def lmgc90_path_in_space(
+    assembly: solver.Assembly, directions: np.ndarray, speed: float, time_step: float, friction: float, sampling: float
+) -> Iterator[Sample]:
+    """LMGC90 with free polyhedra; each support moves along its row of (n_blocks, 3)."""
+    from compas_lmgc90.solver import Solver
+
+    engine = Solver(dt=time_step, theta=0.5, density=float(np.unique(assembly.density)[0]))
+    solids = [{"vertices": corners.tolist(), "faces": faces} for corners, faces in layout_of(assembly).solids]
+    engine.geometry_from_v_f(solids)
+    engine.contact_law("IQS_CLB", friction, alert=0.02 * assembly.block_size)
+    for i in np.flatnonzero(~assembly.free):
+        for component in ("Vx", "Vy", "Vz", "Rx", "Ry", "Rz"):
+            engine.apply_velocity(int(i), component, 0.0)
+        for component, part in zip(("Vx", "Vy", "Vz"), directions[i], strict=True):
+            if assembly.moving[i] and abs(part) > 1e-12:
+                v = speed * part
+                evolution = [[0.0, REST, REST + time_step, 1e6], [0.0, 0.0, v, v]]
+                engine.apply_velocity(int(i), component, np.array(evolution))
+    engine.preprocess()
+    start, moving = np.array(engine.init_coor), np.flatnonzero(assembly.moving)
+    ways = np.where(assembly.moving[:, None], directions, 0.0)
+    per_sample = max(1, round(sampling / time_step))
+    for sample in range(10**9):
+        work = 0.0
+        for _ in range(per_sample):
+            state = engine.lmgc90.compute_one_step()
+            if len(state.interaction_bodies):
+                first, second = (np.array(state.interaction_bodies) - 1).T
+                forces = np.array(state.interaction_force_global)
+                work += float((forces * (ways[first] - ways[second])).sum())
+        moved = np.array(state.bodies) - start
+        clock = (sample + 1) * per_sample * time_step - REST
+        displacement = float(moved[moving[0]] @ directions[moving[0]])
+        yield Sample(clock, displacement, assembly.centroids + moved, np.array([work / per_sample]))
+
+
 ENGINES = {"pymunk": pymunk_path, "mujoco": mujoco_path, "compas_lmgc90": lmgc90_path}
+
+#: Those of blocks in space; their samples have positions (n_blocks, 3), and as force (1,) what the supports resist
+#: along their movement.
+IN_SPACE = {"mujoco": mujoco_path_in_space, "compas_lmgc90": lmgc90_path_in_space}

@@ -43,7 +43,8 @@ def write_vtu(
 
     Notes
     -----
-    The format is inline binary with zlib and 64-bit headers, which ParaView from 5.11 on, pyvista and meshio read.
+    The format is inline binary with zlib and 64-bit headers, which ParaView from 5.11 on and pyvista read; meshio does,
+    too, where no array holds strings.
     Appended raw data, VTK's default, fails in ParaView 5.11 above some 10 kB. Faces of polyhedra stand in the arrays
     ``faces`` and ``faceoffsets`` of version 1.0: those that VTK writes since 9.4 older ParaViews do not know.
     """

@@ -43,7 +43,7 @@ FORMATS = {
     ".obj": _SOLID,
     ".ply": _SOLID,
     ".off": Format("solids"),
-    ".glb": Format("solids"),
+    ".glb": _SOLID,
     ".geo": _CAD,
     ".geo_unrolled": _CAD,
     ".step": _CAD,

@@ -157,7 +157,10 @@ def layout_of_bodies(
         if one.scatter < best.scatter - 1e-4 * size:
             best = one
     name, along = view_along(best.axis), "xyz"[best.axis]
-    notes = [f"{len(bodies)} bodies were read as outlines in {name}; their depth along {along} is the thickness"]
+    notes = [
+        f"{len(bodies)} bodies were read as outlines in {name}; their depth along {along} is the thickness "
+        "(dimension = 3 takes them into space)"
+    ]
     middle = (best.low + best.high) / 2.0
     if np.ptp(middle) > ECCENTRIC * size:
         first, last = bodies[int(middle.argmin())].name, bodies[int(middle.argmax())].name

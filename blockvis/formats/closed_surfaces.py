@@ -13,6 +13,10 @@ from .bodies import Body, fans
 SAME_POINT = 2e-6
 
 
+#: Faces around an edge whose angles differ by less than this [rad] coincide.
+SAME_ANGLE = 1e-4
+
+
 class OpenSurface(ValueError):
     """A surface that encloses nothing."""
 
@@ -30,7 +34,7 @@ def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
 
 
 def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Merge points that coincide, and drop the faces that have no area then or are there already."""
+    """Merge points that coincide, and drop the faces that have no area then."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
@@ -42,10 +46,7 @@ def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> t
     _, label = connected_components(graph, directed=False)
     first = np.unique(label, return_index=True)[1]
     faces = label[inverse.ravel()][faces]
-    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-    # Some files hold each face twice.
-    once = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]
-    return unique[first], faces[np.sort(once)]
+    return unique[first], faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
 
 
 def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path: Path | str) -> list[Body]:
@@ -68,11 +69,17 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
     ValueError
         For bodies that touch along an edge.
     """
-    points, faces = _with_points_merged(points, faces, size)
+    points, every = _with_points_merged(points, faces, size)
+    # Some files hold each face twice.
+    faces = every[np.sort(np.unique(np.sort(every, axis=1), axis=0, return_index=True)[1])]
     if len(faces) == 0:
         raise OpenSurface(f"'{path}': body '{name}' has no face with an area; export closed bodies")
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    if (counts != 2).any():
+        piece = _touching_bodies(points, every)
+        if piece is not None:
+            return _pieces(name, points, every, piece)
     if (counts == 1).any():
         x, y, z = points[unique[counts == 1][0]].mean(axis=0)
         raise OpenSurface(
@@ -88,9 +95,64 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
         )
     # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.
     inverse = inverse.ravel().reshape(-1, 3)
-    piece = components(list(inverse), len(unique))
+    return _pieces(name, points, faces, components(list(inverse), len(unique)))
+
+
+def _pieces(name: str, points: np.ndarray, faces: np.ndarray, piece: np.ndarray) -> list[Body]:
     n = int(piece.max()) + 1
     return [Body(name if n == 1 else f"{name} {k + 1}", points, faces[piece == k]) for k in range(n)]
+
+
+def _touching_bodies(points: np.ndarray, faces: np.ndarray) -> np.ndarray | None:
+    """(m,) int array: the body of each face, where bodies share edges or faces; None where they cannot be told apart.
+
+    Faces are seen counter-clockwise from outside. Around an edge of several bodies, the face with the inside of its
+    body behind it, counter-clockwise, goes with the next that has the inside before it.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    if _volumes(points, faces).sum() < 0.0:
+        faces = faces[:, ::-1]
+    start, end = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
+    apex, owner = points[faces[:, [2, 0, 1]].ravel()], np.repeat(np.arange(len(faces)), 3)
+    forward = start < end
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    along = points[high] - points[low]
+    along = along / np.linalg.norm(along, axis=1)[:, None]
+    _, edge = np.unique(low * np.int64(len(points)) + high, return_inverse=True)
+    edge = edge.ravel()
+    # Axes across each edge, the same for all its faces.
+    helper = np.eye(3)[np.abs(along).argmin(axis=1)]
+    first = np.cross(along, helper)
+    first = first / np.linalg.norm(first, axis=1)[:, None]
+    arms = apex - points[low]
+    angle = np.arctan2((arms * np.cross(along, first)).sum(axis=1), (arms * first).sum(axis=1))
+    # A face that runs along its edge from low to high has its inside before it, counter-clockwise.
+    order = np.lexsort((angle, edge))
+    partner = np.empty(len(edge), dtype=np.int64)
+    for k in np.split(order, np.flatnonzero(np.diff(edge[order])) + 1):
+        if len(k) % 2 or 2 * np.count_nonzero(forward[k]) != len(k):
+            return None
+        turn = angle[k] - angle[k][0]
+        # Faces that coincide: the one that ends a body comes before that which begins one.
+        steps = np.round(turn / SAME_ANGLE).astype(np.int64)
+        k = k[np.lexsort((~forward[k], steps))]
+        begins = ~forward[k]
+        shift = int(np.flatnonzero(begins & ~np.roll(begins, 1))[0])
+        k = np.roll(k, -shift)
+        if not (~forward[k][::2]).all() or not forward[k][1::2].all():
+            return None
+        partner[k[::2]], partner[k[1::2]] = k[1::2], k[::2]
+    links = coo_matrix((np.ones(len(edge)), (owner, owner[partner])), shape=(len(faces), len(faces)))
+    piece = np.asarray(connected_components(links, directed=False)[1])
+    return piece if (np.bincount(piece, _volumes(points, faces)) > 0.0).all() else None
+
+
+def _volumes(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(m,) array: of the tetrahedra over faces, from the middle of all points."""
+    a, b, c = (points - points.mean(axis=0))[faces].transpose(1, 0, 2)
+    return np.asarray((a * np.cross(b, c)).sum(axis=1) / 6.0)
 
 
 def bodies_of_surfaces(

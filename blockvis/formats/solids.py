@@ -21,7 +21,7 @@ from .closed_surfaces import closed_bodies
 from .reading import Reading
 
 #: Programs that write coordinates to .glb as they are, with z up, in small letters.
-Z_IS_UP = ("trimesh", "blockvis")
+Z_IS_UP = ("trimesh",)
 
 #: Largest description of a .glb file that is looked into [bytes].
 LARGEST_HEADER = 64 * 2**20
@@ -72,6 +72,9 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         # The reader returns the objects in an order of its own: rows are matched to them by name.
         by_name = {row.get("name"): row for row in rows}
         rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
+    if suffix == ".glb":
+        found = [mesh.metadata.get("blockvis") for _, mesh in _placed(scene) if len(mesh.faces)]
+        rows = found if len(found) == len(bodies) and all(isinstance(row, dict) for row in found) else []
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
     up, says = _up(path) if suffix == ".glb" else ("z", "")
     return Bodies(tuple(bodies), tuple(known), unit, up=up, up_says=says)
@@ -149,15 +152,37 @@ def _own_rows(path: Path) -> list[dict[str, Any]]:
 
 
 def write(layout: AnyLayout, path: Path) -> None:
-    """Write .stl, .obj or .ply as text: blocks in space, or outlines extruded along z by their thickness, else 1 m."""
+    """Write .stl, .obj or .ply as text, or .glb: blocks in space, or outlines extruded by their thickness, else 1 m."""
     if isinstance(layout, SolidLayout):
         solids, what = list(layout.solids), "blocks in space, z is up, lengths in m"
     else:
         depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
         solids = [prism(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)]
         what = "blocks extruded by their thickness, lengths in m"
+    if path.suffix.lower() == ".glb":
+        # y is up there, as it is in the plane.
+        in_space = isinstance(layout, SolidLayout)
+        turned = [(points[:, [0, 2, 1]] * [1, 1, -1] if in_space else points, faces) for points, faces in solids]
+        path.write_bytes(_glb(turned, rows_of(layout)))
+        return
     lines = {".stl": _stl_lines, ".obj": _obj_lines, ".ply": _ply_lines}[path.suffix.lower()]
     path.write_text("\n".join([*lines(solids, rows_of(layout), what), ""]), encoding="utf-8")
+
+
+def _glb(solids: list[Solid], rows: list[dict[str, Any]]) -> bytes:
+    """Write a node for each block, in single precision; its row stands in the extras."""
+    import trimesh
+
+    scene = trimesh.Scene()
+    for number, ((points, faces), row) in enumerate(zip(solids, rows, strict=True)):
+        mesh = trimesh.Trimesh(points, triangles_of(points, faces), process=False, metadata={"blockvis": row})
+        name = row["name"] if row["name"] not in scene.geometry else f"{row['name']} ({number})"
+        scene.add_geometry(mesh, node_name=name, geom_name=name)
+
+    def signed(tree: dict[str, Any]) -> None:
+        tree["asset"]["generator"] = "blockvis"
+
+    return bytes(scene.export(file_type="glb", tree_postprocessor=signed))
 
 
 def _stl_lines(solids: list[Solid], rows: list[dict[str, Any]], _: str) -> list[str]:

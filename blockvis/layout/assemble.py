@@ -12,6 +12,7 @@ import numpy as np
 import solver
 
 from .assemble_solids import assemble_solids
+from .inspect_solids import inspected_solids
 from .layout import AnyLayout, Layout
 from .repair import duplicates, repaired
 from .roles import checked_role, roles_of
@@ -75,9 +76,7 @@ def assemble(
     """
     if isinstance(layout, SolidLayout):
         if isinstance(joint_thickness, str):
-            raise ValueError(
-                f'joint_thickness is "{joint_thickness}", which measures joints in the plane; give it in m'
-            )
+            joint_thickness = inspected_solids(layout).joint_thickness
         return assemble_solids(
             layout,
             roles=roles,

@@ -65,11 +65,11 @@ def with_rows(layout: Drawn, rows: Sequence[Any]) -> Drawn:
     for name, role in zip(words("name", layout.names), roles, strict=True):
         if role and role not in solver.ROLES:
             raise ValueError(f"block '{name}' has role '{role}' in the file; roles are {', '.join(solver.ROLES)}")
-    if isinstance(layout, Layout):
-        # Blocks in space have no thickness out of a plane.
-        layout = replace(layout, thickness=numbers("thickness"))
+    # Blocks in space have no thickness out of a plane.
+    own = {"thickness": numbers("thickness")} if isinstance(layout, Layout) else {}
     return replace(
         layout,
+        **own,  # type: ignore[arg-type]
         names=words("name", layout.names),
         groups=words("group", [""] * layout.n_blocks),
         roles=roles,

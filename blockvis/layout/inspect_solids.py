@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,10 +12,14 @@ import numpy as np
 import solver
 
 from .assemble_solids import solid_duplicates
-from .facing import Facing, faced
+from .faces import width_of
+from .facing import DEFAULT_FACING, Facing, faced
 from .roles import roles_of
 from .solid_layout import SolidLayout
 from .solids import size_of
+
+#: Gaps between faces that cover each other are joints drawn open between these parts of the width of a typical block.
+SMALLEST_JOINT, WIDEST_JOINT = 1e-3, 0.2
 
 #: Density of blocks for which the layout has none [kg/m³], as of a run.
 DENSITY = 2000.0
@@ -36,6 +41,12 @@ class SolidInspection:
         Role of each block, as a run takes it from roles, groups and names.
     facing : Facing
         Joints whose faces do not lie in one plane, as a run closes them; block numbers count the kept blocks.
+    overlapping : tuple of (int, int, float)
+        Pairs of blocks that overlap nevertheless, and the depth [m], deepest first.
+    open_joints : tuple of (int, int, float)
+        Pairs of blocks of which faces cover each other across a gap, and the gap [m], widest first.
+    refused : str
+        Why a run would refuse the blocks, or "".
     """
 
     layout: SolidLayout
@@ -43,6 +54,9 @@ class SolidInspection:
     twins: tuple[tuple[int, int], ...]
     roles: tuple[str, ...]
     facing: Facing
+    overlapping: tuple[tuple[int, int, float], ...]
+    open_joints: tuple[tuple[int, int, float], ...]
+    refused: str
 
     @cached_property
     def volumes(self) -> np.ndarray:
@@ -57,8 +71,12 @@ class SolidInspection:
 
     @property
     def joint_thickness(self) -> float:
-        """Joint thickness that closes the joints [m]: 0, as joints in space are not measured."""
-        return 0.0
+        """Joint thickness that closes the open joints [m], rounded up to two digits; 0 without any."""
+        if not self.open_joints:
+            return 0.0
+        widest = 1.01 * self.open_joints[0][2]
+        unit = 10.0 ** (math.floor(math.log10(widest)) - 1)
+        return float(f"{math.ceil(widest / unit) * unit:.2g}")
 
     @property
     def low(self) -> np.ndarray:
@@ -105,6 +123,16 @@ class SolidInspection:
         names = [layout.names[i] for i in kept]
         lines.append(f"{'names':15} {', '.join(names[:4])}{' ...' if len(names) > 4 else ''}")
         lines.append(f"joints          {self.facing.note or 'faces in contact lie in one plane'}")
+        for title, pairs, remedy in (
+            ("open joints", self.open_joints, f"; joint_thickness = {self.joint_thickness:g} closes them"),
+            ("overlaps", self.overlapping, "; a run refuses them: move the blocks apart or raise overlap_tolerance"),
+        ):
+            if pairs:
+                worst = [f"{layout.names[i]} | {layout.names[j]} {by:.3g} m" for i, j, by in pairs[:4]]
+                more = f" and {len(pairs) - 4} more" if len(pairs) > 4 else ""
+                lines.append(f"{title:15} {len(pairs)}: {', '.join(worst)}{more}{remedy}")
+        if self.refused:
+            lines.append(f"refused         {self.refused}")
         if self.twins:
             shown = ", ".join(f"{layout.names[b]} = {layout.names[a]}" for a, b in self.twins[:8])
             lines.append(f"duplicates      {shown}{' ...' if len(self.twins) > 8 else ''}")
@@ -124,10 +152,39 @@ def inspected_solids(layout: SolidLayout) -> SolidInspection:
     later = {copy for _, copy in twins}
     kept = np.array([i for i in range(layout.n_blocks) if i not in later])
     some = layout.chosen(kept)
+    facing = faced(some.solids, some.names)
+    overlapping: list[tuple[int, int, float]] = []
+    gaps: list[tuple[int, int, float]] = []
+    refused = ""
+    try:
+        assembly = solver.Assembly.from_solids(facing.solids, names=some.names)
+        width = float(np.median([width_of(*solid) for solid in some.solids]))
+        one, other, depth = assembly.shapes.overlaps(assembly.vertices, DEFAULT_FACING * width)
+        overlapping = [(int(kept[i]), int(kept[j]), float(d)) for i, j, d in zip(one, other, depth, strict=True)]
+        gaps = [(int(kept[i]), int(kept[j]), gap) for i, j, gap in _open_joints(assembly, width)]
+    except ValueError as error:
+        refused = str(error)
     return SolidInspection(
         layout=layout,
         kept=kept,
         twins=tuple(twins),
         roles=tuple(roles_of(layout, {})),
-        facing=faced(some.solids, some.names),
+        facing=facing,
+        overlapping=tuple(sorted(overlapping, key=lambda pair: -pair[2])),
+        open_joints=tuple(sorted(gaps, key=lambda pair: -pair[2])),
+        refused=refused,
     )
+
+
+def _open_joints(assembly: solver.Assembly, width: float) -> list[tuple[int, int, float]]:
+    """Pairs of blocks of which faces cover each other across a gap, and its mean width [m]."""
+    contacts = solver.find_contacts(assembly, assembly.vertices, WIDEST_JOINT * width)
+    pairs, joint = contacts.joints()
+    n = len(pairs)
+    low, high = np.full(n, np.inf), np.full(n, -np.inf)
+    np.minimum.at(low, joint, contacts.gaps)
+    np.maximum.at(high, joint, contacts.gaps)
+    area = np.bincount(joint, contacts.areas, minlength=n)
+    # What touches somewhere, or opens like a wedge, is no joint that was drawn open.
+    found = (low > SMALLEST_JOINT * width) & (high < 2.0 * low) & (area > (0.3 * width) ** 2)
+    return [(int(i), int(j), float(gap)) for (i, j), gap in zip(pairs[found], high[found], strict=True)]

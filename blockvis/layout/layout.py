@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 import solver
 
-from .labels import check_labels
+from .labels import LabelledBlocks
 from .left_out import LeftOut
 from .solid_layout import SolidLayout
 from .solids import extruded
 
 
 @dataclass(frozen=True)
-class Layout:
-    """Outlines of blocks, with their names, groups, roles, materials, thickness and density.
+class Layout(LabelledBlocks):
+    """Outlines of blocks, with what else a drawing says of them.
 
     Attributes
     ----------
@@ -25,68 +25,20 @@ class Layout:
         Corners of each block in order, the first corner not repeated.
     names : tuple of str
         One per block; may repeat.
-    groups : tuple of str
-        Physical group or layer of each block, "" for none.
-    roles : tuple of str
-        "free", "fixed", "moving", or "" where the file says nothing.
-    materials : tuple of str
     thickness : (n_blocks,) array [m] or None
         Out of plane; NaN for a block of which the file says nothing.
-    density : (n_blocks,) array [kg/m³] or None
-        NaN for a block of which the file says nothing.
-    unit : str
-        Unit of length in which the file was read; inside a format's reader the unit that the file states, "" for none.
-    notes : tuple of str
-        What the reader assumed or dropped.
-    source : str
-        The file, "" for a layout that was not read from a file.
-    left_out : tuple of LeftOut
-        What the file draws beside its blocks.
     """
 
     outlines: tuple[np.ndarray, ...]
     names: tuple[str, ...]
-    groups: tuple[str, ...] = ()
-    roles: tuple[str, ...] = ()
-    materials: tuple[str, ...] = ()
-    thickness: np.ndarray | None = None
-    density: np.ndarray | None = None
-    unit: str = "m"
-    notes: tuple[str, ...] = ()
-    source: str = ""
-    left_out: tuple[LeftOut, ...] = ()
+    thickness: np.ndarray | None = field(default=None, kw_only=True)
 
-    def __post_init__(self) -> None:
-        """Check that there is one entry per block, and replace broken characters."""
-        check_labels(self, len(self.outlines), "outlines")
-
-    @property
-    def n_blocks(self) -> int:
-        """Number of outlines."""
-        return len(self.outlines)
-
-    @property
-    def dimension(self) -> int:
-        """Number of coordinates: 2."""
-        return 2
+    shapes_in = "outlines"
+    dimension = 2
 
     def corners(self, block: int) -> np.ndarray:
         """(n, 2) array [m]: the corners of a block."""
         return self.outlines[block]
-
-    def chosen(self, blocks: Sequence[int] | np.ndarray) -> Layout:
-        """Take only these blocks, in this order."""
-        keep = [int(i) for i in blocks]
-        return replace(
-            self,
-            outlines=tuple(self.outlines[i] for i in keep),
-            names=tuple(self.names[i] for i in keep),
-            groups=tuple(self.groups[i] for i in keep),
-            roles=tuple(self.roles[i] for i in keep),
-            materials=tuple(self.materials[i] for i in keep),
-            thickness=None if self.thickness is None else self.thickness[keep],
-            density=None if self.density is None else self.density[keep],
-        )
 
     def leaving_out(self, reasons: Mapping[int, LeftOut]) -> Layout:
         """Leave out these blocks, each for its reason."""

@@ -16,7 +16,7 @@ from PIL import Image
 import solver
 from blockvis.fall import Fall
 from blockvis.numbers import force_text
-from blockvis.results.joint_faces import joint_faces
+from blockvis.results.joint_faces import initial_joints
 
 from . import palette
 from .annotations import SMALLEST_RESULTANT, length_per_force
@@ -88,7 +88,7 @@ class SolidDrawer:
         look = replace(look, forces="none") if look.forces == "auto" else look
         self.response, self.look, self.increments = response, look, increments
         assembly = self.assembly = response.assembly
-        self.joints = joint_faces(assembly)
+        self.joints = initial_joints(assembly)
         self._swing = swing_of(response)
         self.view = chosen_view(response, self._swing.displaced.positions - self._swing.increment.pose.positions)
         self._largest = self._widest = self._strongest = 0.0

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import solver
-from blockvis.results.joint_faces import JointFaces, faces_in_space
-from blockvis.results.joints import TOUCHING
+from blockvis.results.joint_faces import TOUCHING, InitialJoints
+from blockvis.results.joints import carried_faces
 
 from .annotations import SMALLEST_OPENING, STEEPEST, WIDEST
 
@@ -49,21 +49,21 @@ class SolidMarks:
 
 
 def solid_marks(
-    assembly: solver.Assembly, joints: JointFaces, increment: solver.Increment, shown: solver.Pose
+    assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment, shown: solver.Pose
 ) -> SolidMarks:
     """Cracks, sliding faces and hinges of an increment, on blocks shown at a pose.
 
     Parameters
     ----------
     assembly : solver.Assembly
-    joints : JointFaces
+    joints : InitialJoints
     increment : solver.Increment
         Its mechanism has the hinges and sliding joints.
     shown : solver.Pose
         Where the blocks are drawn: the increment's own pose, a magnified one, or a later one.
     """
     size = assembly.block_size
-    now, drawn = faces_in_space(assembly, joints, increment.pose), faces_in_space(assembly, joints, shown)
+    now, drawn = carried_faces(assembly, joints, increment.pose), carried_faces(assembly, joints, shown)
     rings = joints.rings
     start, end = np.arange(len(rings.points)), rings.following
     gaps = np.stack([now.gaps[start], now.gaps[end]], axis=1)
@@ -134,7 +134,7 @@ def hinge_lines(assembly: solver.Assembly, increment: solver.Increment, mechanis
 
 
 def _sliding_faces(
-    joints: JointFaces, mechanism: solver.Mechanism, on_a: np.ndarray, on_b: np.ndarray
+    joints: InitialJoints, mechanism: solver.Mechanism, on_a: np.ndarray, on_b: np.ndarray
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Edges (n, 2, 3) around the faces that slide, and the faces themselves, of both blocks."""
     count = 1 + int(max(joints.block_b.max(initial=0), mechanism.sliding.max(initial=0)))

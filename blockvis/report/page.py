@@ -169,7 +169,7 @@ def _notes(response: solver.Response) -> str:
 
 def _cracks(response: solver.Response) -> str:
     """List the crack lines of the last equilibrium."""
-    if not response.path or response.assembly.dimension == 3:
+    if not response.path:
         return ""
     rows = crack_rows(cracks_of(response.assembly, response.path[-1].pose), LISTED_CRACKS)
     return f'<h2>Cracks at the last equilibrium</h2><table id="crack-lines">{html_rows(rows)}</table>' if rows else ""

@@ -131,7 +131,7 @@
     const falling = model.frames[k].falling, entries = [];
     const add = (kind, text, colour) => entries.push([kind, text, colour]);
     const marked = state.magnify === 1;
-    if (state.cracks && model.space) add("ramp", `open joint, to ${(1000 * model.widest_crack).toPrecision(2)} mm`, `linear-gradient(90deg, ${model.cracks.join(",")})`);
+    if (state.cracks && model.space) add("ramp", `open joint, to ${+(1000 * model.widest_crack).toPrecision(2)} mm`, `linear-gradient(90deg, ${model.cracks.join(",")})`);
     else if (state.cracks) add("area", "open joint", model.colours.open);
     if (layers.hinges && marked && countOf(k, 1)) add(model.space ? "line" : "dot", "hinge", model.colours.hinge);
     if (layers.sliding && marked && countOf(k, 2)) add("line", "sliding joint", model.colours.sliding);
@@ -141,7 +141,7 @@
     if (layers.start && model.arrows.length) add("line", falling ? was : `settlement; ${was}`, falling ? model.colours.hatch : model.colours.settlement);
     if (marked && model.live_words) add("line", model.live_words, model.colours.live);
     if (state.colours === "mechanism" && model.tints.length) add("area", model.tints_words, model.tints[model.moving]);
-    if (state.colours === "displacement") add("ramp", `displacement, 0 to ${(1000 * model.largest_displacement).toPrecision(3)} mm`, `linear-gradient(90deg, ${model.ramp.join(",")})`);
+    if (state.colours === "displacement") add("ramp", `displacement, 0 to ${+(1000 * model.largest_displacement).toPrecision(3)} mm`, `linear-gradient(90deg, ${model.ramp.join(",")})`);
     const many = [["hinges", 1], ["sliding", 2]].filter(([name, kind]) => model.many && countOf(k, kind) && !layers[name]);
     if (many.length) add("", `${many.map(([name]) => (name === "hinges" ? "hinges" : "sliding joints")).join(" and ")} are off: they would hide the cracks of so many blocks`, "");
     if (!marked) add("", "hinges, sliding joints and forces are shown at true scale only", "");

@@ -130,7 +130,9 @@
     "vec4 clip(vec3 v) { return vec4((place.x + place.z * v.x) / size.x * 2.0 - 1.0, 1.0 - (place.y - place.z * v.y) / size.y * 2.0, -(v.z - place.w) / deep, 1.0); }\n";
   const solid = gl && program(
     `${SEE} in vec3 at; in vec3 colour; out vec3 v; out vec3 c; void main() { v = seen(at); c = colour; gl_Position = clip(v); }`,
-    "in vec3 v; in vec3 c; out vec4 o; uniform float lit; void main() { vec3 k = cross(dFdx(v), dFdy(v)); float l = length(k); vec3 n = l > 1e-12 ? k / l : vec3(0.0, 0.0, 1.0);" +
+    // Faces go back behind their edges: by what they fall off over a pixel, but not so far that edges behind come forward.
+    "in vec3 v; in vec3 c; out vec4 o; uniform float lit, back; void main() { float z = gl_FragCoord.z; gl_FragDepth = z + back * (min(0.6 * fwidth(z), 1e-3) + 2e-6);" +
+    "  vec3 k = cross(dFdx(v), dFdy(v)); float l = length(k); vec3 n = l > 1e-12 ? k / l : vec3(0.0, 0.0, 1.0);" +
     " float light = mix(1.0, 0.58 + 0.5 * max(0.0, dot(n, normalize(vec3(-0.45, 0.85, 1.2)))), lit); o = vec4(c * light, 1.0); }");
   const thick = gl && program(
     `${SEE} in vec3 at; in vec3 to; in vec3 colour; in vec2 wide; uniform float ahead; out vec3 c; void main() { vec4 p = clip(seen(at)), r = clip(seen(to));` +
@@ -191,7 +193,7 @@
   function drawPolygons(points, colours, w, h) {
     if (!points.length) return;
     const set = look(solid, w, h);
-    set("lit", 0);
+    set("lit", 0); set("back", 0);
     give("p at", solid, new Float32Array(points.flat()), 3); give("p colour", solid, new Float32Array(colours.flat()), 3);
     gl.drawArrays(gl.TRIANGLES, 0, points.length);
   }
@@ -226,17 +228,16 @@
   }
 
   function drawSolid(w, h, colours, near, falling) {
-    gl.enable(gl.DEPTH_TEST); gl.enable(gl.POLYGON_OFFSET_FILL); gl.polygonOffset(2, 16);
-    let set = look(solid, w, h);
-    set("lit", 1);
+    gl.enable(gl.DEPTH_TEST);
+    const set = look(solid, w, h);
+    set("lit", 1); set("back", 1);
     give("s at", solid, corners, 3); give("s colour", solid, perVertex((b) => rgb(fillOf(b))), 3);
     give("s faces", solid, triangles, 0, gl.ELEMENT_ARRAY_BUFFER);
     gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_INT, 0);
-    set("lit", 0);
+    set("lit", 0); set("back", 0);
     give("s colour", solid, perVertex(() => rgb(model.colours.outline)), 3);
     give("s edges", solid, edges, 0, gl.ELEMENT_ARRAY_BUFFER);
     gl.drawElements(gl.LINES, edges.length, gl.UNSIGNED_INT, 0);
-    gl.disable(gl.POLYGON_OFFSET_FILL);
     if (layers.start) drawStart(w, h, colours);
     if (layers.cracks && (!falling || model.joints_of_fall)) drawCracks(w, h);
     if (state.hover >= 0) {
@@ -345,7 +346,8 @@
     }
     gl.bindFramebuffer(gl.FRAMEBUFFER, target);
     gl.viewport(0, 0, 1, 1); gl.enable(gl.DEPTH_TEST); gl.clearColor(0, 0, 0, 0); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    look(solid, 1, 1, x, y)("lit", 0);
+    const set = look(solid, 1, 1, x, y);
+    set("lit", 0); set("back", 0);
     give("s at", solid, corners, 3); give("s colour", solid, perVertex((b) => [0, 8, 16].map((bits) => (((b + 1) >> bits) & 255) / 255)), 3);
     give("s faces", solid, triangles, 0, gl.ELEMENT_ARRAY_BUFFER);
     gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_INT, 0);

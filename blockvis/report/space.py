@@ -16,7 +16,8 @@ from blockvis.pictures.solid_marks import hinge_lines, settlement_arrows_in_spac
 from blockvis.pictures.solid_view import chosen_view
 from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import Swing
-from blockvis.results.joint_faces import JointFaces, faces_in_space, joint_faces
+from blockvis.results.joint_faces import InitialJoints, initial_joints
+from blockvis.results.joints import carried_faces
 
 from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, hexadecimals, rounded
 
@@ -37,7 +38,7 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
     """
     assembly, shapes = response.assembly, response.assembly.polyhedra
     view = chosen_view(response, swing.displaced.positions - swing.increment.pose.positions)
-    joints = joint_faces(assembly)
+    joints = initial_joints(assembly)
     frame, largest, widest = _surveyed(assembly, joints, shown)
     # Coordinates far from the origin (UTM) would waste the digits.
     origin = np.round(frame.low, 3)
@@ -80,7 +81,7 @@ def model_in_space(response: solver.Response, swing: Swing, shown: list[solver.I
 
 
 def _surveyed(
-    assembly: solver.Assembly, joints: JointFaces, shown: list[solver.Increment]
+    assembly: solver.Assembly, joints: InitialJoints, shown: list[solver.Increment]
 ) -> tuple[Frame, float, float]:
     """Box that holds all poses, the largest resultant of a joint in equilibrium [N] or 1, and the widest crack [m]."""
     largest = widest = 0.0
@@ -93,7 +94,7 @@ def _surveyed(
             if increment.status != solver.Status.FALLING:
                 sizes = np.linalg.norm(resultants(increment)[1], axis=1)
                 largest = max(largest, float(sizes.max(initial=0.0)))
-                widest = max(widest, float(faces_in_space(assembly, joints, increment.pose).gaps.max(initial=0.0)))
+                widest = max(widest, float(carried_faces(assembly, joints, increment.pose).gaps.max(initial=0.0)))
 
     frame = framed(assembly, poses(), margin=0.0, supports=0.25)
     return frame, largest or 1.0, widest
@@ -121,7 +122,7 @@ class _Tables:
     Parameters
     ----------
     assembly : solver.Assembly
-    joints : JointFaces
+    joints : InitialJoints
     shown : list of solver.Increment
         Gone through once.
     origin : (3,) array [m]
@@ -133,7 +134,7 @@ class _Tables:
     def __init__(
         self,
         assembly: solver.Assembly,
-        joints: JointFaces,
+        joints: InitialJoints,
         shown: list[solver.Increment],
         origin: np.ndarray,
         unit: float,
@@ -184,7 +185,9 @@ class _Tables:
         }
 
 
-def _marks(assembly: solver.Assembly, joints: JointFaces, increment: solver.Increment) -> tuple[np.ndarray, np.ndarray]:
+def _marks(
+    assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment
+) -> tuple[np.ndarray, np.ndarray]:
     """List ends (n, 2, 3) [m] of hinges and sliding joints, and (n, 2): 1 and -1, or 2 and the number of the joint."""
     mechanism, points = solver.mechanism_of(assembly, increment), increment.contacts.points
     lines = points[hinge_lines(assembly, increment, mechanism)]

@@ -10,10 +10,12 @@ import numpy as np
 import scipy.sparse as sp
 import shapely
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
 
 import solver
 
-from .joints import InitialJoints, initial_joints, opening_and_slip
+from .joint_faces import InitialJoints, initial_joints
+from .joints import Faces, carried_faces, opening_and_slip
 
 #: A joint is open from this fraction of the block size on; on an ordinary brick it is a tenth of a millimetre.
 SMALLEST_OPENING = 1e-3
@@ -23,6 +25,12 @@ MEETING = 0.02
 
 #: Most crack lines that a summary lists, the widest first.
 MOST_LISTED = 100
+
+#: Joints in space belong to one crack where their blocks part by the same, up to this part of it.
+ALIKE = 0.5
+
+#: Of more points than this the corners of their convex hull are found first.
+MANY = 100
 
 
 @dataclass(frozen=True)
@@ -39,12 +47,12 @@ class Crack:
         Of the widest joint.
     widest : str
         Names of the two blocks that part most.
-    at : (2,) array [m]
+    at : (d,) array [m]
         Middle of that joint in the layout.
-    ends : (2, 2) array [m]
+    ends : (2, d) array [m]
         The two ends that are farthest apart in the layout, the lower first.
-    length : float [m]
-        Of all its joints together.
+    size : float
+        Length [m] of all its joints together, in space their area [m²].
     """
 
     joints: np.ndarray
@@ -53,13 +61,14 @@ class Crack:
     widest: str
     at: np.ndarray
     ends: np.ndarray
-    length: float
+    size: float
 
     @property
     def inclination(self) -> float:
-        """Of the line between its ends, counter-clockwise from the horizontal, from 0 up to 180 [degrees]."""
-        along = self.ends[1] - self.ends[0]
-        return float(np.degrees(np.arctan2(along[1], along[0])) % 180.0)
+        """Of the line between its ends: counter-clockwise from the horizontal to 180, in space to 90 [degrees]."""
+        *level, rise = self.ends[1] - self.ends[0]
+        angle = np.arctan2(rise, level[0]) if len(level) == 1 else np.arctan2(abs(rise), np.hypot(*level))
+        return float(np.degrees(angle) % 180.0)
 
     def values(self) -> dict[str, Any]:
         """Its numbers as ``summary.json`` has them: widths in mm, places and lengths in m."""
@@ -71,7 +80,7 @@ class Crack:
             "from": np.round(self.ends[0], 6).tolist(),
             "to": np.round(self.ends[1], 6).tolist(),
             "inclination_degrees": round(self.inclination, 2),
-            "length": round(self.length, 6),
+            "length" if len(self.at) == 2 else "area": round(self.size, 6),
             "n_joints": len(self.joints),
         }
 
@@ -91,8 +100,9 @@ def cracks_of(assembly: solver.Assembly, pose: solver.Pose, joints: InitialJoint
     least = SMALLEST_OPENING * assembly.block_size
     # A stepped crack runs through bed joints that slide but stay shut.
     chosen = np.flatnonzero((moved[:, 0] > least) | (np.abs(moved[:, 1]) > least))
-    lines = shapely.linestrings(joints.ends[chosen])
-    meeting = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=MEETING * assembly.block_size)
+    meeting = _meetings(joints, chosen, MEETING * assembly.block_size)
+    if assembly.dimension == 3:
+        meeting = meeting[:, _part_alike(carried_faces(assembly, joints, pose), joints, chosen[meeting])]
     graph = sp.coo_array((np.ones(meeting.shape[1]), (meeting[0], meeting[1])), shape=(len(chosen), len(chosen)))
     count, group = connected_components(graph, directed=False)
     found = [_crack(assembly, joints, moved, chosen[group == k]) for k in range(count)]
@@ -104,9 +114,12 @@ def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
     rows = []
     for number, crack in enumerate(cracks[:most], start=1):
         # To a thousandth of the crack: the last digits of a zero are no place.
-        (x, y), (to_x, to_y) = np.round(crack.ends, 3 - int(np.floor(np.log10(crack.length)))) + 0.0
-        words = f"{1e3 * crack.width:.3g} mm at {crack.widest}; {crack.length:.3g} m, {crack.inclination:.0f}°, "
-        words += f"from ({x:.3g}, {y:.3g}) to ({to_x:.3g}, {to_y:.3g}) m"
+        longest = float(np.linalg.norm(crack.ends[1] - crack.ends[0]))
+        ends = np.round(crack.ends, 3 - int(np.floor(np.log10(longest)))) + 0.0
+        first, last = (f"({', '.join(f'{x:.3g}' for x in end)})" for end in ends)
+        size = f"{crack.size:.3g} {'m' if len(crack.at) == 2 else 'm²'}"
+        words = f"{1e3 * crack.width:.3g} mm at {crack.widest}; {size}, {crack.inclination:.0f}°, "
+        words += f"from {first} to {last} m"
         rows.append((f"crack {number}", words))
     if len(cracks) > most:
         rows.append(("and", f"{len(cracks) - most} narrower ones"))
@@ -116,27 +129,71 @@ def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
 def _crack(assembly: solver.Assembly, joints: InitialJoints, moved: np.ndarray, chosen: np.ndarray) -> Crack:
     chosen = chosen[np.argsort(-moved[chosen, 0], kind="stable")]
     widest = chosen[0]
-    points = joints.ends[chosen].reshape(-1, 2)
+    rings = joints.rings
     a, b = (assembly.names[int(of[widest])] for of in (joints.block_a, joints.block_b))
     return Crack(
         joints=chosen,
         width=float(moved[widest, 0]),
         slip=float(abs(moved[widest, 1])),
         widest=f"{a} | {b}",
-        at=joints.ends[widest].mean(axis=0),
-        ends=_farthest(points),
-        length=float(np.hypot(*(joints.ends[chosen, 1] - joints.ends[chosen, 0]).T).sum()),
+        at=rings.middles()[widest],
+        ends=_farthest(rings.points[np.isin(rings.ring, chosen)]),
+        size=float(joints.sizes[chosen].sum()),
     )
 
 
+def _meetings(joints: InitialJoints, chosen: np.ndarray, near: float) -> np.ndarray:
+    """(2, n) int array: places among the chosen joints of those that come within a distance [m] of each other."""
+    rings = joints.rings
+    if rings.points.shape[1] == 2:
+        lines = shapely.linestrings(joints.ends[chosen])
+        return np.asarray(shapely.STRtree(lines).query(lines, predicate="dwithin", distance=near))
+    counts = np.diff(rings.offsets)[chosen]
+    # As many corners for all: the last of a face again and again.
+    corner = np.minimum(np.arange(int(counts.max(initial=1))), counts[:, None] - 1)
+    faces = rings.points[rings.offsets[chosen][:, None] + corner]
+    low, high = faces.min(axis=1) - near / 2.0, faces.max(axis=1) + near / 2.0
+    boxes = shapely.box(*low[:, :2].T, *high[:, :2].T)
+    one, other = shapely.STRtree(boxes).query(boxes, predicate="intersects")
+    level = (low[one, 2] <= high[other, 2]) & (low[other, 2] <= high[one, 2]) & (one != other)
+    one, other = one[level], other[level]
+    meets = _distance(faces[one], faces[other], joints.normals[chosen[other]]) <= near
+    return np.stack([one[meets], other[meets]])
+
+
+def _part_alike(faces: Faces, joints: InitialJoints, pairs: np.ndarray) -> np.ndarray:
+    """(n,) bool array: whether joints, (2, n) int array, part by about the same: the two sides of one crack do.
+
+    Joints of a dome all meet; its meridians and the hinges between its courses are cracks of their own.
+    """
+    rings = joints.rings
+    apart = np.add.reduceat(faces.on_a - faces.on_b, rings.offsets[:-1]) / np.diff(rings.offsets)[:, None]
+    one, other = apart[pairs]
+    difference = np.minimum(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1))
+    largest = np.maximum(np.linalg.norm(one, axis=1), np.linalg.norm(other, axis=1))
+    return np.asarray(difference <= ALIKE * largest)
+
+
+def _distance(points: np.ndarray, faces: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(n,) array [m]: of the nearest of points (n, k, 3) to convex faces (n, m, 3) with normals (n, 3)."""
+    along = (np.roll(faces, -1, axis=1) - faces)[:, None]
+    arms = points[:, :, None] - faces[:, None]
+    place = (arms * along).sum(axis=3) / np.maximum((along**2).sum(axis=3), 1e-300)
+    at_edges = np.linalg.norm(arms - np.clip(place, 0.0, 1.0)[..., None] * along, axis=3).min(axis=2)
+    above = ((arms * np.cross(normals[:, None, None], along)).sum(axis=3) >= 0.0).all(axis=2)
+    level = np.abs((arms[:, :, 0] * normals[:, None]).sum(axis=2))
+    return np.asarray(np.where(above, level, at_edges).min(axis=1))
+
+
 def _farthest(points: np.ndarray) -> np.ndarray:
-    """(2, 2) array: the two points that are farthest apart, the lower one first, or the left one of a level line."""
-    if len(points) > 2:
-        # Only corners of the hull can be; a line has none.
-        hull = shapely.convex_hull(shapely.multipoints(points))
-        points = shapely.get_coordinates(hull)
-    apart = np.hypot(*np.moveaxis(points[:, None] - points[None], 2, 0))
+    """(2, d) array: the two points that are farthest apart, the lower one first, or the left one of a level line."""
+    # Only corners of the hull can be; a line has none.
+    if points.shape[1] == 3 and len(points) > MANY:
+        points = points[ConvexHull(points, qhull_options="QJ").vertices]
+    elif points.shape[1] == 2 and len(points) > 2:
+        points = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(points)))
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
     pair = points[list(np.unravel_index(int(apart.argmax()), apart.shape))]
-    rise, run = pair[1, 1] - pair[0, 1], pair[1, 0] - pair[0, 0]
+    rise, run = pair[1, -1] - pair[0, -1], pair[1, 0] - pair[0, 0]
     level = abs(rise) < 1e-9 * max(abs(run), 1e-300)
     return pair[::-1] if (run < 0.0 if level else rise < 0.0) else pair

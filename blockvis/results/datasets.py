@@ -24,8 +24,8 @@ from vtkmodules.vtkCommonDataModel import (
 
 import solver
 
-from .joint_faces import JointFaces, face_states, joint_faces
-from .joints import InitialJoints, initial_joints, joint_states
+from .joint_faces import InitialJoints, Rings, initial_joints, lengths_of
+from .joints import joint_states
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -115,7 +115,7 @@ def joint_dataset(
     increment: solver.Increment,
     *,
     shape: str = "moved",
-    joints: InitialJoints | JointFaces | None = None,
+    joints: InitialJoints | None = None,
 ) -> pv.UnstructuredGrid:
     """Make a dataset of the joints of one increment: a line for each, in space a face, midway between its two faces.
 
@@ -125,7 +125,7 @@ def joint_dataset(
     increment : solver.Increment
     shape : {"moved", "undeformed"}
         As of :func:`block_dataset`.
-    joints : InitialJoints or JointFaces, optional
+    joints : InitialJoints, optional
         Of the assembly, where they are at hand.
 
     Returns
@@ -146,17 +146,18 @@ def joint_grid(
     increment: solver.Increment,
     *,
     shape: str = "moved",
-    joints: InitialJoints | JointFaces | None = None,
+    joints: InitialJoints | None = None,
 ) -> vtkUnstructuredGrid:
     """Make what :func:`joint_dataset` wraps."""
-    if assembly.dimension == 3:
-        return _face_grid(
-            assembly, increment, joints if isinstance(joints, JointFaces) else joint_faces(assembly), shape
-        )
-    assert not isinstance(joints, JointFaces)
     states = joint_states(assembly, initial_joints(assembly) if joints is None else joints, increment)
-    blocks = (np.repeat(states.block_a, 2), np.repeat(states.block_b, 2))
-    grid = _grid_between(assembly, increment, states.ends.reshape(-1, 2), blocks, VTK_LINE, shape)
+    rings, in_space = states.rings, assembly.dimension == 3
+    # Lines or vertices also where blocks touch at an edge or a corner.
+    kinds = np.array([VTK_VERTEX, VTK_LINE, VTK_POLYGON], dtype=np.uint8)
+    kind = kinds[np.minimum(np.diff(rings.offsets), 3) - 1]
+    blocks = states.block_a[rings.ring], states.block_b[rings.ring]
+    grid = _grid_between(assembly, increment, rings, blocks, kind, shape)
+    if in_space:
+        add_arrays(grid.GetPointData(), {"gap": states.gaps})
     add_arrays(
         grid.GetCellData(),
         {
@@ -164,42 +165,11 @@ def joint_grid(
             "slip": states.slip,
             "normal_force": states.normal_force,
             "shear_force": states.shear_force,
-            "length": np.hypot(*(states.ends[:, 1] - states.ends[:, 0]).T),
-            "block_a": states.block_a.astype(np.int32),
-            "block_b": states.block_b.astype(np.int32),
-            "initial": states.initial.astype(np.int32),
-        },
-    )
-    names = assembly.names
-    words = (f"{names[a]} | {names[b]}" for a, b in zip(states.block_a, states.block_b, strict=True))
-    grid.GetCellData().AddArray(_strings("joint", words))
-    _describe(grid, increment)
-    _state_units(grid)
-    return grid
-
-
-def _face_grid(
-    assembly: solver.Assembly, increment: solver.Increment, joints: JointFaces, shape: str
-) -> vtkUnstructuredGrid:
-    """Make the grid of joints in space: polygons, and lines or vertices where blocks touch at an edge or a corner."""
-    states = face_states(assembly, joints, increment)
-    rings = states.rings
-    kinds = np.array([VTK_VERTEX, VTK_LINE, VTK_POLYGON], dtype=np.uint8)
-    grid = _grid(rings.points, rings.offsets, kinds[np.minimum(np.diff(rings.offsets), 3) - 1])
-    blocks = states.block_a[rings.ring], states.block_b[rings.ring]
-    initial = solver.Pose.initial(assembly)
-    _give_shape(grid, solver.carried_between(rings.points, *blocks, increment.pose, initial), shape)
-    add_arrays(grid.GetPointData(), {"gap": states.gaps})
-    add_arrays(
-        grid.GetCellData(),
-        {
-            "opening": states.opening,
-            "slip": np.linalg.norm(states.slip, axis=1),
-            "normal_force": states.normal_force,
-            "shear_force": states.shear_force,
-            "area": rings.areas(),
-            "normal": states.normals,
-            "force": states.force,
+            **(
+                {"area": rings.areas(), "normal": states.normals, "force": states.force}
+                if in_space
+                else {"length": lengths_of(states.ends)}
+            ),
             "block_a": states.block_a.astype(np.int32),
             "block_b": states.block_b.astype(np.int32),
             "initial": states.initial.astype(np.int32),
@@ -244,7 +214,8 @@ def contact_grid(
     """Make what :func:`contact_dataset` wraps."""
     contacts = increment.contacts
     blocks = (contacts.block_a, contacts.block_b)
-    grid = _grid_between(assembly, increment, contacts.points, blocks, VTK_VERTEX, shape)
+    places = Rings(contacts.points, np.arange(len(contacts) + 1))
+    grid = _grid_between(assembly, increment, places, blocks, VTK_VERTEX, shape)
     normal, tangent = contacts.frames[:, 0], contacts.frames[:, 1]
     balanced = increment.forces * (increment.status != solver.Status.FALLING)
     shear = np.einsum("ki,kij->kj", balanced[:, 1:], contacts.frames[:, 1:])
@@ -326,15 +297,15 @@ def _slip(assembly: solver.Assembly, increment: solver.Increment) -> np.ndarray:
 def _grid_between(
     assembly: solver.Assembly,
     increment: solver.Increment,
-    points: np.ndarray,
+    rings: Rings,
     blocks: tuple[np.ndarray, np.ndarray],
-    kind: int,
+    kind: int | np.ndarray,
     shape: str,
 ) -> vtkUnstructuredGrid:
-    """Make a grid of vertices or lines, whose points, (n, d) [m], lie between two blocks each."""
-    grid = _grid(points, np.arange(0, len(points) + 1, 2 if kind == VTK_LINE else 1), kind)
+    """Make a grid of cells whose points lie between two blocks each, (n_points,) int arrays."""
+    grid = _grid(rings.points, rings.offsets, kind)
     initial = solver.Pose.initial(assembly)
-    _give_shape(grid, solver.carried_between(points, *blocks, increment.pose, initial), shape)
+    _give_shape(grid, solver.carried_between(rings.points, *blocks, increment.pose, initial), shape)
     return grid
 
 

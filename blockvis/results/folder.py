@@ -21,7 +21,6 @@ from blockvis.video_suffixes import VIDEO_SUFFIXES
 
 from .cracks import MOST_LISTED, cracks_of
 from .increments import StoredIncrements, packed_increment
-from .joint_faces import LargestMovementsInSpace
 from .joints import LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
@@ -219,11 +218,8 @@ class ResultsFolder:
         write_whole(self.path / "joints.csv", self._movements.table())
         for name, text in (tables or {}).items():
             write_whole(self.path / name, text)
-        listed = {}
-        # Crack lines are those of joints in the plane.
-        if isinstance(self._movements, LargestMovements):
-            cracks = cracks_of(self.assembly, response.path[-1].pose, self._movements.joints) if response.path else []
-            listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
+        cracks = cracks_of(self.assembly, response.path[-1].pose, self._movements.joints) if response.path else []
+        listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_whole(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
@@ -237,8 +233,7 @@ class ResultsFolder:
         self._rows = io.StringIO()
         self._table = csv.writer(self._rows, lineterminator="\n")
         self._table.writerow((*COLUMNS, *own_columns(self.parameter)))
-        kind = LargestMovements if self.assembly.dimension == 2 else LargestMovementsInSpace
-        self._movements = kind(self.assembly, self.parameter)
+        self._movements = LargestMovements(self.assembly, self.parameter)
 
     def _add_row(self, number: int, increment: solver.Increment) -> None:
         if increment.status == solver.Status.EQUILIBRIUM:

@@ -1,12 +1,7 @@
-"""Joints in space: the polygons in which two blocks touch in the layout, and what becomes of them.
-
-In the plane a joint is a line; see :mod:`blockvis.results.joints`.
-"""
+"""The faces that two blocks have in common: lines in the plane, polygons in space."""
 
 from __future__ import annotations
 
-import csv
-import io
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +10,11 @@ import shapely
 
 import solver
 
-from .joints import TOUCHING
+#: Faces count as one initial joint when they are apart by at most this fraction of the block size.
+TOUCHING = 2e-3
+
+#: Faces of the plane count as parallel up to this sine.
+PARALLEL = 0.05
 
 #: Contact points of two blocks lie in one face where their normals are nearer than this cosine.
 ALIKE = 0.98
@@ -26,11 +25,11 @@ SMALLEST_FACE = 1e-4
 
 @dataclass(frozen=True)
 class Rings:
-    """Polygons in space as flat arrays.
+    """Polygons in space, or lines in the plane, as flat arrays.
 
     Attributes
     ----------
-    points : (n_points, 3) array [m]
+    points : (n_points, d) array [m]
         Corners of all polygons, one after another; of two the ends of a line, of one a point.
     offsets : (n + 1,) int array
         Polygon ``i`` owns ``points[offsets[i]:offsets[i + 1]]``.
@@ -64,13 +63,13 @@ class Rings:
         return np.asarray(np.linalg.norm(cross, axis=1) / 2.0)
 
     def middles(self) -> np.ndarray:
-        """(n, 3) array [m]: mean of the corners of each."""
+        """(n, d) array [m]: mean of the corners of each."""
         if not len(self):
-            return np.zeros((0, 3))
+            return np.zeros((0, self.points.shape[1]))
         return np.add.reduceat(self.points, self.offsets[:-1]) / np.diff(self.offsets)[:, None]
 
     def at(self, points: np.ndarray) -> Rings:
-        """Take the same polygons with their corners elsewhere, (n_points, 3) [m]."""
+        """Take the same polygons with their corners elsewhere, (n_points, d) [m]."""
         return Rings(points, self.offsets)
 
     def joined(self, other: Rings) -> Rings:
@@ -86,15 +85,16 @@ class Rings:
 
 
 @dataclass(frozen=True)
-class JointFaces:
-    """Faces in common of blocks that touch in the layout, in space.
+class InitialJoints:
+    """Pairs of faces that touch in the layout.
 
     Attributes
     ----------
     block_a, block_b : (n_joints,) int arrays
     rings : Rings
-        Where the layout has them, counter-clockwise seen from ``block_a``.
-    normals : (n_joints, 3) array
+        What they have in common where the layout has it: in the plane both ends, in space a polygon, counter-clockwise
+        seen from ``block_a``.
+    normals : (n_joints, d) array
         Unit normal in the layout, from ``block_b`` into ``block_a``.
     """
 
@@ -107,41 +107,81 @@ class JointFaces:
         """Count the joints."""
         return len(self.block_a)
 
+    @property
+    def ends(self) -> np.ndarray:
+        """(n_joints, 2, 2) array [m]: both ends of each, in the plane."""
+        return self.rings.points.reshape(-1, 2, 2)
 
-def joint_faces(assembly: solver.Assembly) -> JointFaces:
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """(n_joints,) array: lengths [m] in the plane, areas [m²] in space."""
+        return lengths_of(self.ends) if self.rings.points.shape[1] == 2 else self.rings.areas()
+
+
+def lines(ends: np.ndarray) -> Rings:
+    """Make rings of lines of which the ends are given, (n, 2, d) [m]."""
+    return Rings(ends.reshape(-1, ends.shape[2]), 2 * np.arange(len(ends) + 1))
+
+
+def lengths_of(ends: np.ndarray) -> np.ndarray:
+    """(n,) array [m]: lengths of lines in the plane, (n, 2, 2) [m]."""
+    return np.asarray(np.hypot(*(ends[:, 1] - ends[:, 0]).T))
+
+
+def initial_joints(assembly: solver.Assembly) -> InitialJoints:
     """Find the faces that touch in the layout; where they part later there is a crack.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-        In space.
 
     Notes
     -----
-    The contact points of two faces are the corners of the polygon they have in common, so the polygon is their convex
-    hull. Blocks that are not convex may have several.
+    In space the contact points of two faces are the corners of the polygon they have in common, so the polygon is their
+    convex hull. Blocks that are not convex may have several.
     """
     tolerance = TOUCHING * assembly.block_size
     contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * tolerance)
     contacts = contacts[np.abs(contacts.gaps) <= tolerance]
-    found = _faces_of(contacts)
-    large = found.rings.areas() > SMALLEST_FACE * assembly.block_size**2
-    return _chosen(found, large)
+    if assembly.dimension == 2:
+        return _joints_in_plane(assembly, contacts, tolerance)
+    found = faces_of(contacts)
+    return _chosen(found, found.rings.areas() > SMALLEST_FACE * assembly.block_size**2)
 
 
-def _chosen(faces: JointFaces, chosen: np.ndarray) -> JointFaces:
+def _joints_in_plane(assembly: solver.Assembly, contacts: solver.Contacts, tolerance: float) -> InitialJoints:
+    vertex, edge_b, _ = solver.corners_and_edges(contacts.features)
+    # The corner belongs to two faces of block a; either may lie on the edge of block b.
+    edge_a = np.concatenate([vertex, assembly.previous_vertex[vertex]])
+    edge_b = np.concatenate([edge_b, edge_b])
+    pairs = np.unique(np.stack([np.minimum(edge_a, edge_b), np.maximum(edge_a, edge_b)], axis=1), axis=0)
+    a, b = pairs[:, 0], pairs[:, 1]
+    start, stop = assembly.vertices[b], assembly.vertices[assembly.next_vertex[b]]
+    length = assembly.edge_lengths[b]
+    tangent = (stop - start) / length[:, None]
+    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    ends_a = np.stack([assembly.vertices[a], assembly.vertices[assembly.next_vertex[a]]], axis=1) - start[:, None]
+    along = np.einsum("nij,nj->ni", ends_a, tangent)
+    across = np.abs(np.einsum("nij,nj->ni", ends_a, normal))
+    lean = np.abs(across[:, 1] - across[:, 0]) / assembly.edge_lengths[a]
+    low = np.maximum(0.0, along.min(axis=1))
+    high = np.minimum(length, along.max(axis=1))
+    keep = (high - low > 10.0 * tolerance) | (high - low > 0.5 * np.minimum(length, assembly.edge_lengths[a]))
+    keep &= (lean < PARALLEL) & (across.min(axis=1) <= 2.0 * tolerance) & (along[:, 0] > along[:, 1])
+    ends = np.stack([start + low[:, None] * tangent, start + high[:, None] * tangent], axis=1)
+    owner = assembly.block_of_vertex
+    return InitialJoints(owner[a][keep], owner[b][keep], lines(ends[keep]), normal[keep])
+
+
+def _chosen(faces: InitialJoints, chosen: np.ndarray) -> InitialJoints:
     counts = np.diff(faces.rings.offsets)[chosen]
     kept = chosen[faces.rings.ring]
     rings = Rings(faces.rings.points[kept], np.concatenate([[0], np.cumsum(counts)]))
-    return JointFaces(faces.block_a[chosen], faces.block_b[chosen], rings, faces.normals[chosen])
+    return InitialJoints(faces.block_a[chosen], faces.block_b[chosen], rings, faces.normals[chosen])
 
 
-def _faces_of(contacts: solver.Contacts) -> JointFaces:
+def faces_of(contacts: solver.Contacts) -> InitialJoints:
     """Gather contact points of two blocks that lie in one plane, and take the convex hull of each group."""
-    pairs, normals, group = _grouped(contacts)
+    pairs, normals, group = grouped_by_face(contacts)
     if not len(pairs):
         nothing = np.zeros(0, dtype=int)
-        return JointFaces(nothing, nothing, Rings(np.zeros((0, 3)), np.zeros(1, dtype=int)), np.zeros((0, 3)))
+        return InitialJoints(nothing, nothing, Rings(np.zeros((0, 3)), np.zeros(1, dtype=int)), np.zeros((0, 3)))
     first, second = _tangents(normals)
     points = contacts.points
     counts = np.bincount(group, minlength=len(pairs))
@@ -164,10 +204,10 @@ def _faces_of(contacts: solver.Contacts) -> JointFaces:
         + level[owner, None] * normals[owner]
     )
     rings = Rings(back, np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(pairs)))]))
-    return JointFaces(pairs[:, 0], pairs[:, 1], rings, normals)
+    return InitialJoints(pairs[:, 0], pairs[:, 1], rings, normals)
 
 
-def _grouped(contacts: solver.Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def grouped_by_face(contacts: solver.Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pairs of blocks (n, 2) and normals (n, 3) of groups of contact points in one plane, and the group of each."""
     pairs, joint = contacts.joints()
     side = np.where(contacts.block_a == pairs[joint, 0], 1.0, -1.0) if len(contacts) else np.zeros(0)
@@ -202,214 +242,3 @@ def _tangents(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     first -= (first * normals).sum(axis=1)[:, None] * normals
     first /= np.linalg.norm(first, axis=1)[:, None]
     return first, np.cross(normals, first)
-
-
-@dataclass(frozen=True)
-class Faces:
-    """The two faces of each joint of the layout, carried to a pose.
-
-    Attributes
-    ----------
-    on_a, on_b : (n_points, 3) arrays [m]
-        Corners of the common polygons, riding on block a and on block b.
-    gaps : (n_points,) array [m]
-        Distance of the two faces at each corner, along the normal.
-    along : (n_points, 3) array [m]
-        Movement of block a along the face of block b there.
-    normals : (n_joints, 3) array
-        Unit normal from block b into block a, turned with block b.
-    """
-
-    on_a: np.ndarray
-    on_b: np.ndarray
-    gaps: np.ndarray
-    along: np.ndarray
-    normals: np.ndarray
-
-
-def faces_in_space(assembly: solver.Assembly, joints: JointFaces, pose: solver.Pose) -> Faces:
-    """Carry the faces of joints to a pose.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    joints : JointFaces
-    pose : solver.Pose
-    """
-    initial, rings = solver.Pose.initial(assembly), joints.rings
-    on_a, on_b = (
-        solver.carried(rings.points, block[rings.ring], initial, pose) for block in (joints.block_a, joints.block_b)
-    )
-    normals = solver.turned(joints.normals, pose.rotations[joints.block_b])
-    apart, normal = on_a - on_b, normals[rings.ring]
-    gaps = (apart * normal).sum(axis=1)
-    return Faces(on_a, on_b, gaps, apart - gaps[:, None] * normal, normals)
-
-
-def openings_and_slips(joints: JointFaces, faces: Faces) -> tuple[np.ndarray, np.ndarray]:
-    """Find opening (n_joints,) and slip (n_joints, 3) [m] of the joints of the layout, as in :class:`FaceStates`."""
-    rings = joints.rings
-    if not len(joints):
-        return np.zeros(0), np.zeros((0, 3))
-    order = np.lexsort((np.abs(faces.gaps), rings.ring))
-    return rings.largest(faces.gaps), faces.along[order[rings.offsets[:-1]]]
-
-
-@dataclass(frozen=True)
-class FaceStates:
-    """What joints in space do at one increment.
-
-    Those of the layout come first, in their order; pairs of blocks that have come to touch since follow.
-
-    Attributes
-    ----------
-    block_a, block_b : (n,) int arrays
-    initial : (n,) bool array
-        Whether the joint is one of the layout.
-    rings : Rings
-        Midway between the two faces, where they are now; of later joints, around their contact points.
-    normals : (n, 3) array
-        Unit normal from block b into block a.
-    gaps : (n_points,) array [m]
-        Distance of the two faces at each corner; 0 for later joints.
-    opening : (n,) array [m]
-        The largest of them.
-    slip : (n, 3) array [m]
-        Movement of block a along the face of block b, at the corner that is open least; 0 for later joints.
-    force : (n, 3) array [N]
-        Resultant on block a; 0 in frames of a fall, where there is no equilibrium.
-    """
-
-    block_a: np.ndarray
-    block_b: np.ndarray
-    initial: np.ndarray
-    rings: Rings
-    normals: np.ndarray
-    gaps: np.ndarray
-    opening: np.ndarray
-    slip: np.ndarray
-    force: np.ndarray
-
-    @property
-    def normal_force(self) -> np.ndarray:
-        """(n,) array [N]: compression positive."""
-        return np.asarray((self.force * self.normals).sum(axis=1))
-
-    @property
-    def shear_force(self) -> np.ndarray:
-        """(n,) array [N]: size of the force along the face."""
-        return np.asarray(np.linalg.norm(self.force - self.normal_force[:, None] * self.normals, axis=1))
-
-
-def face_states(assembly: solver.Assembly, joints: JointFaces, increment: solver.Increment) -> FaceStates:
-    """Work out opening, slip and forces of all joints of an increment in space.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    joints : JointFaces
-    increment : solver.Increment
-    """
-    contacts = increment.contacts
-    faces = faces_in_space(assembly, joints, increment.pose)
-    rings = joints.rings.at((faces.on_a + faces.on_b) / 2.0)
-    opening, slip = openings_and_slips(joints, faces)
-    block_a, block_b, normals, gaps = joints.block_a, joints.block_b, faces.normals, faces.gaps
-    joint = _joint_of(contacts, joints, normals, rings.middles())
-    later = np.flatnonzero(joint < 0)
-    if len(later):
-        found = _faces_of(contacts[later])
-        # Groups of contact points and their hulls are in the same order.
-        joint[later] = len(joints) + _grouped(contacts[later])[2]
-        block_a, block_b = np.concatenate([block_a, found.block_a]), np.concatenate([block_b, found.block_b])
-        rings, normals = rings.joined(found.rings), np.concatenate([normals, found.normals])
-        gaps = np.concatenate([gaps, np.zeros(len(found.rings.points))])
-        opening = np.concatenate([opening, np.zeros(len(found))])
-        slip = np.concatenate([slip, np.zeros((len(found), 3))])
-    force = np.zeros((len(block_a), 3))
-    if increment.status != solver.Status.FALLING and len(contacts):
-        side = np.where(contacts.block_a == block_a[joint], 1.0, -1.0)
-        np.add.at(force, joint, side[:, None] * np.einsum("ki,kij->kj", increment.forces, contacts.frames))
-    return FaceStates(
-        block_a=block_a,
-        block_b=block_b,
-        initial=np.arange(len(block_a)) < len(joints),
-        rings=rings,
-        normals=normals,
-        gaps=gaps,
-        opening=opening,
-        slip=slip,
-        force=force,
-    )
-
-
-def _joint_of(contacts: solver.Contacts, joints: JointFaces, normals: np.ndarray, middles: np.ndarray) -> np.ndarray:
-    """(n_contacts,) int array: the joint between the same blocks whose plane is nearest to each point, or -1."""
-    count = 1 + max(
-        int(block.max(initial=0)) for block in (contacts.block_a, contacts.block_b, joints.block_a, joints.block_b)
-    )
-    known, key = (
-        np.minimum(of.block_a, of.block_b).astype(np.int64) * count + np.maximum(of.block_a, of.block_b)
-        for of in (joints, contacts)
-    )
-    order = np.argsort(known, kind="stable")
-    first, last = (np.searchsorted(known[order], key, side=side) for side in ("left", "right"))
-    joint, least = np.full(len(contacts), -1), np.full(len(contacts), np.inf)
-    for k in range(int((last - first).max(initial=0))):
-        some = np.flatnonzero(first + k < last)
-        face = order[first[some] + k]
-        away = np.abs(((contacts.points[some] - middles[face]) * normals[face]).sum(axis=1))
-        # In a corner two faces are equally near: the point belongs to the one that has its normal.
-        turned = 1.0 - np.abs((contacts.frames[some, 0] * normals[face]).sum(axis=1))
-        away += turned * np.linalg.norm(contacts.points[some] - middles[face], axis=1)
-        closer = away < least[some]
-        joint[some[closer]], least[some[closer]] = face[closer], away[closer]
-    return joint
-
-
-class LargestMovementsInSpace:
-    """The largest opening and slip of each joint over the increments in equilibrium so far: what joints.csv holds.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    parameter : solver.Quantity
-        What the increments run over.
-    """
-
-    def __init__(self, assembly: solver.Assembly, parameter: solver.Quantity) -> None:
-        self.assembly, self.parameter, self.joints = assembly, parameter, joint_faces(assembly)
-        self._largest = np.zeros((len(self.joints), 2))
-        self._at = np.zeros_like(self._largest)
-
-    def add(self, increment: solver.Increment) -> None:
-        """Take an increment in equilibrium into account."""
-        opening, slip = openings_and_slips(self.joints, faces_in_space(self.assembly, self.joints, increment.pose))
-        moved = np.stack([np.abs(opening), np.linalg.norm(slip, axis=1)], axis=1)
-        larger = moved > self._largest
-        self._largest[larger] = moved[larger]
-        self._at[larger] = increment.parameter
-
-    def table(self) -> str:
-        """Write joints.csv: a row for each pair of blocks that touch in the layout, the widest opening first."""
-        joints, names = self.joints, self.assembly.names
-        areas, middles = joints.rings.areas(), joints.rings.middles()
-        pairs, which = np.unique(np.stack([joints.block_a, joints.block_b], axis=1), axis=0, return_inverse=True)
-        rows = []
-        for k, (a, b) in enumerate(pairs):
-            # Blocks that are not convex may touch along several faces: they are one joint.
-            here = np.flatnonzero(which.ravel() == k)
-            place = areas[here] @ middles[here] / areas[here].sum()
-            widest = here[self._largest[here].argmax(axis=0)]
-            largest, at = (values[widest, [0, 1]] for values in (self._largest, self._at))
-            rows.append((f"{names[a]} | {names[b]}", *place, areas[here].sum(), largest[0], at[0], largest[1], at[1]))
-        rows.sort(key=lambda row: -max(row[5], row[7]))
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        what, unit = self.parameter.name, self.parameter.unit
-        opening, slip = (f"{what} at largest {movement} [{unit}]" for movement in ("opening", "slip"))
-        head = ("joint", "x [m]", "y [m]", "z [m]", "area [m²]")
-        table.writerow((*head, "largest opening [m]", opening, "largest slip [m]", slip))
-        # To the nanometre: what is smaller is rounding.
-        table.writerows((name, *(f"{round(number, 9) + 0.0:.6g}" for number in numbers)) for name, *numbers in rows)
-        return text.getvalue()

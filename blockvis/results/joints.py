@@ -10,58 +10,93 @@ import numpy as np
 
 import solver
 
-#: Faces count as one initial joint when they are apart by at most this fraction of the block size.
-TOUCHING = 2e-3
-
-#: Faces count as parallel up to this sine.
-PARALLEL = 0.05
+from .joint_faces import InitialJoints, Rings, faces_of, grouped_by_face, initial_joints, lines
 
 
 @dataclass(frozen=True)
-class InitialJoints:
-    """Pairs of faces that touch in the layout.
+class Faces:
+    """The two faces of each joint of the layout, carried to a pose.
 
     Attributes
     ----------
-    block_a, block_b : (n_joints,) int arrays
-    ends : (n_joints, 2, 2) array [m]
-        Both ends of the common length, where the layout has them.
-    normals : (n_joints, 2) array
-        Unit normal in the layout, from ``block_b`` into ``block_a``.
+    on_a, on_b : (n_points, d) arrays [m]
+        Corners of what they have in common, riding on block a and on block b.
+    gaps : (n_points,) array [m]
+        Distance of the two faces at each corner, along the normal.
+    along : (n_points, d) array [m]
+        Movement of block a along the face of block b there.
+    normals : (n_joints, d) array
+        Unit normal from block b into block a, turned with block b.
     """
 
-    block_a: np.ndarray
-    block_b: np.ndarray
-    ends: np.ndarray
+    on_a: np.ndarray
+    on_b: np.ndarray
+    gaps: np.ndarray
+    along: np.ndarray
     normals: np.ndarray
 
 
-def initial_joints(assembly: solver.Assembly) -> InitialJoints:
-    """Find the faces that touch in the layout; where they part later there is a crack."""
-    tolerance = TOUCHING * assembly.block_size
-    contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * tolerance)
-    touching = np.abs(contacts.gaps) <= tolerance
-    vertex, edge_b, _ = solver.corners_and_edges(contacts.features[touching])
-    # The corner belongs to two faces of block a; either may lie on the edge of block b.
-    edge_a = np.concatenate([vertex, assembly.previous_vertex[vertex]])
-    edge_b = np.concatenate([edge_b, edge_b])
-    pairs = np.unique(np.stack([np.minimum(edge_a, edge_b), np.maximum(edge_a, edge_b)], axis=1), axis=0)
-    a, b = pairs[:, 0], pairs[:, 1]
-    start, stop = assembly.vertices[b], assembly.vertices[assembly.next_vertex[b]]
-    length = assembly.edge_lengths[b]
-    tangent = (stop - start) / length[:, None]
-    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
-    ends_a = np.stack([assembly.vertices[a], assembly.vertices[assembly.next_vertex[a]]], axis=1) - start[:, None]
-    along = np.einsum("nij,nj->ni", ends_a, tangent)
-    across = np.abs(np.einsum("nij,nj->ni", ends_a, normal))
-    lean = np.abs(across[:, 1] - across[:, 0]) / assembly.edge_lengths[a]
-    low = np.maximum(0.0, along.min(axis=1))
-    high = np.minimum(length, along.max(axis=1))
-    keep = (high - low > 10.0 * tolerance) | (high - low > 0.5 * np.minimum(length, assembly.edge_lengths[a]))
-    keep &= (lean < PARALLEL) & (across.min(axis=1) <= 2.0 * tolerance) & (along[:, 0] > along[:, 1])
-    ends = np.stack([start + low[:, None] * tangent, start + high[:, None] * tangent], axis=1)
-    owner = assembly.block_of_vertex
-    return InitialJoints(owner[a][keep], owner[b][keep], ends[keep], normal[keep])
+def carried_faces(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> Faces:
+    """Carry the faces of joints to a pose.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    joints : InitialJoints
+    pose : solver.Pose
+    """
+    initial, rings = solver.Pose.initial(assembly), joints.rings
+    on_a, on_b = (
+        solver.carried(rings.points, block[rings.ring], initial, pose) for block in (joints.block_a, joints.block_b)
+    )
+    normals = solver.turned(joints.normals, pose.rotations[joints.block_b])
+    apart, normal = on_a - on_b, normals[rings.ring]
+    gaps = (apart * normal).sum(axis=1)
+    return Faces(on_a, on_b, gaps, apart - gaps[:, None] * normal, normals)
+
+
+def faces_at(
+    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Carry the faces of joints in the plane to a pose.
+
+    Returns
+    -------
+    on_a, on_b : (n_joints, 2, 2) arrays [m]
+        Both ends of the common length, riding on block a and on block b.
+    normals : (n_joints, 2) array
+        Unit normal from block b into block a, turned with block b.
+    """
+    faces = carried_faces(assembly, joints, pose)
+    return faces.on_a.reshape(-1, 2, 2), faces.on_b.reshape(-1, 2, 2), faces.normals
+
+
+def end_openings(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> np.ndarray:
+    """(n_joints, 2) array [m]: distance of the faces of joints in the plane at their ends, along the normal."""
+    return carried_faces(assembly, joints, pose).gaps.reshape(-1, 2)
+
+
+def opening_and_slip(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> np.ndarray:
+    """(n_joints, 2) array [m]: opening and slip of the joints of the layout, as in :class:`JointStates`."""
+    faces = carried_faces(assembly, joints, pose)
+    opening, along = _openings_and_slips(joints, faces)
+    return np.stack([opening, _signed(along, faces.normals)], axis=1)
+
+
+def _openings_and_slips(joints: InitialJoints, faces: Faces) -> tuple[np.ndarray, np.ndarray]:
+    """Find opening (n_joints,) and movement along the face (n_joints, d) [m], at the corner that is open least."""
+    rings = joints.rings
+    if not len(joints):
+        return np.zeros(0), np.zeros((0, rings.points.shape[1]))
+    order = np.lexsort((np.abs(faces.gaps), rings.ring))
+    return rings.largest(faces.gaps), faces.along[order[rings.offsets[:-1]]]
+
+
+def _signed(along: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(n,) array: parts of vectors (n, d) along the tangents of the plane; in space their sizes."""
+    if along.shape[1] == 3:
+        return np.asarray(np.linalg.norm(along, axis=1))
+    return along[:, 1] * normals[:, 0] - along[:, 0] * normals[:, 1]
 
 
 @dataclass(frozen=True)
@@ -75,61 +110,49 @@ class JointStates:
     block_a, block_b : (n,) int arrays
     initial : (n,) bool array
         Whether the joint is one of the layout.
-    ends : (n, 2, 2) array [m]
-        Middle line between the two faces, where they are now; of later joints, between their outermost contact points.
+    rings : Rings
+        Midway between the two faces, where they are now; of later joints, around their contact points.
+    normals : (n, d) array
+        Unit normal from block b into block a.
+    gaps : (n_points,) array [m]
+        Distance of the two faces at each corner, along the normal; 0 for later joints.
     opening : (n,) array [m]
-        Largest distance of the faces at their ends, along the normal; 0 for later joints.
-    slip : (n,) array [m]
-        Of block a along the tangent of block b, a quarter turn counter-clockwise from the normal into block a, at the
-        end that is open least; 0 for later joints.
-    normal_force, shear_force : (n,) arrays [N]
-        Resultant on block a, compression positive, and along the tangent; 0 in frames of a fall, where there is no
-        equilibrium.
+        The largest of them.
+    along : (n, d) array [m]
+        Movement of block a along the face of block b, at the corner that is open least; 0 for later joints.
+    force : (n, d) array [N]
+        Resultant on block a; 0 in frames of a fall, where there is no equilibrium.
     """
 
     block_a: np.ndarray
     block_b: np.ndarray
     initial: np.ndarray
-    ends: np.ndarray
+    rings: Rings
+    normals: np.ndarray
+    gaps: np.ndarray
     opening: np.ndarray
-    slip: np.ndarray
-    normal_force: np.ndarray
-    shear_force: np.ndarray
+    along: np.ndarray
+    force: np.ndarray
 
+    @property
+    def ends(self) -> np.ndarray:
+        """(n, 2, 2) array [m]: of the joints in the plane, where they are now."""
+        return self.rings.points.reshape(-1, 2, 2)
 
-def faces_at(
-    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Carry the faces of joints to a pose.
+    @property
+    def slip(self) -> np.ndarray:
+        """(n,) array [m]: along the tangent of block b, a quarter turn from the normal; in space its size."""
+        return _signed(self.along, self.normals)
 
-    Returns
-    -------
-    on_a, on_b : (n_joints, 2, 2) arrays [m]
-        Both ends of the common length, riding on block a and on block b.
-    normals : (n_joints, 2) array
-        Unit normal from block b into block a, turned with block b.
-    """
-    initial = solver.Pose.initial(assembly)
-    on_a, on_b = (
-        np.stack([solver.carried(joints.ends[:, k], block, initial, pose) for k in (0, 1)], axis=1)
-        for block in (joints.block_a, joints.block_b)
-    )
-    return on_a, on_b, solver.turned(joints.normals, pose.rotations[joints.block_b])
+    @property
+    def normal_force(self) -> np.ndarray:
+        """(n,) array [N]: compression positive."""
+        return np.asarray((self.force * self.normals).sum(axis=1))
 
-
-def opening_and_slip(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> np.ndarray:
-    """(n_joints, 2) array [m]: opening and slip of the joints of the layout, as in :class:`JointStates`."""
-    on_a, on_b, normals = faces_at(assembly, joints, pose)
-    apart = on_a - on_b
-    across, along = (np.einsum("nij,nj->ni", apart, axis) for axis in (normals, _tangents(normals)))
-    closer = np.abs(across).argmin(axis=1)[:, None]
-    return np.stack([across.max(axis=1), np.take_along_axis(along, closer, axis=1)[:, 0]], axis=1)
-
-
-def end_openings(assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose) -> np.ndarray:
-    """(n_joints, 2) array [m]: distance of the faces of the joints of the layout at their ends, along the normal."""
-    on_a, on_b, normals = faces_at(assembly, joints, pose)
-    return np.asarray(np.einsum("nij,nj->ni", on_a - on_b, normals))
+    @property
+    def shear_force(self) -> np.ndarray:
+        """(n,) array [N]: along the tangent; in space the size of the force along the face."""
+        return _signed(self.force - self.normal_force[:, None] * self.normals, self.normals)
 
 
 def joint_states(assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment) -> JointStates:
@@ -141,42 +164,40 @@ def joint_states(assembly: solver.Assembly, joints: InitialJoints, increment: so
     joints : InitialJoints
     increment : solver.Increment
     """
-    contacts, pose = increment.contacts, increment.pose
-    on_a, on_b, normals = faces_at(assembly, joints, pose)
-    ends, block_a, block_b = (on_a + on_b) / 2.0, joints.block_a, joints.block_b
-    joint = _nearest_face(contacts, joints, ends, normals)
+    contacts = increment.contacts
+    faces = carried_faces(assembly, joints, increment.pose)
+    rings = joints.rings.at((faces.on_a + faces.on_b) / 2.0)
+    opening, along = _openings_and_slips(joints, faces)
+    block_a, block_b, normals, gaps = joints.block_a, joints.block_b, faces.normals, faces.gaps
+    joint = _nearest_face(contacts, joints, rings, normals)
     later = np.flatnonzero(joint < 0)
     if len(later):
-        pairs, which = contacts[later].joints()
-        joint[later] = len(ends) + which
-        spans, across = _later_joints(contacts[later], pairs, which)
-        ends, normals = np.concatenate([ends, spans]), np.concatenate([normals, across])
-        block_a, block_b = (np.concatenate([of, pairs[:, k]]) for k, of in enumerate((block_a, block_b)))
-    force = np.zeros((len(ends), 2))
+        found, which = _later_joints(contacts[later])
+        joint[later] = len(joints) + which
+        block_a, block_b = np.concatenate([block_a, found.block_a]), np.concatenate([block_b, found.block_b])
+        rings, normals = rings.joined(found.rings), np.concatenate([normals, found.normals])
+        gaps, opening, along = (
+            np.concatenate([of, np.zeros((count, *of.shape[1:]))])
+            for of, count in ((gaps, len(found.rings.points)), (opening, len(found)), (along, len(found)))
+        )
+    force = np.zeros((len(block_a), assembly.dimension))
     if increment.status != solver.Status.FALLING and len(contacts):
         side = np.where(contacts.block_a == block_a[joint], 1.0, -1.0)
         np.add.at(force, joint, side[:, None] * np.einsum("ki,kij->kj", increment.forces, contacts.frames))
-    moved = np.zeros((len(ends), 2))
-    moved[: len(on_a)] = opening_and_slip(assembly, joints, pose)
     return JointStates(
         block_a=block_a,
         block_b=block_b,
-        initial=np.arange(len(ends)) < len(on_a),
-        ends=ends,
-        opening=moved[:, 0],
-        slip=moved[:, 1],
-        normal_force=(force * normals).sum(axis=1),
-        shear_force=(force * _tangents(normals)).sum(axis=1),
+        initial=np.arange(len(block_a)) < len(joints),
+        rings=rings,
+        normals=normals,
+        gaps=gaps,
+        opening=opening,
+        along=along,
+        force=force,
     )
 
 
-def _tangents(normals: np.ndarray) -> np.ndarray:
-    return np.stack([-normals[:, 1], normals[:, 0]], axis=1)
-
-
-def _nearest_face(
-    contacts: solver.Contacts, joints: InitialJoints, ends: np.ndarray, normals: np.ndarray
-) -> np.ndarray:
+def _nearest_face(contacts: solver.Contacts, joints: InitialJoints, rings: Rings, normals: np.ndarray) -> np.ndarray:
     """(n_contacts,) int array: the joint between the same blocks that is nearest to each contact point, or -1."""
     count = 1 + max(
         int(block.max(initial=0)) for block in (contacts.block_a, contacts.block_b, joints.block_a, joints.block_b)
@@ -188,24 +209,32 @@ def _nearest_face(
     order = np.argsort(known, kind="stable")
     first, last = (np.searchsorted(known[order], key, side=side) for side in ("left", "right"))
     joint, least = np.full(len(contacts), -1), np.full(len(contacts), np.inf)
+    middles = rings.middles()
     # A pair has one face in common; blocks that are not convex have a few.
     for k in range(int((last - first).max(initial=0))):
         some = np.flatnonzero(first + k < last)
         face = order[first[some] + k]
-        start, along = ends[face, 0], ends[face, 1] - ends[face, 0]
-        squared = np.maximum((along**2).sum(axis=1), 1e-300)
-        place = np.clip(((contacts.points[some] - start) * along).sum(axis=1) / squared, 0.0, 1.0)
-        away = np.hypot(*(contacts.points[some] - start - place[:, None] * along).T)
+        arms = contacts.points[some] - middles[face]
+        if contacts.points.shape[1] == 3:
+            away, extent = np.abs((arms * normals[face]).sum(axis=1)), np.linalg.norm(arms, axis=1)
+        else:
+            half = rings.points[2 * face + 1] - middles[face]
+            squared = np.maximum((half**2).sum(axis=1), 1e-300)
+            place = np.clip((arms * half).sum(axis=1) / squared, -1.0, 1.0)
+            away, extent = np.hypot(*(arms - place[:, None] * half).T), 2.0 * np.sqrt(squared)
         # In a corner two faces are equally near: the point belongs to the one that has its normal.
-        turned = 1.0 - np.abs((contacts.frames[some, 0] * normals[face]).sum(axis=1))
-        away += turned * np.sqrt(squared)
+        away += (1.0 - np.abs((contacts.frames[some, 0] * normals[face]).sum(axis=1))) * extent
         closer = away < least[some]
         joint[some[closer]], least[some[closer]] = face[closer], away[closer]
     return joint
 
 
-def _later_joints(contacts: solver.Contacts, pairs: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find ends (n, 2, 2) [m] and normals (n, 2), into the first block, of pairs that touch at contact points."""
+def _later_joints(contacts: solver.Contacts) -> tuple[InitialJoints, np.ndarray]:
+    """Make joints of contact points of blocks that did not touch in the layout, and give the joint of each."""
+    if contacts.points.shape[1] == 3:
+        # Groups of contact points and their hulls are in the same order.
+        return faces_of(contacts), grouped_by_face(contacts)[2]
+    pairs, which = contacts.joints()
     ends, normals = np.zeros((len(pairs), 2, 2)), np.zeros((len(pairs), 2))
     for k, (first, _) in enumerate(pairs):
         here = np.flatnonzero(which == k)
@@ -213,7 +242,7 @@ def _later_joints(contacts: solver.Contacts, pairs: np.ndarray, which: np.ndarra
         normals[k] = normal if contacts.block_a[here[0]] == first else -normal
         place = contacts.points[here] @ tangent
         ends[k] = contacts.points[here[[place.argmin(), place.argmax()]]]
-    return ends, normals
+    return InitialJoints(pairs[:, 0], pairs[:, 1], lines(ends), normals), which
 
 
 class LargestMovements:
@@ -228,7 +257,7 @@ class LargestMovements:
 
     def __init__(self, assembly: solver.Assembly, parameter: solver.Quantity) -> None:
         self.assembly, self.parameter, self.joints = assembly, parameter, initial_joints(assembly)
-        self._largest = np.zeros((len(self.joints.block_a), 2))
+        self._largest = np.zeros((len(self.joints), 2))
         self._at = np.zeros_like(self._largest)
 
     def add(self, increment: solver.Increment) -> None:
@@ -240,25 +269,24 @@ class LargestMovements:
 
     def table(self) -> str:
         """Write joints.csv: a row for each pair of blocks that touch in the layout, the widest opening first."""
-        joints, names = self.joints, self.assembly.names
-        rows, unit = [], f" [{self.parameter.unit}]"
-        length = np.hypot(*(joints.ends[:, 1] - joints.ends[:, 0]).T)
+        joints, names, unit = self.joints, self.assembly.names, f" [{self.parameter.unit}]"
+        sizes, middles, d = joints.sizes, joints.rings.middles(), self.assembly.dimension
         low, high = np.minimum(joints.block_a, joints.block_b), np.maximum(joints.block_a, joints.block_b)
         pairs, which = np.unique(np.stack([low, high], axis=1), axis=0, return_inverse=True)
+        rows = []
         for k, (a, b) in enumerate(pairs):
             # Blocks that are not convex may touch along several faces: they are one joint.
             here = np.flatnonzero(which.ravel() == k)
-            place = length[here] @ joints.ends[here].mean(axis=1) / length[here].sum()
+            place = sizes[here] @ middles[here] / sizes[here].sum()
             widest = here[self._largest[here].argmax(axis=0)]
             largest, at = (values[widest, [0, 1]] for values in (self._largest, self._at))
-            rows.append((f"{names[a]} | {names[b]}", *place, length[here].sum(), largest[0], at[0], largest[1], at[1]))
-        rows.sort(key=lambda row: -max(row[4], row[6]))
+            rows.append((f"{names[a]} | {names[b]}", *place, sizes[here].sum(), largest[0], at[0], largest[1], at[1]))
+        rows.sort(key=lambda row: -max(row[d + 2], row[d + 4]))
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
         opening, slip = (f"{self.parameter.name} at largest {what}{unit}" for what in ("opening", "slip"))
-        table.writerow(
-            ("joint", "x [m]", "y [m]", "length [m]", "largest opening [m]", opening, "largest slip [m]", slip)
-        )
+        head = ("joint", *(f"{axis} [m]" for axis in "xyz"[:d]), "length [m]" if d == 2 else "area [m²]")
+        table.writerow((*head, "largest opening [m]", opening, "largest slip [m]", slip))
         # To the nanometre: what is smaller is rounding.
         table.writerows((name, *(f"{round(number, 9) + 0.0:.6g}" for number in numbers)) for name, *numbers in rows)
         return text.getvalue()

@@ -9,8 +9,7 @@ from typing import Protocol
 import solver
 from blockvis.vtk_files import is_whole, write_pvd, write_vtu
 
-from .joint_faces import JointFaces, joint_faces
-from .joints import InitialJoints, initial_joints
+from .joint_faces import InitialJoints, initial_joints
 
 #: The VTU files of an increment.
 GRIDS = ("blocks", "contacts", "joints")
@@ -37,7 +36,7 @@ class ViewerFiles:
         Of the blocks; see :func:`blockvis.results.datasets.block_dataset`.
     increments : sequence of solver.Increment
         Whose files are there already.
-    joints : InitialJoints or JointFaces, optional
+    joints : InitialJoints, optional
         Of the assembly, where they are at hand.
     """
 
@@ -47,11 +46,10 @@ class ViewerFiles:
         assembly: solver.Assembly,
         shape: str,
         increments: Sequence[solver.Increment] = (),
-        joints: InitialJoints | JointFaces | None = None,
+        joints: InitialJoints | None = None,
     ) -> None:
-        if joints is None:
-            joints = initial_joints(assembly) if assembly.dimension == 2 else joint_faces(assembly)
-        self.folder, self.assembly, self.shape, self.joints = folder, assembly, shape, joints
+        self.folder, self.assembly, self.shape = folder, assembly, shape
+        self.joints = initial_joints(assembly) if joints is None else joints
         self._listed = list(increments)
 
     def add(self, increment: solver.Increment) -> None:
@@ -110,7 +108,7 @@ def write_grids(
     assembly: solver.Assembly,
     increment: solver.Increment,
     shape: str,
-    joints: InitialJoints | JointFaces | None = None,
+    joints: InitialJoints | None = None,
 ) -> None:
     """Write the VTU files of an increment.
 
@@ -124,7 +122,7 @@ def write_grids(
     increment : solver.Increment
     shape : {"moved", "undeformed"}
         As of the folder.
-    joints : InitialJoints or JointFaces, optional
+    joints : InitialJoints, optional
         Of the assembly, where they are at hand.
     """
     # VTK is loaded where its files are written: another process may do that.

@@ -28,7 +28,7 @@ class ClippedCorners:
     areas : (n,) array [m²]
         The part of its polygon that each corner stands for.
     widths : (n,) array [m]
-        How wide the polygon is.
+        How wide the polygon is; infinite where a corner stands in a re-entrant corner, whatever it covers of its walls.
     """
 
     owner: np.ndarray
@@ -88,20 +88,8 @@ def _clipped(
     apart = np.abs(a[:, :, None] - b[:, None]).max(axis=3)
     both = (apart <= 2.0 * end[..., None]) & used_a[:, :, None] & used_b[:, None]
 
-    # Edge k of a crosses edge l of b where the ends of each are on different sides of the other.
-    next_a, next_b = np.roll(a_in_b, -1, axis=1), np.roll(b_in_a, -1, axis=1)
-    crosses = ((a_in_b > 0.0) != (next_a > 0.0)) & np.swapaxes((b_in_a > 0.0) != (next_b > 0.0), 1, 2)
     tight = end[..., None]
-    crosses &= ~((np.abs(a_in_b) <= tight) & (np.abs(next_a) <= tight))
-    crosses &= ~np.swapaxes((np.abs(b_in_a) <= tight) & (np.abs(next_b) <= tight), 1, 2)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        on_a = np.where(crosses, a_in_b / (a_in_b - next_a), 0.0)
-        on_b = np.where(crosses, np.swapaxes(b_in_a / (b_in_a - next_b), 1, 2), 0.0)
-    # What crosses at a corner that counts already is that corner.
-    for on, long, used, axis in ((on_a, long_a[:, :, None], used_a, 1), (on_b, long_b[:, None], used_b, 2)):
-        here, there = np.expand_dims(used, 3 - axis), np.expand_dims(np.roll(used, -1, axis=1), 3 - axis)
-        crosses &= ~(here & (on * long <= 2.0 * tight)) & ~(there & ((1.0 - on) * long <= 2.0 * tight))
-
+    crosses, on_a, on_b = _crossings(a_in_b, b_in_a, (long_a, long_b), (used_a, used_b), tight)
     pair, p, q = np.nonzero(both)
     on_corner = (
         pair,
@@ -131,9 +119,61 @@ def _clipped(
         np.concatenate(column)
         for column in zip(on_corner, (pair_a, *vertex_a), (pair_b, *vertex_b), across, strict=True)
     )
-    areas, wide = corner_areas(owner, points, len(face_a))
+    areas, wide, long = corner_areas(owner, points, len(face_a))
     kept = wide[owner] > end[owner, 0]
-    return owner[kept], features[kept], areas[kept], wide[owner[kept]]
+    found = owner[kept], features[kept], areas[kept], wide[owner[kept]]
+    if parts.whole:
+        return found
+    narrow = ((wide <= end[:, 0]) & (long > 4.0 * end[:, 0]))[:, None]
+    return _with_reentrant_corners(
+        parts,
+        found,
+        (narrow & used_a, np.abs(a_in_b) <= tight, corner_a, face_b, edge_b),
+        (narrow & used_b, np.abs(b_in_a) <= tight, corner_b, face_a, edge_a),
+    )
+
+
+_Corners = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def _with_reentrant_corners(parts: ConvexParts, found: _Corners, *sides: tuple[np.ndarray, ...]) -> _Corners:
+    """Add the corners, of those used, at the end of a face at which its block was cut: they touch it, and cover none.
+
+    Where a face ends at an edge of its block, an edge that only lies along that one may leave it; in a re-entrant
+    corner it may not.
+    """
+    owners, features = [found[0]], [found[1]]
+    for used, on_edge, corner, face, edge in sides:
+        at_cut = (on_edge & parts.cut_edges[edge][:, None]).any(axis=2)
+        pair, p = np.nonzero(used & at_cut & ~parts.made[parts.solids.corners[corner]])
+        owners.append(pair)
+        features.append(feature_rows(ON_FACE, parts.solids.corners[corner[pair, p]], face[pair], -1))
+    owner = np.concatenate(owners)
+    none = np.zeros(len(owner) - len(found[0]))
+    return owner, np.concatenate(features), np.append(found[2], none), np.append(found[3], none + np.inf)
+
+
+def _crossings(
+    a_in_b: np.ndarray,
+    b_in_a: np.ndarray,
+    long: tuple[np.ndarray, np.ndarray],
+    used: tuple[np.ndarray, np.ndarray],
+    tight: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which edges of two polygons cross, (n, edges of a, edges of b) bool, and how far along either."""
+    # Edge k of a crosses edge l of b where the ends of each are on different sides of the other.
+    next_a, next_b = np.roll(a_in_b, -1, axis=1), np.roll(b_in_a, -1, axis=1)
+    crosses = ((a_in_b > 0.0) != (next_a > 0.0)) & np.swapaxes((b_in_a > 0.0) != (next_b > 0.0), 1, 2)
+    crosses &= ~((np.abs(a_in_b) <= tight) & (np.abs(next_a) <= tight))
+    crosses &= ~np.swapaxes((np.abs(b_in_a) <= tight) & (np.abs(next_b) <= tight), 1, 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        on_a = np.where(crosses, a_in_b / (a_in_b - next_a), 0.0)
+        on_b = np.where(crosses, np.swapaxes(b_in_a / (b_in_a - next_b), 1, 2), 0.0)
+    # What crosses at a corner that counts already is that corner.
+    for on, lengths, counts, axis in ((on_a, long[0][:, :, None], used[0], 1), (on_b, long[1][:, None], used[1], 2)):
+        here, there = np.expand_dims(counts, 3 - axis), np.expand_dims(np.roll(counts, -1, axis=1), 3 - axis)
+        crosses &= ~(here & (on * lengths <= 2.0 * tight)) & ~(there & ((1.0 - on) * lengths <= 2.0 * tight))
+    return crosses, on_a, on_b
 
 
 def _inside(points: np.ndarray, corners: np.ndarray, directions: np.ndarray) -> np.ndarray:
@@ -172,8 +212,8 @@ def _on_face(
     return feature_rows(ON_FACE, solids.corners[own], face[pair], code)
 
 
-def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Part of its convex polygon that each corner stands for, (n,) [m²], and how wide the polygons are, (count,) [m].
+def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Part of its convex polygon that each corner stands for, (n,) [m²], and width and length of all, (count,) [m].
 
     Parameters
     ----------
@@ -185,7 +225,7 @@ def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.
         Number of polygons.
     """
     if len(owner) == 0:
-        return np.zeros(0), np.zeros(count)
+        return np.zeros(0), np.zeros(count), np.zeros(count)
     number = np.bincount(owner, minlength=count)
     total = np.stack([np.bincount(owner, points[:, k], minlength=count) for k in (0, 1)], axis=1)
     middle = total / np.maximum(number, 1)[:, None]
@@ -203,4 +243,4 @@ def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.
     area = np.bincount(owner, shares, minlength=count)
     far = np.zeros(count)
     np.maximum.at(far, owner, np.hypot(arms[:, 0], arms[:, 1]))
-    return np.maximum(shares, 0.0), area / np.maximum(2.0 * far, 1e-300)
+    return np.maximum(shares, 0.0), area / np.maximum(2.0 * far, 1e-300), 2.0 * far

@@ -27,6 +27,9 @@ REENTRANT = 1e-4
 #: Points nearer to a plane than this fraction of the diagonal of their block are on it.
 ON_PLANE = 1e-9
 
+#: Corners of parts farther than this fraction of that diagonal from all corners of their block are made by a cut.
+ON_CORNER = 1e-7
+
 #: Parts whose volumes do not add up to that of their block within this fraction of it are no parts of it.
 VOLUME_LEFT = 0.01
 
@@ -53,6 +56,10 @@ class ConvexParts:
         With these weights.
     inner : (n_faces,) bool array
         Faces of the parts inside their block, where it was cut.
+    plane : (n_faces,) int array
+        The plane of each face of a block: the same for faces into which one face was cut.
+    made : (n_corners,) bool array
+        Corners that the cuts have made: none of the block.
     """
 
     solids: Solids
@@ -60,6 +67,8 @@ class ConvexParts:
     source: np.ndarray
     weights: np.ndarray
     inner: np.ndarray
+    plane: np.ndarray
+    made: np.ndarray
 
     @cached_property
     def cut_edges(self) -> np.ndarray:
@@ -106,9 +115,10 @@ def convex_parts(solids: Solids) -> ConvexParts:
     bent = np.flatnonzero(_out_of_faces(solids) > DRAWN_GAP * solids.widths)
     if len(bent) == 0:
         none = np.zeros((0, 4))
-        inner = np.zeros(len(solids.block_of_face), dtype=bool)
-        return ConvexParts(solids, np.arange(len(solids)), none.astype(np.int64), none, inner)
-    vertices, faces, sources, weights, block_of_part, inner_faces = [], [], [], [], [], []
+        n_faces, n_corners = len(solids.block_of_face), len(solids.vertices)
+        inner, made = np.zeros(n_faces, dtype=bool), np.zeros(n_corners, dtype=bool)
+        return ConvexParts(solids, np.arange(len(solids)), none.astype(np.int64), none, inner, np.arange(n_faces), made)
+    vertices, faces, sources, weights, block_of_part, inner_faces, made_corners = [], [], [], [], [], [], []
     is_bent = np.zeros(len(solids), dtype=bool)
     is_bent[bent] = True
     for block in range(len(solids)):
@@ -121,6 +131,12 @@ def convex_parts(solids: Solids) -> ConvexParts:
             vertices.append(corners)
             faces.append(around)
             block_of_part.append(block)
+            far = ON_CORNER * float(np.linalg.norm(np.ptp(own, axis=0)))
+            made_corners.append(
+                (np.abs(corners[:, None] - own).max(axis=2).min(axis=1) > far)
+                if is_bent[block]
+                else np.zeros(len(corners), dtype=bool)
+            )
             if is_bent[block]:
                 arms = np.linalg.solve((own[frame[1:]] - own[frame[0]]).T, (corners - own[frame[0]]).T).T
                 sources.append(np.tile(start + frame, (len(corners), 1)))
@@ -129,13 +145,29 @@ def convex_parts(solids: Solids) -> ConvexParts:
                 number = start + np.arange(len(corners))
                 sources.append(np.tile(number[:, None], (1, 4)))
                 weights.append(np.tile([1.0, 0.0, 0.0, 0.0], (len(corners), 1)))
+    cut = joined(vertices, faces)
     return ConvexParts(
-        joined(vertices, faces),
+        cut,
         np.array(block_of_part),
         np.concatenate(sources),
         np.concatenate(weights),
         np.array(inner_faces),
+        _planes(cut, np.array(block_of_part), is_bent, solids.widths),
+        np.concatenate(made_corners),
     )
+
+
+def _planes(parts: Solids, block_of_part: np.ndarray, is_bent: np.ndarray, widths: np.ndarray) -> np.ndarray:
+    """(n_faces,) int array: the first face of the same block in the plane of each."""
+    faces = parts.faces(parts.vertices)
+    block = block_of_part[parts.block_of_face]
+    plane = np.arange(len(block))
+    for k in np.split(plane, np.flatnonzero(np.diff(block)) + 1):
+        if is_bent[block[k[0]]]:
+            same = faces.normals[k] @ faces.normals[k].T > ONE_WAY
+            off = np.einsum("fi,gfi->gf", faces.normals[k], faces.middles[k][:, None] - faces.middles[k])
+            plane[k] = k[(same & (np.abs(off) <= 2.0 * DRAWN_GAP * widths[block[k[0]]])).argmax(axis=1)]
+    return plane
 
 
 def surface_of(solids: Solids, block: int) -> tuple[np.ndarray, list[list[int]]]:
@@ -382,7 +414,9 @@ def _cut(piece: _Piece, normal: np.ndarray, origin: np.ndarray, near: float) -> 
         level = (polygon - origin) @ normal
         level[np.abs(level) <= near] = 0.0
         if not level.any():
-            # A face in the plane bounds what is behind it.
+            # A face in the plane bounds what is behind it; a triangle without an area, across it, bounds nothing.
+            if abs(outward @ normal) < 0.5:
+                continue
             side = sides[0] if outward @ normal > 0.0 else sides[1]
             side.polygons.append(polygon)
             side.normals.append(outward)
@@ -439,7 +473,16 @@ def _separate(piece: _Piece, normal: np.ndarray, origin: np.ndarray, near: float
     in_cut = on_plane & on_plane[_following(owner)]
     order = np.flatnonzero(~in_cut)[np.argsort(keys[~in_cut], kind="stable")]
     same = np.flatnonzero(np.diff(keys[order]) == 0)
-    links = (np.ones(len(same)), (owner[order[same]], owner[order[same + 1]]))
+    first, second = owner[order[same]].tolist(), owner[order[same + 1]].tolist()
+    # A face in the plane belongs to the body that it bounds: that whose other faces turn away from it.
+    flat = np.logical_and.reduceat(on_plane, np.searchsorted(owner, np.arange(len(piece.polygons))))
+    for face in np.flatnonzero(flat).tolist():
+        middle = piece.polygons[face].mean(axis=0)
+        for k in np.flatnonzero(np.isin(keys, keys[owner == face]) & (owner != face)).tolist():
+            if (middle - points[k]) @ piece.normals[owner[k]] <= near:
+                first.append(face)
+                second.append(int(owner[k]))
+    links = (np.ones(len(first)), (first, second))
     n = len(piece.polygons)
     count, body = connected_components(coo_array(links, shape=(n, n)), directed=False)
     if count == 1:

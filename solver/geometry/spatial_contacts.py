@@ -15,6 +15,7 @@ from .broad_phase import expand_ranges
 from .clipping import ClippedCorners, clipped_faces
 from .contacts import Contacts, joined_contacts
 from .convex_parts import ConvexParts
+from .cut_points import without_points_of_cuts
 from .facing import FacingParts, facing_parts, near_parts
 from .separations import edge_separations, outward
 from .solids import Faces, Solids, cross, dot, unit
@@ -176,10 +177,12 @@ def find_points(
     tried = np.flatnonzero(pairs.shallow & pairs.face_each_other)
     alone = pairs.shallow & ~pairs.face_each_other
     tips = measured(*_tips(solids, faces, vertices, pairs[alone], reach))
+    tips = tips[near(tips) & ~parts.made[tips.features[:, 1]]]
     crossed = measured(*_crossed_edges(solids, faces, vertices, pairs[pairs.cosine > OPPOSED], reach))
-    crossed = crossed[~parts.cut_edges[crossed.features[:, 1:3]].any(axis=1)]
-    crossed = crossed[near(crossed)]
-    found = [tips[near(tips)], crossed]
+    crossed = crossed[near(crossed) & ~parts.cut_edges[crossed.features[:, 1:3]].any(axis=1)]
+    found = [tips, crossed]
+    # The planes of both faces, and whether the point is near: those of cuts are left out by what lies around them.
+    marks = [np.tile([-1, -1, 1], (len(contacts), 1)) for contacts in found]
     # Where the faces that oppose each other best do not cover each other, others may.
     left = pairs[tried]
     resolved = np.zeros(len(left), dtype=bool)
@@ -203,12 +206,18 @@ def find_points(
         # Points are no nearer than a plane keeps their parts apart: edges that cross behind it do not touch.
         owner = pair[corners.owner]
         behind = contacts.gaps < left.apart[owner] - BEHIND * left.width[owner]
-        kept = np.flatnonzero(near(contacts) & ~slides & ~sliver & ~behind)
-        resolved[pair[corners.owner[kept]]] = True
+        kept = ~slides & ~sliver & ~behind
+        inside = near(contacts)
+        resolved[pair[corners.owner[kept & inside & np.isfinite(corners.widths)]]] = True
+        kept = np.flatnonzero(kept if not parts.whole else kept & inside)
         found.append(contacts[kept])
-    contacts = joined_contacts(found)
-    kind, first, second, _ = contacts.features.T
-    contacts = contacts[np.lexsort((second, first, kind))]
+        owner = corners.owner[kept]
+        marks.append(np.stack([parts.plane[face_i[owner]], parts.plane[face_j[owner]], inside[kept]], axis=1))
+    contacts, mark = joined_contacts(found), np.concatenate(marks)
+    if not parts.whole:
+        contacts, kept = without_points_of_cuts(parts, contacts, mark[:, :2])
+        contacts = contacts[mark[kept, 2] > 0]
+    contacts = contacts[np.lexsort(contacts.features.T[[2, 1, 0]])]
     # Parts of one block may have a point in common, and edges across each other a corner of a polygon.
     several = np.bincount(block_of_part, minlength=len(widths)) > 1
     several[crossed.block_a] = True

@@ -7,7 +7,8 @@ import solver
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read, read_layout, save_layout
 
-WRITTEN = sorted(suffix for suffix, known in FORMATS.items() if known.writes)
+#: All but single precision, which test_space_round_trips looks at.
+WRITTEN = sorted(suffix for suffix, known in FORMATS.items() if known.writes and suffix != ".glb")
 #: What a file cannot say of a block.
 SILENT = {".stl": ("roles", "materials", "density")}
 

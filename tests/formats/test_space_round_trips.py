@@ -134,3 +134,26 @@ def test_a_drawing_in_the_plane_stands_upright_in_space(tmp_path):
     deep = read(tmp_path / "arch.dxf", dimension=3, thickness=0.4)
     assert deep.shapes.volumes == pytest.approx(0.4 * flat.areas)
     assert deep.centroids == pytest.approx(np.insert(flat.centroids, 1, 0.0, axis=1), abs=1e-9)
+
+
+def test_glb_comes_back_in_single_precision_with_y_up(vault, tmp_path):
+    """One node a block, with its name; other programs find the vault standing."""
+    import trimesh
+
+    path = tmp_path / "vault.glb"
+    save_layout(vault, path)
+    scene = trimesh.load_scene(path)
+    assert set(scene.geometry) == set(vault.names)
+    np.testing.assert_allclose(scene.bounds[:, 1], [vault.vertices[:, 2].min(), vault.vertices[:, 2].max()], atol=1e-6)
+    again = read(path)
+    assert again.names == vault.names
+    assert again.roles.tolist() == vault.roles.tolist()
+    assert again.materials == vault.materials
+    np.testing.assert_array_equal(again.density, vault.density)
+    np.testing.assert_allclose(again.shapes.volumes, vault.shapes.volumes, rtol=1e-5)
+    np.testing.assert_allclose(again.centroids, vault.centroids, atol=1e-5)
+    flat = generators.arch()
+    save_layout(flat, tmp_path / "arch.glb")
+    again = read(tmp_path / "arch.glb")
+    assert again.dimension == 2
+    np.testing.assert_allclose(again.centroids, flat.centroids, atol=1e-6)

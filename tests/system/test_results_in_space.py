@@ -7,12 +7,13 @@ import shutil
 import subprocess
 import warnings
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 import pyvista as pv
 from PIL import Image
-from structures import vault_response
+from structures import arch_response, vault_response
 from test_paraview import PVPYTHON, READ
 from test_report import browser, visited
 
@@ -30,7 +31,7 @@ from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import swing_of
 from blockvis.report.page import write_report
 from blockvis.results.datasets import block_dataset, contact_dataset, joint_dataset
-from blockvis.results.joint_faces import face_states, joint_faces
+from blockvis.results.joints import initial_joints, joint_states
 from blockvis.vtk_files import write_vtu
 
 SMALL = (640, 360)
@@ -87,9 +88,29 @@ def test_polyhedra_come_back_through_pyvista(tmp_path):
     assert b'Name="faceoffsets"' in file.read_bytes()
 
 
+@pytest.mark.parametrize("response", [arch_response, vault_response], ids=["plane", "space"])
+def test_results_reach_meshio_as_the_manual_says(response, tmp_path, monkeypatch):
+    """Numbers, cells and, beside them, names: of polygons and of polyhedra, which meshio sorts by their corners."""
+    pytest.importorskip("meshio")
+    manual = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(import meshio.*?)```", manual, re.S)
+    assembly, increment = response().assembly, response().path[-1]
+    monkeypatch.chdir(tmp_path)
+    write_vtu(block_dataset(assembly, increment), tmp_path / "out" / "increments" / "blocks_00000.vtu")
+    read = {}
+    exec(code, read)
+    mesh = read["mesh"]
+    np.testing.assert_array_equal(mesh.points[:, : assembly.dimension], solver.moved_vertices(assembly, increment.pose))
+    assert sum(len(cells.data) for cells in mesh.cells) == assembly.n_blocks
+    numbers = np.concatenate(mesh.cell_data["block_id"])
+    assert [read["names"][k] for k in numbers] == [assembly.names[k] for k in numbers]
+    moved = np.concatenate(mesh.cell_data["displacement"])[np.argsort(numbers), : assembly.dimension]
+    np.testing.assert_allclose(moved, increment.pose.positions - assembly.centroids, atol=1e-15)
+
+
 def test_faces_of_joints_are_those_of_the_voussoirs():
     response = vault_response()
-    joints = joint_faces(response.assembly)
+    joints = initial_joints(response.assembly)
     # Six voussoirs between two springers: seven joints of 0.2 m × 0.5 m.
     np.testing.assert_allclose(joints.rings.areas(), np.full(7, 0.1), rtol=1e-9)
     between = response.assembly.centroids[joints.block_a] - response.assembly.centroids[joints.block_b]
@@ -99,7 +120,7 @@ def test_faces_of_joints_are_those_of_the_voussoirs():
 def test_joints_open_on_one_side_and_carry_the_weight():
     response = vault_response()
     assembly, last = response.assembly, response.path[-1]
-    states = face_states(assembly, joint_faces(assembly), last)
+    states = joint_states(assembly, initial_joints(assembly), last)
     total = np.zeros((assembly.n_blocks, 3))
     np.add.at(total, states.block_a, states.force)
     np.subtract.at(total, states.block_b, states.force)
@@ -362,6 +383,10 @@ def test_one_command_from_case_to_pictures_and_again(tmp_path, monkeypatch, caps
         assert (out / name).stat().st_size > 1000
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert summary["status"] == "collapsed"
+    widest = summary["cracks"][0]
+    assert widest["width_mm"] > 1.0
+    assert len(widest["at"]) == len(widest["to"]) == 3
+    assert widest["widest_joint"] in (out / "report.html").read_text(encoding="utf-8")
     capsys.readouterr()
     assert main(["render", "out", "--animation", "none", "--colour-by", "displacement", "--forces", "thrust"]) == 0
     assert (out / "last.png").stat().st_size > 1000

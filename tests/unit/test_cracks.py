@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import structures
 
 import blockvis
 import solver
+from blockvis.layout.layout import layout_of, standing
 from blockvis.report.page import report_html
 from blockvis.results.cracks import crack_rows, cracks_of
 
@@ -40,7 +42,7 @@ def test_a_block_that_is_lifted_leaves_a_level_crack():
     assert set(crack.widest.split(" | ")) == {"block 0", "block 1"}
     assert crack.inclination == pytest.approx(0.0)
     np.testing.assert_allclose(crack.ends, [[0, 1], [1, 1]], atol=1e-12)
-    assert crack.length == pytest.approx(1.0)
+    assert crack.size == pytest.approx(1.0)
 
 
 def test_a_stepped_crack_is_one_line_through_joints_that_only_slide():
@@ -72,7 +74,7 @@ def test_the_cracks_of_an_arch_are_its_hinges(tmp_path):
     arch = structures.arch_response()
     cracks = cracks_of(arch.assembly, arch.path[-1].pose)
     assert len(cracks) >= 3
-    assert all(crack.length == pytest.approx(0.15, rel=0.01) for crack in cracks)
+    assert all(crack.size == pytest.approx(0.15, rel=0.01) for crack in cracks)
     blockvis.write(arch, tmp_path / "out")
     stored = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["cracks"]
     assert [c["width_mm"] for c in stored] == pytest.approx([1e3 * c.width for c in cracks], abs=1e-3)
@@ -88,3 +90,46 @@ def test_every_key_of_a_crack_is_named_in_the_manual():
     (crack,) = cracks_of(assembly, moved(assembly, block_1=(0, 0.01, 0)))
     manual = (structures.Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
     assert [key for key in crack.values() if f"`{key}`" not in manual] == []
+
+
+def in_space(flat, depth):
+    """The same blocks in space, upright, as deep everywhere."""
+    sketch = replace(layout_of(flat), thickness=None)
+    return solver.Assembly.from_solids(standing(sketch, depth).solids)
+
+
+def test_a_stepped_crack_in_space_is_that_of_the_plane():
+    outlines = [
+        [[0, 0], [2, 0], [2, 1], [0, 1]],
+        [[2, 0], [4, 0], [4, 1], [2, 1]],
+        [[0, 1], [3, 1], [3, 2], [0, 2]],
+        [[3, 1], [4, 1], [4, 2], [3, 2]],
+    ]
+    flat = solver.Assembly.from_outlines(outlines)
+    solid = in_space(flat, 0.5)
+    (crack,) = cracks_of(solid, moved_in_space(solid, {1: (0.02, 0.0, 0.0), 3: (0.02, 0.0, 0.0)}))
+    assert crack.width == pytest.approx(0.02)
+    assert len(crack.joints) == 3
+    assert crack.size == pytest.approx(3 * 0.5)
+    values = crack.values()
+    assert values["area"] == pytest.approx(1.5)
+    assert (values["from"][0], values["from"][2], values["to"][0], values["to"][2]) == (2.0, 0.0, 3.0, 2.0)
+    assert crack.inclination == pytest.approx(np.degrees(np.arctan2(2.0, np.hypot(1.0, 0.5))))
+    assert "1.5 m², 61°, from (2, " in crack_rows([crack], 1)[0][1]
+
+
+def test_joints_that_part_otherwise_are_cracks_of_their_own():
+    """A block that stays, one that goes up from it and one that goes aside: their joints meet at an edge."""
+    flat = squares((0, 0), (0, 1), (1, 0))
+    solid = in_space(flat, 1.0)
+    cracks = cracks_of(solid, moved_in_space(solid, {1: (0.0, 0.0, 0.01), 2: (0.02, 0.0, 0.0)}))
+    assert [round(crack.width, 9) for crack in cracks] == [0.02, 0.01]
+    assert cracks_of(solid, solver.Pose.initial(solid)) == []
+
+
+def moved_in_space(assembly, motions):
+    """The pose in which blocks, by their numbers, have moved."""
+    pose = solver.Pose.initial(assembly)
+    for block, by in motions.items():
+        pose.positions[block] += by
+    return pose

@@ -12,6 +12,7 @@ from blockvis.formats.read import read_layout, write_layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.facing import faced
+from blockvis.layout.inspect_solids import inspected_solids
 from blockvis.layout.layout import layout_of
 from blockvis.layout.solids import box, triangles_of, volume
 
@@ -32,8 +33,9 @@ def shaken(layout, amount, seed=3):
 
 
 def joints(assembly, least):
-    """Pairs of blocks with at least so many contact points."""
+    """Pairs of blocks with at least so many contact points of faces that cover each other."""
     contacts = solver.find_contacts(assembly, assembly.vertices, 1e-5 * assembly.block_size)
+    contacts = contacts[contacts.areas > 0.0]
     pairs = Counter(map(frozenset, zip(contacts.block_a.tolist(), contacts.block_b.tolist(), strict=True)))
     return {pair for pair, count in pairs.items() if count >= least}
 
@@ -135,3 +137,43 @@ def test_a_face_warped_beyond_the_tolerance_stays_two_triangles():
     assert 0.0009 < found.warp < 0.0011
     assert len(found.solid[1]) == 6
     assert found.place == pytest.approx(raised[top], abs=1.1)
+
+
+def shrunk(layout, by):
+    """Every stone smaller about the mean of its corners: joints open everywhere."""
+    smaller = tuple((points + by * (points.mean(axis=0) - points), faces) for points, faces in layout.solids)
+    return replace(layout, solids=smaller)
+
+
+@pytest.mark.parametrize("name", ["extruded arch", "barrel vault", "L corner"])
+def test_open_joints_are_measured_and_closed(name):
+    """Named with their gaps, and closed by the joint thickness that is proposed, by hand or as "auto"."""
+    drawn = generators.build(name, SMALL.get(name, {"voussoirs": 6}))
+    layout = shrunk(layout_of(drawn), 0.05)
+    found = inspected_solids(layout)
+    assert {frozenset(pair[:2]) for pair in found.open_joints} >= joints(drawn, 4) - {
+        frozenset(np.flatnonzero(~drawn.free))
+    }
+    gaps = [gap for *_, gap in found.open_joints]
+    assert gaps == sorted(gaps, reverse=True)
+    assert found.joint_thickness > gaps[0] > 0.01 * drawn.block_size
+    assert f"joint_thickness = {found.joint_thickness:g} closes them" in str(found)
+    closed = {}
+    for thickness in ("auto", found.joint_thickness):
+        with pytest.warns(UserWarning, match="open by up to"):
+            closed[thickness] = assemble(layout, joint_thickness=thickness)
+    assert (closed["auto"].vertices == closed[found.joint_thickness].vertices).all()
+    assert joints(closed["auto"], 3) >= joints(drawn, 4)
+
+
+def test_what_touches_has_no_open_joints_and_what_overlaps_is_named():
+    drawn = generators.build("L corner", SMALL["L corner"])
+    layout = layout_of(drawn)
+    found = inspected_solids(layout)
+    assert (found.open_joints, found.overlapping, found.refused, found.joint_thickness) == ((), (), "", 0.0)
+    points, faces = layout.solids[0]
+    pushed = replace(layout, solids=((points + np.array([0.01, 0.0, 0.0]), faces), *layout.solids[1:]))
+    found = inspected_solids(pushed)
+    assert 0 in found.overlapping[0][:2]
+    assert found.overlapping[0][2] == pytest.approx(0.01, rel=1e-6)
+    assert "a run refuses them: move the blocks apart or raise overlap_tolerance" in str(found)

@@ -1,12 +1,16 @@
 """Contact polygons in space: the same as those of coal, and of the plane where that is extruded."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import shapely
-from scipy.spatial import ConvexHull, Voronoi
+from scipy.spatial import ConvexHull, Voronoi, cKDTree
 
 import solver
 from blockvis import generators
+from blockvis.cases.build import case_assembly
+from blockvis.cases.case import read_case
 from solver.kinematics import Pose, moved, moved_vertices, rotation_matrices
 
 #: Here coal 3.0.3 gives a polygon of half the area, whose corners are on no edge of the faces.
@@ -138,6 +142,35 @@ def test_extruded_structures_have_the_points_of_the_plane(name, size):
         found = rows(solid[np.abs(solid.points[:, 1] - end) < 1e-9], False)
         np.testing.assert_allclose(found, expected, atol=2e-9)
     assert len(solid) == 2 * len(flat)
+
+
+PLANE = [name for name in generators.LAYOUTS if generators.dimension_of(name) == 2]
+EXAMPLES = {path.stem: read_case(path) for path in sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))}
+FLAT = [name for name, case in EXAMPLES.items() if case.layout is None or generators.dimension_of(case.layout) == 2]
+SMALL_FACADE = {"bricks": 12, "courses": 22, "storeys": 1, "windows": 1, "window_bricks": 6, "window_courses": 9}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [*(pytest.param(name, marks=[pytest.mark.slow] * (name == "facade")) for name in [*PLANE, *FLAT]), "small facade"],
+)
+def test_what_touches_in_the_plane_touches_there_in_space(name):
+    """Of every layout and example of the plane, at either end of the thickness; also at re-entrant corners."""
+    if name == "small facade":
+        plane = generators.build("facade", SMALL_FACADE)
+    else:
+        plane = generators.build(name) if name in PLANE else case_assembly(EXAMPLES[name])
+    space, reach = extruded(plane), 1e-6 * plane.block_size
+    expected = rows(solver.find_contacts(plane, plane.vertices, reach), True)
+    solid = solver.find_contacts(space, space.vertices, reach)
+    weights = np.array([1, 1, 1, 1, 1e-2, 1e-2, 1])
+    for end in (0.0, THICKNESS):
+        found = rows(solid[np.abs(solid.points[:, 1] - end) < 1e-9], False)
+        assert len(found) == len(expected)
+        far, which = cKDTree(found * weights).query(expected * weights)
+        assert far.max() < 1e-6
+        assert len(np.unique(which)) == len(which)
+    assert len(solid) == 2 * len(expected)
 
 
 def test_cells_of_space_touch_in_their_common_faces():
