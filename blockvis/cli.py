@@ -313,7 +313,7 @@ def _explain(options: argparse.Namespace) -> int:
     )
     print(found)
     print(f"explain.html, explain.json and explain.png in {folder}/")
-    return 0 if found.causes else NO_EQUILIBRIUM
+    return 0 if found.stands else NO_EQUILIBRIUM
 
 
 def _sweep(options: argparse.Namespace) -> int:

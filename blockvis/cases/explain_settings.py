@@ -29,7 +29,7 @@ class ExplainSettings:
     limit : float, optional [m]
         Largest displacement of a support.
     model_uncertainty : float
-        Standard deviation of computed widths, as a fraction of them.
+        Standard deviation of computed widths, as a fraction of the observed ones.
     place_uncertainty : float, optional [m]
         Within which a crack at x, y may be another joint of the model; half a block by default.
     outliers : float

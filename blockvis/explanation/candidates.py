@@ -23,6 +23,12 @@ MOST_SUPPORTS = 6
 #: Ground on which at least so many blocks stand can form a trough.
 FEWEST_FEET = 3
 
+#: Slopes of the ground begin at these fractions of the width of the structure, from the side that goes down.
+SLOPES = (0.25, 0.375, 0.5, 0.625, 0.75)
+
+#: A trough that moves all feet alike within this fraction of its depth is none.
+LEAST_DIFFERENCE = 1e-3
+
 #: Blocks touch within this fraction of the block size.
 TOUCHING = 2e-3
 
@@ -56,6 +62,8 @@ class Candidate:
         The detail of the candidate that this one was added to look at more closely; empty for those of the start.
     turns : bool
         Whether supports turn as one body: its amount is the angle.
+    bends : bool
+        Whether the ground bends, in a trough or at the beginning of a slope: its amount is the differential settlement.
     """
 
     cause: str
@@ -66,6 +74,7 @@ class Candidate:
     inflection: float = float("nan")
     refines: str = ""
     turns: bool = False
+    bends: bool = False
 
     @property
     def is_trough(self) -> bool:
@@ -189,7 +198,7 @@ def candidates_of(ground: Ground, settings: ExplainSettings, source: Path) -> li
                 found.append(Candidate(f"{words} {move} {direction}", _translation(pieces, VECTORS[direction])))
                 continue
             for sense, way in ((1.0, "counter-clockwise"), (-1.0, "clockwise")):
-                motions = _rotation(ground.assembly, pieces, sense)
+                motions = rotation_of(ground.assembly, pieces, sense)
                 found.append(Candidate(f"{words} {turn} {way}", motions, turns=True))
     if ground.troughs:
         found += _troughs(ground, settings)
@@ -205,7 +214,9 @@ def _translation(pieces: Sequence[str], vector: tuple[float, float]) -> dict[str
     return {piece: (*vector, 0.0) for piece in pieces}
 
 
-def _rotation(assembly: solver.Assembly, pieces: Sequence[str], sense: float) -> dict[str, tuple[float, float, float]]:
+def rotation_of(
+    assembly: solver.Assembly, pieces: Sequence[str], sense: float
+) -> dict[str, tuple[float, float, float]]:
     """Turn supports as one body about the middle of where they carry something."""
     blocks = [assembly.index(piece) for piece in pieces]
     contacts = _touching(assembly)
@@ -227,16 +238,14 @@ def _troughs(ground: Ground, settings: ExplainSettings) -> list[Candidate]:
     found = [trough(ground, centre, inflection) for centre in centres for inflection in inflections]
     if not settings.centres:
         for side, start, end in (("left", low, high), ("right", high, low)):
-            # The ground goes down from a place between a quarter and three quarters of the width on.
-            for share in (0.25, 0.5, 0.75):
+            for share in SLOPES:
                 hinge = start + share * (end - start)
                 points = sorted([(start, 1.0), (hinge, 0.0)])
                 motions = _by_profile(ground, Profile("points", points=tuple(points)))
+                words = f"the ground slopes down to the {side}"
                 if any(any(motion) for motion in motions.values()):
-                    found.append(
-                        Candidate(f"the ground slopes down to the {side}", motions, detail=f"from x = {hinge:.3g} m on")
-                    )
-    return [one for one in found if any(any(motion) for motion in one.motions.values())]
+                    found.append(Candidate(words, motions, detail=f"from x = {hinge:.3g} m on", bends=True))
+    return [one for one in found if differential(ground.assembly, scaled_motions(one)) > LEAST_DIFFERENCE]
 
 
 def _extent(ground: Ground) -> tuple[float, float]:
@@ -250,7 +259,7 @@ def trough(ground: Ground, centre: float, inflection: float, refines: str = "") 
     """Make the candidate of a Gaussian trough."""
     motions = _by_profile(ground, Profile("gaussian", centre, inflection))
     detail = f"deepest at x = {centre:.3g} m, steepest {inflection:.3g} m from there"
-    return Candidate("a trough of the ground", motions, 1.0, detail, centre, inflection, refines)
+    return Candidate("a trough of the ground", motions, 1.0, detail, centre, inflection, refines, bends=True)
 
 
 def _by_profile(ground: Ground, profile: Profile) -> dict[str, tuple[float, float, float]]:
@@ -366,12 +375,23 @@ def opens_cracks(assembly: solver.Assembly, candidate: Candidate) -> bool:
     return bool(np.ptp(motion[:, :2], axis=0).max() > 1e-12 or np.abs(motion[:, 2]).max() > 1e-12)
 
 
-def per_amount(candidate: Candidate) -> tuple[float, str]:
-    """Amount of a candidate per unit of its settlement, and its unit: an angle where supports turn as one."""
+def per_amount(assembly: solver.Assembly, candidate: Candidate) -> tuple[float, str]:
+    """Amount of a candidate per unit of its settlement, and its unit.
+
+    The amount is the displacement of a support that moves, the angle of supports that turn as one, and of a ground that
+    bends the difference between where it goes down most and least: what is common to all feet opens no crack.
+    """
+    motions = scaled_motions(candidate)
+    if candidate.turns:
+        return abs(next(iter(motions.values()))[2]), "rad"
     unit = solver.Settlement(profile=candidate.motions).unit
-    if not candidate.turns:
-        return 1.0, unit
-    return abs(next(iter(scaled_motions(candidate).values()))[2]), "rad"
+    return (differential(assembly, motions) if candidate.bends else 1.0), unit
+
+
+def differential(assembly: solver.Assembly, motions: Mapping[str, tuple[float, float, float]]) -> float:
+    """Difference [m] between the lowest and the highest of the supports on which something stands, moved by these."""
+    bearing = _bearing(assembly, [assembly.names[i] for i in np.flatnonzero(~assembly.free)])
+    return float(np.ptp([motions.get(assembly.names[i], (0.0, 0.0, 0.0))[1] for i in bearing]))
 
 
 def scaled_motions(candidate: Candidate) -> Mapping[str, tuple[float, float, float]]:

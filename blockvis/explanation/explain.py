@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from blockvis.runs.progress import StudyProgress
 from .candidates import (
     Candidate,
     Ground,
+    Twin,
     candidates_of,
     ground_of,
     opens_cracks,
@@ -28,7 +30,7 @@ from .candidates import (
     scaled_motions,
     twins_of,
 )
-from .forward import Order, Run, all_followed, ordered, workers_for
+from .forward import Order, Run, Variant, all_followed, ordered, reach_of, workers_for
 from .likelihood import Comparison, Trial, Trust, tried
 from .observations import Observations, read_observations
 from .ranking import Cause, next_measurement, ranked, unexplained
@@ -41,6 +43,9 @@ FRICTIONS = (0.8, 1.25)
 
 #: Causes that are looked at more closely: so probable at least, and at most so many.
 WORTH_IT, MOST_REFINED = 0.01, 4
+
+#: Candidates of which runs with other coefficients of friction are made, too, at most.
+MOST_VARIED = 6
 
 
 def explain(
@@ -99,7 +104,10 @@ def explain(
         case = replace(case, settlements=(), profiles=())
         drawn = case_assembly(case)
         if drawn.dimension != 2:
-            raise ValueError(f"{case.source}: explain knows structures in the plane only; this one is in space")
+            raise ValueError(
+                f"{case.source}: explain follows structures in the plane, and this one is in space; explain a section "
+                "of it that is drawn in the plane, or follow each settlement that may be the cause with blockvis run"
+            )
         needs_dry_joints(case)
         solver.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)
@@ -112,16 +120,14 @@ def explain(
     if not len(observations.points):
         first = [one for one in first if opens_cracks(ground.assembly, one)]
     about = 3 * len(first)
-    with workers_for(about, workers, scheduler) as client:
-        search.follow(first, (search.frictions[1],), client, progress)
+    with workers_for(about, workers, scheduler) as processes:
+        search.follow([pair for one in first for pair in search.usual(one)], processes, progress)
         worth = [c for c in search.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
         around = refined(ground, [cause.best.candidate for cause in worth], first)
-        search.follow(around, (search.frictions[1],), client, progress)
-        worth = [c for c in search.ranked() if c.probability > WORTH_IT][:MOST_REFINED]
-        closer = [one for cause in worth for one in _closest(cause)]
-        search.follow(closer, (search.frictions[0], search.frictions[2]), client, progress)
+        search.follow([pair for one in around for pair in search.usual(one)], processes, progress)
+        search.follow([pair for one in _likeliest(search.ranked()) for pair in search.others(one)], processes, progress)
     causes = search.ranked()
-    by_best = by_any = np.zeros(0, dtype=bool)
+    by_best = by_any = observations.widths > 0.0
     if causes:
         by_best, by_any = unexplained(search.comparison, causes, search.trials)
     found = Explanation(
@@ -162,10 +168,18 @@ def _any_settlement(assembly: solver.Assembly) -> tuple[solver.Assembly, tuple[s
     return assembly.with_roles(roles), (solver.Settlement(direction=(0.0, -1.0)),) if not assembly.free.all() else ()
 
 
-def _closest(cause: Cause) -> list[Candidate]:
-    """Choose the candidates of a cause whose friction is worth varying: the likeliest ones, at most three."""
-    order = np.argsort(-np.array(cause.weights), kind="stable")[:3]
-    return [cause.trials[k].candidate for k in order if cause.weights[k] > 0.05]
+def _likeliest(causes: Sequence[Cause]) -> list[Trial]:
+    """Choose the candidates whose friction is worth varying, each by its likeliest trial."""
+    trials = [
+        (cause.probability * weight, trial)
+        for cause in causes
+        for trial, weight in zip(cause.trials, cause.weights, strict=True)
+    ]
+    found: list[Trial] = []
+    for probability, trial in sorted(trials, key=lambda one: -one[0]):
+        if probability > WORTH_IT and not any(trial.candidate == other.candidate for other in found):
+            found.append(trial)
+    return found[:MOST_VARIED]
 
 
 class _Search:
@@ -193,69 +207,61 @@ class _Search:
         self.frictions = (low, middle, high)
         self.candidates: list[Candidate] = []
         self.trials: list[Trial] = []
-        # Runs for a little more than the widest crack serve other observations of the same structure, too.
-        self.widest = float(2.0 ** np.ceil(np.log2(observations.largest)))
+        self.reach = reach_of(observations, settings.limit)
 
     @property
     def apart(self) -> bool:
         """Whether the observations tell movements apart that differ by a translation of everything."""
         return len(self.observations.points) > 0
 
-    def follow(self, candidates: Sequence[Candidate], frictions: Sequence[float], client: Any, progress: bool) -> None:
-        """Follow candidates at some frictions, and compare them with the observations."""
-        new = [one for one in candidates if one not in self.candidates]
-        self.candidates += new
+    def usual(self, candidate: Candidate) -> list[tuple[Candidate, Variant]]:
+        """Pair a candidate with the variants in which it is looked at first."""
+        # Of a ground that bends many candidates open much the same cracks: they stand in for the paths of each.
+        leans = (0,) if candidate.bends else (-1, 1)
+        return [(candidate, Variant(self.frictions[1], lean)) for lean in leans]
+
+    def others(self, trial: Trial) -> list[tuple[Candidate, Variant]]:
+        """Pair the candidate of a trial with other coefficients of friction."""
+        leans = (-1, 1) if trial.candidate.bends else (trial.variant.lean,) * 2
+        frictions = (self.frictions[0], self.frictions[2])
+        return [(trial.candidate, Variant(*both)) for both in zip(frictions, leans, strict=True)]
+
+    def follow(self, pairs: Sequence[tuple[Candidate, Variant]], processes: Executor | None, progress: bool) -> None:
+        """Follow candidates in some variants, and compare them with the observations."""
+        for one, _ in pairs:
+            if one not in self.candidates:
+                self.candidates.append(one)
         twins = twins_of(self.ground.assembly, self.candidates)
-        wanted: list[tuple[Candidate, float]] = []
+        wanted: list[tuple[Candidate, Variant, Twin, Candidate, Order]] = []
         orders: dict[Any, Order] = {}
-        for one in candidates:
-            for friction in dict.fromkeys(frictions):
-                if any(t.candidate == one and t.friction == friction for t in self.trials):
-                    continue
-                wanted.append((one, friction))
-                shared = self.candidates[twins[self.candidates.index(one)].of]
-                key = self._key(shared, friction)
-                if key not in self.runs and key not in orders:
-                    orders[key] = ordered(
-                        self.case,
-                        self.ground.assembly,
-                        scaled_motions(shared),
-                        friction,
-                        self.widest,
-                        self.case.explain.limit,
-                    )
+        for one, variant in pairs:
+            if any(t.candidate == one and t.variant == variant for t in self.trials):
+                continue
+            twin = twins[self.candidates.index(one)]
+            shared = self.candidates[twin.of]
+            order = ordered(self.case, self.ground.assembly, scaled_motions(shared), variant, self.reach)
+            wanted.append((one, variant, twin, shared, order))
+            key = self._key(shared, variant)
+            if key not in self.runs:
+                orders[key] = order
         bar = StudyProgress(len(orders), shown=None if progress else False)
         try:
-            found = all_followed(list(orders.values()), client, bar)
+            found = all_followed(list(orders.values()), processes, bar)
         finally:
             bar.done()
         self.runs.update(zip(orders, found, strict=True))
-        for one, friction in wanted:
-            twin = twins[self.candidates.index(one)]
-            factor, unit = per_amount(one)
+        for one, variant, twin, shared, order in wanted:
+            factor, unit = per_amount(self.ground.assembly, one)
             twin = replace(twin, scale=twin.scale * factor, travel=twin.travel / factor)
-            shared = self.candidates[twin.of]
-            order = ordered(
-                self.case, self.ground.assembly, scaled_motions(shared), friction, self.widest, self.case.explain.limit
-            )
-            self.trials.append(
-                tried(
-                    self.comparison,
-                    one,
-                    friction,
-                    self.runs[self._key(shared, friction)],
-                    twin,
-                    shared,
-                    unit,
-                    order.settlement.limit * twin.scale,
-                )
-            )
+            run = self.runs[self._key(shared, variant)]
+            largest = order.settlement.limit * twin.scale
+            self.trials.append(tried(self.comparison, one, variant, run, twin, shared, unit, largest))
 
     def ranked(self) -> list[Cause]:
         """Order the causes so far."""
         return ranked(self.trials, apart=self.apart)
 
-    def _key(self, candidate: Candidate, friction: float) -> Any:
+    def _key(self, candidate: Candidate, variant: Variant) -> Any:
         """Name what a run depends on, within one case."""
         motions = tuple(sorted(scaled_motions(candidate).items()))
-        return (motions, friction, self.widest, self.case.explain.limit)
+        return (motions, variant, self.reach)

@@ -2,37 +2,62 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from multiprocessing import active_children, get_context
+from typing import Any
 
 import numpy as np
 
 import solver
 from blockvis.cases.build import case_interfaces, case_loads
 from blockvis.cases.contents import Case
-from blockvis.extras import MissingExtra, require
+from blockvis.extras import require
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.runs.progress import StudyProgress
 
-if TYPE_CHECKING:
-    from distributed import Client
+from .observations import Observations
 
-#: Increments up to the largest amount of a candidate.
-INCREMENTS = 12
+#: Increments up to the largest amount of a candidate, each longer than the one before by this factor: what an amount
+#: does is known within the same fraction of it, whatever cracks a movement opens.
+INCREMENTS, LONGER = 16, 1.35
 
-#: The first of them is divided, where hinges form: parts of it that have an increment of their own.
-STOPS = (0.125, 0.25, 0.5)
+#: A run stops where a joint is open by so many times the widest observed crack.
+ENOUGH = 2.0
 
-#: A run stops where a joint is open by so many times the widest observed crack, rounded up to a power of two.
-ENOUGH = 1.5
+#: The largest displacement of a support where the case gives none: in widest cracks, for a springer goes down by ten
+#: times the width of those that this opens, and in largest displacements that were observed.
+FARTHEST, AS_FAR = 25.0, 3.0
 
-#: The largest displacement of a support, in such cracks, where the case gives none.
-FARTHEST = 10.0
+#: What is drawn alike on both sides has several paths, and what is built has taken one: stones are heavier by up to
+#: this fraction towards one side, and lighter towards the other. In friction two sides differ by more.
+LEANING = 0.1
+
+#: A collapse is found within this fraction of the largest amount.
+COLLAPSE = 2e-3
 
 #: With fewer runs than this, processes cost more than they save.
 FEWEST_FOR_PROCESSES = 8
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What a run assumes besides the movement of the supports.
+
+    Attributes
+    ----------
+    friction : float
+        Coefficient of [material]; those of pairs of materials follow in proportion.
+    lean : {-1, 0, 1}
+        Whether stones are a little heavier towards the left, nowhere, or towards the right.
+    """
+
+    friction: float
+    lean: int = 0
 
 
 @dataclass(frozen=True)
@@ -90,6 +115,26 @@ class Run:
         return np.asarray(values[place] * (1.0 - rest) + values[following] * rest)
 
 
+def reach_of(observations: Observations, limit: float | None) -> tuple[float, float]:
+    """Say how far runs go: the largest displacement of a support, and the opening at which they may stop [m].
+
+    Parameters
+    ----------
+    observations : Observations
+    limit : float, optional [m]
+        Largest displacement of a support, where the case gives it.
+    """
+
+    def rounded(length: float) -> float:
+        # Runs that go a little farther serve other observations of the same structure, too.
+        return float(2.0 ** np.ceil(np.log2(length))) if length > 0.0 else 0.0
+
+    widest = rounded(observations.widths.max(initial=0.0))
+    moved = rounded(np.hypot(*observations.displacements.T).max(initial=0.0)) if len(observations.points) else 0.0
+    farthest = max(FARTHEST * widest, AS_FAR * moved) if limit is None else limit
+    return farthest, ENOUGH * widest if widest > 0.0 else np.inf
+
+
 def lever_of(assembly: solver.Assembly, settlement: solver.Settlement) -> float:
     """Largest movement of a support where it carries something, per unit of the settlement [m or m/rad]."""
     reach = 2e-3 * assembly.block_size
@@ -107,9 +152,8 @@ def ordered(
     case: Case,
     assembly: solver.Assembly,
     motions: Any,
-    friction: float,
-    widest: float,
-    limit: float | None,
+    variant: Variant,
+    reach: tuple[float, float],
 ) -> Order:
     """State the run of a candidate.
 
@@ -119,21 +163,20 @@ def ordered(
     assembly : solver.Assembly
         Every support fixed.
     motions : mapping of str to (float, float, float)
-    friction : float
-        Coefficient of [material]; those of pairs of materials follow in proportion.
-    widest : float [m]
-        Of the observed cracks.
-    limit : float, optional [m]
-        Largest displacement of a support.
+    variant : Variant
+    reach : (float, float) [m]
+        Largest displacement of a support, and opening of a joint at which the run may stop.
     """
     roles = assembly.roles.astype("<U6").copy()
     roles[[assembly.index(name) for name in motions]] = solver.MOVING
     moving = assembly.with_roles(roles)
     lever = lever_of(moving, solver.Settlement(profile=motions))
-    farthest = (FARTHEST * widest if limit is None else limit) / lever
-    step = farthest / INCREMENTS
-    stops = tuple(part * step for part in STOPS)
-    settlement = solver.Settlement(profile=motions, increment=step, limit=farthest, stops=stops)
+    farthest = reach[0] / lever
+    stops = tuple(farthest / LONGER**k for k in range(1, INCREMENTS))
+    settlement = solver.Settlement(
+        profile=motions, increment=farthest, limit=farthest, stops=stops, tolerance=COLLAPSE * farthest
+    )
+    friction = variant.friction
     factor = friction / case.friction_coefficient if case.friction_coefficient > 0.0 else 1.0
     laws = {
         pair: replace(law, friction_coefficient=factor * law.friction_coefficient)
@@ -141,7 +184,12 @@ def ordered(
     }
     varied = replace(case, friction_coefficient=friction, interfaces=laws)
     controls = replace(case.controls, falling_frames=0)
-    return Order(moving, settlement, case_interfaces(varied), case_loads(case, moving), controls, ENOUGH * widest)
+    loads = case_loads(case, moving)
+    x = moving.centroids[:, 0]
+    middle, half = (x.max() + x.min()) / 2.0, max(float(np.ptp(x)) / 2.0, 1e-300)
+    heavier = 1.0 + LEANING * variant.lean * (x - middle) / half
+    loads = replace(loads, dead=loads.dead * heavier[:, None])
+    return Order(moving, settlement, case_interfaces(varied), loads, controls, reach[1])
 
 
 def followed(order: Order) -> Run:
@@ -179,65 +227,87 @@ def followed(order: Order) -> Run:
 
 
 @contextmanager
-def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterator[Client | None]:
-    """Start or find the Dask workers of the runs; None where this process makes them.
+def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterator[Executor | None]:
+    """Start or find the processes of the runs; None where this process makes them.
 
     Parameters
     ----------
     runs : int
         About so many there will be.
     workers : int, optional
-        Processes of this machine; one per core where the extra ``studies`` is installed and the runs are many.
+        Processes of this machine; one per core where the runs are many.
     scheduler : str, optional
         Address of a Dask scheduler that exists.
     """
     if workers is not None and workers < 1:
         raise ValueError(f"workers is {workers}; give at least 1")
-    from blockvis.studies import campaign
-
     if scheduler is not None:
         require("studies", "explain on a Dask cluster")
+        from blockvis.studies import campaign
+
         with campaign.existing_cluster(scheduler, "") as client:
-            yield client
+            yield client.get_executor(pure=False)
         return
-    if workers == 1 or (workers is None and runs < FEWEST_FOR_PROCESSES):
+    count = min(workers or cores(), runs)
+    if count < 2 or (workers is None and runs < FEWEST_FOR_PROCESSES):
         yield None
         return
+    # Processes that are forked would share the locks of this one's threads.
+    processes = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
+    before = active_children()
     try:
-        require("studies", "explain with several processes")
-    except MissingExtra:
-        if workers is not None:
-            raise
-        yield None
-        return
-    count = min(workers or campaign.cores(), runs)
-    if count < 2:
-        yield None
-        return
-    with campaign.local_cluster(count) as client:
-        yield client
+        yield processes
+    except BaseException:
+        # Whoever interrupts does not wait for the runs that are under way.
+        processes.shutdown(wait=False, cancel_futures=True)
+        for child in active_children():
+            if child not in before:
+                child.terminate()
+        raise
+    processes.shutdown()
 
 
-def all_followed(orders: Sequence[Order], client: Client | None, progress: StudyProgress | None = None) -> list[Run]:
-    """Carry out runs, on the workers of a Dask client or here.
+def cores() -> int:
+    """Count the cores that processes of this machine may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _ignore_interrupts() -> None:
+    """Let the first process alone answer Ctrl-C of their terminal; it stops the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def all_followed(
+    orders: Sequence[Order], processes: Executor | None, progress: StudyProgress | None = None
+) -> list[Run]:
+    """Carry out runs, in other processes or here.
 
     Parameters
     ----------
     orders : sequence of Order
-    client : distributed.Client, optional
+    processes : concurrent.futures.Executor, optional
     progress : StudyProgress, optional
         Counts them.
+
+    Raises
+    ------
+    ValueError
+        Where processes cannot be started, or are ended by the system.
     """
     count: Callable[[], None] = (lambda: None) if progress is None else progress.finished
-    if client is None:
-        found = []
+    found = []
+    if processes is None:
         for order in orders:
             found.append(followed(order))
             count()
         return found
-    futures = client.map(followed, orders, pure=False)
-    found = []
-    for future in futures:
-        found.append(future.result())
-        count()
+    try:
+        for future in [processes.submit(followed, order) for order in orders]:
+            found.append(future.result())
+            count()
+    except BrokenExecutor as error:
+        raise ValueError(
+            f"the processes of the runs have ended ({error}), perhaps for want of memory; ask for fewer with "
+            '--workers 1, and call blockvis.explain in a script under if __name__ == "__main__":'
+        ) from None
     return found

@@ -12,18 +12,27 @@ import solver
 from blockvis.results.joints import InitialJoints, end_openings, initial_joints
 
 from .candidates import Candidate, Twin
-from .forward import Run
+from .forward import Run, Variant
 from .observations import Observations, block_at
 
-#: Amounts at which the likelihood is worked out, evenly from 0 to the largest.
-AMOUNTS = 480
+#: Amounts at which the likelihood is worked out, each larger than the one before by the same factor: from this fraction
+#: of the largest on.
+AMOUNTS, LEAST_AMOUNT = 320, 2e-3
 
-#: The model says nothing of cracks narrower than this fraction of the widest observed one.
-FLOOR = 0.03
+#: An observation may be of a joint that lies about so many blocks farther than its place is certain.
+NEIGHBOURHOOD = 0.5
 
+#: Joints with a smaller chance than this, against that of the nearest, are not compared.
+LEAST_CHANCE = 0.02
+
+#: What the model may show where nothing was observed, as a fraction of the root mean square of what was.
+ELSEWHERE = 0.7
+
+#: A crack is made where the model opens by more than this fraction of its width.
+MADE = 0.25
 
 #: Observations of one structure share the errors of its model: more than this do not count as independent.
-INDEPENDENT = 12
+INDEPENDENT = 20
 
 
 @dataclass(frozen=True)
@@ -33,7 +42,7 @@ class Trust:
     Attributes
     ----------
     model : float
-        Standard deviation of computed widths, as a fraction of them.
+        Standard deviation of computed widths, as a fraction of the observed ones.
     place : float [m]
         Within which a crack at x, y may be another joint.
     outliers : float
@@ -48,10 +57,10 @@ class Trust:
 class Comparison:
     """Observations laid over the joints of a model.
 
-    A joint counts in full where it is as near to a place as the place is certain, and less up to a block farther:
-    which of two neighbouring joints opens, the model cannot say. What was observed is smoothed alike, so that a closed
-    joint beside a crack is not held against a model that has the crack there. Along a joint nothing is smoothed: on
-    which side it gapes tells one hinge from another.
+    An observation may be of any joint near its place: which of two neighbouring joints opens, the model cannot say, and
+    where the drawing has other blocks than the structure its joints lie elsewhere. Each observation is compared with
+    every joint near it, and what these comparisons say is averaged, the nearer ones counting more. Along a joint
+    nothing is left open: on which side it gapes tells one hinge from another.
 
     Parameters
     ----------
@@ -64,28 +73,26 @@ class Comparison:
         self.assembly, self.observations, self.trust = assembly, observations, trust
         self.joints: InitialJoints = initial_joints(assembly)
         given = observations
+        away, along = _projected(given.places, self.joints.ends)
         certain = np.where(given.named, 0.0, trust.place)
-        away, self.along = _projected(given.places, self.joints.ends)
-        # Of a joint that is only named the largest width counts, wherever along it that is.
-        self.along[given.whole] = np.nan
-        #: (n_widths, n_joints) array: weight of each joint at each place.
-        self.nearness = _weight(away - certain[:, None], assembly.block_size)
+        beyond = np.maximum(away - certain[:, None], 0.0) / (NEIGHBOURHOOD * assembly.block_size)
+        chance = np.exp(-0.5 * beyond**2)
         n = len(given.places)
-        every = np.arange(n)
         #: (n_widths,) int array: the joint in which each place lies, or the nearest.
         self.own = away.argmin(axis=1) if n else np.zeros(0, dtype=int)
-        self.nearness[every, self.own] = 1.0
-        # Row i: the other places, as the joint of place i sees them.
-        between, there = _projected(given.places, self.joints.ends[self.own])
-        between, there = between.T, there.T
-        sides = 1.0 - 2.0 * np.abs(there - self.along[every, self.own][:, None])
-        sides[given.whole], sides[:, given.whole] = 1.0, 1.0
-        alike = _weight(between - certain[:, None], assembly.block_size) * np.clip(sides, 0.0, 1.0)
-        np.fill_diagonal(alike, 1.0)
-        #: (n_widths,) array [m]: the observed widths, smoothed as those of the model are.
-        self.smoothed = (alike * given.widths[None, :]).max(axis=1, initial=0.0)
-        source = (alike * given.widths[None, :]).argmax(axis=1) if n else np.zeros(0, dtype=int)
-        self.sigma = np.maximum(given.uncertainties, given.uncertainties[source] * (self.smoothed > given.widths))
+        chance[np.arange(n), self.own] = 1.0
+        chance[chance < LEAST_CHANCE] = 0.0
+        chance /= chance.sum(axis=1, keepdims=True)
+        #: (n_widths, n_joints) array: probability that an observation is of a joint, before its width is known.
+        self.chance = chance
+        #: (n_pairs,) int arrays: observation and joint of the pairs that are compared, observation by observation.
+        self.seen, self.joint = np.nonzero(chance)
+        self.first = np.searchsorted(self.seen, np.arange(n))
+        self.log_chance = np.log(chance[self.seen, self.joint])
+        # Of a joint that is only named the largest width counts, wherever along it that is.
+        along[given.whole] = np.nan
+        #: (n_pairs,) array: where along the joint, from 0 to 1; nan where its largest width counts.
+        self.along = along[self.seen, self.joint]
         names = {name: i for i, name in enumerate(assembly.names)}
         self.blocks = np.array(
             [
@@ -94,6 +101,10 @@ class Comparison:
             ],
             dtype=int,
         )
+        #: (n_widths,) and (m, 2) arrays [m]: sizes of which the model's errors are fractions.
+        self.scales = _error_scales(given.widths), _error_scales(given.displacements)
+        # How supports move is what a cause says, not what the model makes of it.
+        self.scales[1][~assembly.free[self.blocks]] = 0.0
 
     def openings(self, moved: np.ndarray) -> np.ndarray:
         """(n, n_joints, 2) array [m]: at both ends of the joints, where blocks move by (n, n_blocks, 3)."""
@@ -103,10 +114,9 @@ class Comparison:
         return np.maximum(np.array(found).reshape(len(moved), -1, 2), 0.0)
 
     def widths(self, openings: np.ndarray) -> np.ndarray:
-        """(n, n_widths) array [m]: what openings (n, n_joints, 2) show at the places."""
-        first, last = openings[:, None, :, 0], openings[:, None, :, 1]
-        there = np.where(np.isnan(self.along), np.maximum(first, last), first + (last - first) * self.along)
-        return np.asarray((self.nearness * there).max(axis=2, initial=0.0))
+        """(n, n_pairs) array [m]: what openings (n, n_joints, 2) show at the places, in each joint near these."""
+        first, last = openings[:, self.joint, 0], openings[:, self.joint, 1]
+        return np.where(np.isnan(self.along), np.maximum(first, last), first + (last - first) * self.along)
 
     def displacements(self, moved: np.ndarray) -> np.ndarray:
         """(n, n_points, 2) array [m]: of the observed points, where blocks move by (n, n_blocks, 3)."""
@@ -119,36 +129,97 @@ class Comparison:
     def log_likelihood(self, widths: np.ndarray, displacements: np.ndarray) -> np.ndarray:
         """(n,) array: logarithm of the probability density of the observations.
 
+        Parameters
+        ----------
+        widths : (n, n_pairs) array [m]
+        displacements : (n, n_points, 2) array [m]
+
         Notes
         -----
         Each observation is normally distributed about what the model shows, with the variances of the measurement and
         of the model added, or, with the probability of an outlier, evenly over twice the largest observed width.
         Observations beyond :data:`INDEPENDENT` sharpen nothing: all of them weigh less.
         """
+        given = self.observations
+        count = len(given.widths) + 2 * len(given.points)
+        weight = min(1.0, INDEPENDENT / count)
+        span = 2.0 * given.largest
+        strays = np.log(self.trust.outliers / span)
         total = np.zeros(len(widths))
-        count = len(self.observations.widths) + 2 * len(self.observations.points)
-        span = 2.0 * self.observations.largest
-        for gap, sigma in self._residuals(widths, displacements):
-            fits = -0.5 * (gap / sigma) ** 2 - np.log(sigma * np.sqrt(2.0 * np.pi)) + np.log1p(-self.trust.outliers)
-            strays = np.log(self.trust.outliers / span)
+        sigma, spread = self.deviations
+        if len(self.seen):
+            terms = _log_normal(widths - given.widths[self.seen], sigma[self.seen]) + self.log_chance
+            fits = _log_sums(terms, self.first) + np.log1p(-self.trust.outliers)
             total += np.logaddexp(fits, strays).sum(axis=1)
-        return total * min(1.0, INDEPENDENT / count)
+        if len(given.points):
+            fits = _log_normal(displacements - given.displacements, spread) + np.log1p(-self.trust.outliers)
+            total += np.logaddexp(fits, strays).sum(axis=(1, 2))
+        return weight * total
+
+    @property
+    def deviations(self) -> tuple[np.ndarray, np.ndarray]:
+        """Standard deviations of observed minus computed widths (n_widths,) and displacements (n_points, 2) [m]."""
+        given, model = self.observations, self.trust.model
+        # By the observed sizes, not the computed ones: else a smaller amount would always look more certain.
+        sigma = np.hypot(given.uncertainties, model * self.scales[0])
+        return sigma, np.hypot(given.point_uncertainties[:, None], model * self.scales[1])
+
+    def likeliest(self, widths: np.ndarray) -> np.ndarray:
+        """(n, n_widths) int array: the pair of each observation that fits best, of pairs with widths (n, n_pairs)."""
+        sigma, _ = self.deviations
+        terms = _log_normal(widths - self.observations.widths[self.seen], sigma[self.seen]) + self.log_chance
+        last = np.append(self.first, len(self.seen))[1:]
+        best = [start + terms[:, start:end].argmax(axis=1) for start, end in zip(self.first, last, strict=True)]
+        return np.array(best, dtype=int).reshape(-1, len(widths)).T
+
+    def made(self, widths: np.ndarray, displacements: np.ndarray) -> np.ndarray:
+        """(n,) bool array: whether any of the cracks, or displacements, that were observed is made at all.
+
+        Else a movement that moves nothing would be the likeliest cause of what no movement makes, at any amount.
+
+        Parameters
+        ----------
+        widths : (n, n_widths) array [m]
+        displacements : (n, n_points, 2) array [m]
+        """
+        given = self.observations
+        opened = given.widths > 0.0
+        makes = (widths[:, opened] > MADE * given.widths[opened]).any(axis=1)
+        along = (displacements * given.displacements).sum(axis=2)
+        return np.asarray(makes | (along > MADE * (given.displacements**2).sum(axis=1)).any(axis=1))
 
     def misfits(self, widths: np.ndarray, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Differences from the observed widths and points, in standard deviations: (n, n_widths), (n, n_points)."""
-        (gap, sigma), (apart, spread) = self._residuals(widths, displacements)
-        over = (apart / spread).reshape(len(widths), -1, 2)
-        return gap / sigma, np.hypot(over[..., 0], over[..., 1])
+        """Differences from the observed widths and points, in standard deviations: (n, n_widths), (n, n_points).
 
-    def _residuals(self, widths: np.ndarray, displacements: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        given, floor = self.observations, FLOOR * self.observations.largest
-        # By the observed size, not the computed one: else a smaller amount would always look more certain.
-        sigma = np.sqrt(self.sigma**2 + (self.trust.model * self.smoothed) ** 2 + floor**2)
-        apart = displacements - given.displacements
-        size = np.abs(given.displacements)
-        spread = np.sqrt(given.point_uncertainties[:, None] ** 2 + (self.trust.model * size) ** 2 + floor**2)
-        n = len(widths)
-        return [(widths - self.smoothed, sigma[None]), (apart.reshape(n, -1), spread.reshape(1, -1))]
+        Parameters
+        ----------
+        widths : (n, n_widths) array [m]
+        displacements : (n, n_points, 2) array [m]
+        """
+        sigma, spread = self.deviations
+        over = (displacements - self.observations.displacements) / spread
+        return (widths - self.observations.widths) / sigma, np.hypot(over[..., 0], over[..., 1])
+
+
+def _error_scales(observed: np.ndarray) -> np.ndarray:
+    """Sizes of which the model's errors are fractions: those observed, and everywhere a part of their mean square.
+
+    A joint that is closed beside wide cracks may be open in a model of other blocks.
+    """
+    return np.hypot(observed, ELSEWHERE * np.sqrt((observed**2).mean())) if observed.size else np.zeros(observed.shape)
+
+
+def _log_normal(gap: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Logarithm of the normal density [1/m] at gaps [m]."""
+    return np.asarray(-0.5 * (gap / sigma) ** 2 - np.log(sigma * np.sqrt(2.0 * np.pi)))
+
+
+def _log_sums(terms: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Logarithms of the sums of exp(terms), (n, n_pairs), over runs of pairs that begin at `first`, (m,): (n, m)."""
+    top = np.maximum.reduceat(terms, first, axis=1)
+    lengths = np.diff([*first, terms.shape[1]])
+    sums = np.add.reduceat(np.exp(terms - np.repeat(top, lengths, axis=1)), first, axis=1)
+    return np.asarray(top + np.log(sums))
 
 
 def _projected(points: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -160,11 +231,6 @@ def _projected(points: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.nda
     return np.hypot(apart[..., 0], apart[..., 1]), along
 
 
-def _weight(beyond: np.ndarray, size: float) -> np.ndarray:
-    """1 up to where a place is certain, falling to 0 a block farther."""
-    return np.clip(1.0 - np.maximum(beyond, 0.0) / size, 0.0, 1.0)
-
-
 @dataclass(frozen=True)
 class Trial:
     """A candidate at one friction, against the observations.
@@ -172,7 +238,7 @@ class Trial:
     Attributes
     ----------
     candidate : Candidate
-    friction : float
+    variant : Variant
     run : Run
         Of the candidate itself, or of its twin.
     twin : Twin
@@ -182,17 +248,19 @@ class Trial:
     unit : str
         Of the amounts.
     amounts : (n,) array [m or rad]
-        Of the candidate, evenly spaced up to the largest that is looked at.
+        Of the candidate, each larger than the one before by the same factor, up to the largest that is looked at.
     log_likelihood : (n,) array
-        -inf where the structure has fallen, or where the run was not followed.
+        -inf where the structure has fallen, where the run was not followed, and where nothing observed is made.
     widths : (n, n_widths) array [m]
-        At the places that were observed.
+        What it shows of the observations: in the joint near each of them that fits best.
+    pairs : (n, n_widths) int array
+        Which joint that is, as a pair of the comparison.
     ends : (n_increments, n_joints, 2) array [m]
         Openings of the joints at their ends, at the increments of the run.
     """
 
     candidate: Candidate
-    friction: float
+    variant: Variant
     run: Run
     twin: Twin
     shared: Candidate
@@ -200,12 +268,24 @@ class Trial:
     amounts: np.ndarray
     log_likelihood: np.ndarray
     widths: np.ndarray
+    pairs: np.ndarray
     ends: np.ndarray
+
+    @property
+    def friction(self) -> float:
+        """Coefficient of friction of [material]."""
+        return self.variant.friction
 
     @cached_property
     def log_evidence(self) -> float:
         """Logarithm of the likelihood, averaged over the amounts."""
-        return float(logsumexp(self.log_likelihood) - np.log(len(self.amounts)))
+        return float(logsumexp(self.log_mass))
+
+    @property
+    def log_mass(self) -> np.ndarray:
+        """(n,) array: logarithm of the likelihood of each amount times its prior, evenly spread up to the largest."""
+        # Each stands for those around it, which are as many as it is large.
+        return np.asarray(self.log_likelihood + np.log(self.amounts / self.amounts.sum()))
 
     @property
     def best(self) -> int:
@@ -226,7 +306,7 @@ class Trial:
 def tried(
     comparison: Comparison,
     candidate: Candidate,
-    friction: float,
+    variant: Variant,
     run: Run,
     twin: Twin,
     shared: Candidate,
@@ -239,7 +319,7 @@ def tried(
     ----------
     comparison : Comparison
     candidate : Candidate
-    friction : float
+    variant : Variant
     run : Run
     twin : Twin
     shared : Candidate
@@ -249,16 +329,20 @@ def tried(
     largest : float [m or rad]
         Largest amount of the candidate that is looked at.
     """
-    amounts = largest * np.arange(1, AMOUNTS + 1) / AMOUNTS
+    amounts = largest * np.geomspace(LEAST_AMOUNT, 1.0, AMOUNTS)
     if len(run.amounts) < 2:
         widths = np.zeros((AMOUNTS, len(comparison.observations.widths)))
         ends = np.zeros((1, len(comparison.joints.ends), 2))
-        return Trial(candidate, friction, run, twin, shared, unit, amounts, np.full(AMOUNTS, -np.inf), widths, ends)
+        none = np.full(AMOUNTS, -np.inf)
+        return Trial(candidate, variant, run, twin, shared, unit, amounts, none, widths, widths.astype(int), ends)
     own = amounts / twin.scale
     # At the increments the pictures are exact; between them joints open evenly.
     ends = comparison.openings(run.moved)
-    widths = run.at(own, comparison.widths(ends))
+    pairs = run.at(own, comparison.widths(ends))
     displacements = run.at(own, comparison.displacements(run.moved)) + (amounts[:, None] * twin.travel)[:, None, :]
-    found = comparison.log_likelihood(widths, displacements)
+    found = comparison.log_likelihood(pairs, displacements)
     found[own > run.amounts[-1] * (1.0 + 1e-9)] = -np.inf
-    return Trial(candidate, friction, run, twin, shared, unit, amounts, found, widths, ends)
+    chosen = comparison.likeliest(pairs)
+    widths = np.take_along_axis(pairs, chosen, axis=1)
+    found[~comparison.made(widths, displacements)] = -np.inf
+    return Trial(candidate, variant, run, twin, shared, unit, amounts, found, widths, chosen, ends)

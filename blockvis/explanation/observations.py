@@ -17,6 +17,7 @@ import shapely
 from scipy.optimize import linear_sum_assignment
 
 import solver
+from blockvis.cases.toml_table import shortened
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
 from blockvis.layout.layout import Layout
@@ -34,6 +35,9 @@ FARTHEST = 2.0
 
 #: A width of more than this, in block sizes, is a mistake in its unit.
 WIDEST = 1.0
+
+#: A point that is displaced by more than this fraction of the structure is a mistake in its unit.
+FARTHEST_POINT = 0.3
 
 #: Blocks of a drawing of the damaged state have moved by less than this, in block sizes, or are others.
 FARTHEST_BLOCK = 1.5
@@ -117,9 +121,12 @@ def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly
         rows = [{str(key): value for key, value in row.items()} for row in source]
         return _of_rows(enumerate(rows, start=1), list(rows[0]) if rows else [], assembly, "observations", "row")
     path = Path(source)
-    if not path.exists():
+    if not path.is_file():
         near = files_like(path, "*.csv", or_any=True)
-        raise ValueError(f"there are no observations '{path}'" + (f"; beside it are {', '.join(near)}" if near else ""))
+        problem = f"'{path}' is a folder, no table" if path.is_dir() else f"there are no observations '{path}'"
+        raise ValueError(
+            problem + (f"; beside it are {', '.join(near)}" if near else "; give a table (.csv) or a drawing")
+        )
     if path.suffix.lower() in FORMATS:
         return _of_drawing(path, assembly)
     try:
@@ -142,6 +149,11 @@ def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly
             if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
                 if mark != ",":
                     cells = [re.sub(r"^(\s*[-+]?\d*),(\d+\s*)$", r"\1.\2", cell) for cell in cells]
+                if any(cell.strip() for cell in cells[len(header) :]):
+                    raise ValueError(
+                        f"{path}, line {table.line_num}: has {len(cells)} cells, and the first line {len(header)}; "
+                        "where numbers have a decimal comma, put semicolons between the columns"
+                    )
                 yield table.line_num, dict(zip(header, cells, strict=False))
 
     return _of_rows(numbered(), header, assembly, str(path), "line")
@@ -189,8 +201,9 @@ def _columns(header: Sequence[str], where: str) -> dict[str, _Column]:
         missing = "block"
     else:
         return found
+    there = shortened(", ".join(header)) if any(header) else "none"
     raise ValueError(
-        f"{where}: has no column '{missing}'; its columns are {', '.join(header) or 'none'}. Give width and joint "
+        f"{where}: has no column '{missing}'; its columns are {there}. Give width and joint "
         '("A | B"), block_a and block_b, or x and y; or block and dx, dy; with units as in: width [mm]'
     )
 
@@ -212,9 +225,7 @@ def _of_rows(
         if width is not None:
             place, named, whole, label = _place(cells, assembly, joints)
             _check_width(width, cells, assembly)
-            uncertainty = cells.number("uncertainty")
-            if uncertainty is not None and uncertainty <= 0.0:
-                raise cells.error("uncertainty", f"is {uncertainty:g} m; give a length above 0")
+            uncertainty = cells.uncertainty()
             usual = max(WIDTH_UNCERTAINTY * width, LEAST_UNCERTAINTY)
             widths.append((place, named, whole, width, usual if uncertainty is None else uncertainty, label))
         moved = _displacement(cells, assembly)
@@ -279,6 +290,13 @@ class _Cells:
     def width(self) -> float | None:
         """Width [m]; 0 for a closed joint, None where there is none."""
         return 0.0 if self.text("width").lower() == "closed" else self.number("width")
+
+    def uncertainty(self) -> float | None:
+        """Read the standard deviation [m]; None where there is none."""
+        found = self.number("uncertainty")
+        if found is not None and found <= 0.0:
+            raise self.error("uncertainty", f"is {self.text('uncertainty')}; give a length above 0")
+        return found
 
     def error(self, key: str, problem: str) -> ValueError:
         """Make an error that names the file, the line and the column."""
@@ -381,8 +399,15 @@ def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray,
         displaced = np.array(moved, dtype=float)
     else:
         raise cells.error("dy" if moved[1] is None else "dx", "is missing; give both coordinates")
-    uncertainty = cells.number("uncertainty") or POINT_UNCERTAINTY
-    return point, assembly.names[block], displaced, uncertainty
+    extent = float(np.ptp(assembly.vertices, axis=0).max())
+    if np.hypot(*displaced) > FARTHEST_POINT * extent:
+        raise cells.error(
+            "displaced_x" if None not in there else "dx",
+            f"puts '{assembly.names[block]}' {np.hypot(*displaced):.3g} m from where it is drawn, in a structure of "
+            f"{extent:.3g} m; is it in mm? name the column so, as in: dx [mm]",
+        )
+    uncertainty = cells.uncertainty()
+    return point, assembly.names[block], displaced, POINT_UNCERTAINTY if uncertainty is None else uncertainty
 
 
 def block_at(assembly: solver.Assembly, point: np.ndarray) -> int:

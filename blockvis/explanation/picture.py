@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import solver
 from blockvis.atomic_files import whole_file
@@ -57,22 +58,24 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     drawn = solver.Pose.initial(assembly)
     poses = [_pose(assembly, cause) for cause in causes]
     free = assembly.free
-    moved = [pose.displacements(assembly)[:, :2] for pose in poses]
-    largest = max((float(np.hypot(*m.T).max()) for m in moved), default=0.0)
+    largest = [float(np.hypot(*pose.displacements(assembly)[:, :2].T).max()) for pose in poses]
     extent = float(np.ptp(assembly.vertices[free[assembly.block_of_vertex]], axis=0).max())
-    factor = max(1.0, rounded_length(SHOWN * extent / largest)) if largest > 0.0 else 1.0
-    shown = [_magnified(assembly, pose, factor) for pose in poses]
+    # Each cause by its own: what one makes by going far, another may make by going a little.
+    factors = [max(1.0, rounded_length(SHOWN * extent / most)) if most > 0.0 else 1.0 for most in largest]
+    shown = [_magnified(assembly, pose, factor) for pose, factor in zip(poses, factors, strict=True)]
     frame = framed(assembly, [drawn, *shown])
     count = 1 + len(causes)
     aspect = float(frame.size[0] / frame.size[1])
     rows, columns = (count, 1) if aspect > WIDE else (1, count)
     width = PANEL * (2.0 if aspect > WIDE else 1.0)
     height = min(width / aspect, 1.4 * PANEL) + HEAD
-    figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
+    figure = Figure(figsize=(width * columns, height * rows), layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06))
     FigureCanvasAgg(figure)
     axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False).ravel())
     _observed(axes[0], found)
-    for number, (panel, cause, pose, there) in enumerate(zip(axes[1:], causes, poses, shown, strict=True), start=1):
+    for number, (panel, cause, pose, there, factor) in enumerate(
+        zip(axes[1:], causes, poses, shown, factors, strict=True), start=1
+    ):
         _computed(panel, found, cause, pose, there, number, factor)
     for panel in axes:
         panel.set_xlim(frame.low[0], frame.high[0])
@@ -158,11 +161,9 @@ def _computed(
     )
     middles = (on_a + on_b).mean(axis=1) / 2.0
     if len(given.widths):
-        compared = found.comparison
-        along = np.nan_to_num(compared.along, nan=0.5)
-        there = ends[None, :, 0] * (1.0 - along) + ends[None, :, 1] * along
-        joint = (compared.nearness * (there + 1e-6 * given.largest)).argmax(axis=1)
-        share = along[np.arange(len(joint)), joint][:, None]
+        pairs = cause.best.pairs[cause.at]
+        joint = found.comparison.joint[pairs]
+        share = np.nan_to_num(found.comparison.along[pairs], nan=0.5)[:, None]
         faces = (on_a + on_b)[joint] / 2.0
         places = faces[:, 0] * (1.0 - share) + faces[:, 1] * share
         _labels(panel, places, cause.best.widths[cause.at], found, given.places, sizes=given.widths)
@@ -185,7 +186,8 @@ def _computed(
         _arrows(panel, _tops(assembly, moving, shown), moved, assembly)
     amount = amount_text(float(cause.best.amounts[cause.at]), cause.unit)
     panel.set_title(
-        f"{number}  {cause.name}: {amount}, {percent(cause.probability)}\nwidths [mm]; displacements × {factor:g}",
+        f"{number}  {cause.name}, {percent(cause.probability)}\n"
+        f"best fit: {amount}; widths [mm]; displacements × {factor:g}",
         loc="left",
         fontsize=TEXT + 1,
         color=_rgb(palette.INK),

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from .likelihood import FLOOR, Comparison, Trial
+from .likelihood import MADE, Comparison, Trial
+from .observations import LEAST_UNCERTAINTY
 
 #: Causes less probable than the best by more than this factor are told apart from it.
 TOLD_APART = 10.0
@@ -168,7 +169,7 @@ def _range_of(own: Sequence[Trial], share: np.ndarray) -> tuple[float, float, fl
     """Quantiles of the amount over the trials of a cause."""
     amounts = np.concatenate([trial.amounts for trial in own])
     mass = np.concatenate(
-        [s * np.exp(t.log_likelihood - logsumexp(t.log_likelihood)) for s, t in zip(share, own, strict=True) if s > 0.0]
+        [s * np.exp(t.log_mass - logsumexp(t.log_mass)) for s, t in zip(share, own, strict=True) if s > 0.0]
         or [np.ones(1)]
     )
     amounts = np.concatenate([t.amounts for s, t in zip(share, own, strict=True) if s > 0.0] or [amounts[:1]])
@@ -212,9 +213,9 @@ def unexplained(
         possible = np.isfinite(trial.log_likelihood)
         if possible.any():
             reached = np.maximum(reached, trial.widths[possible].max(axis=0, initial=0.0))
-    slack = EXPLAINED * np.hypot(comparison.sigma, comparison.trust.model * widths)
+    slack = EXPLAINED * comparison.deviations[0]
     # What is within what is left of the model's own width is no sign of another cause.
-    by_any = (widths > 0.0) & (reached < np.maximum(widths - slack, 0.25 * widths))
+    by_any = (widths > 0.0) & (reached < np.maximum(widths - slack, MADE * widths))
     return by_best & (widths > 0.0) | by_any, by_any
 
 
@@ -232,8 +233,7 @@ def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measure
     chosen = [cause for k, cause in enumerate(causes[:4]) if k < 2 or cause.probability > WORTH_A_WORD]
     table = np.array([_expected(cause) for cause in chosen])
     mean, spread = table[:, 0], table[:, 1]
-    widest = comparison.observations.largest
-    sigma = np.sqrt(spread**2 + (comparison.trust.model * mean) ** 2 + (FLOOR * widest) ** 2)
+    sigma = np.sqrt(spread**2 + (comparison.trust.model * mean) ** 2 + LEAST_UNCERTAINTY**2)
     weights = np.array([max(cause.probability, WORTH_A_WORD) for cause in chosen])
     n = len(comparison.joints.block_a)
     gain, apart = np.zeros(n), np.zeros(n)
@@ -243,7 +243,7 @@ def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measure
             gain += weights[a] * weights[b] * np.minimum(difference, 2.0 * EXPLAINED)
             apart = np.maximum(apart, difference)
     # Where somebody has measured already nothing new is to be found.
-    gain[(comparison.nearness > 0.99).any(axis=0)] = 0.0
+    gain[comparison.own] = 0.0
     best = int(np.argmax(gain))
     if gain[best] <= 0.0 or apart[best] < DECISIVE:
         return None
@@ -264,7 +264,7 @@ def _expected(cause: Cause) -> tuple[np.ndarray, np.ndarray]:
     for trial, share in zip(cause.trials, cause.weights, strict=True):
         if share < 1e-3:
             continue
-        mass = share * np.exp(trial.log_likelihood - logsumexp(trial.log_likelihood))
+        mass = share * np.exp(trial.log_mass - logsumexp(trial.log_mass))
         heavy = np.flatnonzero(mass > 1e-3 * mass.max())
         openings = trial.openings(heavy).max(axis=2)
         first, second = mass[heavy] @ openings, mass[heavy] @ openings**2

@@ -27,7 +27,7 @@ class Explanation:
     observations : Observations
     comparison : Comparison
     causes : tuple of Cause
-        The most probable first; empty where no candidate stands at any amount.
+        The most probable first; empty where no candidate makes any of the cracks, or stands at any amount.
     unexplained : tuple of int
         Numbers of the observed widths that the best cause does not make.
     made_by_none : tuple of int
@@ -52,6 +52,11 @@ class Explanation:
     runs: dict[Any, Run] = field(repr=False, default_factory=dict)
     notes: tuple[str, ...] = ()
     words: str = ""
+
+    @property
+    def stands(self) -> bool:
+        """Whether the structure stands as drawn."""
+        return any(len(run.amounts) > 1 for run in self.runs.values())
 
     @property
     def alike(self) -> tuple[Cause, ...]:

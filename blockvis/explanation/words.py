@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from .ranking import Cause, Measurement
     from .result import Explanation
 
+#: An amount is left open where the end of its range is so many times the beginning.
+OPEN = 4.0
+
 #: Causes that the command line lists.
 LISTED = 6
 
@@ -44,6 +47,16 @@ def range_text(cause: Cause) -> str:
     return f"{amount_text(middle, cause.unit)} ({ends})"
 
 
+def how_far(cause: Cause) -> str:
+    """Name a cause with its amount, or say that the observations leave this open."""
+    low, middle, high = cause.amount
+    words = f"{cause_text(cause)}{',' if cause.detail else ''} by"
+    if high > OPEN * low:
+        range_of = f"{1e3 * low:.3g} to {amount_text(high, cause.unit)}"
+        return f"{words} {range_of} (the observations leave the amount open)"
+    return f"{words} {amount_text(middle, cause.unit)}"
+
+
 def percent(probability: float) -> str:
     """Write a probability; none is certain.
 
@@ -72,15 +85,17 @@ def measurement_text(measurement: Measurement) -> str:
 def verdict(found: Explanation) -> str:
     """Say what the observations point at, in one sentence."""
     if not found.causes:
-        return "No candidate stands at any amount: the structure does not stand as drawn"
+        if not found.stands:
+            return "No candidate stands at any amount: the structure does not stand as drawn"
+        return "No candidate makes any of the observed cracks"
     best, others = found.causes[0], found.alike[1:]
     none = set(found.made_by_none)
     if none and len(none) == int((found.observations.widths > 0.0).sum()) and not len(found.observations.points):
         return "No candidate makes any of the observed cracks"
     if others:
         more = " or ".join(cause_text(cause) for cause in others)
-        return f"{_capital(cause_text(best))}, or else {more}: the observations cannot tell these apart"
-    return f"{_capital(cause_text(best))} by {amount_text(best.amount[1], best.unit)}"
+        return f"{_capital(how_far(best))}, or else {more}: the observations cannot tell these apart"
+    return _capital(how_far(best))
 
 
 def in_words(found: Explanation) -> str:
@@ -162,7 +177,8 @@ def values_of(found: Explanation) -> dict[str, Any]:
             ],
         },
         "assumed": {
-            "prior": "causes alike, amounts evenly up to the largest looked at, frictions and places of troughs alike",
+            "prior": "causes alike, amounts evenly up to the largest looked at, frictions and places of troughs alike, "
+            "stones heavier towards the left or right alike",
             "model_uncertainty": settings.model_uncertainty,
             "place_uncertainty": found.comparison.trust.place,
             "outliers": settings.outliers,

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 from blockvis.atomic_files import make_folder, write_whole
 from blockvis.results.folder import ResultsExist
 
-from .likelihood import INDEPENDENT
+from .forward import LEANING
+from .likelihood import ELSEWHERE, INDEPENDENT
 from .picture import draw_explanation
 from .words import (
     amount_text,
@@ -190,10 +191,14 @@ def _assumed(found: Explanation) -> list[str]:
         "Before anything was observed the causes are taken as equally probable (movements between two directions half "
         "as much), their amounts as evenly spread"
         + (f" up to {amount_text(largest, found.causes[0].unit)} (first cause)" if found.causes else "")
-        + ", frictions and places of troughs as equally probable.",
-        f"Computed widths are trusted to {100.0 * trust.model:.3g} %, besides the uncertainty of each observation; a "
-        f"crack at x, y may be another joint within {1e3 * trust.place:.3g} mm; an observation has another cause with "
-        f"a probability of {100.0 * trust.outliers:.3g} %.",
+        + ", frictions and places of troughs as equally probable. The amount of a trough or slope is how much more the "
+        "ground goes down at one foot of the structure than at another.",
+        "A structure that is alike on both sides has taken one of several paths: every movement of a support is "
+        f"followed with stones heavier by up to {100.0 * LEANING:g} % towards the left, and towards the right.",
+        f"Computed widths are trusted to {100.0 * trust.model:.3g} % of what was observed there, and of "
+        f"{100.0 * ELSEWHERE:.2g} % of the root mean square of all, besides the uncertainty of each observation; a "
+        f"crack at x, y may be in another joint within {1e3 * trust.place:.3g} mm and, less probably, beyond; an "
+        f"observation has another cause with a probability of {100.0 * trust.outliers:.3g} %.",
         f"Observations share the errors of the model: more than {INDEPENDENT} do not count as independent.",
         f"Coefficients of friction: {', '.join(f'{value:.3g}' for value in frictions) or 'none'}; {len(runs)} runs.",
         "Probabilities are among the causes that were looked at: a cause that is not in the list has none.",

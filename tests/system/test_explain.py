@@ -11,6 +11,7 @@ from PIL import Image
 import blockvis
 import solver
 from blockvis import cli, generators
+from blockvis.explanation.explain import read_explained
 from blockvis.formats.read import save_layout
 from blockvis.results.joints import end_openings, initial_joints
 
@@ -138,7 +139,7 @@ def test_one_crack_leaves_causes_open_and_a_joint_to_measure(folder, tmp_path):
 
 @pytest.mark.slow
 def test_a_crack_that_no_candidate_makes_is_said_to_be_unexplained(folder):
-    case = blockvis.explanation.explain.read_explained(folder / "arch.toml")
+    case = read_explained(folder / "arch.toml")
     runs = {}
     seen = [
         dict(zip(("x", "y", "width [mm]"), row.split(","), strict=True))
@@ -168,7 +169,7 @@ def test_displaced_points_tell_which_springer_has_moved(folder):
     ]  # fmt: skip
     (folder / "both.toml").write_text(CASE.replace('["down", "right"]', '["left", "right"]'), encoding="utf-8")
     found = blockvis.explain(folder / "both.toml", rows)
-    assert len(found.runs) == 3, "movements that differ by a translation share their run"
+    assert len(found.runs) == 6, "movements that differ by a translation share their runs"
     assert found.causes[0].name == "right springer moves right"
     assert found.causes[0].also == ()
     assert found.causes[0].amount[1] == pytest.approx(SPREAD, rel=0.1)
@@ -194,7 +195,15 @@ def test_a_drawing_of_the_damaged_arch_is_explained(folder, tmp_path):
     [
         ("joint\nvoussoir 1 | voussoir 2\n", "has no column 'width'"),
         ("joint,width [mm]\nvoussoir 1 | vousoir 2,3\n", "did you mean 'voussoir"),
-        ("joint,width [mm]\nvoussoir 1 | voussoir 2,-3\n", "give a width of at least 0"),
+        ("joint,width [mm]\nvoussoir 1 | voussoir 2,-3\n", "line 2: width [mm] is -3; give a width of at least 0"),
+        ("joint,width [mm]\nvoussoir 1 | voussoir 2,3,5\n", "line 2: has 3 cells, and the first line 2; where numbers"),
+        (
+            "block,dx [mm],dy [mm],uncertainty [mm]\nvoussoir 1,3,2,-1\n",
+            "line 2: uncertainty [mm] is -1; give a length",
+        ),
+        ("block,dx,dy\nvoussoir 1,3,2\n", "line 2: dx puts 'voussoir 1' 3.61 m from where it is drawn"),
+        ("x,y,width\n0,0.5,2\n", "line 2: width is 2 m, more than a block is wide"),
+        ("x,y,width\n0,0.5,closed\n", "nothing has opened or moved"),
     ],
 )
 def test_observations_that_cannot_be_used_end_with_bad_input(folder, tmp_path, capsys, table, words):
@@ -236,6 +245,31 @@ def test_a_structure_that_does_not_stand_has_no_cause(folder, tmp_path, capsys):
     assert "does not stand as drawn" in (tmp_path / "out" / "explain.html").read_text(encoding="utf-8")
 
 
+def test_a_folder_is_no_table(folder, capsys):
+    command = ["explain", str(folder / "arch.toml"), "--observed", str(folder), "-o", str(folder / "never")]
+    assert cli.main(command) == cli.BAD_INPUT
+    assert "is a folder, no table" in capsys.readouterr().err
+
+
+def test_blocks_in_space_are_refused_with_what_to_do_instead(folder, tmp_path, capsys):
+    case = '[geometry]\nlayout = "dome"\n[geometry.parameters]\ncourses = 3\n'
+    (tmp_path / "dome.toml").write_text(case, encoding="utf-8")
+    command = ["explain", str(tmp_path / "dome.toml"), "--observed", str(folder / "cracks.csv")]
+    assert cli.main([*command, "-o", str(tmp_path / "out")]) == cli.BAD_INPUT
+    said = capsys.readouterr().err
+    assert len(said.splitlines()) == 1
+    assert "dome.toml: explain follows structures in the plane, and this one is in space; explain a section" in said
+
+
+@pytest.mark.slow
+def test_how_a_support_was_seen_to_move_is_what_has_happened(folder):
+    rows = [{"block": "right springer", "dx [mm]": 0.0, "dy [mm]": -9.0}]
+    found = blockvis.explain(folder / "arch.toml", rows)
+    assert found.causes[0].name == "right springer moves down"
+    assert found.causes[0].amount[1] == pytest.approx(0.009, rel=0.1)
+    assert found.causes[0].probability > 0.5
+
+
 def test_an_analysis_of_another_kind_is_refused(folder, tmp_path, capsys):
     (tmp_path / "case.toml").write_text(CASE + '[analysis]\nkind = "limit load"\n', encoding="utf-8")
     command = ["explain", str(tmp_path / "case.toml"), "--observed", str(folder / "cracks.csv")]
@@ -244,8 +278,10 @@ def test_an_analysis_of_another_kind_is_refused(folder, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_workers_give_the_same_answer(folder, said, scheduler, tmp_path):
-    command = ["explain", str(folder / "arch.toml"), "--observed", str(folder / "cracks.csv"), "--scheduler", scheduler]
+@pytest.mark.parametrize("whose", ["processes", "a scheduler's"])
+def test_workers_give_the_same_answer(folder, said, scheduler, tmp_path, whose):
+    workers = ["--workers", "2"] if whose == "processes" else ["--scheduler", scheduler]
+    command = ["explain", str(folder / "arch.toml"), "--observed", str(folder / "cracks.csv"), *workers]
     assert cli.main([*command, "-o", str(tmp_path / "out")]) == 0
     mine, theirs = (
         json.loads((Path(path) / "explain.json").read_text(encoding="utf-8"))
