@@ -714,9 +714,9 @@ class Path:
                 crept = self._settles(new, CREEPS, JUMP)
             if self._holds(crept):
                 assert crept is not None
-                proved, reported = crept, not self._is_stop(new.s)
-                if np.isinf(self.barrier):
-                    without, spent = None, None
+                # What has been shown of the place beyond stays true.
+                proved, reported, without = crept, not self._is_stop(new.s), None
+                spent = spent if np.isfinite(self.barrier) else None
             else:
                 length = new.s - place.s
                 step = min(step, 0.5 * length)
