@@ -22,10 +22,7 @@ def test_three_blocks_at_a_corner():
     assert tried("voronoi", 1049).wrong == []
 
 
-@pytest.mark.xfail(
-    reason="issue 2 (the same wall, the same answer): a step that no way solves, under one kernel or another",
-    strict=False,
-)
+@pytest.mark.thorough
 def test_a_sliver_that_tips_does_not_end_the_run():
     """Here 0.07 % of the weight once passed for the collapse of the whole."""
     finding = tried("cuts", 100320)
