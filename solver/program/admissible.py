@@ -12,7 +12,7 @@ from solver.cones.solve import solve_cones
 from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.lp.problem import LinearProgram, LPSolution, Unbounded
+from solver.lp.problem import LinearProgram, LPSolution, SolveError, Unbounded
 from solver.lp.solve import INTERIOR_ROUTES, SIMPLEX_ROWS, solve_lp
 from solver.tolerances import BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
 
@@ -33,7 +33,8 @@ class Admissible:
     unbalanced : float
         Least sum of unbalanced forces over the total load: zero where an equilibrium exists.
     low, high : float
-        Of the reaction [N or N·m], or of the live loads' multiplier; infinite where friction bounds neither.
+        Of the reaction [N or N·m], or of the live loads' multiplier; infinite where friction bounds neither; the
+        one that gives no forces is not a number where its program was not solved.
     gap : float
         Largest relative difference of the two objectives of the programs.
     programs : int
@@ -113,14 +114,8 @@ def admissible(
         along = np.zeros(len(free)) if rate is None else (rate / model.lengths).ravel()
         objective = np.concatenate([rays.T @ (matrix.T @ np.where(free, 0.0, along)), np.zeros(2 * rows)])
         unit = model.force * model.length
-    lower, upper = -load - tolerance, -load + tolerance
     along_rows = along_structure(free_blocks(model.assembly), pose)
     routes = None if vertex or rows <= SIMPLEX_ROWS else INTERIOR_ROUTES
-
-    def solved(cost: np.ndarray, matrix: sp.csc_array) -> LPSolution | ConicSolution:
-        if d == 3:
-            return solve_cones(ConicProgram(cost, matrix, -load, friction[closed], along=along_rows))
-        return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, along=along_rows), routes)
 
     def extreme(sign: float, *, slack: bool) -> LPSolution | ConicSolution | None:
         """Least or, by sign, largest value, with or without unbalanced forces; None where it has no bound."""
@@ -131,10 +126,18 @@ def admissible(
             kept = np.concatenate([np.arange(n), np.arange(n + 2 * rows, matrix.shape[1])])
             cost, matrix = cost[kept], matrix[:, kept]
         try:
-            return solved(cost, matrix)
+            return _solution(d, cost, matrix, load, tolerance, friction[closed], along_rows, routes)
         except Unbounded:
             return None
+        except SolveError:
+            # The bound that gives no forces may stay unknown: what exists is proved without it.
+            if sign == with_forces:
+                raise
+            unknown.add(sign)
+            return None
 
+    with_forces = 1.0 if live_size == 0.0 else -1.0
+    unknown: set[float] = set()
     found = {sign: extreme(sign, slack=True) for sign in (1.0, -1.0)}
     out = {k: float(s.x[n : n + 2 * rows].sum()) / model.total_load for k, s in found.items() if s is not None}
     unbalanced = min(out.values(), default=np.inf)
@@ -147,13 +150,30 @@ def admissible(
             solution, programs = extreme(sign, slack=False), programs + 1
             balanced = np.delete(objective, np.arange(n, n + 2 * rows))
         if solution is None:
-            values.append(-sign * np.inf)
+            values.append(np.nan if sign in unknown else -sign * np.inf)
             continue
         values.append(float(balanced @ solution.x) * unit)
         gaps.append(solution.gap)
-        if sign == (1.0 if live_size == 0.0 else -1.0):
+        if sign == with_forces:
             forces = rays @ solution.x[:n]
     # Where both run away, forces without limit balance everything.
     return Admissible(
         0.0 if np.isinf(unbalanced) else unbalanced, values[0], values[1], max(gaps), programs, forces.reshape(-1, d)
     )
+
+
+def _solution(
+    dimension: int,
+    cost: np.ndarray,
+    matrix: sp.csc_array,
+    load: np.ndarray,
+    tolerance: float,
+    friction: np.ndarray,
+    along: np.ndarray | None,
+    routes: tuple[str, ...] | None,
+) -> LPSolution | ConicSolution:
+    """Solve for forces that balance a load: a linear program in the plane, in space one over round cones."""
+    if dimension == 3:
+        return solve_cones(ConicProgram(cost, matrix, -load, friction, along=along))
+    lower, upper = -load - tolerance, -load + tolerance
+    return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, along=along), routes)
