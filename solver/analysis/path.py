@@ -570,7 +570,10 @@ class Path:
 
     def _closed_gap(self, place: Place) -> float:
         """Largest gap of contact points that may carry in an equilibrium at a place, in block sizes."""
-        return COMPUTED_GAP if place.s == 0.0 else CLOSING_GAP
+        if place.s == 0.0 or place.s < self.careful_until:
+            return COMPUTED_GAP
+        # Not wider than how closely a collapse is to be enclosed.
+        return max(COMPUTED_GAP, min(CLOSING_GAP, self.driver.tolerance * self.lever / self.model.length))
 
     def _on_supports(self, contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarray:
         """(n_blocks, n_dof) array [N, N, N·m]: what the structure does to each support; zero for free blocks."""
