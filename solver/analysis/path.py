@@ -709,14 +709,7 @@ class Path:
             if new is place:
                 without, spent = None, None
                 continue
-            try:
-                reached = self.proved(new)
-            except SolveError:
-                # A little nearer its programs may be solved.
-                step = 0.5 * (new.s - place.s)
-                if step < SMALLEST_STEP * self.model.length / self.lever:
-                    raise
-                continue
+            reached = self.proved(new)
             crept: Proved | None = reached
             lost = reached.measured if reached.bounds.exists else None
             if not self._holds(reached) and lost is None and new.s > self.careful_until:
