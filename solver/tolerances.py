@@ -69,8 +69,8 @@ IMPERFECTION = 1e-7
 DRAG = 1e-2
 
 #: Movement of the supports, in block sizes, over which what moves on as before comes to be held back no more by the
-#: drag, which resists changes of the velocity only: no longer than the steps in which events are followed. With none,
-#: the drag of a step would depend on its length, and with it which of several mechanisms is taken.
+#: drag, which resists changes of the velocity only: about as long as the steps in which events are followed. With
+#: none, the drag of a step would depend on its length, and with it which of several mechanisms is taken.
 MEMORY = 1e-2
 
 # Of positions: fractions of the block size.
