@@ -125,13 +125,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     """Make a case of the values of a parsed TOML text; paths in it are relative to the folder of ``source``."""
     top = Table(values, "", source)
     geometry = top.table("geometry")
-    file, layout = geometry.text("file"), geometry.text("layout")
-    parameters = geometry.table("parameters").values
-    if (file is None) == (layout is None):
-        problem = "is missing; name the layout file" if file is None else "and layout are both given; give one of them"
-        raise geometry.error("file", problem + f", or a layout: {', '.join(generators.LAYOUTS)}" * (file is None))
-    if file is not None and parameters:
-        raise geometry.error("parameters", "belong to a layout, not to a file")
+    file, layout, parameters, unit = _drawn(geometry)
     view, ignore, only = _chosen(geometry, file)
     dimension = geometry.take("dimension", "auto")
     if isinstance(dimension, bool) or dimension not in (2, 3, "auto"):
@@ -173,7 +167,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         file=None if file is None else source.parent / file,
         layout=layout,
         parameters=dict(parameters),
-        unit=geometry.text("unit"),
+        unit=unit,
         view=view,
         dimension=dimension,
         ignore=ignore,
@@ -212,6 +206,22 @@ def _tolerance(geometry: Table) -> float | None:
     if value is not None and value < 0.0:
         raise geometry.error("outline_tolerance", f"is {value:g}; give a length in m of at least 0")
     return None if value is None else float(value)
+
+
+def _drawn(geometry: Table) -> tuple[str | None, str | None, Mapping[str, Any], str | None]:
+    """File or layout, with the parameters of the one and the unit of the other."""
+    file, layout, unit = (geometry.text(key) for key in ("file", "layout", "unit"))
+    parameters = geometry.table("parameters").values
+    if (file is None) == (layout is None):
+        problem = "is missing; name the layout file" if file is None else "and layout are both given; give one of them"
+        raise geometry.error("file", problem + f", or a layout: {', '.join(generators.LAYOUTS)}" * (file is None))
+    if file is not None and parameters:
+        raise geometry.error("parameters", "belong to a layout, not to a file")
+    if layout is not None and unit not in (None, "m"):
+        raise geometry.error(
+            "unit", f"is {shortened(unit)}, but is of a file's lengths; a layout is in m: leave it out"
+        )
+    return file, layout, parameters, unit
 
 
 def _chosen(geometry: Table, file: str | None) -> tuple[str | None, tuple[str, ...], tuple[str, ...]]:

@@ -149,6 +149,13 @@ def test_bad_values(case, capsys, old, new, words):
     _refused(_changed(case, old, new), capsys, *words)
 
 
+def test_the_unit_of_a_file_is_refused_for_a_layout(case, capsys):
+    """It was ignored: a layout stayed in metres."""
+    text = case.read_text(encoding="utf-8")
+    case.write_text(text.replace('file = "arch.msh"', 'layout = "arch"\nunit = "mm"'), encoding="utf-8")
+    _refused(case, capsys, "[geometry] unit is 'mm'", "a layout is in m")
+
+
 def test_overlapping_support_names_both_blocks_and_the_depth(case, capsys):
     with open(case, "a", encoding="utf-8") as file:
         file.write('\n[[supports]]\nname = "prop"\noutline = [[-0.2, 0.9], [0.2, 0.9], [0.2, 1.0], [-0.2, 1.0]]\n')
