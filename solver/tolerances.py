@@ -78,7 +78,7 @@ MEMORY = 1e-2
 #: Elastic give of a contact point under the mean block weight, across the joint and along it: what makes the forces of
 #: a wall unique and gives them a memory. It is taken back within each step, so that it stays out of the geometry. With
 #: a third or three times of the second, α of a settled wall moved by one per cent, its reaction by a thousandth.
-GIVE_ACROSS, GIVE = 3e-7, 3e-5
+GIVE_ACROSS, GIVE = 3e-7, 1e-5
 
 #: Coordinates, added up and taken off again.
 COORDINATE_ROUNDING = 1e-12

@@ -18,8 +18,9 @@ Newton's method with one sparse factorisation an iteration, scaled as Nesterov &
 https://doi.org/10.1287/moor.22.1.1, for what Andersen, Roos & Terlaky (2003),
 https://doi.org/10.1007/s10107-002-0349-3, call the quadratic cone, predictor and corrector (Mehrotra 1992,
 https://doi.org/10.1137/0802028). Once the path shows which points are open, stick or slide, Newton's method on the
-states takes over, as in plasticity. Where the path is lost, the solution is followed from soft joints to stiff ones;
-where that fails, too, the caller takes a smaller step of the supports, for which the drag dominates.
+states takes over, as in plasticity. Where the path is lost, the step is solved by parts, each from the one before: a
+long step may have several solutions, and this is the one that its start leads to, whatever rounding does. Where that
+ends, too, the caller takes a smaller step of the supports, for which the drag dominates.
 
 In the plane the friction law is the linear complementarity form of Stewart & Trinkle (1996) and of Anitescu & Potra
 (1997), https://doi.org/10.1023/A:1008292328909, here for quasi-static steps.
@@ -61,9 +62,6 @@ STALLED, LOOK_BACK = 0.8, 8
 #: Corrections of second order are cut off at so many times the mean product.
 CORRECTION = 30.0
 
-#: Centring at least of the second try, which also leaves corrections of second order out.
-CAREFUL = 0.5
-
 #: Newton's method on the points' states: part of a force that counts as none, and iterations after which it is given
 #: up. Where more points change their state than the time before it goes round, and is left at once.
 STATES, STATE_CHANGES = 1e-9, 12
@@ -72,9 +70,9 @@ STATES, STATE_CHANGES = 1e-9, 12
 #: the solution; where they are not, again after the mean product has fallen by the second number.
 STATES_SEEN, AGAIN = 1e-3, 100.0
 
-#: Joints that give so many times as much, at first by what factor they become stiffer, the least such factor, and how
-#: often at most.
-SOFTEST, STIFFER, LEAST_STIFFER, STIFFENINGS = 1e4, 4.0, 1.1, 40
+#: Where the central path is lost, a step is solved by parts: the first of them, by how much a part becomes shorter
+#: where its path is lost, too, and the least.
+FIRST_PART, SHORTER, LEAST_PART = 0.25, 4.0, 0.01
 
 #: Nearest that a point comes to the boundary of its cone, squared, as a part of its axis: keeps the scaling finite.
 INSIDE = 1e-20
@@ -111,8 +109,8 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
         try:
             return _followed(step, pattern, gone, multiplier, *_centred(near, scale))
         except NotSolved:
-            pass
-    elif (step.normal > 0.0).any() and not _slides(step, step.normal, step.shear):
+            return _continued(step, pattern, gone, multiplier)
+    if (step.normal > 0.0).any() and not _slides(step, step.normal, step.shear):
         # What hinges only has no other solution than the one in which everything goes on as it did.
         found = _in_states(step, pattern, gone, remembered)
         if found is not None and not _slides(step, found.normal, found.shear):
@@ -121,39 +119,49 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
     start = _within(step.normal, lean, FIRST_FORCE), _apart(step.gap, step.slip.T, FIRST_DISTANCE * scale)
     try:
         return _followed(step, pattern, gone, multiplier, *start)
-    except NotSolved as error:
-        failed = error
-    found = _from_soft_joints(step, pattern, gone, remembered)
-    if found is not None:
-        return found
-    try:
-        return _followed(step, pattern, gone, multiplier, *start, careful=True)
     except NotSolved:
-        pass
-    # In steps so short that nothing moves all is as it was.
-    found = _in_states(step, pattern, gone, remembered)
-    if found is None:
-        raise failed
-    return found
+        return _continued(step, pattern, gone, multiplier)
 
 
-def _from_soft_joints(step: Step, pattern: Pattern, gone: np.ndarray, start: Moved) -> Moved | None:
-    """Solve a step with joints that give far more, and follow its solution while they become as stiff as they are."""
-    soft = reached = SOFTEST
-    ratio, followed = STIFFER, False
-    for _ in range(STIFFENINGS):
-        across, along = step.give
-        found = _in_states(replace(step, give=(across * soft, along * soft)), pattern, gone, start, patient=True)
+def _continued(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float) -> Moved:
+    """Solve a step by parts, from nothing moved and the forces remembered, each part from the one before.
+
+    A step of some length may have several solutions where many points slide. This is the one that the start leads to.
+
+    Raises
+    ------
+    NotSolved
+    """
+    live = 0.0 if step.live is None else multiplier * step.live
+    unbalanced = step.load + live + pattern.to_blocks @ paired(step.normal, step.shear) - step.drag * gone
+    gap = np.where(step.normal > 0.0, 0.0, np.maximum(step.gap, 0.0))
+    near = _as_remembered(replace(step, gap=gap, slip=0.0 * step.slip), multiplier)
+    gone_by, part, failed = 0.0, FIRST_PART, None
+    while gone_by < 1.0:
+        to = min(gone_by + part, 1.0)
+        now = replace(
+            step,
+            load=step.load - (1.0 - to) * unbalanced,
+            gap=gap + to * (step.gap - gap),
+            slip=to * step.slip,
+            wanted=to * step.wanted,
+        )
+        found = _in_states(now, pattern, gone, near)
         if found is None:
-            if not followed or ratio < LEAST_STIFFER:
-                return None
-            ratio = float(np.sqrt(ratio))
-        else:
-            if soft == 1.0:
-                return found
-            reached, start, followed = soft, found, True
-        soft = max(reached / ratio, 1.0)
-    return None
+            least = FIRST_DISTANCE * (step.size * (to - gone_by) + step.give[1])
+            start = (
+                _within(near.forces[0], near.forces[1:], FIRST_FORCE),
+                _apart(near.distances[0], near.distances[2:], least),
+            )
+            try:
+                found = _followed(now, pattern, gone, near.multiplier, *start)
+            except NotSolved as error:
+                failed, part = error, part / SHORTER
+                if part < LEAST_PART:
+                    raise failed from None
+                continue
+        gone_by, near, part = to, found, 2.0 * part
+    return near
 
 
 def _within(normal: np.ndarray, lean: np.ndarray, least: float) -> np.ndarray:
@@ -214,7 +222,7 @@ def _as_remembered(step: Step, multiplier: float) -> Moved:
     )
 
 
-def _in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved, *, patient: bool = False) -> Moved | None:
+def _in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved) -> Moved | None:
     """Newton's method on which points are open, stick or slide, and where to; None where it goes round.
 
     On the central path nothing is at its bound: there the larger of a force and its distance says which of them stays.
@@ -226,13 +234,14 @@ def _in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved, *, p
     way = lean / np.maximum(size, 1e-300)
     closed = normal * along > near.distances[0]
     short = 0.5 * (near.distances[1] - (way * near.distances[2:]).sum(axis=0))
-    slides = (0.5 * (normal - size) * along <= short) & (size > 0.0)
+    # What is at the limit of its friction but for rounding slides, for all that anybody knows.
+    slides = (0.5 * (normal - size - STATES * normal) * along <= short) & (size > 0.0)
     way, turn = way.T, mu * normal / (mu * normal + near.distances[1] / along + 1e-300)
     no_force, no_way = STATES * max(float(near.normal.max(initial=0.0)), 1.0), EQUATIONS * (step.size + along)
     trial_before, multiplier = step.shear - step.slip / along, near.multiplier
     changes, out = n, np.inf
     eye = np.eye(d - 1)
-    for iteration in range((1 + patient) * STATE_CHANGES):
+    for iteration in range(STATE_CHANGES):
         slides &= closed
         sticks = closed & ~slides
         # Across the way that a point slides it is held by its friction, the less the farther it slides.
@@ -293,7 +302,7 @@ def _in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved, *, p
                 return None
             out = float(np.abs(unbalanced).max())
         before, changes = changes, int(changed.sum())
-        if iteration > 0 and changes > before and not patient:
+        if iteration > 0 and changes > before:
             return None
         closed = (closed | closes) & ~opens
         slides = starts | (slides & ~stops) | (closes & (size > most))
@@ -310,7 +319,6 @@ def _followed(
     multiplier: float,
     forces: np.ndarray,
     distances: np.ndarray,
-    careful: bool = False,
 ) -> Moved:
     mu, (across, along) = step.friction, step.give
     scale, no_slip = step.size + along, step.shear.T
@@ -352,8 +360,8 @@ def _followed(
         second = np.clip(change.forces[0] * change.distances[0], -most, most)
         third = _product(newton.scaled(change.forces), newton.unscaled(change.distances[1:]))
         third *= np.minimum(1.0, most / np.maximum(np.abs(third[0]) + np.sqrt((third[1:] ** 2).sum(axis=0)), 1e-300))
-        if careful or short:
-            centring, second, third = (1.0 if short else max(centring, CAREFUL)), 0.0 * second, 0.0 * third
+        if short:
+            centring, second, third = 1.0, 0.0 * second, 0.0 * third
         aims = -_product(newton.middle, newton.middle)
         aims[0] += 2.0 * centring * mean
         change = newton.direction(centring * mean - across_products - second, aims - third, *errors)
