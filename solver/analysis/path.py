@@ -42,7 +42,7 @@ from .drivers import Driver
 
 #: Largest step inside an increment: movement of the supports in block sizes. The smallest, in the same measure, ends
 #: the analysis where no step is solved.
-LARGEST_STEP, SMALLEST_STEP = 0.05, 1e-9
+LARGEST_STEP, SMALLEST_STEP = 0.025, 1e-9
 
 #: Change of the velocities, as a part of them, from which on a step is taken again in shorter ones, down to this part
 #: of the largest.

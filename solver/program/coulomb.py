@@ -101,7 +101,6 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
         return Moved(step.load / step.drag - gone, none[0], step.shear, multiplier, 0, none, none)
     pattern = Pattern(step) if near is None or near.pattern is None else near.pattern.fill(step)
     scale = step.size + step.give[1]
-    remembered = _as_remembered(step, multiplier)
     if near is not None:
         found = _in_states(step, pattern, gone, near)
         if found is not None:
@@ -110,13 +109,15 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
             return _followed(step, pattern, gone, multiplier, *_centred(near, scale))
         except NotSolved:
             return _continued(step, pattern, gone, multiplier)
-    if (step.normal > 0.0).any() and not _slides(step, step.normal, step.shear):
-        # What hinges only has no other solution than the one in which everything goes on as it did.
-        found = _in_states(step, pattern, gone, remembered)
-        if found is not None and not _slides(step, found.normal, found.shear):
+    if (step.normal > 0.0).any():
+        # Mostly things go on as they did, or a few points change.
+        found = _in_states(step, pattern, gone, _unmoved(step, multiplier))
+        if found is not None:
             return found
-    lean = remembered.forces[1:]
-    start = _within(step.normal, lean, FIRST_FORCE), _apart(step.gap, step.slip.T, FIRST_DISTANCE * scale)
+    start = (
+        _within(step.normal, _lean(step), FIRST_FORCE),
+        _apart(step.gap, step.slip.T, FIRST_DISTANCE * scale),
+    )
     try:
         return _followed(step, pattern, gone, multiplier, *start)
     except NotSolved:
@@ -134,9 +135,8 @@ def _continued(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float
     """
     live = 0.0 if step.live is None else multiplier * step.live
     unbalanced = step.load + live + pattern.to_blocks @ paired(step.normal, step.shear) - step.drag * gone
-    gap = np.where(step.normal > 0.0, 0.0, np.maximum(step.gap, 0.0))
-    near = _as_remembered(replace(step, gap=gap, slip=0.0 * step.slip), multiplier)
-    gone_by, part, failed = 0.0, FIRST_PART, None
+    near = _unmoved(step, multiplier)
+    gap, gone_by, part = near.distances[0], 0.0, FIRST_PART
     while gone_by < 1.0:
         to = min(gone_by + part, 1.0)
         now = replace(
@@ -156,9 +156,9 @@ def _continued(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float
             try:
                 found = _followed(now, pattern, gone, near.multiplier, *start)
             except NotSolved as error:
-                failed, part = error, part / SHORTER
+                part /= SHORTER
                 if part < LEAST_PART:
-                    raise failed from None
+                    raise error
                 continue
         gone_by, near, part = to, found, 2.0 * part
     return near
@@ -207,19 +207,17 @@ def _between(forces: np.ndarray, distances: np.ndarray, scale: float) -> np.ndar
     return np.maximum(found, CENTRED * scale / (10.0 * scale + np.abs(distances)))
 
 
-def _slides(step: Step, normal: np.ndarray, shear: np.ndarray) -> bool:
-    """Whether the friction of any contact point that carries is used up."""
-    size = np.sqrt((shear**2).sum(axis=1))
-    return bool(((size >= (1.0 - STATES) * step.friction * normal) & (normal > STATES)).any())
+def _lean(step: Step) -> np.ndarray:
+    """(d - 1, n) array: τ of the forces that a step remembers."""
+    return (step.shear / np.maximum(step.friction, 1e-12)[:, None]).T
 
 
-def _as_remembered(step: Step, multiplier: float) -> Moved:
-    """The forces that a step remembers, as a solution near its own: all sticks and slides as it did."""
-    lean = (step.shear / np.maximum(step.friction, 1e-12)[:, None]).T
-    forces = _within(step.normal, lean, 0.0)
-    return Moved(
-        np.zeros(len(step.load)), step.normal, step.shear, multiplier, 0, forces, _apart(step.gap, step.slip.T, 0.0)
-    )
+def _unmoved(step: Step, multiplier: float) -> Moved:
+    """The start of a step as a solution: the forces remembered, what carries closed, nothing moved."""
+    forces = _within(step.normal, _lean(step), 0.0)
+    gap = np.where(step.normal > 0.0, 0.0, np.maximum(step.gap, 0.0))
+    distances = _apart(gap, np.zeros_like(step.slip.T), 0.0)
+    return Moved(np.zeros(len(step.load)), step.normal, step.shear, multiplier, 0, forces, distances)
 
 
 def _in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved) -> Moved | None:
