@@ -410,6 +410,8 @@ def _controls(table: Table, overlap_tolerance: float | None) -> solver.Controls:
     counts = {}
     for key in ("event_refinement", "correctors", "falling_frames"):
         value = table.number(key, getattr(default, key))
+        if value is None:
+            continue
         if value < (0 if key == "falling_frames" else 1) or value != int(value):
             raise table.error(key, f"is {value:g}; give a whole number")
         if value > MOST_STEPS:
@@ -418,7 +420,7 @@ def _controls(table: Table, overlap_tolerance: float | None) -> solver.Controls:
     return solver.Controls(
         increments=table.text("increments", default.increments, among=solver.INCREMENTS),
         overlap_tolerance=overlap_tolerance,
-        falling_frames=counts["falling_frames"],
+        falling_frames=counts.get("falling_frames"),
         trust_region=table.number("trust_region", positive=True),
         event_refinement=counts["event_refinement"],
         correctors=counts["correctors"],

@@ -16,6 +16,10 @@ INCREMENTS = (COULOMB, LINEAR_PROGRAM)
 LARGEST_FOLLOWED = 500
 
 
+#: Frames of the fall after collapse, by dimension, where nothing else is asked for.
+FALLING_FRAMES = {2: 10, 3: 40}
+
+
 @dataclass(frozen=True)
 class Controls:
     """How the increment loop proceeds; the defaults suit everything we have tried.
@@ -28,8 +32,9 @@ class Controls:
         blocks and for every pushover, the latter, which takes a twentieth of the time there, for larger settlements.
     overlap_tolerance : float, optional [m]
         Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
-    falling_frames : int
-        Frames of the fall after collapse.
+    falling_frames : int, optional
+        Frames of the fall after collapse: enough for the mechanism in the plane, where dynamics can show the fall, and
+        to follow it in space.
     trust_region : float, optional [m]
         Of the linear program: largest movement of a block; the block size, or ten increments where that is more.
     event_refinement : int
@@ -46,7 +51,7 @@ class Controls:
 
     increments: str | None = None
     overlap_tolerance: float | None = None
-    falling_frames: int = 40
+    falling_frames: int | None = None
     trust_region: float | None = None
     event_refinement: int = 8
     correctors: int = 25
@@ -55,6 +60,10 @@ class Controls:
         """Refuse an unknown way to find increments."""
         if self.increments not in (None, *INCREMENTS):
             raise ValueError(f"increments is '{self.increments}'; it is 'coulomb' or 'linear program'")
+
+    def frames(self, dimension: int) -> int:
+        """Frames of the fall after collapse of a structure in the plane, 2, or in space, 3."""
+        return FALLING_FRAMES[dimension] if self.falling_frames is None else self.falling_frames
 
 
 @dataclass(frozen=True)

@@ -398,11 +398,11 @@ class _Path:
 
     def _fall(self, s: float, solved: Solved) -> Iterator[Increment]:
         """Pseudo-time frames: the blocks move downhill by a trust region at a time until they rest."""
-        if self.controls.falling_frames == 0:
+        if self.controls.frames(self.model.dimension) == 0:
             return
         yield _falling_frame(self.model, solved, s, self.number)
         model = replace(self.model, trust=self.model.length / 10.0)
-        for _ in range(self.controls.falling_frames - 1):
+        for _ in range(self.controls.frames(self.model.dimension) - 1):
             size = _largest_movement(model, solved.motion)
             part = min(1.0, model.trust / size)
             solved = replace(solved, motion=solved.motion * part, slip=solved.slip * part)

@@ -136,7 +136,7 @@ def _increments(
     if resume is not None:
         start = resume.start
     model = model_of(assembly, loads, interfaces, loads.live)
-    path = Path(model, ControlledLoad(assembly, control, start), 0, controls.falling_frames)
+    path = Path(model, ControlledLoad(assembly, control, start), 0, controls.frames(assembly.dimension))
     place = path.at_start(start)
     if resume is None:
         try:

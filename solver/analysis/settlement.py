@@ -190,7 +190,7 @@ def _increments(
         if resume is not None:
             start = resume.start
         driver = SupportMotion(assembly, phase, start)
-        path = Path(model_of(assembly, loads, interfaces), driver, number, controls.falling_frames)
+        path = Path(model_of(assembly, loads, interfaces), driver, number, controls.frames(assembly.dimension))
         if resume is not None:
             place = resume.place
         elif place is None:

@@ -406,11 +406,14 @@ def test_falling_frames_follow_the_path_and_go_down():
     n = len(response.path)
     assert set(status[:n]) == {solver.Status.EQUILIBRIUM}
     assert set(status[n:]) == {solver.Status.FALLING}
-    assert 5 < len(status) - n <= solver.Controls().falling_frames
+    assert 5 < len(status) - n <= 12
     weights = response.assembly.masses * response.assembly.free
     height = [weights @ i.pose.positions[:, 1] for i in response.increments[n:]]
     assert (np.diff(height) < 1e-9 * weights.sum()).all()
-    assert height[-1] < 0.85 * height[0]
+    assert height[-1] < height[0]
+    # Frames are as far apart as one can see.
+    way = np.linalg.norm(np.diff([i.pose.positions for i in response.increments[n + 2 :]], axis=0), axis=2).max(axis=1)
+    assert (way > 0.05 * response.assembly.block_size).all()
     assert all(i.settlement == response.increments[n].settlement for i in response.increments[n:])
 
 
