@@ -15,7 +15,7 @@ This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 from .analysis.controls import INCREMENTS, Controls, Ending
 from .analysis.drivers import ControlDisplacement
 from .analysis.limit_load import limit_load, limit_load_envelope
-from .analysis.path import Checkpoint
+from .analysis.place import Checkpoint
 from .analysis.pushover import pushover, pushover_increments
 from .analysis.settlement import check_settlement, settle, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly, find_contacts, measure_contacts

@@ -17,7 +17,8 @@ from solver.results.response import Response
 from .controls import LINEAR_PROGRAM, Controls, Ending
 from .drivers import ControlDisplacement, ControlledLoad
 from .limit_load import checked_live
-from .path import Checkpoint, Falls, Path
+from .path import Path
+from .place import Checkpoint, Falls
 from .settlement import drained, model_of, timed
 
 
@@ -137,13 +138,13 @@ def _increments(
         start = resume.start
     model = model_of(assembly, loads, interfaces, loads.live)
     path = Path(model, ControlledLoad(assembly, control, start), 0, controls.frames(assembly.dimension))
-    place = path.at_start(start)
+    place = path.steps.at_start(start)
     if resume is None:
         try:
             place = path.rested(start)
         except (NotSolved, Falls):
             # A pose that is given may stand with its live load only.
-            place = path.at_start(start)
+            place = path.steps.at_start(start)
     try:
         return (yield from path.follow(place, resume))
     except SolveError as error:

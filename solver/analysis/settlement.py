@@ -23,7 +23,8 @@ from .controls import LARGEST_FOLLOWED, LINEAR_PROGRAM, Controls, Ending
 from .drivers import SupportMotion
 from .linear_program import linear_program_increments
 from .local_origin import at_origin, told_from, without_origin
-from .path import Checkpoint, Falls, Path, Place
+from .path import Path
+from .place import Checkpoint, Falls, Place
 
 
 def settle(
@@ -197,7 +198,7 @@ def _increments(
             try:
                 place = path.rested(start)
             except (NotSolved, Falls):
-                place = path.at_start(start)
+                place = path.steps.at_start(start)
             except SolveError as error:
                 return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
         else:

@@ -1,0 +1,115 @@
+"""What equilibrium within friction says of a place of the path."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from solver.equilibrium import block_forces, wrench_matrix
+from solver.geometry.contacts import Contacts
+from solver.kinematics import Pose
+from solver.program.admissible import admissible
+from solver.program.coulomb import solve_step
+from solver.program.model import Model
+from solver.program.step import NotSolved, Step
+from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, USED_UP
+
+from .place import Place, Proved
+from .stepping import Steps
+
+
+def on_supports(model: Model, contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarray:
+    """(n_blocks, n_dof) array [N, N, N·m]: what the structure does to each support; zero for free blocks."""
+    resultant = block_forces(contacts, pose, forces) * model.force
+    return np.where(model.assembly.free[:, None], 0.0, resultant)
+
+
+class Proofs:
+    """Proofs of the places that steps lead to.
+
+    Parameters
+    ----------
+    steps : Steps
+    """
+
+    def __init__(self, steps: Steps) -> None:
+        self.steps, self.model, self.driver = steps, steps.model, steps.driver
+
+    def proved(self, place: Place) -> Proved:
+        """What equilibrium within friction says of a place, and balanced forces near those of the path."""
+        model, assembly = self.model, self.model.assembly
+        contacts = self.steps.around(place.pose)
+        friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
+        rate = None if model.live is not None else self.driver.rate(place.s)
+        bounds = admissible(
+            model, place.pose, contacts, friction, rate, vertex=place.s == 0.0, gap=self._closed_gap(place)
+        )
+        self.steps.programs += bounds.programs
+        remembered = self.steps.remembered(place, contacts)
+        if not bounds.exists:
+            return Proved(place, contacts, friction, bounds, remembered, place.multiplier)
+        if place.s == 0.0 and np.isfinite(bounds.low if model.live is None else bounds.high):
+            # Nothing has moved: what the first movement has to overcome, least reaction or largest multiplier.
+            forces, multiplier = bounds.forces, bounds.high
+        else:
+            # Where none near those of the path are found, those of the bounds are in equilibrium, too.
+            forces, multiplier = self._balanced(place, contacts, friction, remembered) or (bounds.forces, bounds.high)
+        if model.live is None:
+            multiplier = float((on_supports(model, contacts, place.pose, forces) * self.driver.rate(place.s)).sum())
+        return Proved(place, contacts, friction, bounds, forces, multiplier)
+
+    def holds(self, proved: Proved | None) -> bool:
+        """Whether equilibrium is possible there, under a live load with some of it."""
+        return proved is not None and proved.bounds.exists and (self.model.live is None or proved.measured > 0.0)
+
+    def _closed_gap(self, place: Place) -> float:
+        """Largest gap of contact points that may carry in an equilibrium at a place, in block sizes."""
+        if place.s == 0.0 or place.s < self.steps.careful_until:
+            return COMPUTED_GAP
+        # Not wider than how closely a collapse is to be enclosed.
+        return max(COMPUTED_GAP, min(CLOSING_GAP, self.driver.tolerance * self.steps.lever / self.model.length))
+
+    def _balanced(
+        self, place: Place, contacts: Contacts, friction: np.ndarray, remembered: np.ndarray
+    ) -> tuple[np.ndarray, float] | None:
+        """Forces in equilibrium without the drag, near those remembered, or none; open points carry nothing."""
+        model, free = self.model, self.model.assembly.free
+        closed = np.flatnonzero(contacts.gaps <= self._closed_gap(place) * model.length)
+        d = model.dimension
+        columns = (d * closed[:, None] + np.arange(d)).ravel()
+        live, live_size = model.scaled_live
+        load = model.scaled_load[free].ravel()
+        none = np.zeros(len(closed))
+        # What has used up its friction goes on doing so: where it slides, forces are no matter of choice.
+        mu, normal, shear = friction[closed], remembered[closed, 0], remembered[closed, 1:]
+        size = np.linalg.norm(shear, axis=1)
+        used_up = (normal > 0.0) & (size >= mu * normal * (1.0 - USED_UP))
+        far = np.where(used_up, -1e2 * (1.0 + normal), 0.0)
+        on = far[:, None] * np.divide(shear, size[:, None], out=np.zeros_like(shear), where=size[:, None] > 0.0)
+        still = Step(
+            matrix=wrench_matrix(contacts, place.pose, model.length)[:, columns],
+            free=np.repeat(free, len(model.lengths)),
+            load=load,
+            drag=np.full(len(load), 1e-12),
+            gap=none,
+            slip=on,
+            normal=normal,
+            shear=shear,
+            friction=mu,
+            give=(1.0, 1.0),
+            size=1.0,
+            live=live[free].ravel() if model.live is not None else None,
+            control=live[free].ravel() if model.live is not None else None,
+        )
+        forces = np.zeros_like(remembered)
+        for step in (still, replace(still, slip=np.zeros_like(on))):
+            try:
+                found = solve_step(step, np.zeros(len(load)), place.multiplier * live_size)
+                break
+            except NotSolved:
+                continue
+        else:
+            return None
+        forces[closed] = np.column_stack([found.normal, found.shear])
+        return forces, found.multiplier / (live_size or 1.0)

@@ -1,0 +1,183 @@
+"""What a path tells: its increments, and what it says of blocks in words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from solver.equilibrium import wrench_matrix
+from solver.geometry.contacts import Contacts
+from solver.kinematics import Pose, moved_vertices, relative_velocities
+from solver.results.certificate import Certificate
+from solver.results.increment import Increment, State, Status
+from solver.tolerances import COMPUTED_GAP
+
+from .controls import Ending
+from .place import Note, Place, Proved
+from .proofs import on_supports
+from .stepping import Steps
+
+#: Blocks that a message names.
+NAMED = 4
+
+
+class Reports:
+    """Increments of a phase, and messages.
+
+    Parameters
+    ----------
+    steps : Steps
+        That led to what is told; their programs are counted.
+    number : int
+        Of the phase.
+    """
+
+    def __init__(self, steps: Steps, number: int) -> None:
+        self.steps, self.model, self.driver, self.number = steps, steps.model, steps.driver, number
+        self.notes: list[Note] = []
+
+    def increment(self, proved: Proved, velocity: np.ndarray, works: tuple[float, float, float]) -> Increment:
+        """Of an equilibrium and the movement that follows, with all notes so far and the works done until then."""
+        model, place, contacts = self.model, proved.place, proved.contacts
+        resultant = (wrench_matrix(contacts, place.pose, model.length) @ proved.forces.ravel()).reshape(
+            model.load.shape
+        )
+        live, live_size = model.scaled_live
+        measured = proved.measured
+        balance = (
+            resultant + model.scaled_load + (proved.measured * live_size if model.live is not None else 0.0) * live
+        )[model.assembly.free]
+        gaps = contacts.gaps / model.length
+        carried = np.where(gaps > COMPUTED_GAP, proved.forces[:, 0] * gaps, 0.0).sum()
+        certificate = Certificate(
+            equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
+            largest_penetration=float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)),
+            duality_gap=proved.bounds.gap,
+            complementarity=float(carried),
+            kinematic_violation=0.0,
+            energy_residual=abs(works[0] - works[1] - works[2]) / max(sum(map(abs, works)), 1e-12),
+        )
+        support_forces = on_supports(model, contacts, place.pose, proved.forces)
+        notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
+        self.notes = []
+        return self.reported(
+            place,
+            contacts,
+            proved.forces,
+            proved.friction,
+            velocity,
+            measured,
+            support_forces,
+            certificate,
+            Status.EQUILIBRIUM,
+            notes,
+            (proved.bounds.low, proved.bounds.high),
+        )
+
+    def falling(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
+        """Of a place that is no equilibrium."""
+        model, assembly = self.model, self.model.assembly
+        contacts = self.steps.around(place.pose)
+        friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
+        none = Certificate(0.0, float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)), 0.0, 0.0, 0.0)
+        return self.reported(
+            replace(place, s=s),
+            contacts,
+            self.steps.remembered(place, contacts),
+            friction,
+            velocity,
+            0.0,
+            np.zeros_like(model.load),
+            none,
+            Status.FALLING,
+            (),
+        )
+
+    def reported(
+        self,
+        place: Place,
+        contacts: Contacts,
+        forces: np.ndarray,
+        friction: np.ndarray,
+        velocity: np.ndarray,
+        measured: float,
+        support_forces: np.ndarray,
+        certificate: Certificate,
+        status: Status,
+        notes: tuple[str, ...],
+        bounds: tuple[float, float] = (np.nan, np.nan),
+    ) -> Increment:
+        """As given, with the programs since the last."""
+        pushed = self.model.live is not None
+        programs, self.steps.programs = self.steps.programs, 0
+        return Increment(
+            parameter=place.s,
+            measured=measured,
+            phase=self.number,
+            load_multiplier=measured if pushed else 0.0,
+            reaction=measured * self.model.live_force if pushed else measured,
+            certificate=certificate,
+            status=status,
+            programs=programs,
+            seconds=0.0,
+            held=State(
+                pose=place.pose,
+                contacts=contacts,
+                forces=forces * self.model.force,
+                displacements=relative_velocities(contacts, place.pose, velocity),
+                friction=friction,
+                velocity=velocity,
+                support_forces=support_forces,
+            ),
+            least=bounds[0],
+            largest=bounds[1],
+            notes=notes,
+        )
+
+    def reached(self) -> Ending:
+        """How a path ends that has not collapsed."""
+        driver = self.driver
+        return Ending(Status.LIMIT_REACHED, f"the {driver.what} reached its limit of {driver.limit:g} {driver.unit}")
+
+    def locked(self, place: Place) -> str:
+        """Which blocks are wedged."""
+        assembly, contacts, normal = self.model.assembly, place.contacts, place.forces[:, 0]
+        assert contacts is not None
+        pressed = normal > 0.1 * normal.max()
+        blocks = np.unique(np.concatenate([contacts.block_a[pressed], contacts.block_b[pressed]]))
+        blocks = blocks[assembly.free[blocks]]
+        return f"the supports cannot move on: {len(blocks)} blocks are wedged ({self._named(blocks)})"
+
+    def no_equilibrium(self, motion: np.ndarray) -> str:
+        """Which blocks fall, and what to look for."""
+        assembly = self.model.assembly
+        size = np.abs(motion[:, : self.model.dimension]).max(axis=1)
+        falling = np.flatnonzero(assembly.free & (size > 0.5 * size.max()))
+        shown = ", ".join(f"'{assembly.names[i]}'" for i in falling[:8])
+        more = f" and {len(falling) - 8} more" if len(falling) > 8 else ""
+        return (
+            f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
+            f"({shown}{more}); look for gaps between blocks (joint_thickness), a missing support or too little friction"
+        )
+
+    def no_step(self, reason: str) -> str:
+        """Where, and what to do."""
+        return (
+            f"no step of the {self.driver.what} was solved, however small, {reason}; repeat the analysis with another "
+            "increment, and send the case to the developers if it stays"
+        )
+
+    def jump(self, start: Pose, end: Pose) -> str:
+        """Which blocks moved, and how far."""
+        assembly = self.model.assembly
+        far = np.linalg.norm(moved_vertices(assembly, end) - moved_vertices(assembly, start), axis=1)
+        way = np.zeros(assembly.n_blocks)
+        np.maximum.at(way, assembly.block_of_vertex, np.where(assembly.free[assembly.block_of_vertex], far, 0.0))
+        fell = np.flatnonzero(way > 0.1 * way.max())
+        return f"{self._named(fell)} moved by up to {way.max():.2g} m at once to the next equilibrium"
+
+    def _named(self, blocks: np.ndarray) -> str:
+        shown = ", ".join(f"'{self.model.assembly.names[i]}'" for i in blocks[:NAMED])
+        more = f" and {len(blocks) - NAMED} more" if len(blocks) > NAMED else ""
+        return f"block{'' if len(blocks) == 1 else 's'} {shown}{more}"
