@@ -28,7 +28,7 @@ FALLING_FORCE = 1.0
 CARE = 1e-3
 
 #: Part of the give of the joints that is left there, where forces grow without limit before a snap.
-STIFF = 1e-2
+STIFF = 1e-3
 
 #: Penetration that a step may leave, in block sizes, where forces grow fast.
 PRESSED = 1e-5
