@@ -125,6 +125,11 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--no-pictures", action="store_true", help="draw nothing and write no report; blockvis render OUT does later"
     )
+    run.add_argument(
+        "--check-steps",
+        action="store_true",
+        help="follow the path again in steps half as long and say how far apart the two are",
+    )
     run.set_defaults(verb=_run)
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
     info.add_argument("file", metavar="FILE", help="or a folder or a pattern of files, one per stone")
@@ -403,6 +408,8 @@ def _run(options: argparse.Namespace) -> int:
     for problem in run.missing:
         print(f"blockvis: everything but the pictures is written: {problem}", file=sys.stderr)
     stop = run.response.stop
+    if options.check_steps and stop is not solver.Status.INTERRUPTED:
+        print(_step_check(run.folder))
     if stop is solver.Status.INTERRUPTED:
         print(f"blockvis: go on with it by blockvis run --resume {run.folder}", file=sys.stderr)
         return INTERRUPTED
@@ -411,6 +418,19 @@ def _run(options: argparse.Namespace) -> int:
     if stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
         return NO_EQUILIBRIUM
     return NO_PICTURES if run.missing else 0
+
+
+def _step_check(folder: Path) -> str:
+    from .runs.step_check import NOTABLE, check_steps
+
+    check = check_steps(folder)
+    if check.error > NOTABLE or check.stop != check.stop_of_check:
+        warnings.warn(
+            f"the steps matter by more than {100.0 * NOTABLE:g} %: where many joints slide, or stones slip off each "
+            "other, a wall may have several paths; try half the increment, and give results with that range",
+            stacklevel=2,
+        )
+    return str(check)
 
 
 def _info(options: argparse.Namespace) -> int:

@@ -44,6 +44,8 @@ class Advance:
     ----------
     steps : Steps
     proofs : Proofs
+    shorter : float
+        Steps are so many times as short.
 
     Attributes
     ----------
@@ -55,10 +57,10 @@ class Advance:
         The last two that are a notable way apart.
     """
 
-    def __init__(self, steps: Steps, proofs: Proofs) -> None:
+    def __init__(self, steps: Steps, proofs: Proofs, shorter: float = 1.0) -> None:
         self.steps, self.proofs, self.model, self.driver = steps, proofs, steps.model, steps.driver
-        self.longest = min(self.driver.increment, LARGEST_STEP * self.model.length / steps.lever)
-        self.finest = LARGEST_STEP / EVENT_REFINEMENT * self.model.length / steps.lever
+        largest = LARGEST_STEP * self.model.length / steps.lever
+        self.longest, self.finest = min(self.driver.increment, largest) / shorter, largest / EVENT_REFINEMENT / shorter
         self.smallest = SMALLEST_STEP * self.model.length / steps.lever
         self.barrier, self.works = np.inf, (0.0, 0.0, 0.0)
         self.marks: tuple[Place, ...] = ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 from solver.results.increment import Status
 from solver.results.response import Collapse
@@ -35,6 +36,9 @@ class Controls:
     falling_frames : int, optional
         Frames of the fall after collapse: enough for the mechanism in the plane, where dynamics can show the fall, and
         to follow it in space.
+    shorter_steps : float
+        Of the path: its steps, and those in which events are followed, are so many times as short. A second path with 2
+        tells how much the length of the steps matters.
     trust_region : float, optional [m]
         Of the linear program: largest movement of a block; the block size, or ten increments where that is more.
     event_refinement : int
@@ -46,20 +50,23 @@ class Controls:
     Raises
     ------
     ValueError
-        For an unknown way to find increments.
+        For an unknown way to find increments, or shorter_steps below 1.
     """
 
     increments: str | None = None
     overlap_tolerance: float | None = None
     falling_frames: int | None = None
+    shorter_steps: float = 1.0
     trust_region: float | None = None
     event_refinement: int = 8
     correctors: int = 25
 
     def __post_init__(self) -> None:
-        """Refuse an unknown way to find increments."""
+        """Refuse an unknown way to find increments, and longer steps than those that are known to do."""
         if self.increments not in (None, *INCREMENTS):
             raise ValueError(f"increments is '{self.increments}'; it is 'coulomb' or 'linear program'")
+        if not (isfinite(self.shorter_steps) and self.shorter_steps >= 1.0):
+            raise ValueError(f"shorter_steps is {self.shorter_steps:g}; it is at least 1")
 
     def frames(self, dimension: int) -> int:
         """Frames of the fall after collapse of a structure in the plane, 2, or in space, 3."""

@@ -17,7 +17,7 @@ from solver.results.increment import Increment, Status
 from solver.tolerances import GIVE, JUMP
 
 from .advancing import Advance
-from .controls import Ending
+from .controls import Controls, Ending
 from .drivers import Driver
 from .falling import CREEPS, Falling
 from .place import Checkpoint, Falls, NoStep, Place, Proved, Wedged
@@ -39,17 +39,17 @@ class Path:
     driver : Driver
     number : int
         Of the phase.
-    falling_frames : int
-        Frames of the fall after collapse.
+    controls : Controls
+        Frames of the fall after collapse, and how short the steps are.
     """
 
-    def __init__(self, model: Model, driver: Driver, number: int = 0, falling_frames: int = 0) -> None:
+    def __init__(self, model: Model, driver: Driver, number: int, controls: Controls) -> None:
         self.model, self.driver, self.number = model, driver, number
         self.steps = Steps(model, driver)
         self.proofs = Proofs(self.steps)
-        self.advance = Advance(self.steps, self.proofs)
+        self.advance = Advance(self.steps, self.proofs, controls.shorter_steps)
         self.reports = Reports(self.steps, number)
-        self.falling = Falling(self.steps, self.proofs, self.reports, falling_frames)
+        self.falling = Falling(self.steps, self.proofs, self.reports, controls.frames(model.dimension))
 
     def rested(self, pose: Pose) -> Place:
         """The place in which a pose comes to rest from no forces at all.

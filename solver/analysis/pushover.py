@@ -137,7 +137,7 @@ def _increments(
     if resume is not None:
         start = resume.start
     model = model_of(assembly, loads, interfaces, loads.live)
-    path = Path(model, ControlledLoad(assembly, control, start), 0, controls.frames(assembly.dimension))
+    path = Path(model, ControlledLoad(assembly, control, start), 0, controls)
     place = path.steps.at_start(start)
     if resume is None:
         try:

@@ -191,7 +191,7 @@ def _increments(
         if resume is not None:
             start = resume.start
         driver = SupportMotion(assembly, phase, start)
-        path = Path(model_of(assembly, loads, interfaces), driver, number, controls.frames(assembly.dimension))
+        path = Path(model_of(assembly, loads, interfaces), driver, number, controls)
         if resume is not None:
             place = resume.place
         elif place is None:

@@ -1,0 +1,87 @@
+"""``blockvis run --check-steps``: the same path in steps half as long, through the real entry point."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+import blockvis
+import solver
+from blockvis.runs.step_check import compared
+
+CASE = """
+[geometry]
+layout = "arch"
+
+[geometry.parameters]
+voussoirs = 6
+thickness_ratio = 0.2
+
+[material]
+friction_coefficient = 2.0
+
+[settlement]
+direction = [1.0, 0.0]
+increment = 0.1
+limit = 1.0
+tolerance = 1e-3
+"""
+
+LIMIT_LOAD = """
+[geometry]
+layout = "arch"
+
+[material]
+friction_coefficient = 2.0
+
+[analysis]
+kind = "limit load"
+
+[[loads]]
+kind = "live"
+blocks = "voussoir 3"
+force = [0.0, -1.0]
+"""
+
+
+def run(folder, text, *options):
+    (folder / "case.toml").write_text(text, encoding="utf-8")
+    command = [sys.executable, "-m", "blockvis", "run", "case.toml", "-o", "out", "--no-pictures", *options]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.thorough
+def test_the_command_says_how_much_the_steps_matter(tmp_path):
+    done = run(tmp_path, CASE, "--check-steps")
+    assert done.returncode == 0, done.stderr
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("error of the steps")]
+    check = json.loads((tmp_path / "out" / "step_check.json").read_text(encoding="utf-8"))
+    assert check["stop"] == check["stop_of_check"] == "collapsed"
+    # The collapse is enclosed to a thousandth of a metre, in other steps at other places.
+    displacement = blockvis.open_results(tmp_path / "out").collapse.displacement
+    assert 0.0 < check["collapse"] < 2e-3 / displacement
+    assert check["difference"] < 1e-5
+    assert "collapse" in line
+    assert "steps matter" not in done.stderr
+
+
+@pytest.mark.thorough
+def test_what_has_no_steps_is_refused(tmp_path):
+    done = run(tmp_path, LIMIT_LOAD, "--check-steps")
+    assert done.returncode == 2
+    assert "has no path whose steps could be checked (limit load" in done.stderr
+    assert (tmp_path / "out" / "summary.json").is_file()
+
+
+def test_reactions_are_compared_at_the_same_places_only():
+    arch = blockvis.generators.arch(voussoirs=6, thickness_ratio=0.2)
+    settlement = solver.Settlement(direction=(1, 0), increment=0.1, limit=0.2)
+    response = solver.settle(arch, settlement, friction_coefficient=2.0)
+    heavier = [replace(i, measured=1.02 * i.measured, reaction=1.02 * i.reaction) for i in response.increments]
+    elsewhere = [replace(i, parameter=i.parameter + 0.03) for i in response.increments[1:]]
+    check = compared(response, replace(response, increments=(*heavier[:2], *elsewhere)))
+    assert check.at == pytest.approx(0.1)
+    assert check.difference == pytest.approx(0.02 * response.reaction[1] / response.reaction.max())
+    assert check.error == check.difference
