@@ -72,7 +72,7 @@ STATES_SEEN, AGAIN = 1e-3, 100.0
 
 #: Where the central path is lost, a step is solved by parts: the first of them, by how much a part becomes shorter
 #: where its path is lost, too, and the least.
-FIRST_PART, SHORTER, LEAST_PART = 0.25, 4.0, 0.01
+FIRST_PART, SHORTER, LEAST_PART = 0.25, 4.0, 0.004
 
 #: Nearest that a point comes to the boundary of its cone, squared, as a part of its axis: keeps the scaling finite.
 INSIDE = 1e-20
@@ -147,19 +147,16 @@ def _continued(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float
             wanted=to * step.wanted,
         )
         found = _in_states(now, pattern, gone, near)
+        if found is None and part > LEAST_PART:
+            part /= SHORTER
+            continue
         if found is None:
             least = FIRST_DISTANCE * (step.size * (to - gone_by) + step.give[1])
             start = (
                 _within(near.forces[0], near.forces[1:], FIRST_FORCE),
                 _apart(near.distances[0], near.distances[2:], least),
             )
-            try:
-                found = _followed(now, pattern, gone, near.multiplier, *start)
-            except NotSolved as error:
-                part /= SHORTER
-                if part < LEAST_PART:
-                    raise error
-                continue
+            found = _followed(now, pattern, gone, near.multiplier, *start)
         gone_by, near, part = to, found, 2.0 * part
     return near
 
