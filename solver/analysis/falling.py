@@ -23,7 +23,7 @@ from .stepping import MECHANISM, SLOW_GROWTH, Steps
 
 #: A fall is followed in steps of this movement of a block, in block sizes.
 FALL_STEP = 0.1
-FALL_STEPS, CREEPS, FALL_FAILURES = 60, 16, 30
+FALL_STEPS, CREEPS, FALL_FAILURES = 240, 16, 60
 
 #: Unbalanced force, in block weights, under which what creeps may have come to rest.
 CREEPING = 1e-2

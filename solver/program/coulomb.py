@@ -43,8 +43,9 @@ ITERATIONS, FRACTION, FRACTION_IN_SPACE = 60, 0.99, 0.9
 #: one's root.
 BALANCE, EQUATIONS, PRODUCT = 1e-9, 1e-8, 1e-9
 
-#: Mean product of force and distance, in block weights and sizes, at which a solution that converges no further counts.
-PRODUCT_LEFT = 1e-9
+#: Balance, and mean product of force and distance, in block weights and sizes, at which a solution that converges no
+#: further counts: forces that are reported are balanced once more.
+BALANCE_LEFT, PRODUCT_LEFT = 1e-8, 1e-9
 
 #: Start: least forces in mean block weights, least distances in parts of a step and an elastic give.
 FIRST_FORCE, FIRST_DISTANCE = 0.1, 0.3
@@ -368,7 +369,7 @@ def _followed(
         motion, multiplier = motion + part * change.motion, multiplier + part * change.multiplier
         gap, slip = gap + part * change.relative[0], slip + part * change.relative[1:]
         forces, distances = forces + part * change.forces, distances + part * change.distances
-    if out < BALANCE and wrong < EQUATIONS * scale and mean < PRODUCT_LEFT:
+    if out < BALANCE_LEFT and wrong < EQUATIONS * scale and mean < PRODUCT_LEFT:
         # Points that neither carry nor are open converge slowly: by their states at once, or as they are.
         return _in_states(step, pattern, gone, here) or here
     raise NotSolved(f"balance {out:.1e}, distances {wrong:.1e}, product {mean:.1e} after {iteration} iterations")
