@@ -35,6 +35,7 @@ from solver.tolerances import FARTHEST_FALL, JUMP, OVERLAP
 from .checkpoint import Note, Place, ProgramCheckpoint
 from .controls import Controls, Ending
 from .local_fall import jump_words, snapped
+from .reports import no_equilibrium
 
 #: The mechanism has changed within an increment when the velocities before and after differ by this much of their
 #: size, weighted by mass, times the root of the number of blocks (in a wall a few bricks always change their ways),
@@ -76,7 +77,7 @@ def linear_program_increments(
         pose = at_rest(model, pose, controls.correctors) if resume is None else resume.start
     except Falls as fall:
         yield _falling_frame(model, fall.solved, 0.0, 0)
-        return Ending(Status.NO_INITIAL_EQUILIBRIUM, _no_equilibrium_message(assembly, fall.solved))
+        return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(assembly, fall.solved.motion))
     except (Locked, SolveError, NotConverged) as error:
         return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
     ending = _reached(phases[-1])
@@ -194,7 +195,7 @@ class _Path:
             except _NotHere as fall:
                 if not self.left:
                     yield _falling_frame(self.model, fall.solved, here.s, self.number)
-                    message = _no_equilibrium_message(self.model.assembly, fall.solved)
+                    message = no_equilibrium(self.model.assembly, fall.solved.motion)
                     return Ending(Status.NO_INITIAL_EQUILIBRIUM, message)
                 self.first_without = min(self.first_without, here.s)
                 step = self._go_back()
@@ -470,15 +471,4 @@ def _increment(
             velocity=velocity,
             support_forces=solved.support_forces,
         ),
-    )
-
-
-def _no_equilibrium_message(assembly: Assembly, solved: Solved) -> str:
-    size = np.abs(solved.motion[:, :2]).max(axis=1)
-    falling = np.flatnonzero(assembly.free & (size > 0.5 * size.max()))
-    shown = ", ".join(f"'{assembly.names[i]}'" for i in falling[:8])
-    more = f" and {len(falling) - 8} more" if len(falling) > 8 else ""
-    return (
-        f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
-        f"({shown}{more}); look for gaps between blocks (joint_thickness), a missing support or too little friction"
     )

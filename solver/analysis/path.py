@@ -22,7 +22,7 @@ from .drivers import Driver
 from .falling import CREEPS, Falling
 from .place import Checkpoint, Falls, NoStep, Place, Proved, Wedged
 from .proofs import Proofs, on_supports
-from .reports import Reports
+from .reports import Reports, no_equilibrium
 from .stepping import MECHANISM, Steps
 
 #: First step, and movement by which a structure has begun to move, in elastic gives.
@@ -99,7 +99,7 @@ class Path:
         if not (proved.bounds.exists and self._light_blocks_stand(start.pose)):
             motion = next((motion for _, motion, _ in self.falling.sinking(start)), self.steps.drag)
             yield self.reports.falling(start, motion * self.model.lengths, start.s)
-            return Ending(Status.NO_INITIAL_EQUILIBRIUM, self.reports.no_equilibrium(motion))
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(self.model.assembly, motion))
         if self.model.live is not None and not 0.0 < proved.bounds.high < np.inf:
             if proved.bounds.high > 0.0:
                 return Ending(

@@ -9,7 +9,7 @@ import numpy as np
 from solver.equilibrium import block_forces, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.program.admissible import admissible
+from solver.program.admissible import Admissible, admissible
 from solver.program.coulomb import solve_step
 from solver.program.model import Model
 from solver.program.step import NotSolved, Step
@@ -53,11 +53,32 @@ class Proofs:
             # Nothing has moved: what the first movement has to overcome, least reaction or largest multiplier.
             forces, multiplier = bounds.forces, bounds.high
         else:
-            # Where none near those of the path are found, those of the bounds are in equilibrium, too.
-            forces, multiplier = self._balanced(place, contacts, friction, remembered) or (bounds.forces, bounds.high)
+            near = self._balanced(place, contacts, friction, remembered)
+            forces, multiplier = near or self._between_bounds(place, contacts, bounds, remembered)
         if model.live is None:
-            multiplier = float((on_supports(model, contacts, place.pose, forces) * self.driver.rate(place.s)).sum())
+            multiplier = self._reaction(place, contacts, forces)
         return Proved(place, contacts, friction, bounds, forces, multiplier)
+
+    def _reaction(self, place: Place, contacts: Contacts, forces: np.ndarray) -> float:
+        return float((on_supports(self.model, contacts, place.pose, forces) * self.driver.rate(place.s)).sum())
+
+    def _between_bounds(
+        self, place: Place, contacts: Contacts, bounds: Admissible, remembered: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        """Forces in equilibrium with the reaction, or the multiplier, of the path: a mean of those of the two bounds.
+
+        What lies between two equilibria within friction is one, too.
+        """
+        if bounds.others is None:
+            return bounds.forces, bounds.high
+        if self.model.live is None:
+            wanted, one, other = (
+                self._reaction(place, contacts, f) for f in (remembered, bounds.forces, bounds.others)
+            )
+        else:
+            wanted, one, other = place.multiplier, bounds.high, bounds.low
+        part = 0.0 if one == other else float(np.clip((wanted - one) / (other - one), 0.0, 1.0))
+        return (1.0 - part) * bounds.forces + part * bounds.others, (1.0 - part) * one + part * other
 
     def holds(self, proved: Proved | None) -> bool:
         """Whether equilibrium is possible there, under a live load with some of it."""

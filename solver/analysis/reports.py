@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.assembly import Assembly
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose, moved_vertices, relative_velocities
@@ -149,18 +150,6 @@ class Reports:
         blocks = blocks[assembly.free[blocks]]
         return f"the supports cannot move on: {len(blocks)} blocks are wedged ({self._named(blocks)})"
 
-    def no_equilibrium(self, motion: np.ndarray) -> str:
-        """Which blocks fall, and what to look for."""
-        assembly = self.model.assembly
-        size = np.abs(motion[:, : self.model.dimension]).max(axis=1)
-        falling = np.flatnonzero(assembly.free & (size > 0.5 * size.max()))
-        shown = ", ".join(f"'{assembly.names[i]}'" for i in falling[:8])
-        more = f" and {len(falling) - 8} more" if len(falling) > 8 else ""
-        return (
-            f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
-            f"({shown}{more}); look for gaps between blocks (joint_thickness), a missing support or too little friction"
-        )
-
     def no_step(self, reason: str) -> str:
         """Where, and what to do."""
         return (
@@ -181,3 +170,22 @@ class Reports:
         shown = ", ".join(f"'{self.model.assembly.names[i]}'" for i in blocks[:NAMED])
         more = f" and {len(blocks) - NAMED} more" if len(blocks) > NAMED else ""
         return f"block{'' if len(blocks) == 1 else 's'} {shown}{more}"
+
+
+def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
+    """Which blocks fall before any settlement, and what to look for.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    motion : (n_blocks, n_dof) array
+        Of the fall.
+    """
+    size = np.abs(motion[:, : assembly.dimension]).max(axis=1)
+    falling = np.flatnonzero(assembly.free & (size > 0.5 * size.max()))
+    shown = ", ".join(f"'{assembly.names[i]}'" for i in falling[:8])
+    more = f" and {len(falling) - 8} more" if len(falling) > 8 else ""
+    return (
+        f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
+        f"({shown}{more}); look for gaps between blocks (joint_thickness), a missing support or too little friction"
+    )

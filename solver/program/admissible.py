@@ -40,6 +40,8 @@ class Admissible:
     programs : int
     forces : (n_contacts, d) array
         Normal and shear forces of the least reaction or largest multiplier, in units of the program.
+    others : (n_contacts, d) array, optional
+        Those of the other bound, where there is one.
     """
 
     unbalanced: float
@@ -48,6 +50,7 @@ class Admissible:
     gap: float
     programs: int
     forces: np.ndarray
+    others: np.ndarray | None = None
 
     @property
     def exists(self) -> bool:
@@ -142,7 +145,7 @@ def admissible(
     out = {k: float(s.x[n : n + 2 * rows].sum()) / model.total_load for k, s in found.items() if s is not None}
     unbalanced = min(out.values(), default=np.inf)
     programs, values, gaps = 2, [], [0.0]
-    forces = np.zeros(d * len(contacts))
+    forces, others = np.zeros((len(contacts), d)), None
     for sign, solution in found.items():
         balanced = objective
         if solution is not None and out[sign] > FALLING_FRACTION >= unbalanced:
@@ -154,11 +157,11 @@ def admissible(
             continue
         values.append(float(balanced @ solution.x) * unit)
         gaps.append(solution.gap)
-        if sign == with_forces:
-            forces = rays @ solution.x[:n]
+        carried = (rays @ solution.x[:n]).reshape(-1, d)
+        forces, others = (carried, others) if sign == with_forces else (forces, carried)
     # Where both run away, forces without limit balance everything.
     return Admissible(
-        0.0 if np.isinf(unbalanced) else unbalanced, values[0], values[1], max(gaps), programs, forces.reshape(-1, d)
+        0.0 if np.isinf(unbalanced) else unbalanced, values[0], values[1], max(gaps), programs, forces, others
     )
 
 
