@@ -20,6 +20,12 @@ _RUN = sys.modules[blockvis.run_case.__module__]
 _DRAW_RESULTS, _STARTED_FILM = _RUN.draw_results, _RUN.started_film
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """End the run where a worker dies: its replacement can keep the others waiting without end (pytest-xdist 3.8)."""
+    if getattr(config.option, "maxworkerrestart", "absent") is None:
+        config.option.maxworkerrestart = "0"
+
+
 @pytest.fixture(scope="session", autouse=True)
 def undrawn() -> Iterator[None]:
     """Runs write no pictures and no report: most tests look at numbers, and pictures take longer than the solution."""
