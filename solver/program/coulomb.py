@@ -43,9 +43,10 @@ ITERATIONS, FRACTION, FRACTION_IN_SPACE = 60, 0.99, 0.9
 #: one's root.
 BALANCE, EQUATIONS, PRODUCT = 1e-9, 1e-8, 1e-9
 
-#: Balance, and mean product of force and distance, in block weights and sizes, at which a solution that converges no
-#: further counts: forces that are reported are balanced once more.
-BALANCE_LEFT, PRODUCT_LEFT = 1e-8, 1e-9
+#: Balance, the linear equations as above, and mean product of force and distance, in block weights and sizes, at which
+#: a solution that converges no further counts: forces that are reported are balanced once more, and the geometry is
+#: measured anew.
+BALANCE_LEFT, EQUATIONS_LEFT, PRODUCT_LEFT = 1e-7, 1e-6, 1e-9
 
 #: Start: least forces in mean block weights, least distances in parts of a step and an elastic give.
 FIRST_FORCE, FIRST_DISTANCE = 0.1, 0.3
@@ -72,8 +73,9 @@ STATES, STATE_CHANGES = 1e-9, 12
 STATES_SEEN, AGAIN = 1e-3, 100.0
 
 #: Where the central path is lost, a step is solved by parts: the first of them, by how much a part becomes shorter
-#: where its path is lost, too, and the least.
-FIRST_PART, SHORTER, LEAST_PART = 0.25, 4.0, 0.004
+#: where its path is lost, too, the least, and how many of those there may be: where a structure jumps, no part is short
+#: enough, and a smaller step of the supports, for which the drag holds, costs less.
+FIRST_PART, SHORTER, LEAST_PART, LEAST_PARTS = 0.25, 4.0, 0.004, 12
 
 #: Nearest that a point comes to the boundary of its cone, squared, as a part of its axis: keeps the scaling finite.
 INSIDE = 1e-20
@@ -137,7 +139,7 @@ def _continued(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float
     live = 0.0 if step.live is None else multiplier * step.live
     unbalanced = step.load + live + pattern.to_blocks @ paired(step.normal, step.shear) - step.drag * gone
     near = _unmoved(step, multiplier)
-    gap, gone_by, part = near.distances[0], 0.0, FIRST_PART
+    gap, gone_by, part, least_parts = near.distances[0], 0.0, FIRST_PART, 0
     while gone_by < 1.0:
         to = min(gone_by + part, 1.0)
         now = replace(
@@ -152,6 +154,9 @@ def _continued(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float
             part /= SHORTER
             continue
         if found is None:
+            least_parts += 1
+            if least_parts > LEAST_PARTS:
+                raise NotSolved(f"no short parts lead beyond {gone_by:.3f} of the step")
             least = FIRST_DISTANCE * (step.size * (to - gone_by) + step.give[1])
             start = (
                 _within(near.forces[0], near.forces[1:], FIRST_FORCE),
@@ -369,7 +374,7 @@ def _followed(
         motion, multiplier = motion + part * change.motion, multiplier + part * change.multiplier
         gap, slip = gap + part * change.relative[0], slip + part * change.relative[1:]
         forces, distances = forces + part * change.forces, distances + part * change.distances
-    if out < BALANCE_LEFT and wrong < EQUATIONS * scale and mean < PRODUCT_LEFT:
+    if out < BALANCE_LEFT and wrong < EQUATIONS_LEFT * scale and mean < PRODUCT_LEFT:
         # Points that neither carry nor are open converge slowly: by their states at once, or as they are.
         return _in_states(step, pattern, gone, here) or here
     raise NotSolved(f"balance {out:.1e}, distances {wrong:.1e}, product {mean:.1e} after {iteration} iterations")
