@@ -94,13 +94,35 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
             "export one file or one named object per block (.obj, .glb, .step)"
         )
     # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.
-    inverse = inverse.ravel().reshape(-1, 3)
-    return _pieces(name, points, faces, components(list(inverse), len(unique)))
+    edge = inverse.ravel().reshape(-1, 3)
+    piece = components(list(edge), len(unique))
+    return _pieces(name, points, _seen_from_outside(points, faces, edge, piece), piece)
 
 
 def _pieces(name: str, points: np.ndarray, faces: np.ndarray, piece: np.ndarray) -> list[Body]:
     n = int(piece.max()) + 1
     return [Body(name if n == 1 else f"{name} {k + 1}", points, faces[piece == k]) for k in range(n)]
+
+
+def _seen_from_outside(points: np.ndarray, faces: np.ndarray, edge: np.ndarray, piece: np.ndarray) -> np.ndarray:
+    """(m, 3) int array: the faces of closed pieces, all seen counter-clockwise from outside whatever the file has.
+
+    Two faces see their edge in opposite senses. Each face is there twice, as it is and turned round, and goes with the
+    one of each neighbour that fits: of a piece that encloses something there are two sets, and one is taken.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    m = len(faces)
+    first, second = edge.ravel().argsort(kind="stable").reshape(-1, 2).T
+    forward = (faces < np.roll(faces, -1, axis=1)).ravel()
+    fits = forward[first] != forward[second]
+    one, other = first // 3, second // 3
+    rows, columns = np.append(one, one + m), np.append(other + m * ~fits, other + m * fits)
+    label = connected_components(coo_matrix((np.ones(2 * len(one)), (rows, columns)), shape=(2 * m, 2 * m)))[1]
+    faces = np.where((label[:m] > label[m:])[:, None], faces[:, ::-1], faces)
+    inside_out = np.bincount(piece, _volumes(points, faces)) < 0.0
+    return np.where(inside_out[piece][:, None], faces[:, ::-1], faces)
 
 
 def _touching_bodies(points: np.ndarray, faces: np.ndarray) -> np.ndarray | None:

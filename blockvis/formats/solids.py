@@ -37,7 +37,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         scene = trimesh.load_scene(str(path), process=False, **options)
         parts = [
             (str(name), np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
-            for name, mesh in _placed(scene)
+            for name, mesh in _placed(scene, path)
             if len(mesh.faces)
         ]
         parts = _numbered(parts, scene) if suffix == ".ply" else parts
@@ -73,36 +73,50 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         by_name = {row.get("name"): row for row in rows}
         rows = [by_name[body.name] for body in bodies] if {body.name for body in bodies} == set(by_name) else []
     if suffix == ".glb":
-        found = [mesh.metadata.get("blockvis") for _, mesh in _placed(scene) if len(mesh.faces)]
+        found = [mesh.metadata.get("blockvis") for _, mesh in _placed(scene, path) if len(mesh.faces)]
         rows = found if len(found) == len(bodies) and all(isinstance(row, dict) for row in found) else []
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
     up, says = _up(path) if suffix == ".glb" else ("z", "")
     return Bodies(tuple(bodies), tuple(known), unit, up=up, up_says=says)
 
 
-def _up(path: Path) -> tuple[str, str]:
-    """Find the coordinate that points up in a .glb file: y, as the format has it, but of programs that write z."""
+def _description(path: Path) -> dict[str, Any]:
+    """Read what a .glb file says about itself; empty where it is no JSON."""
     with path.open("rb") as stream:
         head = stream.read(20)
         content = stream.read(min(int.from_bytes(head[12:16], "little"), LARGEST_HEADER))
     try:
-        generator = str(json.loads(content).get("asset", {}).get("generator", ""))
-    except (ValueError, AttributeError):
+        found = json.loads(content)
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _up(path: Path) -> tuple[str, str]:
+    """Find the coordinate that points up in a .glb file: y, as the format has it, but of programs that write z."""
+    try:
+        generator = str(_description(path).get("asset", {}).get("generator", ""))
+    except AttributeError:
         generator = ""
     if any(word in generator.lower() for word in Z_IS_UP):
         return "z", ""
     return "y", f"y is up in .glb files{f' ({generator})' if generator else ''}"
 
 
-def _placed(scene: Any) -> list[tuple[str, Any]]:
-    """Meshes of a scene with its transforms applied, and their names."""
-    found = []
+def _placed(scene: Any, path: Path) -> list[tuple[str, Any]]:
+    """Meshes of a scene with its transforms applied, and their names.
+
+    In a .glb file the node has the name of the stone: several nodes may place one mesh.
+    """
+    nodes = _description(path).get("nodes", []) if path.suffix.lower() == ".glb" else []
+    number = {node["name"]: k for k, node in enumerate(nodes) if isinstance(node, dict) and "name" in node}
     order = {name: k for k, name in enumerate(scene.geometry)}
     placed = [(*scene.graph[node], str(node)) for node in scene.graph.nodes_geometry]
-    for transform, name, _node in sorted(placed, key=lambda item: (order[item[1]], item[2])):
+    found = []
+    for transform, name, node in sorted(placed, key=lambda item: (order[item[1]], number.get(item[2], -1), item[2])):
         mesh = scene.geometry[name]
         if hasattr(mesh, "faces"):
-            found.append((str(name), mesh.copy().apply_transform(transform)))
+            found.append((node if node in number else str(name), mesh.copy().apply_transform(transform)))
     return found
 
 

@@ -202,3 +202,47 @@ def test_damaged_layouts_are_refused_by_name(change, reason, tmp_path):
     (tmp_path / "a.json").write_text(json.dumps({"format": "blockvis layout", "blocks": [block]}), encoding="utf-8")
     with pytest.raises(ValueError, match=reason):
         read(tmp_path / "a.json")
+
+
+def test_nodes_of_a_glb_file_name_the_stones_that_share_a_mesh(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    box = trimesh.creation.box((1.0, 1.0, 1.0))
+    scene = trimesh.Scene({"Cube": box})
+    scene.graph.clear()
+    for level, name in enumerate(("support base", "lower", "upper")):
+        place = trimesh.transformations.translation_matrix((0.0, 0.0, level))
+        scene.graph.update(frame_to=name, matrix=place, geometry="Cube")
+    scene.export(tmp_path / "tower.glb")
+    found = read(tmp_path / "tower.glb", dimension=3)
+    assert {name: z for name, (_, _, z) in zip(found.names, found.centroids.round(6).tolist(), strict=True)} == {
+        "support base": 0.0, "lower": 1.0, "upper": 2.0,
+    }  # fmt: skip
+    assert found.roles[found.index("support base")] == "fixed"
+
+
+@pytest.mark.parametrize("turned", [[0], [0, 3, 7], [1, 2, 4, 5, 8, 11], list(range(12))])
+def test_triangles_of_a_stone_may_be_seen_from_either_side(tmp_path, turned):
+    trimesh = pytest.importorskip("trimesh")
+    lower, upper = trimesh.creation.box((1.0, 2.0, 0.5)), trimesh.creation.box((1.0, 2.0, 0.5))
+    upper.apply_translation((0.0, 0.0, 0.5))
+    faces = upper.faces.copy()
+    faces[turned] = faces[turned, ::-1]
+    upper = trimesh.Trimesh(upper.vertices, faces, process=False)
+    trimesh.Scene({"lower": lower, "upper": upper}).export(tmp_path / "tower.obj")
+    layout = read_layout(tmp_path / "tower.obj", dimension=3)
+    assert layout.volumes == pytest.approx([1.0, 1.0])
+    assert read(tmp_path / "tower.obj", roles={"lower": "fixed"}, dimension=3).shapes.volumes == pytest.approx(
+        [1.0, 1.0]
+    )
+
+
+def test_of_two_copies_that_with_a_role_stays(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    low, high = trimesh.creation.box((1.0, 1.0, 1.0)), trimesh.creation.box((1.0, 1.0, 1.0))
+    high.apply_translation((0.0, 0.0, 1.0))
+    trimesh.Scene({"copy": low, "base": low.copy(), "stone": high}).export(tmp_path / "tower.obj")
+    with pytest.warns(UserWarning, match="1 of 3 blocks are drawn twice and were dropped: 'copy' = 'base'"):
+        found = read(tmp_path / "tower.obj", roles={"base": "fixed"}, dimension=3)
+    assert sorted(found.names) == ["base", "stone"]
+    with pytest.warns(UserWarning, match="'base' = 'copy'|'copy' = 'base'"):
+        assert read(tmp_path / "tower.obj", dimension=3).n_blocks == 2
