@@ -15,7 +15,7 @@ from .assemble_solids import assemble_solids
 from .inspect_solids import inspected_solids
 from .layout import AnyLayout, Layout
 from .repair import duplicates, repaired
-from .roles import checked_role, roles_of
+from .roles import checked_role, dropped_twins, roles_of, twins_note
 from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
 from .solid_layout import SolidLayout
@@ -91,13 +91,9 @@ def assemble(
     n_drawn = layout.n_blocks
     twins = duplicates(layout.outlines)
     if twins:
-        later = {copy for _, copy in twins}
-        listed = ", ".join(f"'{layout.names[copy]}' = '{layout.names[first]}'" for first, copy in twins[:20])
-        more = f" and {len(twins) - 20} more" if len(twins) > 20 else ""
-        warnings.warn(
-            f"{len(twins)} of {n_drawn} blocks are drawn twice and were dropped: {listed}{more}", stacklevel=2
-        )
-        layout = layout.chosen([i for i in range(n_drawn) if i not in later])
+        dropped = dropped_twins(layout, twins, roles or {})
+        warnings.warn(twins_note(layout, twins, dropped), stacklevel=2)
+        layout = layout.chosen([i for i in range(n_drawn) if i not in dropped])
         n_drawn = layout.n_blocks
     tolerance = default_tolerance(layout.outlines) if outline_tolerance is None else float(outline_tolerance)
     if not (np.isfinite(tolerance) and tolerance >= 0):

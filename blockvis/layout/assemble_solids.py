@@ -13,7 +13,7 @@ import solver
 
 from .faces import width_of
 from .facing import DEFAULT_FACING, faced
-from .roles import checked_role, roles_of
+from .roles import checked_role, dropped_twins, roles_of, twins_note
 from .solid_layout import SolidLayout
 from .solids import Solid, prism
 
@@ -64,13 +64,9 @@ def assemble_solids(
             warnings.warn(f"{layout.source or 'layout'}: {note}", stacklevel=2)
     twins = solid_duplicates(layout.solids)
     if twins:
-        later = {copy for _, copy in twins}
-        listed = ", ".join(f"'{layout.names[copy]}' = '{layout.names[first]}'" for first, copy in twins[:20])
-        more = f" and {len(twins) - 20} more" if len(twins) > 20 else ""
-        warnings.warn(
-            f"{len(twins)} of {layout.n_blocks} blocks are drawn twice and were dropped: {listed}{more}", stacklevel=2
-        )
-        layout = layout.chosen([i for i in range(layout.n_blocks) if i not in later])
+        dropped = dropped_twins(layout, twins, roles or {})
+        warnings.warn(twins_note(layout, twins, dropped), stacklevel=2)
+        layout = layout.chosen([i for i in range(layout.n_blocks) if i not in dropped])
     n_drawn = layout.n_blocks
     layout = _with_supports(layout, supports)
     width = float(np.median([width_of(*solid) for solid in layout.solids[:n_drawn]]))

@@ -13,7 +13,7 @@ from .joints.close import Proposal, proposed
 from .joints.facing_edges import Facing
 from .layout import Layout
 from .repair import DEFAULT_OVERLAP, ROUNDING, duplicates, overlaps
-from .roles import roles_of
+from .roles import dropped_twins, roles_of
 from .simplify import default_tolerance, simplified
 
 #: Classes of joint thickness in the report.
@@ -154,8 +154,8 @@ def inspected(layout: Layout) -> Inspection:
     Inspection
     """
     twins = duplicates(layout.outlines)
-    later = {copy for _, copy in twins}
-    kept = np.array([i for i in range(layout.n_blocks) if i not in later])
+    dropped = dropped_twins(layout, twins, {})
+    kept = np.array([i for i in range(layout.n_blocks) if i not in dropped])
     assembly = solver.Assembly.from_outlines([layout.outlines[i] for i in kept], names=[layout.names[i] for i in kept])
     width = float(np.median(assembly.widths))
     found = overlaps(assembly, ROUNDING * width)

@@ -14,7 +14,7 @@ import solver
 from .assemble_solids import solid_duplicates
 from .faces import width_of
 from .facing import DEFAULT_FACING, Facing, faced
-from .roles import roles_of
+from .roles import dropped_twins, roles_of
 from .solid_layout import SolidLayout
 from .solids import size_of
 
@@ -149,8 +149,8 @@ def inspected_solids(layout: SolidLayout) -> SolidInspection:
         As read, duplicates included.
     """
     twins = solid_duplicates(layout.solids)
-    later = {copy for _, copy in twins}
-    kept = np.array([i for i in range(layout.n_blocks) if i not in later])
+    dropped = dropped_twins(layout, twins, {})
+    kept = np.array([i for i in range(layout.n_blocks) if i not in dropped])
     some = layout.chosen(kept)
     facing = faced(some.solids, some.names)
     overlapping: list[tuple[int, int, float]] = []

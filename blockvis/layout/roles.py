@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import solver
 from blockvis.suggestions import by_similarity
@@ -18,8 +18,11 @@ def checked_role(role: str, whose: str) -> str:
     return role
 
 
-def roles_of(layout: AnyLayout, roles: Mapping[str, str]) -> list[str]:
-    """Role of every block: the caller's, else the file's, else its group or name if that is a role, else free."""
+def roles_of(layout: AnyLayout, roles: Mapping[str, str], *, all_match: bool = True) -> list[str]:
+    """Role of every block: the caller's, else the file's, else its group or name if that is a role, else free.
+
+    Keys that match no block are refused, or left out where some blocks are still to come.
+    """
     found = []
     for name, group, role in zip(layout.names, layout.groups, layout.roles, strict=True):
         said = (role, group.strip().lower(), name.strip().lower())
@@ -41,13 +44,35 @@ def roles_of(layout: AnyLayout, roles: Mapping[str, str]) -> list[str]:
                 for i in range(layout.n_blocks)
                 if any(values[i] and fnmatch.fnmatchcase(values[i], key) for values in labels.values())
             ]
-            if not hits:
+            if not hits and all_match:
                 raise ValueError(_unmatched(key, layout))
             by_pattern.append((hits, role))
     for hits, role in by_pattern + by_group + by_name:
         for i in hits:
             found[i] = role
     return found
+
+
+def dropped_twins(layout: AnyLayout, twins: Sequence[tuple[int, int]], roles: Mapping[str, str]) -> set[int]:
+    """Which of two blocks that are drawn in the same place goes: the later, or the first where only the later holds.
+
+    Parameters
+    ----------
+    layout : Layout or SolidLayout
+    twins : sequence of (int, int)
+        The first and its later copy.
+    roles : mapping of str to {"free", "fixed", "moving"}
+    """
+    said = roles_of(layout, roles, all_match=False)
+    return {first if said[first] == solver.FREE != said[copy] else copy for first, copy in twins}
+
+
+def twins_note(layout: AnyLayout, twins: Sequence[tuple[int, int]], dropped: set[int]) -> str:
+    """Say which blocks were dropped, and in favour of which."""
+    pairs = [(k, i if k == j else j) for i, j in twins for k in (j if j in dropped else i,)]
+    listed = ", ".join(f"'{layout.names[gone]}' = '{layout.names[kept]}'" for gone, kept in pairs[:20])
+    more = f" and {len(twins) - 20} more" if len(twins) > 20 else ""
+    return f"{len(twins)} of {layout.n_blocks} blocks are drawn twice and were dropped: {listed}{more}"
 
 
 def _unmatched(key: str, layout: AnyLayout) -> str:
