@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 import solver
@@ -17,6 +19,32 @@ FAILED_BADGE = "SOLVER FAILED"
 #: Multipliers above this many times the lowest of an envelope are not shown: over a support a load may grow nearly
 #: without limit.
 MOST_OVER_LOWEST = 8.0
+
+
+def in_one_unit(response: solver.Response, phase: int | None = None) -> solver.Response:
+    """Leave out the phases that another unit parts from a given one: distances and rotations share no axis.
+
+    Parameters
+    ----------
+    response : solver.Response
+    phase : int, optional
+        The last with an increment by default.
+    """
+    units = [settlement.unit for settlement in response.settlements]
+    if len(set(units)) < 2 or not response.increments:
+        return response
+    phase = min(response.increments[-1].phase if phase is None else phase, len(units) - 1)
+    first = last = phase
+    while first > 0 and units[first - 1] == units[phase]:
+        first -= 1
+    while last < len(units) - 1 and units[last + 1] == units[phase]:
+        last += 1
+    return replace(
+        response,
+        increments=tuple(i for i in response.increments if first <= i.phase <= last),
+        parameter=solver.settlement_in(units[phase]),
+        measured=solver.reaction_to(units[phase]),
+    )
 
 
 def parameter_unit(response: solver.Response) -> tuple[float, str]:
@@ -112,6 +140,7 @@ def state_text(increment: solver.Increment, response: solver.Response) -> str:
     increment : solver.Increment
     response : solver.Response
     """
+    response = in_one_unit(response, increment.phase)
     place = parameter_text(increment.parameter, response)
     if response.parameter.is_path:
         text = f"{response.parameter.name.capitalize()} {place}"
@@ -127,8 +156,7 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
     measured = response.measured
     name = measured.name.capitalize()
     if measured.is_force:
-        phase = min(increment.phase, len(response.settlements) - 1)
-        moment = response.settlements[phase].unit == "rad" if response.settlements else measured.unit == "N·m"
+        moment = measured.unit == "N·m"
         text = f"{name} {force_text(increment.measured, moment)}"
         return text if moment else f"{text} = {increment.measured / response.total_weight:.4f} W"
     if not np.isfinite(increment.measured):
@@ -155,9 +183,9 @@ def failure_text(response: solver.Response) -> str:
     """Say where the solver failed and why; empty where it did not."""
     if response.stop is not solver.Status.SOLVER_FAILED:
         return ""
-    where = ""
-    if response.path and response.parameter.is_path:
-        where = f" after {response.parameter.name} {parameter_text(response.path[-1].parameter, response)}"
+    where, here = "", in_one_unit(response)
+    if here.path and here.parameter.is_path:
+        where = f" after {here.parameter.name} {parameter_text(here.path[-1].parameter, here)}"
     return f"The solver failed{where}: {response.message}" if response.message else f"The solver failed{where}"
 
 

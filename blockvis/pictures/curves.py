@@ -22,6 +22,7 @@ from . import palette
 from .captions import (
     collapse_places,
     force_unit,
+    in_one_unit,
     lost_text,
     parameter_label,
     parameter_text,
@@ -78,13 +79,16 @@ def draw_curve(
     -------
     pathlib.Path
     """
-    path = Path(path)
+    path, name = Path(path), about(response).name
+    if in_one_unit(response) is not response:
+        response = in_one_unit(response)
+        name += f"   ·   phase {response.path[-1].phase + 1} of {len(response.settlements)}" if response.path else ""
     if path.suffix.lower() not in CURVE_SUFFIXES:
         raise ValueError(f"'{path.name}' is no curve that blockvis draws; end its name in {', '.join(CURVE_SUFFIXES)}")
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.add_subplot()
     _draw(axes, response, events=True)
-    axes.set_title(about(response).name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK))
+    axes.set_title(name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK))
     with whole_file(path) as partial:
         figure.savefig(partial, dpi=200)
     return path
@@ -126,6 +130,7 @@ class CurvePanel:
     """
 
     def __init__(self, response: solver.Response, size: tuple[int, int], text: int) -> None:
+        response = in_one_unit(response)
         self._response, self._text = response, text
         figure = Figure(figsize=(size[0] / 100.0, size[1] / 100.0), dpi=100, layout="constrained")
         canvas = FigureCanvasAgg(figure)
@@ -147,7 +152,8 @@ class CurvePanel:
     def image(self, increment: solver.Increment) -> Image.Image:
         """Return the curve with the dot at an increment; at the end of the curve during the fall."""
         picture = self._picture.copy()
-        if len(self._total) == 0:
+        # Phases in another unit are not on the curve.
+        if len(self._total) == 0 or (self._response.settlements and increment.phase not in self._offsets):
             return picture
         falling = increment.status == solver.Status.FALLING
         at = self._offsets.get(increment.phase, 0.0) + increment.parameter
@@ -163,7 +169,7 @@ class CurvePanel:
 def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = TEXT) -> None:
     path = response.path
     factor, _ = force_unit(response)
-    moment = any(s.unit == "rad" for s in response.settlements) or response.measured.unit == "N·m"
+    moment = response.measured.unit == "N·m"
     per_length, _ = parameter_unit(response)
     total = response.parameters * per_length
     values = response.values / factor

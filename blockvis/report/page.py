@@ -35,6 +35,7 @@ from blockvis.pictures.captions import (
     collapse_places,
     failure_text,
     force_unit,
+    in_one_unit,
     parameter_label,
     parameter_unit,
     shown_range,
@@ -444,6 +445,7 @@ def _times(shown: list[_Frame]) -> list[float]:
 
 
 def _curve(response: solver.Response) -> dict[str, Any]:
+    before, response = len(response.path), in_one_unit(response)
     per_length, _ = parameter_unit(response)
     factor, _ = force_unit(response)
     x = response.parameters * per_length
@@ -459,6 +461,8 @@ def _curve(response: solver.Response) -> dict[str, Any]:
         return [float(f"{t:.6g}") for t in MaxNLocator(n).tick_values(low, high) if low <= t <= high]
 
     return {
+        # Frames before this one are of phases in another unit.
+        "first": before - len(response.path) if len(response.settlements) > 1 else 0,
         "settlement": [float(f"{v:.7g}") for v in x],
         "reaction": [float(f"{v:.7g}") if np.isfinite(v) else None for v in y],
         "collapse": collapse,

@@ -196,10 +196,10 @@
       pen.strokeStyle = model.colours.warning; pen.lineWidth = 1; pen.setLineDash([5, 4]);
       pen.beginPath(); pen.moveTo(X(c.collapse), top); pen.lineTo(X(c.collapse), h - bottom); pen.stroke(); pen.setLineDash([]);
     }
-    const at = Math.min(model.frames[k].curve, c.settlement.length - 1);
+    const at = Math.min(model.frames[k].curve - c.first, c.settlement.length - 1);
     pen.fillStyle = model.frames[k].falling ? model.colours.warning : model.colours.settlement;
     pen.beginPath();
-    if (c.reaction[at] !== null && c.reaction[at] <= yHigh) pen.arc(c.single ? X(model.frames[k].falling ? 0.5 : 0) : X(c.settlement[at]), Y(c.reaction[at]), 5.5, 0, 2 * Math.PI);
+    if (at >= 0 && c.reaction[at] !== null && c.reaction[at] <= yHigh) pen.arc(c.single ? X(model.frames[k].falling ? 0.5 : 0) : X(c.settlement[at]), Y(c.reaction[at]), 5.5, 0, 2 * Math.PI);
     pen.fill();
     state.curveX = c.single ? null : X;
   }
@@ -341,7 +341,8 @@
     if (!state.curveX) return;
     let best = 0, nearest = Infinity;
     model.frames.forEach((f, k) => {
-      const d = f.falling ? Infinity : Math.abs(state.curveX(model.curve.settlement[Math.min(f.curve, model.curve.settlement.length - 1)]) - e.offsetX);
+      const at = Math.min(f.curve - model.curve.first, model.curve.settlement.length - 1);
+      const d = f.falling || at < 0 ? Infinity : Math.abs(state.curveX(model.curve.settlement[at]) - e.offsetX);
       if (d < nearest) { nearest = d; best = k; }
     });
     stop(); show(best);

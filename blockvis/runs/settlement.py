@@ -70,31 +70,36 @@ class SettlementKind(AnalysisKind):
 
     def lines(self, response: solver.Response) -> list[str]:
         """Give the first and last reaction, and the settlement at collapse."""
-        path, weight, unit = response.path, response.total_weight, response.settlements[-1].unit
+        path, weight = response.path, response.total_weight
+
+        def reaction(value: float, increment: solver.Increment) -> str:
+            if _is_moment(response, increment):
+                return f"{value:12.6g} N·m"
+            return f"{value:12.6g} N   {value / weight:.6f} W"
+
         lines = []
         if _method(response) == LINEAR_PROGRAM:
             lines.append("increments by linear program: reactions are the least that equilibrium allows")
         if path:
-            lines.append(f"first reaction       {path[0].reaction:12.6g} N   {path[0].reaction / weight:.6f} W")
+            lines.append(f"first reaction       {reaction(path[0].reaction, path[0])}")
             onset = path[0].onset
             if abs(onset - path[0].reaction) > NOTABLE * weight:
                 lines[-1] += "   the least that equilibrium allows"
-                lines.append(
-                    f"reaction at onset    {onset:12.6g} N   {onset / weight:.6f} W   where friction leaves it"
-                )
+                lines.append(f"reaction at onset    {reaction(onset, path[0])}   where friction leaves it")
         if response.collapse is not None:
             low, high = response.collapse.bracket
-            last, at = response.collapse.reaction, response.collapse.displacement
+            at = response.collapse.displacement
             lines += [
-                f"last reaction        {last:12.6g} N   {last / weight:.6f} W",
-                f"collapse displacement{at:12.6g} {unit}   between {low:.6g} and {high:.6g}",
+                f"last reaction        {reaction(response.collapse.reaction, path[-1])}",
+                f"collapse displacement{at:12.6g} {response.collapse.unit}   between {low:.6g} and {high:.6g}",
                 f"mechanism: {mechanism_text(response)}",
             ]
             loss = loss_of(response)
             lines += [] if loss is None else [str(loss)]
         elif len(path) > 1:
-            lines.append(f"last reaction        {path[-1].reaction:12.6g} N   {path[-1].reaction / weight:.6f} W")
-            lines.append(f"last settlement      {path[-1].parameter:12.6g} {unit}")
+            last = path[-1]
+            lines.append(f"last reaction        {reaction(last.reaction, last)}")
+            lines.append(f"last settlement      {last.parameter:12.6g} {response.settlements[last.phase].unit}")
         return lines
 
     def title(self, response: solver.Response) -> str:
@@ -112,9 +117,9 @@ class SettlementKind(AnalysisKind):
     def rows(self, response: solver.Response) -> list[tuple[str, str]]:
         """Give the settlement at collapse, first and last reaction."""
         path, weight, c = response.path, response.total_weight, response.collapse
-        moment = response.parameter.unit == "rad"
 
-        def reaction(value: float) -> str:
+        def reaction(increment: solver.Increment) -> str:
+            value, moment = increment.reaction, _is_moment(response, increment)
             over = "" if moment or weight <= 0 else f" = {value / weight:.4f} W"
             return force_text(value, moment) + over
 
@@ -123,8 +128,8 @@ class SettlementKind(AnalysisKind):
             rows.append(("collapse displacement", f"{c.displacement:.6g} {c.unit}"))
             rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))
         if path:
-            rows.append(("first reaction", reaction(path[0].reaction)))
-            rows.append(("last reaction", reaction(path[-1].reaction)))
+            rows.append(("first reaction", reaction(path[0])))
+            rows.append(("last reaction", reaction(path[-1])))
         return rows
 
 
@@ -140,6 +145,11 @@ def stored_settlements(summary: Mapping[str, Any]) -> tuple[solver.Settlement, .
     for motion in motions:
         motion["blocks"] = None if motion["blocks"] is None else tuple(motion["blocks"])
     return tuple(solver.Settlement(**motion) for motion in motions)
+
+
+def _is_moment(response: solver.Response, increment: solver.Increment) -> bool:
+    """Whether the supports rotate in the phase of an increment: what resists them is a moment."""
+    return response.settlements[increment.phase].unit == "rad"
 
 
 def _method(response: solver.Response) -> str | None:

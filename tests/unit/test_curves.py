@@ -11,8 +11,9 @@ from structures import arch_response, parted, wall
 import blockvis
 import solver
 from blockvis.pictures import curves, palette
-from blockvis.pictures.captions import parameter_text
+from blockvis.pictures.captions import parameter_text, state_text
 from blockvis.pictures.curves import CurvePanel, Event, draw_curve, events_of
+from blockvis.runs.kinds import KINDS
 
 
 def test_png_has_a_curve_and_the_collapse(tmp_path):
@@ -105,3 +106,31 @@ def test_the_dot_moves_along_the_panel():
     start, end = dot(response.path[0]), dot(response.path[-1])
     assert end[0] > start[0] + 100
     assert end[1] < start[1]
+
+
+def test_phases_in_other_units_share_no_axis(tmp_path):
+    """A block on a support that sinks, then tilts until the block falls over its edge."""
+    assembly = solver.Assembly.from_outlines(
+        [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]],
+        names=["base", "block"],
+        roles=["moving", "free"],
+    )
+    sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.05, limit=0.1)
+    tilts = solver.Settlement(rotation_centre=(0.0, 0.0), rotation=-1.0, increment=0.1, limit=1.0)
+    response = solver.settle(assembly, (sinks, tilts), friction_coefficient=0.8)
+    assert response.collapse.displacement == pytest.approx(np.arctan(0.5), rel=1e-3)
+    told = said(response, tmp_path / "curve.svg")
+    assert {"settlement [rad]", "reaction [kN·m]"} <= set(told) or {"settlement [rad]", "reaction [N·m]"} <= set(told)
+    assert any(line.endswith("phase 2 of 2") for line in told)
+    assert "reaction / weight W" not in told
+    first, last = (state_text(increment, response) for increment in (response.path[1], response.path[-1]))
+    assert first.startswith(("Settlement 50.00 mm", "Settlement 0.0500 m"))
+    assert "1.0000 W" in first
+    assert re.fullmatch(r"Settlement 0\.463\d rad   ·   Reaction [\d.]+ k?N·m", last)
+    lines = KINDS["settlement"].lines(response)
+    assert any(re.fullmatch(r"first reaction +9810 N   1\.000000 W", line) for line in lines)
+    assert any(re.fullmatch(r"last reaction +[\d.]+ N·m", line) for line in lines)
+    panel = CurvePanel(response, (300, 200), 12)
+    blank = np.asarray(panel.image(response.path[1]))
+    assert (blank == np.asarray(panel._picture)).all(), "no dot for a phase that is not on the curve"
+    assert (np.asarray(panel.image(response.path[-1])) != blank).any()
