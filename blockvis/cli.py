@@ -37,6 +37,9 @@ EXIT_CODES = f"""exit codes:
   {NO_EQUILIBRIUM}    no initial equilibrium: the structure does not stand as drawn
   {INTERRUPTED}  interrupted by Ctrl-C; blockvis run --resume OUT goes on"""
 
+#: Pixels below which a picture has no room for its words.
+SMALLEST_PICTURE = 160
+
 #: What ``blockvis completion`` writes for, and where it goes.
 SHELLS = {
     "bash": "blockvis completion bash > ~/.local/share/bash-completion/completions/blockvis",
@@ -486,8 +489,7 @@ def _render(options: argparse.Namespace) -> int:
 
     folder = Path(options.results)
     response = open_results(folder)
-    width, _, height = options.size.partition("x")
-    size = (int(_number(width)), int(_number(height or "0")))
+    size = _size(options.size)
     fall = stored_fall(folder) or fall_of(response)
     write_report(response, folder / "report.html", stored_case(folder), fall=fall)
     drawn = ["report.html"]
@@ -525,6 +527,16 @@ def _new_file(path: str, force: bool) -> Path:
 
 def _dimension(options: argparse.Namespace) -> int | str:
     return "auto" if options.dimension == "auto" else int(options.dimension)
+
+
+def _size(text: str) -> tuple[int, int]:
+    """Read the size of pictures in pixels, as in 1280x720."""
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal() and min(int(width), int(height)) >= SMALLEST_PICTURE):
+        raise ValueError(
+            f"--size is '{text}'; give width and height in pixels, as in 1280x720, at least {SMALLEST_PICTURE} each"
+        )
+    return int(width), int(height)
 
 
 def _number(text: str) -> float:

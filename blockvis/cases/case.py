@@ -354,6 +354,13 @@ def _settlement(table: Table) -> tuple[solver.Settlement, Profile | None]:
         raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 
 
+def _pressure_direction(table: Table) -> tuple[float, float]:
+    given = table.vector("direction", (0.0, -1.0))
+    if len(given) != 2:
+        raise table.error("direction", "has three numbers; pressure is of blocks in the plane: in space give force")
+    return given[0], given[1]
+
+
 def _load(table: Table) -> LoadCase:
     given = set(table.values)
     load = LoadCase(
@@ -364,7 +371,7 @@ def _load(table: Table) -> LoadCase:
         point=table.vector("point"),
         moment=_moment(table),
         pressure=table.number("pressure"),
-        direction=table.pair("direction", (0.0, -1.0)),
+        direction=_pressure_direction(table),
         edge=table.whole("edge", 1),
         positions=_positions(table),
     )

@@ -150,11 +150,14 @@ def with_moving_load(
 
 
 def _chosen(load: LoadCase, assembly: solver.Assembly, where: str) -> np.ndarray:
-    chosen = [i for i, name in enumerate(assembly.names) if fnmatchcase(name, load.blocks)]
-    chosen = [i for i in chosen if assembly.free[i]]
+    named = [i for i, name in enumerate(assembly.names) if fnmatchcase(name, load.blocks)]
+    chosen = [i for i in named if assembly.free[i]]
+    if not chosen and named:
+        raise ValueError(f"{where} '{load.blocks}' matches supports only; loads act on free blocks: name one")
     if not chosen:
+        names = [name for name, free in zip(assembly.names, assembly.free, strict=True) if free]
         raise ValueError(
-            f"{where} '{load.blocks}' matches no free block{nearest(load.blocks, assembly.names)}; "
-            f"the layout has {', '.join(assembly.names[:12])}"
+            f"{where} '{load.blocks}' matches no free block{nearest(load.blocks, names)}; "
+            f"the layout has {', '.join(names[:12])}"
         )
     return np.array(chosen)

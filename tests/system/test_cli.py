@@ -286,3 +286,9 @@ def test_output_that_nobody_reads_to_its_end_is_no_error(case):
         ["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"], capture_output=True, text=True, check=False, cwd=ROOT
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("size", ["abc", "1280", "40x", "40x30", "-5x300"])
+def test_sizes_of_pictures_are_checked_before_anything_is_drawn(arch_results, capsys, size):
+    assert main(["render", str(arch_results), f"--size={size}"]) == 2
+    assert f"--size is '{size}'; give width and height in pixels" in capsys.readouterr().err
