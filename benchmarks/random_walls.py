@@ -92,7 +92,7 @@ def drawn(seed: int) -> RandomWall:
 
 
 def analysed(wall: RandomWall, analysis: str, *, parts: int = 1) -> solver.Response:
-    """The settlement of a part of the ground, or a push to the right with the weight, at the last brick of the top."""
+    """The settlement of a part of the ground, or a push to the right, where the limit load's mechanism moves most."""
     assembly = wall.assembly(settles=analysis == "settlement")
     limit, controls = INCREMENTS * wall.increment, solver.Controls(increments="coulomb", falling_frames=1)
     increment = wall.increment / parts
@@ -100,11 +100,13 @@ def analysed(wall: RandomWall, analysis: str, *, parts: int = 1) -> solver.Respo
         settlement = solver.Settlement(direction=wall.direction, increment=increment, limit=limit)
         return solver.settle(assembly, settlement, friction_coefficient=wall.friction, controls=controls)
     live = solver.weight_fraction(assembly, (1.0, 0.0), assembly.free)
-    top = max(np.flatnonzero(assembly.free), key=lambda i: tuple(np.round(assembly.centroids[i, ::-1], 9)))
+    loads = solver.Loads(solver.self_weight(assembly).dead, live)
+    begins = solver.limit_load(assembly, loads=loads, friction_coefficient=wall.friction).mechanism[:, 0].round(9)
+    control = assembly.names[int(begins.argmax())]
     return solver.pushover(
         assembly,
-        solver.ControlDisplacement(assembly.names[top], (1.0, 0.0), increment=increment, limit=limit),
-        loads=solver.Loads(solver.self_weight(assembly).dead, live),
+        solver.ControlDisplacement(control, (1.0, 0.0), increment=increment, limit=limit),
+        loads=loads,
         friction_coefficient=wall.friction,
         controls=controls,
     )

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from solver.lp.problem import LinearProgram, LPSolution, SolveError
-from solver.lp.solve import solve_lp
+from solver.lp.solve import CROSSOVER_ROWS, SIMPLEX_ROWS, VERTEX_ROUTES, solve_lp
 
 from .clarabel import run_clarabel
 from .cuts import run_cuts
@@ -88,7 +88,9 @@ def solve_between(
         As of :func:`solve_lp` and :func:`solve_cones`.
     """
     if len(friction) == 0:
-        return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper))
+        # Of limit loads: a vertex is one mechanism, an interior point a mean of several: fixed points wander from it.
+        routes = VERTEX_ROUTES if SIMPLEX_ROWS < matrix.shape[0] <= CROSSOVER_ROWS else None
+        return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper), routes)
     by_row, equal = sp.csr_array(matrix), lower == upper
     below, above = np.flatnonzero(~equal & np.isfinite(lower)), np.flatnonzero(~equal & np.isfinite(upper))
     rows = sp.vstack([by_row[equal], by_row[below], by_row[above]])

@@ -8,15 +8,21 @@ from .band import Diverges, NoProgress, interior_point
 from .highs import run_highs
 from .problem import LinearProgram, LPSolution, SolveError, checked, raise_if_proved
 
-#: Up to this many rows the simplex method is the fastest; up to the second number crossover from an interior solution
-#: to a vertex costs little, beyond it twenty times the program itself (measured on running-bond walls).
-SIMPLEX_ROWS, CROSSOVER_ROWS = 250, 1500
+#: Up to this many rows the simplex method is the fastest, and gives a vertex.
+SIMPLEX_ROWS = 250
+
+#: Up to this many rows crossover from an interior solution to a vertex may be asked for: it takes twenty times as long
+#: as the program itself (measured on running-bond walls), and more beyond.
+CROSSOVER_ROWS = 1500
 
 #: Our own way, for programs whose rows form a band.
 BAND = "band"
 
-#: The order for large programs, and for small ones that need no vertex.
+#: The order for all but the smallest programs, and for small ones that need no vertex.
 INTERIOR_ROUTES = (BAND, "hipo", "hipo without presolve", "ipx", "ipx with crossover", "simplex")
+
+#: The order for programs of which a vertex is wanted.
+VERTEX_ROUTES = ("hipo with crossover", "ipx with crossover", "simplex", "simplex without presolve")
 
 
 def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> LPSolution:
@@ -36,13 +42,8 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> L
         If no route gives a solution that passes; the message lists what each of them ended with.
     """
     if routes is None:
-        rows = program.matrix.shape[0]
-        if rows <= SIMPLEX_ROWS:
-            routes = ("simplex", "simplex without presolve", "ipx with crossover", "hipo")
-        elif rows <= CROSSOVER_ROWS:
-            routes = ("hipo with crossover", "ipx with crossover", "simplex", "simplex without presolve")
-        else:
-            routes = INTERIOR_ROUTES
+        small = program.matrix.shape[0] <= SIMPLEX_ROWS
+        routes = ("simplex", "simplex without presolve", "ipx with crossover", "hipo") if small else INTERIOR_ROUTES
     outcomes = []
     for route in routes:
         solution, status = _in_band(program) if route == BAND else run_highs(program, route)

@@ -9,7 +9,7 @@ import numpy as np
 from solver.assembly import Assembly
 from solver.interfaces import Interfaces
 from solver.kinematics import dimension_of, motion_size, unit_lengths
-from solver.lp.solve import CROSSOVER_ROWS
+from solver.lp.solve import SIMPLEX_ROWS
 
 
 @dataclass
@@ -70,7 +70,7 @@ class Model:
     @property
     def large(self) -> bool:
         """Whether programs are too large for vertex solutions, and corrections therefore stop before they are exact."""
-        return self.n_dof * int(self.assembly.free.sum()) > CROSSOVER_ROWS
+        return self.n_dof * int(self.assembly.free.sum()) > SIMPLEX_ROWS
 
     @property
     def lengths(self) -> np.ndarray:

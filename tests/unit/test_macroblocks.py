@@ -75,7 +75,7 @@ def test_a_large_wall_closes_up_like_a_small_one(wall, monkeypatch):
     sinks = solver.Settlement(direction=(0.0, -1.0), increment=0.004, limit=0.016)
     controls = solver.Controls(increments="linear program")
     exact = solver.settle(wall, sinks, friction_coefficient=0.6, controls=controls)
-    monkeypatch.setattr("solver.program.model.CROSSOVER_ROWS", 10)
+    monkeypatch.setattr("solver.program.model.SIMPLEX_ROWS", 10)
     large = solver.settle(wall, sinks, friction_coefficient=0.6, controls=controls)
     assert large.stop is solver.Status.LIMIT_REACHED
     here = np.interp(exact.settlement, large.settlement, large.reaction)
