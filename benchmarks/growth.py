@@ -2,8 +2,9 @@
 
     python benchmarks/growth.py [blocks ...]
 
-By linear programs, whatever the size. Each size runs in a process of its own: the equilibrium at the start and the first increment, and writing it.
-Seconds are processor time, split into finding contacts, linear programs, what else the solver does, and output.
+By linear programs, whatever the size. Each size runs in a process of its own: the equilibrium at the start and the
+first increment, and writing it. Seconds are processor time, split into finding contacts, linear programs, what else
+the solver does, and output.
 """
 
 from __future__ import annotations
