@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from solver.lp.problem import LinearProgram, LPSolution, SolveError
-from solver.lp.solve import CROSSOVER_ROWS, SIMPLEX_ROWS, VERTEX_ROUTES, solve_lp
+from solver.lp.solve import solve_lp, vertex_routes
 
 from .clarabel import run_clarabel
 from .cuts import run_cuts
@@ -89,8 +89,8 @@ def solve_between(
     """
     if len(friction) == 0:
         # Of limit loads: a vertex is one mechanism, an interior point a mean of several: fixed points wander from it.
-        routes = VERTEX_ROUTES if SIMPLEX_ROWS < matrix.shape[0] <= CROSSOVER_ROWS else None
-        return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper), routes)
+        program = LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper)
+        return solve_lp(program, vertex_routes(matrix.shape[0]))
     by_row, equal = sp.csr_array(matrix), lower == upper
     below, above = np.flatnonzero(~equal & np.isfinite(lower)), np.flatnonzero(~equal & np.isfinite(upper))
     rows = sp.vstack([by_row[equal], by_row[below], by_row[above]])

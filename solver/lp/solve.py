@@ -25,6 +25,11 @@ INTERIOR_ROUTES = (BAND, "hipo", "hipo without presolve", "ipx", "ipx with cross
 VERTEX_ROUTES = ("hipo with crossover", "ipx with crossover", "simplex", "simplex without presolve")
 
 
+def vertex_routes(rows: int) -> tuple[str, ...] | None:
+    """Give the order in which a vertex of a program with so many rows is looked for; None for the one by size."""
+    return VERTEX_ROUTES if SIMPLEX_ROWS < rows <= CROSSOVER_ROWS else None
+
+
 def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> LPSolution:
     """Solve a linear program, trying one route after another until a solution passes its check.
 

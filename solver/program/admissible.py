@@ -13,7 +13,7 @@ from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
 from solver.lp.problem import LinearProgram, LPSolution, SolveError, Unbounded
-from solver.lp.solve import INTERIOR_ROUTES, SIMPLEX_ROWS, solve_lp
+from solver.lp.solve import solve_lp, vertex_routes
 from solver.tolerances import BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
 
 from .increment import along_structure
@@ -81,7 +81,7 @@ def admissible(
     rate : (n_blocks, n_dof) array, optional
         Movement of the supports along which the reaction is bounded.
     vertex : bool
-        In the plane: forces at a vertex of the program, as few as there are; otherwise, in larger models, those found
+        In the plane, up to 500 blocks: forces at a vertex of the program, as few as there are; otherwise those found
         fastest. Round cones have no such vertices.
     gap : float
         Of contact points that carry at most, in block sizes.
@@ -118,7 +118,7 @@ def admissible(
         objective = np.concatenate([rays.T @ (matrix.T @ np.where(free, 0.0, along)), np.zeros(2 * rows)])
         unit = model.force * model.length
     along_rows = along_structure(free_blocks(model.assembly), pose)
-    routes = None if vertex or rows <= SIMPLEX_ROWS else INTERIOR_ROUTES
+    routes = vertex_routes(rows) if vertex else None
 
     def extreme(sign: float, *, slack: bool) -> LPSolution | ConicSolution | None:
         """Least or, by sign, largest value, with or without unbalanced forces; None where it has no bound."""
