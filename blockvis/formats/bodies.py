@@ -42,6 +42,9 @@ AT_A_TIME = 20
 #: More faces are no stone, but a scan or a curved surface in small triangles.
 MOST_FACES = 400
 
+#: Change of a block's volume, as a part of it, that is told: far above what planes fitted to drawn faces change.
+NOTED_VOLUME = 1e-3
+
 #: A body of less than this fraction of the cube around the drawing has no volume.
 NO_VOLUME = 1e-15
 
@@ -201,7 +204,7 @@ def solids_of_bodies(
     """
     asked = _asked(found, path, ignore, only)
     lying = found.up == "y" if view is None else view == "xy"
-    solids, warped = [], []
+    solids, warped, changed = [], [], []
     for body in asked.bodies:
         plane = with_plane_faces(body.points, body.faces)
         points, faces = plane.solid
@@ -217,6 +220,8 @@ def solids_of_bodies(
             )
         if plane.warp:
             warped.append((plane.warp, body.name, plane.place))
+        drawn = abs(volume(body.points, body.faces))
+        changed.append((volume(points, faces) / drawn - 1.0, body.name))
         solids.append((points[:, [0, 2, 1]] * [1.0, -1.0, 1.0] if lying else points, faces))
     notes = []
     if warped:
@@ -224,6 +229,13 @@ def solids_of_bodies(
         notes.append(
             f"planes were fitted to warped faces of {len(warped)} of {len(solids)} blocks: up to {most:.3g} in the "
             f"file's unit, of '{name}' at ({', '.join(f'{x:.6g}' for x in place)})"
+        )
+    coarser = [one for one in changed if abs(one[0]) > NOTED_VOLUME]
+    if coarser:
+        most, name = max(coarser, key=lambda one: abs(one[0]))
+        notes.append(
+            f"faces were joined to fewer plane ones: the volume of {len(coarser)} of {len(solids)} blocks is off by up "
+            f"to {100.0 * most:+.2g} %, of '{name}'; draw round stones with fewer sides"
         )
     if lying and view is None:
         notes.append(f'{found.up_says}: its (x, y, z) were read as (x, -z, y); give view = "xz" if z is up')

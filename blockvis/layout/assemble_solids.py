@@ -18,7 +18,10 @@ from .solid_layout import SolidLayout
 from .solids import Solid, prism
 
 #: Beginnings of the notes of a layout in space that change what is analysed.
-TOLD = ("unit", "left out", "blocks in space", "planes were fitted", "y is up", "the drawing in the plane")
+TOLD = (
+    "unit", "left out", "blocks in space", "planes were fitted", "faces were joined", "y is up",
+    "the drawing in the plane",
+)  # fmt: skip
 
 #: Two blocks closer than this fraction of their size, corner by corner, are one block drawn twice.
 SAME = 1e-6

@@ -246,3 +246,14 @@ def test_of_two_copies_that_with_a_role_stays(tmp_path):
     assert sorted(found.names) == ["base", "stone"]
     with pytest.warns(UserWarning, match="'base' = 'copy'|'copy' = 'base'"):
         assert read(tmp_path / "tower.obj", dimension=3).n_blocks == 2
+
+
+@pytest.mark.parametrize(("sides", "told"), [(24, False), (96, True)])
+def test_a_round_stone_that_loses_volume_says_so(tmp_path, sides, told):
+    trimesh = pytest.importorskip("trimesh")
+    drum = trimesh.creation.cylinder(0.25, 0.3, sections=sides)
+    trimesh.Scene({"drum": drum}).export(tmp_path / "drum.obj")
+    layout = read_layout(tmp_path / "drum.obj", dimension=3)
+    noted = [note for note in layout.notes if "the volume of 1 of 1 blocks is off by up to -" in note]
+    assert bool(noted) == told
+    assert (abs(layout.volumes[0] / drum.volume - 1.0) > 1e-3) == told
