@@ -10,7 +10,7 @@ import json
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Those of the process by default.
     """
     options = _parser().parse_args(arguments)
-    warnings.showwarning = _show_warning
+    warnings.showwarning = _notes_said_once()
     try:
         code: int = options.verb(options)
     except (ValueError, OSError, MissingExtra) as error:
@@ -587,5 +587,13 @@ def _in_words(response: solver.Response, folder: Path) -> str:
     return "\n".join(lines)
 
 
-def _show_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
-    print(f"blockvis: note: {message}", file=sys.stderr)
+def _notes_said_once() -> Callable[..., None]:
+    """Make what shows warnings as notes, each once: a case may be checked more than once."""
+    said: set[str] = set()
+
+    def show(message: Warning | str, *_: object, **__: object) -> None:
+        if str(message) not in said:
+            said.add(str(message))
+            print(f"blockvis: note: {message}", file=sys.stderr)
+
+    return show

@@ -19,9 +19,13 @@ def nearest(word: str, known: Sequence[str]) -> str:
     --------
     >>> nearest("thikness", ["density", "thickness"])
     " (did you mean 'thickness'?)"
+    >>> nearest("frction", ["cohesion", "friction_coefficient"])
+    " (did you mean 'friction_coefficient'?)"
     """
-    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
-    return f" (did you mean '{near[0]}'?)" if near else ""
+    # A word of a longer name counts as much as the name: who writes "frction" means friction_coefficient.
+    whole = {part: name for name in reversed(known) for part in name.split("_")} | {name: name for name in known}
+    near = difflib.get_close_matches(word, list(whole), n=1, cutoff=0.5)
+    return f" (did you mean '{whole[near[0]]}'?)" if near else ""
 
 
 def by_similarity(word: str, known: Iterable[str]) -> list[str]:

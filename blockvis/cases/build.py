@@ -69,6 +69,7 @@ def case_assembly(case: Case) -> solver.Assembly:
         closing=case.closing,
         outline_tolerance=case.outline_tolerance,
     )
+    _refuse_unknown_materials(case, assembly)
     if case.settlements and not assembly.moving.any():
         groups = sorted({g for g in sketch.groups if g} | {s["name"] for s in case.supports}) or list(sketch.names[:12])
         raise ValueError(
@@ -80,6 +81,18 @@ def case_assembly(case: Case) -> solver.Assembly:
     _note_units(case, assembly)
     assembly = cut_ground(assembly, case.profiles)
     return imperfect(assembly, case.imperfections)
+
+
+def _refuse_unknown_materials(case: Case, assembly: solver.Assembly) -> None:
+    known = sorted({material for material in assembly.materials if material})
+    for pair in case.interfaces:
+        for material in pair:
+            if material not in known:
+                has = f"the blocks have {known}" if known else "no block has one"
+                near = nearest(material, known)
+                raise ValueError(
+                    f"{case.source}: [[interfaces]] material '{material}' is that of no block{near}; {has}"
+                )
 
 
 def _note_numbers(assembly: solver.Assembly, source: Path) -> None:

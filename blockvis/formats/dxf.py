@@ -6,7 +6,7 @@ import json
 import logging
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -88,12 +88,13 @@ def _read(path: Path, reading: Reading) -> Layout:
     stated = UNIT_CODES.get(int(document.header.get("$INSUNITS", 0) or 0), "")
     in_metres = metres_per(reading.unit or stated or "m")
     tolerance = None if reading.chord_tolerance is None else reading.chord_tolerance / in_metres
-    shut = {layer.dxf.name for layer in document.layers if layer.is_off() or layer.is_frozen()}
+    frozen = {layer.dxf.name for layer in document.layers if layer.is_frozen()}
+    shut = frozen | {layer.dxf.name for layer in document.layers if layer.is_off()}
     found = _Found()
     # A small file can insert any number of copies: more entities than a quarter of its bytes are refused.
     size = path.stat().st_size
     most = budget = max(size // 4, 1000)
-    for entity, handle in _flat(document.modelspace(), 0, path):
+    for entity, handle in _flat(document.modelspace(), 0, path, frozen):
         budget -= 1
         if budget < 0:
             raise ValueError(
@@ -182,19 +183,27 @@ def _turned(found: _Found, view: str | None, path: Path) -> list[str]:
     return [f"{UPRIGHT}: its ({chosen[0]}, {chosen[1]}) were read as (x, y)"]
 
 
-def _flat(entities: Any, depth: int, path: Path, parent: str = "") -> Iterator[tuple[Any, str]]:
-    """Yield all entities, inserted blocks resolved, each with a handle that names it."""
+def _flat(
+    entities: Any, depth: int, path: Path, frozen: Set[str], parent: str = "", layer: str = "0"
+) -> Iterator[tuple[Any, str]]:
+    """Yield all entities, inserted blocks resolved, each with a handle that names it.
+
+    What a block draws on layer 0 lies on the layer on which it is inserted; on a frozen one none of it is seen.
+    """
     if depth > DEEPEST_INSERT:
         raise ValueError(f"'{path}' inserts blocks into each other more than {DEEPEST_INSERT} deep; explode them")
     for number, entity in enumerate(entities):
         handle = f"{parent}.{number}" if parent else str(entity.dxf.handle or number)
-        if entity.dxftype() != "INSERT":
+        if parent and entity.dxf.layer == "0":
+            entity.dxf.layer = layer
+        if entity.dxftype() != "INSERT" or entity.dxf.layer in frozen:
             yield entity, handle
             continue
         copies = entity.multi_insert() if entity.mcount > 1 else [entity]
         for k, copy in enumerate(copies):
             inner = _inserted(copy, path)
-            yield from _flat(inner, depth + 1, path, f"{handle}.{k}" if entity.mcount > 1 else handle)
+            number_of = f"{handle}.{k}" if entity.mcount > 1 else handle
+            yield from _flat(inner, depth + 1, path, frozen, number_of, entity.dxf.layer)
 
 
 def _inserted(insert: Any, path: Path) -> Iterator[Any]:
@@ -263,6 +272,10 @@ def _circular(entity: Any, tolerance: float | None) -> np.ndarray | None:
     it by up to 2.7e-4 of the radius.
     """
     kind = entity.dxftype()
+    if kind == "SPLINE" and entity.dxf.degree == 1 and len(entity.control_points):
+        # Straight from corner to corner: ezdxf would put a smooth curve through them.
+        straight = np.array([(*point,) for point in entity.control_points])
+        return np.concatenate([straight, straight[:1]]) if entity.closed else straight
     if kind in ("CIRCLE", "ARC"):
         start, end = (0.0, 360.0) if kind == "CIRCLE" else (entity.dxf.start_angle, entity.dxf.end_angle)
         sweep = math.radians((end - start) % 360.0 or 360.0)

@@ -109,7 +109,8 @@ def read(path: Path, reading: Reading) -> Layout:
     turned = tuple(ring * [1.0, -1.0] for ring in found.rings)
     names = tuple(row.get("name", f"block {k}") for k, row in enumerate(found.rows))
     left_out = tuple(item.mapped((1.0, -1.0)) for item in found.left_out)
-    layout = Layout(outlines=turned, names=names, unit=stated, notes=tuple(found.notes), left_out=left_out)
+    notes = tuple(dict.fromkeys(found.notes))
+    layout = Layout(outlines=turned, names=names, unit=stated, notes=notes, left_out=left_out)
     return with_rows(layout, found.rows)
 
 

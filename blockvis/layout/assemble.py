@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -20,8 +21,11 @@ from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
 from .solid_layout import SolidLayout
 
-#: Beginnings of the notes of a layout that change what is analysed.
-TOLD = ("unit", "left out", "ignore", "cut", "joined", "the middle planes", "elevations were ignored")
+#: How the notes of a layout begin that change what is analysed, after a number of what they are about.
+TOLD = re.compile(
+    r"unit|left out|ignore|cut|joined|the middle planes|elevations were ignored|skipped|a hidden <|a <use>"
+    r"|\d+ (blocks are faces|faults of the file|hidden|<use>)"
+)
 
 
 def assemble(
@@ -86,7 +90,7 @@ def assemble(
             overlap_tolerance=overlap_tolerance,
         )
     for note in layout.notes:
-        if note.startswith(TOLD):
+        if TOLD.match(note):
             warnings.warn(f"{layout.source}: {note}", stacklevel=2)
     n_drawn = layout.n_blocks
     twins = duplicates(layout.outlines)

@@ -181,6 +181,11 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
     axes.grid(color="#e4e4e4", linewidth=0.8)
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.02, y=0.12)
+    if len(known) == 0 and len(path) > 1:
+        axes.set_xlim(float(total.min()), float(total.max()))
+        axes.set_ylim(0.0, 1.0)
+        axes.set_yticks([])
+        axes.text(0.5, 0.5, "unbounded everywhere", transform=axes.transAxes, ha="center", fontsize=text)
     if len(known):
         low, high = shown_range(values, response)
         axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
@@ -338,8 +343,12 @@ def _mark_events(axes: Axes, response: solver.Response, factor: float, text: flo
             textcoords="offset points", ha="center", va="bottom" if above else "top", fontsize=0.8 * text,
         )  # fmt: skip
     lines = [f"{n}  {e.text}" for n, e in enumerate(found, 1)]
+    # On the side of the left half that the curve leaves free.
+    left = (response.values / factor)[response.parameters * per_length < 0.5 * (low + high)]
+    foot = len(left) == 0 or float(np.nanmean(left)) > float(np.mean(axes.get_ylim()))
     axes.text(
-        0.02, 0.04, "\n".join(lines), transform=axes.transAxes, va="bottom", fontsize=0.8 * text, linespacing=1.4,
+        0.02, 0.04 if foot else 0.96, "\n".join(lines), transform=axes.transAxes, va="bottom" if foot else "top",
+        fontsize=0.8 * text, linespacing=1.4,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85},
     )  # fmt: skip
 

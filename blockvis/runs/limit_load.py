@@ -191,7 +191,8 @@ class LimitLoadKind(AnalysisKind):
             moves = chosen.velocity.any()
             summary["mechanism"] = str(solver.mechanism_of(response.assembly, chosen)) if moves else None
         if not response.parameter.is_path and len(response.limits) > 1:
-            summary["governing_position"] = None if chosen is None else chosen.parameter
+            found = chosen is not None and np.isfinite(chosen.measured)
+            summary["governing_position"] = chosen.parameter if chosen is not None and found else None
         return summary
 
     def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:

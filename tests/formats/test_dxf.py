@@ -1,5 +1,6 @@
 """DXF as drawing programs write it, R12 to R2018."""
 
+import itertools
 import time
 
 import ezdxf
@@ -205,3 +206,51 @@ def test_faults_of_a_file_are_noted_and_not_printed(tmp_path, capfd):
     assert layout.n_blocks == 1
     assert any("faults of the file were repaired or passed over" in note for note in layout.notes)
     assert capfd.readouterr() == ("", "")
+
+
+def test_what_a_block_draws_on_layer_0_lies_where_it_is_inserted(tmp_path):
+    def draw(document, space):
+        document.layers.add("gone").freeze()
+        document.layers.add("dark").off()
+        block = document.blocks.new("stone")
+        block.add_lwpolyline(SQUARE, close=True)
+        own = document.blocks.new("own")
+        own.add_lwpolyline(SQUARE, close=True, dxfattribs={"layer": "granite"})
+        nested = document.blocks.new("nested")
+        nested.add_blockref("stone", (0, 0))
+        for x, (name, layer) in enumerate(
+            [
+                ("stone", "brick"),
+                ("own", "brick"),
+                ("nested", "fixed"),
+                ("stone", "gone"),
+                ("own", "gone"),
+                ("stone", "dark"),
+            ]
+        ):
+            space.add_blockref(name, (2 * x, 0), dxfattribs={"layer": layer})
+
+    path = saved(tmp_path, draw)
+    assert "skipped on layers that are off or frozen: 2 on 'gone', 1 on 'dark'" in read_layout(path).notes
+    with pytest.warns(UserWarning, match="skipped on layers that are off or frozen"):
+        assembly = read(path)
+    assert assembly.materials == ("brick", "granite", "fixed")
+    assert assembly.roles.tolist() == ["free", "free", "fixed"]
+
+
+def test_a_spline_of_degree_one_is_straight(tmp_path):
+    def draw(document, space):
+        space.add_open_spline([*((x, y, 0) for x, y in SQUARE), (0, 0, 0)], degree=1)
+
+    assert read(saved(tmp_path, draw)).areas.tolist() == pytest.approx([1.0])
+    assert len(read(saved(tmp_path, draw)).vertices) == 4
+
+
+def test_faces_of_lines_are_told_where_they_are_analysed(tmp_path):
+    def draw(document, space):
+        corners = [*SQUARE, SQUARE[0]]
+        for start, end in itertools.pairwise(corners):
+            space.add_line(start, end)
+
+    with pytest.warns(UserWarning, match="1 blocks are faces between 4 loose lines; an opening enclosed by lines"):
+        read(saved(tmp_path, draw))

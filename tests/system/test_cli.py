@@ -292,3 +292,19 @@ def test_output_that_nobody_reads_to_its_end_is_no_error(case):
 def test_sizes_of_pictures_are_checked_before_anything_is_drawn(arch_results, capsys, size):
     assert main(["render", str(arch_results), f"--size={size}"]) == 2
     assert f"--size is '{size}'; give width and height in pixels" in capsys.readouterr().err
+
+
+def test_materials_of_an_interface_that_no_block_has_are_refused(case, capsys):
+    case.write_text(
+        case.read_text(encoding="utf-8")
+        + '[[interfaces]]\nmaterials = ["stnoe", "stone"]\nfriction_coefficient = 0.1\n',
+        encoding="utf-8",
+    )
+    assert main(["run", str(case), "-o", str(case.parent / "out")]) == 2
+    assert "[[interfaces]] material 'stnoe' is that of no block" in capsys.readouterr().err
+
+
+def test_a_note_is_printed_once(case, capsys):
+    case.write_text(case.read_text(encoding="utf-8") + '[[loads]]\nkind = "live"\nforce = [0, -1]\n', encoding="utf-8")
+    assert main(["run", str(case), "-o", str(case.parent / "out")]) in (0, 4)
+    assert capsys.readouterr().err.count("leaves the live loads out") == 1
