@@ -69,7 +69,7 @@ def dropped_twins(layout: AnyLayout, twins: Sequence[tuple[int, int]], roles: Ma
 
 def twins_note(layout: AnyLayout, twins: Sequence[tuple[int, int]], dropped: set[int]) -> str:
     """Say which blocks were dropped, and in favour of which."""
-    pairs = [(k, i if k == j else j) for i, j in twins for k in (j if j in dropped else i,)]
+    pairs = [(copy, first) if copy in dropped else (first, copy) for first, copy in twins]
     listed = ", ".join(f"'{layout.names[gone]}' = '{layout.names[kept]}'" for gone, kept in pairs[:20])
     more = f" and {len(twins) - 20} more" if len(twins) > 20 else ""
     return f"{len(twins)} of {layout.n_blocks} blocks are drawn twice and were dropped: {listed}{more}"
