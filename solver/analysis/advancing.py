@@ -16,7 +16,7 @@ from solver.tolerances import GIVE
 
 from .place import Falls, NoStep, Place, Pressed, Wedged
 from .proofs import Proofs
-from .stepping import MECHANISM, SLOW_GROWTH, Steps
+from .stepping import GROWTH, MECHANISM, Steps
 
 #: Largest step inside an increment: movement of the supports in block sizes. The smallest, in the same measure, ends
 #: the analysis where no step is solved.
@@ -61,6 +61,7 @@ class Advance:
         self.steps, self.proofs, self.model, self.driver = steps, proofs, steps.model, steps.driver
         largest = LARGEST_STEP * self.model.length / steps.lever
         self.longest, self.finest = min(self.driver.increment, largest) / shorter, largest / EVENT_REFINEMENT / shorter
+        self.growth = GROWTH ** (1.0 / shorter)
         self.smallest = SMALLEST_STEP * self.model.length / steps.lever
         self.barrier, self.works = np.inf, (0.0, 0.0, 0.0)
         self.marks: tuple[Place, ...] = ()
@@ -83,7 +84,6 @@ class Advance:
         Wedged
         """
         tolerance, started = self.driver.tolerance, place.s
-        grow = 2.0
         for _ in range(STEPS_UNPROVED):
             ahead = target - place.s
             if ahead <= 1e-12 * max(abs(target), self.smallest):
@@ -93,7 +93,7 @@ class Advance:
             try:
                 new, motion = self.steps.careful_step(place, length) if careful else self.steps.step(place, length)
             except NotSolved as error:
-                step, grow = self._shorter(place, length, error), SLOW_GROWTH
+                step = self._shorter(place, length, error)
                 continue
             except Falls:
                 # The drag may lose its hold early.
@@ -101,7 +101,6 @@ class Advance:
                     step = length / 2.0
                     if careful and length <= tolerance / 4.0:
                         break
-                grow = SLOW_GROWTH
                 continue
             if float(new.forces[:, 0].max(initial=0.0)) > LOCKED_FORCE * self.model.total_load:
                 raise Wedged(new)
@@ -111,7 +110,7 @@ class Advance:
             self.works = self._works(place, new, motion)
             place = replace(new, s=target) if length == ahead else new
             self._reach(place)
-            step = min(self.longest, max(step, grow * length)) if length >= 0.99 * step else step
+            step = min(self.longest, max(step, self.growth * length)) if length >= 0.99 * step else step
             moved_by = float(np.abs(motion[self.model.assembly.free]).max(initial=0.0))
             if moved_by > FAST * length * self.steps.lever / self.model.length:
                 # What jumps does not go on like that.

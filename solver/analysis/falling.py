@@ -19,11 +19,11 @@ from .controls import Ending
 from .place import Falls, Note, Place, Proved
 from .proofs import Proofs
 from .reports import Reports
-from .stepping import MECHANISM, SLOW_GROWTH, Steps
+from .stepping import GROWTH, MECHANISM, Steps
 
 #: A fall is followed in steps of this movement of a block, in block sizes.
 FALL_STEP = 0.1
-FALL_STEPS, CREEPS, FALL_FAILURES = 240, 16, 60
+FALL_STEPS, CREEPS, FALL_FAILURES = 120, 16, 60
 
 #: Unbalanced force, in block weights, under which what creeps may have come to rest.
 CREEPING = 1e-2
@@ -60,7 +60,8 @@ class Falling:
             # As slow as what creeps under a small part of its weight.
             fastest = float(np.abs(motion[model.assembly.free]).max(initial=0.0))
             speed = fastest * model.length / (length * self.steps.lever)
-            often = number & (number - 1) == 0 or number == steps or fastest < AT_REST
+            at_rest = self._at_rest(motion, length)
+            often = number & (number - 1) == 0 or number == steps or at_rest
             if speed * DRAG > CREEPING or not often:
                 continue
             found = self.proofs.proved(sunk)
@@ -68,9 +69,13 @@ class Falling:
                 if way > JUMP * model.length:
                     self.reports.notes.append(Note(sunk.s, self.reports.jump(start, sunk.pose)))
                 return found
-            if fastest < AT_REST:
+            if at_rest:
                 return None
         return None
+
+    def _at_rest(self, motion: np.ndarray, length: float) -> bool:
+        """Whether a step that the drag hardly held back moved nothing: a short one may not show what begins to fall."""
+        return length * self.steps.lever >= self.model.length and bool(np.abs(motion).max() < AT_REST)
 
     def sinking(self, place: Place) -> Iterator[tuple[Place, np.ndarray, float]]:
         """Steps in which what falls sinks against the drag, the driver at rest; remembered for who asks once more."""
@@ -93,7 +98,7 @@ class Falling:
             try:
                 new, motion = self.steps.step(place, length, still=True)
             except (NotSolved, Falls):
-                length, failures, grow = length / 3.0, failures + 1, SLOW_GROWTH
+                length, failures, grow = length / 3.0, failures + 1, GROWTH
                 continue
             moved_by = float(np.abs(motion[self.model.assembly.free]).max(initial=0.0))
             if moved_by > 2.0 * FALL_STEP:
@@ -173,7 +178,7 @@ class Falling:
         for new, motion, length in islice(self.sinking(place), 4 * max(self.falling_frames, 4)):
             total = total + motion
             moved_by = float(np.abs(total).max())
-            at_rest = length >= self.model.length and float(np.abs(motion).max()) < AT_REST
+            at_rest = self._at_rest(motion, length)
             if (frames == 0 and moved_by > MECHANISM) or moved_by > FALL_STEP or at_rest:
                 yield self.reports.falling(start, total * self.model.lengths, start.s)
                 frames, start, total = frames + 1, new, np.zeros_like(total)

@@ -28,6 +28,9 @@ from .stepping import MECHANISM, Steps
 #: First step, and movement by which a structure has begun to move, in elastic gives.
 FIRST_STEP, ONSET = 0.1, 100.0
 
+#: What a path knows of the way behind and ahead: works, barrier, marks, and how far to be careful.
+Known = tuple[tuple[float, float, float], float, tuple[Place, ...], float]
+
 
 class Path:
     """The path of one phase under a driver.
@@ -50,6 +53,10 @@ class Path:
         self.advance = Advance(self.steps, self.proofs, controls.shorter_steps)
         self.reports = Reports(self.steps, number)
         self.falling = Falling(self.steps, self.proofs, self.reports, controls.frames(model.dimension))
+        give = GIVE * model.length / self.steps.lever
+        self.first_step = FIRST_STEP * give / controls.shorter_steps
+        self.onset = min(ONSET * give, self._next_stop(0.0))
+        self.begun: tuple[Place, float, Known, int] | None = None
 
     def rested(self, pose: Pose) -> Place:
         """The place in which a pose comes to rest from no forces at all.
@@ -71,7 +78,7 @@ class Path:
     def follow(self, start: Place, resume: Checkpoint | None = None) -> Generator[Increment, None, Ending]:
         """Yields the increments of the phase, returns how it ended and leaves the last place in ``self.last``."""
         self.last, self.start = start, start.pose
-        step = FIRST_STEP * GIVE * self.model.length / self.steps.lever
+        step = self.first_step
         if resume is not None:
             start, step, self.advance.barrier = resume.place, resume.step, resume.first_without
             self.start, self.advance.works, self.steps.careful_until = resume.start, resume.works, resume.careful_until
@@ -142,9 +149,7 @@ class Path:
                 yield from self._unreported(proved)
                 return (yield from self.falling.collapse(proved, without, self.advance.barrier, spent))
             try:
-                new, step = self.advance.advanced(
-                    place, min(self._next_stop(place.s), 0.5 * (place.s + self.advance.barrier)), step
-                )
+                new, step = self._onward(place, step)
             except Wedged as wedged:
                 return Ending(Status.LOCKED, self.reports.locked(wedged.place))
             except NoStep as reason:
@@ -163,6 +168,45 @@ class Path:
                 step = min(step, 0.5 * length)
                 if self.advance.falls_within(place, length):
                     without, spent = new, lost
+
+    def _onward(self, place: Place, step: float) -> tuple[Place, float]:
+        """Where the path goes from a place, and the step to try from there.
+
+        Raises
+        ------
+        NoStep
+        Wedged
+        """
+        if place.s > 0.0 or step != self.first_step:
+            return self.advance.advanced(
+                place, min(self._next_stop(place.s), 0.5 * (place.s + self.advance.barrier)), step
+            )
+        if self.begun is None:
+            return self._begin(place)
+        new, step, known, programs = self.begun
+        self._know(known)
+        self.steps.programs += programs
+        return new, step
+
+    def _begin(self, place: Place) -> tuple[Place, float]:
+        """Go on from the start until the structure has begun to move, far beyond the give of the joints.
+
+        Raises
+        ------
+        NoStep
+        Wedged
+        """
+        step = self.first_step
+        while place.s < self.onset and np.isinf(self.advance.barrier):
+            place, step = self.advance.advanced(place, self.onset, step)
+        return place, step
+
+    def _known(self) -> Known:
+        advance = self.advance
+        return advance.works, advance.barrier, advance.marks, self.steps.careful_until
+
+    def _know(self, known: Known) -> None:
+        self.advance.works, self.advance.barrier, self.advance.marks, self.steps.careful_until = known
 
     def _found(self, proved: Proved, step: float) -> Increment:
         """The increment at an equilibrium, with the checkpoint from which the path goes on with this step."""
@@ -218,21 +262,22 @@ class Path:
         return place
 
     def _at_first(self, proved: Proved) -> tuple[float, float]:
-        """The reaction at rest, and once the structure has begun to move: far beyond the give of the joints."""
-        place, advance = proved.place, self.advance
-        before = advance.works, advance.barrier, advance.marks, self.steps.careful_until
-        rate = self.driver.rate(0.0)
+        """The reaction at rest, and once the structure has begun to move."""
+        place, before = proved.place, self._known()
         remembered = self.steps.remembered(place, proved.contacts)
+        rate = self.driver.rate(0.0)
         at_rest = float((on_supports(self.model, proved.contacts, place.pose, remembered) * rate).sum())
-        onset = np.nan
-        give = GIVE * self.model.length / self.steps.lever
+        onset, programs = np.nan, self.steps.programs
         try:
-            begun, _ = advance.advanced(place, ONSET * give, FIRST_STEP * give)
-            begun_there = self.proofs.proved(begun)
-            onset = begun_there.measured if begun_there.bounds.exists else np.nan
+            begun, step = self._begin(place)
+            self.begun = begun, step, self._known(), self.steps.programs - programs
+            there = self.proofs.proved(begun)
+            onset = there.measured if there.bounds.exists else np.nan
         except (NoStep, Wedged):
             pass
-        advance.works, advance.barrier, advance.marks, self.steps.careful_until = before
+        self._know(before)
+        # They belong to the increment that the path goes on to from there.
+        self.steps.programs = programs
         return at_rest, onset
 
     def _is_stop(self, s: float) -> bool:

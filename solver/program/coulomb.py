@@ -18,9 +18,10 @@ Newton's method with one sparse factorisation an iteration, scaled as Nesterov &
 https://doi.org/10.1287/moor.22.1.1, for what Andersen, Roos & Terlaky (2003),
 https://doi.org/10.1007/s10107-002-0349-3, call the quadratic cone, predictor and corrector (Mehrotra 1992,
 https://doi.org/10.1137/0802028). Once the path shows which points are open, stick or slide, Newton's method on the
-states takes over, as in plasticity. Where the path is lost, the step is solved by parts, each from the one before: a
-long step may have several solutions, and this is the one that its start leads to, whatever rounding does. Where that
-ends, too, the caller takes a smaller step of the supports, for which the drag dominates.
+states takes over, as in plasticity. A long step may have several solutions. Where the states do not come to one from
+those of its start, the step is therefore solved by parts, each from the one before: this is the one that its start
+leads to, and shorter steps lead to the same. Where that ends, too, the caller takes a smaller step of the supports, for
+which the drag dominates.
 
 In the plane the friction law is the linear complementarity form of Stewart & Trinkle (1996) and of Anitescu & Potra
 (1997), https://doi.org/10.1023/A:1008292328909, here for quasi-static steps.
@@ -65,23 +66,25 @@ STALLED, LOOK_BACK = 0.8, 8
 CORRECTION = 30.0
 
 #: Newton's method on the points' states: part of a force that counts as none, and iterations after which it is given
-#: up. Where more points change their state than the time before it goes round, and is left at once.
-STATES, STATE_CHANGES = 1e-9, 12
+#: up. Where more points change their state than the time before it goes round, and the second time it is left.
+STATES, STATE_CHANGES = 1e-9, 16
 
 #: Mean product, in elastic gives across, from which on the states at a point of the central path are tried as those of
 #: the solution; where they are not, again after the mean product has fallen by the second number.
 STATES_SEEN, AGAIN = 1e-3, 100.0
 
-#: Where the central path is lost, a step is solved by parts: the first of them, by how much a part becomes shorter
-#: where its path is lost, too, the least, and how many of those there may be: where a structure jumps, no part is short
-#: enough, and a smaller step of the supports, for which the drag holds, costs less.
-FIRST_PART, SHORTER, LEAST_PART, LEAST_PARTS = 0.25, 4.0, 0.004, 12
+#: A step that is solved by parts: the first of them, by how much a part becomes shorter where its states are not found,
+#: the least, and how many of those there may be: where a structure jumps, no part is short enough, and a smaller step
+#: of the supports, for which the drag holds, costs less.
+FIRST_PART, SHORTER, LEAST_PART, LEAST_PARTS = 0.25, 4.0, 0.004, 4
 
 #: Nearest that a point comes to the boundary of its cone, squared, as a part of its axis: keeps the scaling finite.
 INSIDE = 1e-20
 
 
-def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Moved | None = None) -> Moved:
+def solve_step(
+    step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Moved | None = None, *, led: bool = True
+) -> Moved:
     """Solves a step.
 
     Parameters
@@ -93,6 +96,9 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
         Of the live load, to start from.
     near : Moved, optional
         The solution at a geometry very near, with the same contact points.
+    led : bool
+        Of several solutions, to the one that the start of the step leads to. With hardly any drag, and with round
+        cones, parts of a step more often lead nowhere: there any solution will do.
 
     Raises
     ------
@@ -104,27 +110,28 @@ def solve_step(step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Move
         return Moved(step.load / step.drag - gone, none[0], step.shear, multiplier, 0, none, none)
     pattern = Pattern(step) if near is None or near.pattern is None else near.pattern.fill(step)
     scale = step.size + step.give[1]
-    if near is not None:
-        found = _in_states(step, pattern, gone, near)
+    remembers = bool((step.normal > 0.0).any())
+    if near is not None or remembers:
+        # Mostly things go on as they did, or a few points change.
+        found = _in_states(step, pattern, gone, near or _unmoved(step, multiplier))
         if found is not None:
             return found
+    if near is not None:
+        start = _centred(near, scale)
+    else:
+        start = (
+            _within(step.normal, _lean(step), FIRST_FORCE),
+            _apart(step.gap, step.slip.T, FIRST_DISTANCE * scale),
+        )
+    if near is not None or not remembers or not led:
         try:
-            return _followed(step, pattern, gone, multiplier, *_centred(near, scale))
+            return _followed(step, pattern, gone, multiplier, *start)
         except NotSolved:
             return _continued(step, pattern, gone, multiplier)
-    if (step.normal > 0.0).any():
-        # Mostly things go on as they did, or a few points change.
-        found = _in_states(step, pattern, gone, _unmoved(step, multiplier))
-        if found is not None:
-            return found
-    start = (
-        _within(step.normal, _lean(step), FIRST_FORCE),
-        _apart(step.gap, step.slip.T, FIRST_DISTANCE * scale),
-    )
     try:
-        return _followed(step, pattern, gone, multiplier, *start)
-    except NotSolved:
         return _continued(step, pattern, gone, multiplier)
+    except NotSolved:
+        return _followed(step, pattern, gone, multiplier, *start)
 
 
 def _continued(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float) -> Moved:
@@ -240,7 +247,7 @@ def _in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved) -> M
     way, turn = way.T, mu * normal / (mu * normal + near.distances[1] / along + 1e-300)
     no_force, no_way = STATES * max(float(near.normal.max(initial=0.0)), 1.0), EQUATIONS * (step.size + along)
     trial_before, multiplier = step.shear - step.slip / along, near.multiplier
-    changes, out = n, np.inf
+    changes, out, rises = n, np.inf, 0
     eye = np.eye(d - 1)
     for iteration in range(STATE_CHANGES):
         slides &= closed
@@ -303,7 +310,8 @@ def _in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved) -> M
                 return None
             out = float(np.abs(unbalanced).max())
         before, changes = changes, int(changed.sum())
-        if iteration > 0 and changes > before:
+        rises += iteration > 0 and changes > before
+        if rises > 1:
             return None
         closed = (closed | closes) & ~opens
         slides = starts | (slides & ~stops) | (closes & (size > most))
