@@ -38,6 +38,8 @@ def main(source: str, target: str, chords: str, memory: str) -> int:
             "General.NumThreads": 1,
             "Mesh.MshFileVersion": 4.1,
             "Mesh.Binary": 0,
+            # No points within a face: on a curved one triangles between such points lie across each other.
+            "Mesh.Algorithm": 8,
         }
         for name, value in options.items():
             gmsh.option.setNumber(name, value)

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import solver
 from blockvis import generators
 from blockvis.formats.read import inspect, read, read_layout
 from blockvis.layout.layout import layout_of
@@ -112,6 +113,27 @@ def test_a_unit_and_its_doubt(dome, tmp_path):
     assert same(read(tmp_path / "b.obj", unit="mm"), dome)
     notes = read_layout(tmp_path / "b.obj").notes
     assert any("unit m in doubt: it makes the median block" in note and "--unit mm" in note for note in notes)
+
+
+@pytest.mark.cad
+def test_drums_of_a_column(tmp_path):
+    """Round faces are strips from rim to rim; triangles across them made stones that seemed to cross themselves."""
+    gmsh = pytest.importorskip("gmsh", reason="gmsh is an extra", exc_type=(ImportError, OSError))
+    gmsh.initialize(["gmsh", "-nopopup"], interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.model.occ.addBox(-1000, -1000, -200, 2000, 2000, 200)
+    for height in (0, 300, 600):
+        gmsh.model.occ.addCylinder(0, 0, height, 0, 0, 300, 250)
+    gmsh.model.occ.synchronize()
+    gmsh.write(str(tmp_path / "a.step"))
+    gmsh.finalize()
+    found = read(tmp_path / "a.step")
+    assert found.shapes.volumes[1:] == pytest.approx([0.3 * np.pi * 0.25**2] * 3, rel=0.015)
+    column = found.with_roles(["fixed", "free", "free", "free"])
+    live = solver.weight_fraction(column, (1.0, 0.0, 0.0), column.free)
+    loads = solver.Loads(solver.self_weight(column).dead, live)
+    pushed = solver.limit_load(column, friction_coefficient=0.9, loads=loads)
+    assert pushed.multiplier == pytest.approx(0.5 / 0.9, rel=0.01)
 
 
 @pytest.mark.cad
