@@ -33,6 +33,10 @@ ENCLOSED = 8.0
 #: many steps.
 FAST, STEPS_UNPROVED = 10.0, 16
 
+#: Steps that are tried from one increment to the next before an analysis ends: what creeps from one slip to another in
+#: steps of a hundred millionth of a block would take days.
+MOST_TRIED = 1000
+
 #: Force, in total loads, beyond which blocks wedged between supports count as locked.
 LOCKED_FORCE = 1e3
 
@@ -55,6 +59,8 @@ class Advance:
         Of loads, on supports and of friction since the start of the phase, in units of the program.
     marks : tuple of Place
         The last two that are a notable way apart.
+    tried : int
+        Steps since the last increment.
     """
 
     def __init__(self, steps: Steps, proofs: Proofs, shorter: float = 1.0) -> None:
@@ -65,6 +71,7 @@ class Advance:
         self.smallest = SMALLEST_STEP * self.model.length / steps.lever
         self.barrier, self.works = np.inf, (0.0, 0.0, 0.0)
         self.marks: tuple[Place, ...] = ()
+        self.tried = 0
 
     def advanced(self, place: Place, target: float, step: float) -> tuple[Place, float]:
         """Goes towards a parameter in steps that suit the path, and stops early where a place is worth a proof.
@@ -90,6 +97,9 @@ class Advance:
                 break
             careful = place.s < self.steps.careful_until
             length = self._length(place, ahead, step)
+            self.tried += 1
+            if self.tried > MOST_TRIED:
+                raise NoStep(f"at {place.s:.6g} {self.driver.unit}: {MOST_TRIED} were tried since the last increment")
             try:
                 new, motion = self.steps.careful_step(place, length) if careful else self.steps.step(place, length)
             except NotSolved as error:

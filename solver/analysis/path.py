@@ -227,6 +227,7 @@ class Path:
         first = place.s == 0.0 and self.model.live is None
         at_rest, onset = self._at_first(proved) if first else (np.nan, np.nan)
         found = self.reports.increment(proved, motion, self.advance.works)
+        self.advance.tried = 0
         return replace(found, checkpoint=checkpoint, at_rest=at_rest, onset=onset)
 
     def _unreported(self, proved: Proved) -> Iterator[Increment]:

@@ -153,8 +153,8 @@ class Reports:
     def no_step(self, reason: str) -> str:
         """Where, and what to do."""
         return (
-            f"no step of the {self.driver.what} was solved, however small, {reason}; repeat the analysis with another "
-            "increment, and send the case to the developers if it stays"
+            f"steps of the {self.driver.what}, however small, lead no further {reason}; repeat the analysis with "
+            "another increment, and send the case to the developers if it stays"
         )
 
     def jump(self, start: Pose, end: Pose) -> str:
