@@ -183,7 +183,7 @@ class Path:
             )
         if self.begun is None:
             return self._begin(place)
-        new, step, known, programs = self.begun
+        (new, step, known, programs), self.begun = self.begun, None
         self._know(known)
         self.steps.programs += programs
         return new, step

@@ -123,15 +123,16 @@ def solve_step(
             _within(step.normal, _lean(step), FIRST_FORCE),
             _apart(step.gap, step.slip.T, FIRST_DISTANCE * scale),
         )
+    ways = [
+        lambda: _continued(step, pattern, gone, multiplier),
+        lambda: _followed(step, pattern, gone, multiplier, *start),
+    ]
     if near is not None or not remembers or not led:
-        try:
-            return _followed(step, pattern, gone, multiplier, *start)
-        except NotSolved:
-            return _continued(step, pattern, gone, multiplier)
+        ways.reverse()
     try:
-        return _continued(step, pattern, gone, multiplier)
+        return ways[0]()
     except NotSolved:
-        return _followed(step, pattern, gone, multiplier, *start)
+        return ways[1]()
 
 
 def _continued(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float) -> Moved:
