@@ -143,7 +143,6 @@ class Steps:
         pose = self._with_supports(place.pose, supports)
         way, pressed, near = 0.0, 0.0, None
         stiff = 1.0 if self.care == 1.0 else STIFF
-        led = self.care == 1.0 and model.dimension == 2
         for _ in range(LINEARISATIONS):
             contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
             control = driver.control(pose) if model.live is not None else None
@@ -164,7 +163,7 @@ class Steps:
                 wanted=0.0 if control is None else (s - driver.gone(pose)) / model.length,
             )
             self.programs += 1
-            found = solve_step(linear, gone, multiplier, near, led=led)
+            found = solve_step(linear, gone, multiplier, near)
             near, pressed = found, float((found.normal - normal).max(initial=0.0)) * linear.give[0]
             # The give is taken back: the next linearisation starts from the forces it has reached.
             normal, shear, multiplier = found.normal, found.shear, found.multiplier

@@ -1,4 +1,4 @@
-"""One step of the path: Coulomb friction without lift, at a linearised geometry, by an interior method.
+"""One step of the path: Coulomb friction without lift, at a linearised geometry.
 
 Over the movements q of the free blocks in a step h of the supports, with the contact forces N (compression) and
 T = μ τ, one shear force in the plane, two in space::
@@ -12,16 +12,18 @@ nothing else holds, comes to |σ|: a point that slides takes all of its friction
 the plane the cone is its two rays. Without the give the forces of a wall are not unique, without the drag its motion is
 not; both are small, see :mod:`solver.tolerances`.
 
-The complementarity problem is that of De Saxcé's cone, and friction without lift makes it no convex program. An
-interior method follows its central path all the same: yN = β and the product of the cone's algebra 2β (1, 0), β to 0,
-Newton's method with one sparse factorisation an iteration, scaled as Nesterov & Todd (1997),
-https://doi.org/10.1287/moor.22.1.1, for what Andersen, Roos & Terlaky (2003),
-https://doi.org/10.1007/s10107-002-0349-3, call the quadratic cone, predictor and corrector (Mehrotra 1992,
-https://doi.org/10.1137/0802028). Once the path shows which points are open, stick or slide, Newton's method on the
-states takes over, as in plasticity. A long step may have several solutions. Where the states do not come to one from
-those of its start, the step is therefore solved by parts, each from the one before: this is the one that its start
-leads to, and shorter steps lead to the same. Where that ends, too, the caller takes a smaller step of the supports, for
-which the drag dominates.
+The complementarity problem is that of De Saxcé's cone, and friction without lift makes it no convex program: a step of
+some length may have several solutions. Newton's method on the points' states, as in plasticity, finds one where things
+go on as they did. Where it does not, in the plane the step is followed from its start (:mod:`solver.program.led`): the
+solution is the one that the start leads to, and shorter steps lead to the same.
+
+Where nothing is remembered, in space, and where the start leads nowhere, an interior method follows the central path of
+the problem: yN = β and the product of the cone's algebra 2β (1, 0), β to 0, Newton's method with one sparse
+factorisation an iteration, scaled as Nesterov & Todd (1997), https://doi.org/10.1287/moor.22.1.1, for what Andersen,
+Roos & Terlaky (2003), https://doi.org/10.1007/s10107-002-0349-3, call the quadratic cone, predictor and corrector
+(Mehrotra 1992, https://doi.org/10.1137/0802028). Once the path shows which points are open, stick or slide, Newton's
+method on the states takes over. Where it ends, too, the caller takes a smaller step of the supports, for which the drag
+dominates.
 
 In the plane the friction law is the linear complementarity form of Stewart & Trinkle (1996) and of Anitescu & Potra
 (1997), https://doi.org/10.1023/A:1008292328909, here for quasi-static steps.
@@ -29,20 +31,22 @@ In the plane the friction law is the linear complementarity form of Stewart & Tr
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .led import led
+from .states import BALANCE, EQUATIONS, STATES, in_states
 from .step import Moved, NotSolved, Pattern, Step, paired
 
 #: Iterations, and part of the way to the nearest bound that is gone, in the plane and in space, where shear forces that
 #: turn about a round cone soon leave it close to its edge.
 ITERATIONS, FRACTION, FRACTION_IN_SPACE = 60, 0.99, 0.9
 
-#: The solution counts when balance, the linear equations in parts of a step and an elastic give, and the largest
-#: product in elastic gives across are below these. A point that neither carries nor is open keeps a force of the last
-#: one's root.
-BALANCE, EQUATIONS, PRODUCT = 1e-9, 1e-8, 1e-9
+#: The solution counts when balance and the linear equations are met as in given states, and the largest product is
+#: below this, in elastic gives across. A point that neither carries nor is open keeps a force of its root.
+PRODUCT = 1e-9
 
 #: Balance, the linear equations as above, and mean product of force and distance, in block weights and sizes, at which
 #: a solution that converges no further counts: forces that are reported are balanced once more, and the geometry is
@@ -65,17 +69,13 @@ STALLED, LOOK_BACK = 0.8, 8
 #: Corrections of second order are cut off at so many times the mean product.
 CORRECTION = 30.0
 
-#: Newton's method on the points' states: part of a force that counts as none, and iterations after which it is given
-#: up. Where more points change their state than the time before it goes round, and the second time it is left.
-STATES, STATE_CHANGES = 1e-9, 16
-
 #: Mean product, in elastic gives across, from which on the states at a point of the central path are tried as those of
 #: the solution; where they are not, again after the mean product has fallen by the second number.
 STATES_SEEN, AGAIN = 1e-3, 100.0
 
-#: A step that is solved by parts: the first of them, by how much a part becomes shorter where its states are not found,
-#: the least, and how many of those there may be: where a structure jumps, no part is short enough, and a smaller step
-#: of the supports, for which the drag holds, costs less.
+#: A step in space that is solved by parts: the first of them, by how much a part becomes shorter where its states are
+#: not found, the least, and how many of those there may be: where a structure jumps, no part is short enough, and a
+#: smaller step of the supports, for which the drag holds, costs less.
 FIRST_PART, SHORTER, LEAST_PART, LEAST_PARTS = 0.25, 4.0, 0.004, 4
 
 #: Nearest that a point comes to the boundary of its cone, squared, as a part of its axis: keeps the scaling finite.
@@ -83,7 +83,7 @@ INSIDE = 1e-20
 
 
 def solve_step(
-    step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Moved | None = None, *, led: bool = True
+    step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Moved | None = None, *, by_way: bool = True
 ) -> Moved:
     """Solves a step.
 
@@ -96,9 +96,8 @@ def solve_step(
         Of the live load, to start from.
     near : Moved, optional
         The solution at a geometry very near, with the same contact points.
-    led : bool
-        Of several solutions, to the one that the start of the step leads to. With hardly any drag, and with round
-        cones, parts of a step more often lead nowhere: there any solution will do.
+    by_way : bool
+        In the plane, of several solutions that to which the start of the step leads.
 
     Raises
     ------
@@ -111,11 +110,15 @@ def solve_step(
     pattern = Pattern(step) if near is None or near.pattern is None else near.pattern.fill(step)
     scale = step.size + step.give[1]
     remembers = bool((step.normal > 0.0).any())
+    plane, unmoved, found = step.shear.shape[1] == 1, _unmoved(step, multiplier), None
     if near is not None or remembers:
         # Mostly things go on as they did, or a few points change.
-        found = _in_states(step, pattern, gone, near or _unmoved(step, multiplier))
-        if found is not None:
-            return found
+        found = in_states(step, pattern, gone, near or unmoved)
+    if found is None and by_way and remembers and plane:
+        with suppress(NotSolved):
+            found = in_states(step, pattern, gone, led(step, pattern, gone, unmoved))
+    if found is not None:
+        return found
     if near is not None:
         start = _centred(near, scale)
     else:
@@ -123,22 +126,16 @@ def solve_step(
             _within(step.normal, _lean(step), FIRST_FORCE),
             _apart(step.gap, step.slip.T, FIRST_DISTANCE * scale),
         )
-    ways = [
-        lambda: _continued(step, pattern, gone, multiplier),
-        lambda: _followed(step, pattern, gone, multiplier, *start),
-    ]
-    if near is not None or not remembers or not led:
-        ways.reverse()
     try:
-        return ways[0]()
+        return _followed(step, pattern, gone, multiplier, *start)
     except NotSolved:
-        return ways[1]()
+        if plane:
+            raise
+        return _continued(step, pattern, gone, multiplier)
 
 
 def _continued(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float) -> Moved:
-    """Solve a step by parts, from nothing moved and the forces remembered, each part from the one before.
-
-    A step of some length may have several solutions where many points slide. This is the one that the start leads to.
+    """Solve a step in space by parts, from nothing moved and the forces remembered, each part from the one before.
 
     Raises
     ------
@@ -157,7 +154,7 @@ def _continued(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float
             slip=to * step.slip,
             wanted=to * step.wanted,
         )
-        found = _in_states(now, pattern, gone, near)
+        found = in_states(now, pattern, gone, near)
         if found is None and part > LEAST_PART:
             part /= SHORTER
             continue
@@ -226,99 +223,10 @@ def _lean(step: Step) -> np.ndarray:
 def _unmoved(step: Step, multiplier: float) -> Moved:
     """The start of a step as a solution: the forces remembered, what carries closed, nothing moved."""
     forces = _within(step.normal, _lean(step), 0.0)
-    gap = np.where(step.normal > 0.0, 0.0, np.maximum(step.gap, 0.0))
+    carries = step.normal > STATES * float(step.normal.max(initial=0.0))
+    gap = np.where(carries, 0.0, np.maximum(step.gap, 0.0))
     distances = _apart(gap, np.zeros_like(step.slip.T), 0.0)
     return Moved(np.zeros(len(step.load)), step.normal, step.shear, multiplier, 0, forces, distances)
-
-
-def _in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved) -> Moved | None:
-    """Newton's method on which points are open, stick or slide, and where to; None where it goes round.
-
-    On the central path nothing is at its bound: there the larger of a force and its distance says which of them stays.
-    """
-    mu, (across, along) = step.friction, step.give
-    n, d = near.forces.shape[1], len(near.forces)
-    normal, lean = near.forces[0], near.forces[1:]
-    size = np.sqrt((lean**2).sum(axis=0))
-    way = lean / np.maximum(size, 1e-300)
-    closed = normal * along > near.distances[0]
-    short = 0.5 * (near.distances[1] - (way * near.distances[2:]).sum(axis=0))
-    # What is at the limit of its friction but for rounding slides, for all that anybody knows.
-    slides = (0.5 * (normal - size - STATES * normal) * along <= short) & (size > 0.0)
-    way, turn = way.T, mu * normal / (mu * normal + near.distances[1] / along + 1e-300)
-    no_force, no_way = STATES * max(float(near.normal.max(initial=0.0)), 1.0), EQUATIONS * (step.size + along)
-    trial_before, multiplier = step.shear - step.slip / along, near.multiplier
-    changes, out, rises = n, np.inf, 0
-    eye = np.eye(d - 1)
-    for iteration in range(STATE_CHANGES):
-        slides &= closed
-        sticks = closed & ~slides
-        # Across the way that a point slides it is held by its friction, the less the farther it slides.
-        held = (sticks[:, None, None] * eye) + (slides * turn)[:, None, None] * (
-            eye - way[:, :, None] * way[:, None, :]
-        )
-        pushed = (slides * mu)[:, None] * way
-        local = np.zeros((n, d, d))
-        local[:, 0, 0] = closed / across
-        local[:, 1:, 0] = pushed / across
-        local[:, 1:, 1:] = held / along
-        first = np.where(closed, step.normal - step.gap / across, 0.0)
-        second = pushed * first[:, None] + np.matmul(held, trial_before[:, :, None])[:, :, 0]
-        try:
-            solve = pattern.factorised(local)
-        except NotSolved:
-            return None
-        motion = solve(step.load + pattern.to_blocks @ paired(first, second) - step.drag * gone)
-        if step.live is not None and step.control is not None:
-            by_live = solve(step.live)
-            moved = float(step.control @ by_live)
-            if moved == 0.0:
-                return None
-            multiplier = (step.wanted - float(step.control @ motion)) / moved
-            motion = motion + multiplier * by_live
-        relative = (pattern.to_contacts @ motion).reshape(-1, d)
-        normal = first - local[:, 0, 0] * relative[:, 0]
-        distance = step.gap + relative[:, 0] + across * (normal - step.normal)
-        trial = trial_before - relative[:, 1:] / along
-        size, most = np.sqrt((trial**2).sum(axis=1)), mu * np.maximum(normal, 0.0)
-        opens, closes = closed & (normal < -no_force), ~closed & (distance < -no_way)
-        starts = sticks & (size > most + no_force) & ~opens
-        # How far a point has slid the way that it was held to slide.
-        slid = (way * trial).sum(axis=1) - most
-        stops = slides & (slid < -no_way / along)
-        changed = opens | closes | starts | stops
-        if not changed.any():
-            normal = np.maximum(normal, 0.0)
-            over = slides & (size > most)
-            shear = np.where(
-                slides[:, None],
-                np.where(over[:, None], trial * (most / np.maximum(size, 1e-300))[:, None], most[:, None] * way),
-                trial * sticks[:, None],
-            )
-            unbalanced = step.load + pattern.to_blocks @ paired(normal, shear) - step.drag * (gone + motion)
-            if step.live is not None:
-                unbalanced = unbalanced + multiplier * step.live
-            if np.abs(unbalanced).max() < BALANCE:
-                slipped = step.slip + relative[:, 1:] + along * (shear - step.shear)
-                slipped = np.where(sticks[:, None], 0.0, slipped)
-                cone = np.sqrt((slipped**2).sum(axis=1))
-                tau = np.divide(shear, mu[:, None], out=np.zeros_like(shear), where=mu[:, None] > 0.0)
-                forces = np.stack([normal, *tau.T])
-                distances = np.stack([np.maximum(distance, 0.0), cone, *slipped.T])
-                return Moved(motion, normal, shear, multiplier, iteration, forces, distances, pattern)
-            if np.abs(unbalanced).max() > 0.5 * out:
-                # Rounding: next to nothing holds what moves.
-                return None
-            out = float(np.abs(unbalanced).max())
-        before, changes = changes, int(changed.sum())
-        rises += iteration > 0 and changes > before
-        if rises > 1:
-            return None
-        closed = (closed | closes) & ~opens
-        slides = starts | (slides & ~stops) | (closes & (size > most))
-        way = np.where((slides & (size > 0.0))[:, None], trial / np.maximum(size, 1e-300)[:, None], 0.0)
-        turn = np.minimum(most / np.maximum(size, 1e-300), 1.0)
-    return None
 
 
 @np.errstate(all="ignore")  # A step that leaves the numbers is seen by what it gives.
@@ -354,7 +262,7 @@ def _followed(
             return here
         if mean < to_try:
             to_try = mean / AGAIN
-            found = _in_states(step, pattern, gone, here)
+            found = in_states(step, pattern, gone, here)
             if found is not None:
                 return replace(found, iterations=iteration + found.iterations)
         means.append(mean)
@@ -385,7 +293,7 @@ def _followed(
         forces, distances = forces + part * change.forces, distances + part * change.distances
     if out < BALANCE_LEFT and wrong < EQUATIONS_LEFT * scale and mean < PRODUCT_LEFT:
         # Points that neither carry nor are open converge slowly: by their states at once, or as they are.
-        return _in_states(step, pattern, gone, here) or here
+        return in_states(step, pattern, gone, here) or here
     raise NotSolved(f"balance {out:.1e}, distances {wrong:.1e}, product {mean:.1e} after {iteration} iterations")
 
 
