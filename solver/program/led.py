@@ -56,27 +56,33 @@ def led(step: Step, pattern: Pattern, gone: np.ndarray, start: Moved) -> Moved:
     """
     way = _Way(step, pattern, gone, start)
     t, onwards = 0.0, 1.0
-    at, growth = way.forces()
     for _ in range(len(step.gap) + TAKEN_IN):
-        value, change = way.measured(at + t * growth), onwards * way.measured(growth)
+        value, growth = way.measured[0] + t * way.measured[1], onwards * way.measured[1]
         ahead = np.full(value.shape, np.inf)
-        np.divide(np.maximum(value, 0.0), -change, out=ahead, where=change < 0.0)
-        which, number = divmod(int(np.argmin(ahead)), value.shape[1])
+        np.divide(np.maximum(value, 0.0), -growth, out=ahead, where=growth < 0.0)
+        which, number = divmod(int(ahead.argmin()), value.shape[1])
         nearest = float(ahead[which, number])
         if onwards > 0.0 and t + nearest >= 1.0:
-            return way.found(at + growth)
+            return way.found()
         t += onwards * nearest
         if not -FARTHEST_BACK < t < np.inf:
             break
-        grows = way.change(which, number, at + t * growth)
-        at, growth = way.forces()
+        grows = way.change(which, number, t)
         # On the other side of the change its point goes on from it: where the structure snaps, as t turns.
-        onwards = 1.0 if way.measured(growth)[grows, number] > 0.0 else -1.0
+        onwards = 1.0 if way.measured[1, grows, number] > 0.0 else -1.0
     raise NotSolved(f"the start leads no further than {t:.3g} of the step")
 
 
 class _Way:
-    """The points' states on the way, and P, linear in t, that follows from them."""
+    """The points' states on the way, and P, linear in t, that follows from them.
+
+    Attributes
+    ----------
+    forces : (2, 2, n) array
+        P at the start of the step and how it grows with t, in the present states.
+    measured : (2, 2, n) array
+        Likewise of each point two functions of P that are positive as long as its state lasts.
+    """
 
     def __init__(self, step: Step, pattern: Pattern, gone: np.ndarray, start: Moved) -> None:
         self.step, self.pattern = step, pattern
@@ -99,22 +105,11 @@ class _Way:
             -np.stack([step.gap - gap, step.slip[:, 0]]) / self.give,
         )
         self.functions = np.zeros((2, 2, len(normal)))
-        self._set_functions(np.arange(len(normal)))
+        self._set_functions(slice(None))
         self._factorise()
+        self._measure()
 
-    def forces(self) -> tuple[np.ndarray, np.ndarray]:
-        """(2, n) arrays: P at the start of the step and how it grows with t, in the present states."""
-        m = self.taken_in
-        self.parts = self.inverse[:m, :m] @ self.right[:m]
-        taken = self.parts.T @ self.taken[:m].reshape(m, self.base[0].size)
-        first, second = self.base - taken.reshape(self.base.shape)
-        return first, second
-
-    def measured(self, forces: np.ndarray) -> np.ndarray:
-        """(2, n) array: two functions of P at each point that are positive as long as its state lasts."""
-        return np.asarray((self.functions * forces).sum(axis=1))
-
-    def change(self, which: int, number: int, forces: np.ndarray) -> int:
+    def change(self, which: int, number: int, t: float) -> int:
         """Change the state of the point whose function has come to zero; gives that which must grow now.
 
         Raises
@@ -134,18 +129,20 @@ class _Way:
         else:
             closes = not self.closed[number]
             if closes:
-                self.sense[number] = -1.0 if forces[1, number] < 0.0 else 1.0
+                shear = self.forces[0, 1, number] + t * self.forces[1, 1, number]
+                self.sense[number] = -1.0 if shear < 0.0 else 1.0
             self.closed[number] = self.slides[number] = closes
             grows = 0
             put, read = np.array([1.0, friction * self.sense[number]]), np.array([1.0 if closes else -1.0, 0.0])
-        self._set_functions(np.array([number]))
+        self._set_functions(slice(number, number + 1))
         if self.taken_in == TAKEN_IN or not self._taken_in(number, put, read):
             self._factorise()
+        self._measure()
         return grows
 
-    def found(self, forces: np.ndarray) -> Moved:
+    def found(self) -> Moved:
         """The solution at the end of the step."""
-        step, mu = self.step, self.step.friction
+        step, mu, forces = self.step, self.step.friction, self.forces.sum(axis=0)
         (across, along), slides = step.give, self.slides & self.closed
         normal = np.where(self.closed, np.maximum(forces[0], 0.0), 0.0)
         shear = np.where(slides, self.sense * mu * normal, np.where(self.closed, forces[1], 0.0))
@@ -158,14 +155,22 @@ class _Way:
             none, normal, shear[:, None], multiplier, 0, np.stack([normal, tau]), np.stack([gap, abs(slipped), slipped])
         )
 
-    def _set_functions(self, numbers: np.ndarray) -> None:
+    def _measure(self) -> None:
+        m = self.taken_in
+        self.parts = self.inverse[:m, :m] @ self.right[:m]
+        taken = self.parts.T @ self.taken[:m].reshape(m, self.base[0].size)
+        self.forces = self.base - taken.reshape(self.base.shape)
+        self.measured = self.functions[0] * self.forces[:, :1] + self.functions[1] * self.forces[:, 1:]
+
+    def _set_functions(self, numbers: slice) -> None:
         mu, sense = self.step.friction[numbers], self.sense[numbers]
         closed, slides = self.closed[numbers], self.slides[numbers]
         sticks, slides = closed & ~slides, closed & slides
-        self.functions[0, 0, numbers] = np.where(sticks, mu, np.where(closed, 1.0, -1.0))
-        self.functions[0, 1, numbers] = np.where(sticks, -1.0, 0.0)
-        self.functions[1, 0, numbers] = np.where(sticks, mu, np.where(slides, -mu, 0.0))
-        self.functions[1, 1, numbers] = np.where(sticks, 1.0, np.where(slides & (mu > 0.0), sense, 0.0))
+        of_normal, of_shear = self.functions
+        of_normal[0, numbers] = np.where(sticks, mu, np.where(closed, 1.0, -1.0))
+        of_normal[1, numbers] = np.where(sticks, mu, np.where(slides, -mu, 0.0))
+        of_shear[0, numbers] = np.where(sticks, -1.0, 0.0)
+        of_shear[1, numbers] = np.where(sticks, 1.0, np.where(slides & (mu > 0.0), sense, 0.0))
 
     def _factorise(self) -> None:
         step, n = self.step, len(self.closed)
