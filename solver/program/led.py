@@ -56,7 +56,7 @@ def led(step: Step, pattern: Pattern, gone: np.ndarray, start: Moved) -> Moved:
     """
     way = _Way(step, pattern, gone, start)
     t, onwards = 0.0, 1.0
-    for _ in range(len(step.gap) + TAKEN_IN):
+    for _ in range(len(step.gap) // 2 + TAKEN_IN):
         value, growth = way.measured[0] + t * way.measured[1], onwards * way.measured[1]
         ahead = np.full(value.shape, np.inf)
         np.divide(np.maximum(value, 0.0), -growth, out=ahead, where=growth < 0.0)
