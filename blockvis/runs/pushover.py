@@ -57,8 +57,6 @@ class PushoverKind(AnalysisKind):
             "limit": table.number("limit", 1.0, positive=True),
             "tolerance": table.number("tolerance", positive=True),
         }
-        if keys["direction"] is None:
-            keys["direction"] = (1.0, 0.0) if keys["point"] is None else (1.0, *[0.0] * (len(keys["point"]) - 1))
         block = table.text("block")
         table.finish()
         if block is None:

@@ -118,8 +118,8 @@ class ControlDisplacement:
     ----------
     block : str
         Name of a free block.
-    direction : (d,) sequence
-        Direction in which the displacement counts; only its direction matters.
+    direction : (d,) sequence, optional
+        Direction in which the displacement counts; only its direction matters. Along x by default.
     point : (d,) sequence, optional [m]
         A point of the block, in the drawing; its centroid by default.
     increment : float [m]
@@ -131,7 +131,7 @@ class ControlDisplacement:
     """
 
     block: str
-    direction: Sequence[float] = (1.0, 0.0)
+    direction: Sequence[float] | None = None
     point: Sequence[float] | None = None
     increment: float = 0.01
     limit: float = 1.0
@@ -147,10 +147,11 @@ class ControlDisplacement:
             if numbers.shape not in ((2,), (3,)) or not np.isfinite(numbers).all():
                 raise ValueError(f"control {name} is {value!r}; give two finite numbers [x, y], or in space three")
             object.__setattr__(self, name, tuple(numbers.tolist()))
-        length = float(np.linalg.norm(self.direction))
-        if length == 0.0:
-            raise ValueError("control direction is [0, 0]; give the direction in which the displacement counts")
-        object.__setattr__(self, "direction", tuple(part / length for part in self.direction))
+        if self.direction is not None:
+            length = float(np.linalg.norm(self.direction))
+            if length == 0.0:
+                raise ValueError("control direction is [0, 0]; give the direction in which the displacement counts")
+            object.__setattr__(self, "direction", tuple(part / length for part in self.direction))
         if self.tolerance is None:
             object.__setattr__(self, "tolerance", self.increment / 100.0)
         for name in ("increment", "limit", "tolerance"):
@@ -168,29 +169,30 @@ class ControlDisplacement:
         block, arm = self._place(assembly)
         turned = rotation_matrices(pose.rotations[[block]])[0] @ arm
         moved_by = pose.positions[block] + turned - assembly.centroids[block] - arm
-        return float(moved_by @ np.asarray(self.direction))
+        return float(moved_by @ self._along(assembly))
 
     def speed(self, assembly: Assembly, pose: Pose, velocity: np.ndarray) -> float:
         """Rate of the control displacement in a velocity (n_blocks, n_dof) of the blocks."""
         block, arm = self._place(assembly)
         point = pose.positions[[block]] + arm @ rotation_matrices(pose.rotations[[block]])[0].T
-        return float((point_velocities(point, np.array([block]), pose, velocity) @ np.asarray(self.direction))[0])
+        return float((point_velocities(point, np.array([block]), pose, velocity) @ self._along(assembly))[0])
 
     def weights(self, assembly: Assembly, pose: Pose) -> np.ndarray:
         """(n_blocks, n_dof) array whose product with a movement of the blocks is that of the control point."""
         block, arm = self._place(assembly)
         turned = rotation_matrices(pose.rotations[[block]])[0] @ arm
-        along = np.asarray(self.direction)
+        along = self._along(assembly)
         weights = np.zeros((assembly.n_blocks, len(along) + rotation_count(len(along))))
         weights[block] = np.concatenate([along, cross_rows(turned[None])[0] @ along])
         return weights
 
     def _place(self, assembly: Assembly) -> tuple[int, np.ndarray]:
         block = assembly.index(self.block)
-        arm = (
-            np.zeros(len(self.direction)) if self.point is None else np.asarray(self.point) - assembly.centroids[block]
-        )
-        return block, arm
+        centroid = assembly.centroids[block]
+        return block, np.zeros_like(centroid) if self.point is None else np.asarray(self.point) - centroid
+
+    def _along(self, assembly: Assembly) -> np.ndarray:
+        return np.eye(assembly.dimension)[0] if self.direction is None else np.asarray(self.direction)
 
     def check_dimension(self, assembly: Assembly) -> None:
         """Raise ``ValueError`` where the numbers are for the plane and the blocks in space, or the other way round."""
@@ -239,6 +241,6 @@ class ControlledLoad:
     def misdirected(self) -> str:
         """Names the block and the direction."""
         return (
-            f"the mechanism does not move block '{self.chosen.block}' along {self.chosen.direction}; choose another "
-            "control block, point or direction"
+            f"the mechanism does not move block '{self.chosen.block}' along {self.chosen.direction or 'x'}; choose "
+            "another control block, point or direction"
         )

@@ -1,5 +1,7 @@
 """Case files in space: two numbers or three, supports, generators by name, blockvis new."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -139,3 +141,19 @@ def test_new_names_the_supports_of_a_drawing(tmp_path):
     text = (tmp_path / "dome.toml").read_text(encoding="utf-8")
     found = case_assembly(parse_case(text, tmp_path / "dome.toml"))
     assert int((~found.free).sum()) == 4
+
+
+def test_a_pushover_counts_along_x_unless_told_otherwise(tmp_path):
+    """A block of 0.4 by 0.4 by 1 m, pushed along x, tips when α is its slenderness."""
+    solids = [box((-1, -1, -0.5), (2, 2, 0)), box((0, 0, 0), (0.4, 0.4, 1))]
+    blocks = solver.Assembly.from_solids(solids, names=["ground", "block"], roles=["fixed", "free"])
+    write_layout(layout_of(blocks), tmp_path / "block.obj")
+    (tmp_path / "case.toml").write_text(
+        '[geometry]\nfile = "block.obj"\nunit = "m"\ndimension = 3\n[roles]\nground = "fixed"\n'
+        '[analysis]\nkind = "pushover"\n[material]\nfriction_coefficient = 0.9\n'
+        '[[loads]]\nblocks = "block"\nkind = "live"\nweight_fraction = [1, 0, 0]\n'
+        '[control]\nblock = "block"\nincrement = 0.05\nlimit = 0.05\n',
+        encoding="utf-8",
+    )
+    assert main(["run", str(tmp_path / "case.toml"), "--no-pictures", "-o", str(tmp_path / "out")]) == 0
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["limit_load_multiplier"] == pytest.approx(0.4)
