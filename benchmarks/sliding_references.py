@@ -1,11 +1,13 @@
 """Reactions and capacities where joints slide, beside closed forms and physics engines.
 
-    python benchmarks/sliding_references.py [--only column door window panel pushover] [--parts 1 2]
+    python benchmarks/sliding_references.py [--only column door window panel pushover] [--parts 1 2] \
+        [--engines pymunk compas_lmgc90 [--speed 0.01] [--time-step 0.0005]]
 
 Values of the engines are those of LMGC90 0.1.11 and pymunk 7.3.1 with supports at 5 to 20 mm/s, settings as in
-``physics_engines.py``. The column is elementary statics: nothing presses it against the wall, so that the wall carries
-nothing. The pushover is wall 1 of Ferris & Tin-Loi, Int. J. Mech. Sci. 43 (2001) 209-224, pushed over with its weight;
-nobody has published where its capacity ends, so that descriptions and increments stand beside each other.
+``physics_engines.py``; ``--engines`` runs them beside, in the same run. The column is elementary statics: nothing
+presses it against the wall, so that the wall carries nothing. The pushover is wall 1 of Ferris & Tin-Loi, Int. J. Mech.
+Sci. 43 (2001) 209-224, pushed over with its weight; nobody has published where its capacity ends, so that descriptions
+and increments stand beside each other.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
+from physics_engines import ENGINES, SAMPLING
 from sliding_walls import DESCRIPTIONS, WALLS, Wall, door, sinking, spread
 
 import solver
@@ -26,6 +29,9 @@ COLUMN = ((0.02, 1.0, 0.997, 1.0), (0.1, 1.0, 0.997, 1.0), (0.2, 1.0, 0.997, 1.0
 DOOR = ((0.061, 0.4394, 0.440), (0.164, 0.4510, 0.451))
 WINDOW = ((0.01, 0.411, 0.415, 0.410), (0.02, 0.411, 0.415, 0.410), (0.03, 0.411, 0.415, 0.410))
 PANEL = ((0.2, 0.180, 0.1805), (0.38, 0.1866, 0.188))
+
+#: Way over which a reaction of an engine, which trembles, is averaged [m].
+MEAN_OVER = 0.002
 
 COURSES = ((0.5, 1, 1, 1, 1, 0.5), (1, 1, 1, 1, 1))
 
@@ -85,6 +91,30 @@ def compared(name: str, wall: Wall, references: Sequence[tuple[float, ...]], par
             )
 
 
+def beside(name: str, wall: Wall, references: Sequence[tuple[float, ...]], chosen: argparse.Namespace) -> None:
+    """R / W of the engines, run here, at the same settlements: means over the last of the way to each."""
+    weight = float(np.hypot(*wall.loads.dead[wall.assembly.free, :2].sum(axis=0)))
+    friction = wall.interfaces.default.friction_coefficient
+    direction = wall.direction / np.linalg.norm(wall.direction)
+    for engine in chosen.engines:
+        given = (wall.assembly, tuple(direction), chosen.speed, chosen.time_step, friction)
+        started = time.process_time()
+        seen: list[tuple[float, float]] = []
+        for sample in ENGINES[engine](*given, SAMPLING):
+            seen.append((sample.displacement, float(sample.force @ direction) / weight))
+            if sample.displacement > max(s for s, *_ in references):
+                break
+        way, reaction = np.array(seen).T
+        for s, *_ in references:
+            there = (way > s - MEAN_OVER) & (way <= s)
+            print(
+                f"{name:12s} s = {s:<6g} {engine} {chosen.speed:g} m/s, {chosen.time_step:g} s: R = "
+                f"{reaction[there].mean():.5f} ± {reaction[there].std():.5f} W; "
+                f"{time.process_time() - started:.0f} s",
+                flush=True,
+            )
+
+
 def pushed_over(descriptions: Sequence[str], parts: Sequence[int], limit: float) -> None:
     """Limit load, α on the way, and zero capacity of the wall of Ferris & Tin-Loi."""
     ends = []
@@ -128,16 +158,21 @@ def main() -> None:
     parser.add_argument("--parts", nargs="+", type=int, default=[1, 2], help="parts of the increment")
     parser.add_argument("--descriptions", nargs="+", choices=DESCRIPTIONS, default=["drawn", "mirrored", "renumbered"])
     parser.add_argument("--limit", type=float, default=1.0, help="end of the pushover in metres of the drawing")
+    parser.add_argument("--engines", nargs="+", choices=ENGINES, default=[], help="run these beside")
+    parser.add_argument("--speed", type=float, default=0.01, help="of the supports in the engines [m/s]")
+    parser.add_argument("--time-step", type=float, default=5e-4, help="of the engines [s]")
     chosen = parser.parse_args()
-    if "column" in chosen.only:
-        compared("column", column(), COLUMN, chosen.parts)
-    if "door" in chosen.only:
-        compared("door", door(), DOOR, chosen.parts)
-    if "window" in chosen.only:
-        compared("window", WALLS["window"](), WINDOW, chosen.parts)
-    if "panel" in chosen.only:
-        wall = sinking(catalogue.build("panel", {"nb": 5, "nc": 6}), 0.3, 0.02, (0.2, 0.38))
-        compared("panel 5x6", wall, PANEL, chosen.parts)
+    panel = {"nb": 5, "nc": 6}
+    walls: dict[str, tuple[Wall, Sequence[tuple[float, ...]]]] = {
+        "column": (column(), COLUMN),
+        "door": (door(), DOOR),
+        "window": (WALLS["window"](), WINDOW),
+        "panel": (sinking(catalogue.build("panel", panel), 0.3, 0.02, (0.2, 0.38)), PANEL),
+    }
+    for name, (wall, references) in walls.items():
+        if name in chosen.only:
+            compared(name, wall, references, chosen.parts)
+            beside(name, wall, references, chosen)
     if "pushover" in chosen.only:
         pushed_over(chosen.descriptions, chosen.parts, chosen.limit)
 
