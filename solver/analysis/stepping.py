@@ -34,8 +34,8 @@ STIFF = 1e-3
 PRESSED = 1e-5
 
 #: A corner that carries this force, in block weights, may slip past the end of its edge, or come into another block
-#: from the side, in steps of the supports, and of blocks, no larger than this, in block sizes; what falls, in steps
-#: whose drag is that of the second.
+#: from the side, in steps of the supports, and of blocks, no larger than this, in block sizes, or in smaller ones where
+#: less drag holds it; what falls, in steps whose drag is that of the second.
 SLIPPED_OFF_FORCE, SLIP_OFF, SHORTEST_FALL = 1e-3, 1e-4, 1e-6
 
 #: Contact points of two blocks no farther apart than this, in block sizes, are one, by whichever corner and edge.
@@ -183,7 +183,7 @@ class Steps:
         motion = np.where(free[:, None], full, place.pose.movement_to(pose))
         if not still and np.abs(gone).max(initial=0.0) > max(FALLING_FORCE / (DRAG * self.care) * size, 1e3 * GIVE):
             raise Falls
-        if size > (SHORTEST_FALL if still else SLIP_OFF) and np.abs(gone).max(initial=0.0) > SLIP_OFF:
+        if size > self.care * (SHORTEST_FALL if still else SLIP_OFF) and np.abs(gone).max(initial=0.0) > SLIP_OFF:
             self._refuse_beyond(contacts, normal, pose)
         forces = np.column_stack([normal, shear])
         velocity = None if still else self._velocity(place, motion, length)
