@@ -25,7 +25,8 @@ TIGHT = 1e-9
 
 #: Where many joints slide. A collapse is enclosed to a tolerance, and rounding may choose among the places within it:
 #: 8e-4 between two computers, and 4e-3 in the reaction at the last of them, which grows fast there. The façade is
-#: followed by linear programs, whose solutions rounding chooses: 8e-3.
+#: followed by linear programs, whose solutions rounding chooses: its last reaction is 47.95, 48.43, 51.84 and 52.72 kN
+#: with the kernels Haswell, Prescott, Sandybridge and SkylakeX.
 LOOSER = dict.fromkeys(
     (
         "panel_with_opening",
@@ -38,7 +39,7 @@ LOOSER = dict.fromkeys(
 ) | {
     "wall_with_arch": 5e-3,
     "panel_settlement_friction": 2e-3,
-    "facade": 0.03,
+    "facade": 0.12,
     # In space: 1e-3 between the kernels.
     "corner_of_walls": 5e-3,
     "cross_vault_corner": 2e-3,
