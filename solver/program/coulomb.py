@@ -73,9 +73,9 @@ CORRECTION = 30.0
 #: the solution; where they are not, again after the mean product has fallen by the second number.
 STATES_SEEN, AGAIN = 1e-3, 100.0
 
-#: A step in space that is solved by parts: the first of them, by how much a part becomes shorter where its states are
-#: not found, the least, and how many of those there may be: where a structure jumps, no part is short enough, and a
-#: smaller step of the supports, for which the drag holds, costs less.
+#: A step that is solved by parts, in space or from no forces: the first of them, by how much a part becomes shorter
+#: where its states are not found, the least, and how many of those there may be: where a structure jumps, no part is
+#: short enough, and a smaller step of the supports, for which the drag holds, costs less.
 FIRST_PART, SHORTER, LEAST_PART, LEAST_PARTS = 0.25, 4.0, 0.004, 4
 
 #: Nearest that a point comes to the boundary of its cone, squared, as a part of its axis: keeps the scaling finite.
@@ -129,13 +129,13 @@ def solve_step(
     try:
         return _followed(step, pattern, gone, multiplier, *start)
     except NotSolved:
-        if plane:
+        if plane and remembers:
             raise
         return _continued(step, pattern, gone, multiplier)
 
 
 def _continued(step: Step, pattern: Pattern, gone: np.ndarray, multiplier: float) -> Moved:
-    """Solve a step in space by parts, from nothing moved and the forces remembered, each part from the one before.
+    """Solve a step by parts, from nothing moved and the forces remembered, each part from the one before.
 
     Raises
     ------
