@@ -24,7 +24,7 @@ LINEARISATIONS, EXACT, ACCEPTED = 6, 1e-6, 1e-4
 #: its weight.
 FALLING_FORCE = 1.0
 
-#: Part of the drag that is left where a collapse is being enclosed.
+#: Part of the drag, and of the imperfection, that is left where a collapse is being enclosed.
 CARE = 1e-3
 
 #: Part of the give of the joints that is left there, where forces grow without limit before a snap.
@@ -132,7 +132,7 @@ class Steps:
         friction = model.interfaces.friction(assembly, start.block_a, start.block_b)
         n_dof = len(scales)
         rows = np.repeat(free, n_dof)
-        load = (model.scaled_load + self.imperfection)[free].ravel()
+        load = (model.scaled_load + self.care * self.imperfection)[free].ravel()
         drag = DRAG * self.care / size * self.drag[free].ravel()
         if place.velocity is not None and not still:
             # The drag resists changes of the velocity: what moves on as before is soon not held back.

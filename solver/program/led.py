@@ -195,9 +195,7 @@ class _Way:
     def _taken_in(self, number: int, put: np.ndarray, read: np.ndarray) -> bool:
         """Take in that the forces put on a point change by what is read of P there; False where it costs digits."""
         step, m = self.step, self.taken_in
-        force = np.zeros((2, len(self.closed)))
-        force[:, number] = put
-        moved = self.solve(self._on_blocks(force))
+        moved = self.solve(self.pattern.by_one(number, put))
         self.taken[m] = taken = self._on_contacts(moved)
         self.places[m], self.reads[m] = number, read
         self.right[m] = self.base[:, :, number] @ read

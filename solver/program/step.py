@@ -91,6 +91,7 @@ class Pattern:
         dof = rows.shape[2]
         number = np.where(step.free, np.cumsum(step.free) - 1, -1)
         self.coupling = Coupling(number[rows[:, :, 0]] // dof, len(step.load) // dof, dof)
+        self.rows = number[rows].reshape(n, -1)
         self.fill(step)
 
     def fill(self, step: Step) -> Pattern:
@@ -103,6 +104,13 @@ class Pattern:
         self.to_blocks = to_blocks.toarray() if dense else to_blocks
         self.to_contacts = np.ascontiguousarray(self.to_blocks.T) if dense else sp.csr_array(to_blocks.T)
         return self
+
+    def by_one(self, number: int, forces: np.ndarray) -> np.ndarray:
+        """(n_dof,) array: what (d,) forces at one contact point put on the blocks."""
+        # What a block without freedom takes goes beyond the last.
+        on_blocks = np.zeros(len(self.drag) + 1)
+        on_blocks[self.rows[number]] = forces @ self.blocks[number]
+        return on_blocks[:-1]
 
     def factorised(self, local: np.ndarray) -> Solve:
         """What solves with the stiffness and the drag, for (n_contacts, d, d) answers of the contact points.

@@ -107,6 +107,23 @@ def test_a_wall_sinks_alike_with_half_the_increment(name):
     assert reaction == pytest.approx(expected, abs=HALVED[name] * expected.max())
 
 
+@pytest.mark.slow
+def test_a_keystone_between_equal_halves_slips_the_same_way_in_any_increment():
+    """The wall of examples/wall_with_arch.toml; whole it slipped to the left, halved to the right."""
+    arch = {"x": 1.25, "y": 0.0, "width": 1.0, "height": 1.0, "head": "segmental arch", "rise": 0.2}
+    parameters = {"width": 3.5, "height": 1.8, "settling": [1.75, 4.5], "openings": [arch]}
+    assembly = generators.build("wall", parameters)
+    keystone, turned_by = assembly.names.index("voussoir 1-5"), []
+    for increment in (0.02, 0.01):
+        spreads = solver.Settlement(direction=(1.0, 0.0), increment=increment, limit=0.04)
+        response = solver.settle(assembly, spreads, friction_coefficient=0.5, controls=NO_FALL)
+        assert response.stop is solver.Status.LIMIT_REACHED, response.message
+        turned_by.append(response.path[-1].pose.rotations[keystone].item())
+    # Settled by 0.02 m it still stands upright.
+    assert abs(turned_by[0]) > 5e-3
+    assert turned_by[1] == pytest.approx(turned_by[0], rel=0.1)
+
+
 def test_a_wall_a_thousand_times_as_heavy_ends_alike():
     _, expected = as_drawn("panel")
     response = sinking(described(wall("panel"), density=2e6))
