@@ -21,6 +21,7 @@ from solver.tolerances import (
     COORDINATE_ROUNDING,
     CORNER_TOLERANCE,
     GEOMETRY_TOLERANCE,
+    INTERIOR_TOLERANCE,
     LARGEST_DRIFT,
     LEFT_WEDGED,
     ROUNDING,
@@ -97,6 +98,10 @@ def closing_program(
     rays = friction_rays(np.where(sticking, friction, 0.0))[:, columns]
     drift = np.where(sticking, drift, 0.0)
     distance = distances_of(model, contacts, drift, ROUNDING)
+    if bodies is not None:
+        # An interior solution is no more exact than that, and without it large blocks wedged against each other, by
+        # less, leave no interior at all.
+        distance[0::2] += INTERIOR_TOLERANCE
     weights = np.where(same[:, None], before.forces[place], 0.0) / model.force
     weights[:, 1] = np.where(sticking, weights[:, 1], 0.0)
     by_body = sp.csr_array(parts.motions.T @ matrix)
