@@ -1,7 +1,7 @@
 """Reactions and capacities where joints slide, beside closed forms and physics engines.
 
     python benchmarks/sliding_references.py [--only column door window panel pushover] [--parts 1 2] \
-        [--engines pymunk compas_lmgc90 [--speed 0.01] [--time-step 0.0005]]
+        [--engines pymunk compas_lmgc90 [--speed 0.01] [--time-step 0.0005 0.0001]]
 
 Values of the engines are those of LMGC90 0.1.11 and pymunk 7.3.1 with supports at 5 to 20 mm/s, settings as in
 ``physics_engines.py``; ``--engines`` runs them beside, in the same run. The column is elementary statics: nothing
@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from physics_engines import ENGINES, SAMPLING
@@ -96,8 +97,8 @@ def beside(name: str, wall: Wall, references: Sequence[tuple[float, ...]], chose
     weight = float(np.hypot(*wall.loads.dead[wall.assembly.free, :2].sum(axis=0)))
     friction = wall.interfaces.default.friction_coefficient
     direction = wall.direction / np.linalg.norm(wall.direction)
-    for engine in chosen.engines:
-        given = (wall.assembly, tuple(direction), chosen.speed, chosen.time_step, friction)
+    for engine, time_step in product(chosen.engines, chosen.time_step):
+        given = (wall.assembly, tuple(direction), chosen.speed, time_step, friction)
         started = time.process_time()
         seen: list[tuple[float, float]] = []
         for sample in ENGINES[engine](*given, SAMPLING):
@@ -108,7 +109,7 @@ def beside(name: str, wall: Wall, references: Sequence[tuple[float, ...]], chose
         for s, *_ in references:
             there = (way > s - MEAN_OVER) & (way <= s)
             print(
-                f"{name:12s} s = {s:<6g} {engine} {chosen.speed:g} m/s, {chosen.time_step:g} s: R = "
+                f"{name:12s} s = {s:<6g} {engine} {chosen.speed:g} m/s, {time_step:g} s: R = "
                 f"{reaction[there].mean():.5f} ± {reaction[there].std():.5f} W; "
                 f"{time.process_time() - started:.0f} s",
                 flush=True,
@@ -160,7 +161,7 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=1.0, help="end of the pushover in metres of the drawing")
     parser.add_argument("--engines", nargs="+", choices=ENGINES, default=[], help="run these beside")
     parser.add_argument("--speed", type=float, default=0.01, help="of the supports in the engines [m/s]")
-    parser.add_argument("--time-step", type=float, default=5e-4, help="of the engines [s]")
+    parser.add_argument("--time-step", type=float, nargs="+", default=[5e-4, 1e-4], help="of the engines [s]")
     chosen = parser.parse_args()
     panel = {"nb": 5, "nc": 6}
     walls: dict[str, tuple[Wall, Sequence[tuple[float, ...]]]] = {
