@@ -389,6 +389,7 @@ def framed(
     margin: float = 0.04,
     supports: float = 0.13,
     axes: np.ndarray | None = None,
+    whole: float = 0.0,
 ) -> Frame:
     """Frame in which every free block stays over all poses.
 
@@ -404,6 +405,8 @@ def framed(
         supports of any extent.
     axes : (2, d) array, optional
         Unit vectors to the right and up in the picture; the axes of the drawing by default.
+    whole : float
+        Supports are shown whole where the picture is then no larger than this many times the free blocks.
     """
     free = assembly.free[assembly.block_of_vertex]
     d = assembly.dimension if axes is None else len(axes)
@@ -415,6 +418,8 @@ def framed(
         outer.hold(corners[~free] if (~free).any() else corners)
     low, high = inner.low, inner.high
     size = float((high - low).max())
-    low = np.minimum(low, np.maximum(outer.low, low - supports * size))
-    high = np.maximum(high, np.minimum(outer.high, high + supports * size))
+    all_of_it = float((np.maximum(high, outer.high) - np.minimum(low, outer.low)).max())
+    beyond = np.inf if all_of_it <= whole * size else supports * size
+    low = np.minimum(low, np.maximum(outer.low, low - beyond))
+    high = np.maximum(high, np.minimum(outer.high, high + beyond))
     return Frame(low - margin * size, high + margin * size)

@@ -48,6 +48,10 @@ GLASS = 0.35
 #: Length of the arrows at the supports, as a part of the larger side of the picture.
 ARROW = 0.09
 
+#: Supports are shown whole where the picture is no larger for it than this many times the blocks: part of a slab that
+#: ends just outside looks like a mistake.
+WHOLE = 1.75
+
 #: The arrows of a mechanism are longer than the way it is drawn by, to be seen on the blocks.
 LONGER = 1.6
 
@@ -97,7 +101,7 @@ class SolidDrawer:
         self._strongest_live = live * max((abs(_multiplier(i)) for i in increments), default=0.0)
         self._sizes: list[np.ndarray] = []
         poses = chain([solver.Pose.initial(assembly)], self._surveyed(), extra)
-        frame = framed(assembly, poses, margin=0.05, supports=0.3, axes=self.view.axes[:2])
+        frame = framed(assembly, poses, margin=0.05, supports=0.3, axes=self.view.axes[:2], whole=WHOLE)
         self._arrow = ARROW * float(frame.size.max())
         frame = frame.holding(self._arrow_tips(extra))
         self.largest = self._largest

@@ -205,6 +205,15 @@ def test_huge_supports_do_not_shrink_the_structure():
     assert frame.size.max() < 3.0
 
 
+def test_supports_are_shown_whole_where_there_is_room():
+    outlines = [[[-0.5, 0], [0.5, 0], [0.5, 1], [-0.5, 1]], [[-0.8, -0.5], [0.8, -0.5], [0.8, 0], [-0.8, 0]]]
+    block = solver.Assembly.from_outlines(outlines, roles=["free", "fixed"])
+    pose = [solver.Pose.initial(block)]
+    assert framed(block, pose, margin=0.0, supports=0.2).size.tolist() == pytest.approx([1.4, 1.2])
+    assert framed(block, pose, margin=0.0, supports=0.2, whole=1.75).size.tolist() == pytest.approx([1.6, 1.5])
+    assert framed(block, pose, margin=0.0, supports=0.2, whole=1.5).size.tolist() == pytest.approx([1.4, 1.2])
+
+
 def test_magnified_keeps_blocks_rigid():
     response = arch_response()
     pose = magnified(response.assembly, response.path[-1].pose, 3.0)
