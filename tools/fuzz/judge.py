@@ -184,7 +184,8 @@ def _judge_increment(
     finding.counted("reaction, other form of the program")
     if np.isfinite(increment.least) and not min(values) - same <= increment.least <= max(values) + same:
         finding.wrong.append(f"increment {k}: least reaction {increment.least!r}, by the oracle {values}, W {total!r}")
-    if not increment.least - same <= increment.reaction <= increment.largest + same:
+    # A bound that is not a number was not found, and contradicts nothing.
+    if increment.reaction < increment.least - same or increment.reaction > increment.largest + same:
         finding.wrong.append(
             f"increment {k}: reaction {increment.reaction!r}, not within {increment.least!r} to {increment.largest!r}"
         )
