@@ -24,6 +24,13 @@ SHORT_STEPS, SHORT = 20, 1e-3
 #: need 2e9, a tenth of a second. They grow with the square of the blocks: larger programs go to HiGHS.
 OPERATIONS = 1e10
 
+#: A column with more entries than the first number, such as a load on every block, would fill the band: it is cut into
+#: pieces of so many rows that lie beside each other, which equations chain together.
+WIDE, PIECE = 64, 12
+
+#: Half the width that a row has at least: an equation has no inside.
+LEAST_WIDTH = 1e-11
+
 #: Weight of the proximal term. Without it the multipliers that carry force weigh 1e16 at the end, and the balance of
 #: the blocks is lost in rounding at 1e-6; with it the point strays from dual feasibility by this times the last step.
 PROXIMAL = 1e-11
@@ -143,9 +150,11 @@ class _Method:
         along: np.ndarray | None,
     ) -> None:
         rows, columns = matrix.shape
-        if not (np.isfinite(lower).all() and np.isfinite(upper).all() and (upper > lower).all()):
-            raise NoProgress("a row is an equation or has no bound")
-        self.cost, self.lower, self.upper = cost, lower, upper
+        if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
+            raise NoProgress("a row has no bound")
+        middle = (lower + upper) / 2.0
+        self.cost = cost
+        self.lower, self.upper = np.minimum(lower, middle - LEAST_WIDTH), np.maximum(upper, middle + LEAST_WIDTH)
         self.matrix, self.transposed = sp.csr_array(matrix), sp.csr_array(matrix.T)
         self.x = slice(0, columns)
         self.below, self.above = slice(columns, columns + rows), slice(columns + rows, columns + 2 * rows)
@@ -154,20 +163,20 @@ class _Method:
         self.tried = 0
 
     def _start(self, matrix: sp.csc_array) -> _Point:
-        """Start from equal multipliers, the rows balanced by the unit columns that every row has."""
+        """Start from equal multipliers, the rows balanced by their unit columns where they have any."""
         middle = (self.lower + self.upper) / 2.0
         single = np.flatnonzero(np.diff(matrix.indptr) == 1)
         row, value = matrix.indices[matrix.indptr[single]], matrix.data[matrix.indptr[single]]
+        # The last one of a row where there are several.
+        units = np.full((2, len(middle)), -1)
+        for unit, of_sign in zip(units, (value > 0.0, value < 0.0), strict=True):
+            unit[row[of_sign]] = single[of_sign]
+        rows = np.flatnonzero((units >= 0).all(axis=0))
+        single = single[np.isin(row, rows)]
         x = np.full(matrix.shape[1], START)
         x[single] = 0.0
-        missing = middle - matrix @ x
-        for sign in (1.0, -1.0):
-            of_sign = value * sign > 0.0
-            # The last one of a row where there are several.
-            unit = np.full(len(middle), -1)
-            unit[row[of_sign]] = single[of_sign]
-            if unit.min(initial=0) < 0:
-                raise NoProgress("a row has no slack of either sign")
+        missing = (middle - matrix @ x)[rows]
+        for unit, sign in zip(units[:, rows], (1.0, -1.0), strict=True):
             x[unit] = np.maximum(sign * missing, 0.0) / np.abs(matrix.data[matrix.indptr[unit]])
         x[single] += START_SLACK
         reduced = np.maximum(self.cost, START_COST)
@@ -334,9 +343,8 @@ def interior_point(
     ----------
     cost : (n,) array
     matrix : (m, n) sparse array, by columns
-        With a unit column of either sign for every row.
     lower, upper : (m,) arrays
-        Finite, and different from each other.
+        Finite.
     along : (m,) array, optional
         Where each row lies along the structure: an order of the rows to try beside that of Cuthill & McKee. Along the
         longer side of a wall it makes a band two thirds as wide.
@@ -365,9 +373,57 @@ def interior_point(
     """
     try:
         with one_thread(), np.errstate(divide="raise", over="raise", invalid="raise"):
+            wide = np.flatnonzero(np.diff(matrix.indptr) > WIDE)
+            if len(wide):
+                return _solved_in_pieces(cost, matrix, lower, upper, along, wide)
             return _solved(_Method(cost, matrix, lower, upper, along))
     except (NotLimited, FloatingPointError) as error:
         raise NoProgress(str(error)) from None
+
+
+def _solved_in_pieces(
+    cost: np.ndarray,
+    matrix: sp.csc_array,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    along: np.ndarray | None,
+    wide: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Solve with wide columns cut into pieces along the rows, and equations that all pieces of one are the same."""
+    rows, columns = matrix.shape
+    narrow = np.delete(np.arange(columns), wide)
+    _, place = narrowest(sp.csc_array(matrix[:, narrow]), along)
+    piece = place // PIECE
+    n = int(piece.max()) + 1
+    each = sp.csc_array((np.ones(rows), (np.arange(rows), piece)), shape=(rows, n))
+    cut = [sp.diags_array(matrix[:, [k]].toarray()[:, 0]) @ each for k in wide]
+    chain = sp.diags_array([np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1], shape=(n - 1, n))
+    links = sp.block_diag([chain] * len(wide))
+    unfolded = sp.csc_array(sp.block_array([[matrix[:, narrow], sp.hstack(cut)], [None, links]]))
+    none = np.zeros(links.shape[0])
+    # The cost of a wide column is that of its first piece.
+    costs = np.zeros((len(wide), n))
+    costs[:, 0] = cost[wide]
+    method = _Method(
+        np.concatenate([cost[narrow], costs.ravel()]),
+        unfolded,
+        np.concatenate([lower, none]),
+        np.concatenate([upper, none]),
+        np.concatenate([place, np.tile((np.arange(n - 1) + 1.0) * PIECE - 0.5, len(wide))]),
+    )
+    try:
+        found, row_dual, iterations = _solved(method)
+    except Diverges as error:
+        raise Diverges(_folded(error.ray, narrow, wide)) from None
+    return _folded(found, narrow, wide), row_dual[:rows], iterations
+
+
+def _folded(x: np.ndarray, narrow: np.ndarray, wide: np.ndarray) -> np.ndarray:
+    """(n,) array: the multipliers of a program whose wide columns were cut into pieces."""
+    whole = np.empty(len(narrow) + len(wide))
+    whole[narrow] = x[: len(narrow)]
+    whole[wide] = x[len(narrow) :].reshape(len(wide), -1).mean(axis=1)
+    return whole
 
 
 def _solved(method: _Method) -> tuple[np.ndarray, np.ndarray, int]:

@@ -115,8 +115,11 @@ def admissible(
         objective, unit = np.concatenate([objective, np.zeros(2 * rows), [1.0, -1.0]]), 1.0 / live_size
     else:
         along = np.zeros(len(free)) if rate is None else (rate / model.lengths).ravel()
+        # In the speed of the supports: blocks out of balance are to cost more whatever the unit of the drawing.
+        fastest = float(np.abs(along).max(initial=0.0)) or 1.0
+        along = along / fastest
         objective = np.concatenate([rays.T @ (matrix.T @ np.where(free, 0.0, along)), np.zeros(2 * rows)])
-        unit = model.force * model.length
+        unit = model.force * model.length * fastest
     along_rows = along_structure(free_blocks(model.assembly), pose)
     routes = vertex_routes(rows) if vertex else None
 

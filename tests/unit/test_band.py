@@ -105,18 +105,36 @@ def refusal(**change):
 
 
 def test_refuses_what_it_was_not_made_for():
-    assert "equation" in refusal(upper=lambda program: program.lower)
     assert "bound" in refusal(lower=lambda program: np.full(30, -np.inf))
-    assert "slack" in refusal(matrix=lambda program: program.matrix[:, :-1], cost=lambda program: program.cost[:-1])
 
 
-def test_refuses_a_load_on_every_block_before_it_fills_the_memory():
-    """A column with an entry in each of 30,000 rows would make 900 million entries of the normal equations."""
+def test_refuses_a_wide_band_before_it_fills_the_memory():
+    """Columns that join 30,000 rows to any others would make 900 million entries of the normal equations."""
     rows = 30_000
-    unit = sp.eye_array(rows)
-    matrix = sp.csc_array(sp.hstack([sp.csc_array(np.ones((rows, 1))), unit, -unit]))
-    with pytest.raises(NoProgress, match="30000 rows in a band 30000 wide"):
-        interior_point(np.ones(2 * rows + 1), matrix, np.zeros(rows), np.ones(rows))
+    across = sp.random_array((rows, rows), density=2.0 / rows, rng=np.random.default_rng(1), format="csc")
+    matrix = sp.csc_array(sp.hstack([across, sp.eye_array(rows), -sp.eye_array(rows)]))
+    with pytest.raises(NoProgress, match=r"30000 rows in a band \d+ wide"):
+        interior_point(np.ones(3 * rows), matrix, np.zeros(rows), np.ones(rows))
+
+
+@pytest.mark.parametrize("blocks", [2, 30, 150])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_load_on_every_block_and_equations_without_slack(seed, blocks):
+    """Two columns with an entry in every row, as a live load has, and rows that are equations: as scipy finds."""
+    random, given = np.random.default_rng(seed), chain(seed, blocks)
+    rows, joints = 3 * blocks, given.matrix.shape[1] - 6 * blocks
+    wide = sp.csc_array(random.standard_normal((rows, 2)))
+    matrix = sp.csc_array(sp.hstack([wide, given.matrix[:, :joints]]))
+    x = np.concatenate([[0.3, 0.0], random.uniform(0.5, 1.0, joints)])
+    cost = np.concatenate([[-1.0, 0.5], random.uniform(0.1, 1.0, joints)])
+    # The cost is that of prices that leave no column negative, lest there be no least.
+    cost = np.maximum(cost, 0.0) + matrix.T @ random.standard_normal(rows)
+    program = problem.LinearProgram(cost, matrix, matrix @ x, matrix @ x)
+    known = linprog(cost, A_eq=matrix, b_eq=program.lower, method="highs-ds")
+    found = solved(program)
+    assert found.accepted
+    assert found.objective == pytest.approx(known.fun, abs=2e-7 * (1 + abs(known.fun)))
+    assert len(found.row_dual) == rows
 
 
 def test_an_objective_that_falls_without_limit_is_proved_by_its_ray():

@@ -32,7 +32,9 @@ def ordinary():
     return solver.settle(_arch(), _spread(), friction_coefficient=0.7, controls=solver.Controls(falling_frames=1))
 
 
-@pytest.mark.parametrize("scale", [1e-3, *(pytest.param(scale, marks=pytest.mark.thorough) for scale in (1e-2, 100.0))])
+@pytest.mark.parametrize(
+    "scale", [1e-5, 1e-3, *(pytest.param(scale, marks=pytest.mark.thorough) for scale in (1e-6, 1e-2, 100.0))]
+)
 def test_any_size(ordinary, scale):
     found = solver.settle(
         _arch(scale), _spread(scale), friction_coefficient=0.7, controls=solver.Controls(falling_frames=1)
