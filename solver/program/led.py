@@ -31,7 +31,7 @@ TAKEN_IN = 32
 DIGITS = 1e-6
 
 #: How far behind its start a step is followed, in parts of it, where the way turns back.
-FARTHEST_BACK = 1.0
+FARTHEST_BACK = 10.0
 
 #: Forces by which a point at the limit of its friction, or one that just touches, is on one side of it at the start.
 ASIDE = 1e-7

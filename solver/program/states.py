@@ -44,11 +44,13 @@ def in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved) -> Mo
     short = 0.5 * (near.distances[1] - (way * near.distances[2:]).sum(axis=0))
     # What is at the limit of its friction but for rounding slides, for all that anybody knows.
     slides = (0.5 * (normal - size - STATES * normal) * along <= short) & (size > 0.0)
+    # Without friction there is nothing to stick by, nor a way to be held to.
+    smooth = mu <= 0.0
     way, turn = way.T, mu * normal / (mu * normal + near.distances[1] / along + 1e-300)
     no_force, no_way = STATES * max(float(near.normal.max(initial=0.0)), 1.0), EQUATIONS * (step.size + along)
     changes, out, rises = n, np.inf, 0
     for iteration in range(STATE_CHANGES):
-        slides &= closed
+        slides = (slides | smooth) & closed
         try:
             there = _InStates(step, pattern, gone, _States(closed, slides, way, turn), near.multiplier)
         except NotSolved:
@@ -60,7 +62,7 @@ def in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved) -> Mo
         starts = sticks & (size > most + no_force) & ~opens
         # How far a point has slid the way that it was held to slide.
         slid = (way * trial).sum(axis=1) - most
-        stops = slides & (slid < -no_way / along)
+        stops = slides & ~smooth & (slid < -no_way / along)
         changed = opens | closes | starts | stops
         if not changed.any():
             for _ in range(REFINED if d == 2 else 0):

@@ -45,3 +45,24 @@ def test_a_trial_is_made_from_its_kind_and_seed_alone():
     one, other = trial("voronoi", 7), trial("voronoi", 7)
     assert one.assembly.vertices.tobytes() == other.assembly.vertices.tobytes()
     assert (one.friction, one.settlement) == (other.friction, other.settlement)
+
+
+def test_joints_without_friction_have_nothing_to_stick_by():
+    """Here steps grew shorter without end, as points that carry no shear force came to stick and to slide in turns."""
+    finding = tried("layout", 30024)
+    assert finding.wrong == []
+    assert finding.outcome == "limit reached"
+
+
+def test_tiny_blocks_stand_like_others():
+    """Here blocks of a tenth of a millimetre fell for being cheaper out of balance than the reaction."""
+    finding = tried("courses", 30098)
+    assert finding.wrong == []
+    assert finding.outcome == "limit reached"
+
+
+@pytest.mark.thorough
+def test_a_way_that_turns_back_beyond_its_step_is_followed():
+    finding = tried("voronoi", 30152)
+    assert finding.wrong == []
+    assert finding.outcome == "limit reached"
