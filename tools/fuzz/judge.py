@@ -184,8 +184,9 @@ def _judge_increment(
     finding.counted("reaction, other form of the program")
     if np.isfinite(increment.least) and not min(values) - same <= increment.least <= max(values) + same:
         finding.wrong.append(f"increment {k}: least reaction {increment.least!r}, by the oracle {values}, W {total!r}")
-    # A bound that is not a number was not found, and contradicts nothing.
-    if increment.reaction < increment.least - same or increment.reaction > increment.largest + same:
+    # A bound that is not a number was not found, and contradicts nothing; a reaction has to be one.
+    low, high = np.fmax(increment.least, -np.inf), np.fmin(increment.largest, np.inf)
+    if not low - same <= increment.reaction <= high + same:
         finding.wrong.append(
             f"increment {k}: reaction {increment.reaction!r}, not within {increment.least!r} to {increment.largest!r}"
         )
