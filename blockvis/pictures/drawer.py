@@ -235,10 +235,11 @@ class Drawer:
         shown = magnified(self.assembly, true, self.look.magnification)
         at = increment.with_arrays(pose=true, contacts=contacts_at(increment, true)) if pose is not None else increment
         self.scene.pose(shown, self._block_colours(true))
+        hinges = np.zeros((0, 2))
         if blocks_only:
             self.scene.clear(*OF_STATICS)
         else:
-            self._draw_joints(at, shown)
+            hinges = self._draw_joints(at, shown)
             self._draw_forces(at, shown)
             self._draw_ground(shown)
             self._draw_settlement_arrow(at, shown)
@@ -248,7 +249,7 @@ class Drawer:
         head, detail = caption_of(self.response, increment, self.look.magnification)
         picture = self.scene.image()
         if widths and self.look.joints and not falling:
-            self._write_widths(picture, true, shown)
+            self._write_widths(picture, true, shown, hinges)
         return self.sheet.composed(
             picture,
             title=title or head,
@@ -367,9 +368,10 @@ class Drawer:
         colours = palette.displacement_colours(np.hypot(*moved.T) / (self.largest or 1.0))
         return np.where(self.assembly.free[:, None], colours, self.fill)
 
-    def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> None:
+    def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> np.ndarray:
+        """Draw open and sliding joints and hinges; returns where the dots of the hinges are, (n, 2) [m]."""
         if not self.look.joints:
-            return
+            return np.zeros((0, 2))
         scene, thin = self.scene, self.scene.size[1] / 1080.0
         found = marks_of(self.assembly, self.joints, increment, shown)
         scene.polygons("crack", found.cracks, palette.OPEN)
@@ -380,20 +382,22 @@ class Drawer:
         scene.lines("crack edge/faces", found.faces, palette.OPEN, self._line(3.0 * thin))
         scene.lines("crack edge/fine", middle[fine], palette.OPEN, self._line(1.1 * thin))
         if self.many:
-            return
+            return np.zeros((0, 2))
         scene.lines("sliding", found.sliding, palette.SLIDING, self._line(5.0 * thin))
         radius = float(np.clip(0.09 * self.assembly.block_size / scene.pixel, 3.0 * thin, 11.0 * thin))
         scene.discs("hinge/rim", found.hinges, radius * 1.35, palette.PAPER)
         scene.discs("hinge top", found.hinges, radius, palette.HINGE)
+        return found.hinges
 
-    def _write_widths(self, picture: Image.Image, pose: solver.Pose, shown: solver.Pose) -> None:
+    def _write_widths(self, picture: Image.Image, pose: solver.Pose, shown: solver.Pose, hinges: np.ndarray) -> None:
         """Write the widths of the widest crack lines at a pose beside them, where there is room."""
         cracks = cracks_of(self.assembly, pose, self.joints)[: 2 * MOST_WIDTHS]
         cracks = [crack for crack in cracks if crack.width >= LEAST_WIDTH * cracks[0].width]
         on_a, on_b, _ = faces_at(self.assembly, self.joints, shown)
         widest = [int(crack.joints[0]) for crack in cracks]
         places = self.scene.at_pixel((on_a + on_b)[widest].mean(axis=1) / 2.0)
-        write_labels(picture, places, [f"{1e3 * crack.width:.3g} mm" for crack in cracks], self.sheet.text, MOST_WIDTHS)
+        words = [f"{1e3 * crack.width:.3g} mm" for crack in cracks]
+        write_labels(picture, places, words, self.sheet.text, MOST_WIDTHS, self.scene.at_pixel(hinges))
 
     def _line(self, pixels: float) -> float:
         return max(pixels, 1.2)

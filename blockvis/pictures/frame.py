@@ -249,8 +249,12 @@ class Sheet:
         draw.text((left, top - 0.6 * self.text), f"displacement\n[{unit}]", palette.INK, font, anchor="ld")
 
 
-def write_labels(picture: Image.Image, places: np.ndarray, words: Sequence[str], text: int, most: int) -> None:
+def write_labels(
+    picture: Image.Image, places: np.ndarray, words: Sequence[str], text: int, most: int, dots: np.ndarray
+) -> None:
     """Write labels on paper beside places of a picture, in their order, each where none lies yet.
+
+    They leave dots free where there is room beside them.
 
     Parameters
     ----------
@@ -263,25 +267,31 @@ def write_labels(picture: Image.Image, places: np.ndarray, words: Sequence[str],
         Height of the text in pixels.
     most : int
         Labels written at most.
+    dots : (n, 2) array [pixel]
     """
     draw, font = ImageDraw.Draw(picture), _font(round(0.85 * text))
-    high, pad = 1.2 * text, 0.25 * text
+    high, pad, rim = 1.2 * text, 0.25 * text, 0.4 * text
     written: list[tuple[float, float, float, float]] = []
     for (x, y), label in zip(places.tolist(), words, strict=True):
         wide = font.getlength(label) + 2.0 * pad
-        for left, top in (
+        corners = (
             (x + 0.6 * text, y - high / 2.0),
             (x - 0.6 * text - wide, y - high / 2.0),
             (x - wide / 2.0, y - 0.6 * text - high),
             (x - wide / 2.0, y + 0.6 * text),
-        ):
+        )
+        free: list[tuple[int, int, tuple[float, float, float, float]]] = []
+        for left, top in corners:
             box = (left, top, left + wide, top + high)
             inside = box[0] >= 0 and box[1] >= 0 and box[2] <= picture.width and box[3] <= picture.height
             if inside and not any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in written):
-                draw.rounded_rectangle(box, 0.25 * text, fill=palette.PAPER, outline=palette.OPEN)
-                draw.text((left + wide / 2.0, top + high / 2.0), label, palette.INK, font, anchor="mm")
-                written.append(box)
-                break
+                hidden = int(((dots > np.subtract(box[:2], rim)) & (dots < np.add(box[2:], rim))).all(axis=1).sum())
+                free.append((hidden, len(free), box))
+        if free:
+            box = min(free)[2]
+            draw.rounded_rectangle(box, 0.25 * text, fill=palette.PAPER, outline=palette.OPEN)
+            draw.text((box[0] + wide / 2.0, box[1] + high / 2.0), label, palette.INK, font, anchor="mm")
+            written.append(box)
         if len(written) == most:
             return
 

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from PIL import Image
 from structures import arch_response, parted, wall
 
 import solver
@@ -15,7 +16,7 @@ from blockvis.pictures import palette
 from blockvis.pictures.captions import FAILED_BADGE, FALL_BADGE
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of
-from blockvis.pictures.frame import Sheet
+from blockvis.pictures.frame import Sheet, write_labels
 from blockvis.pictures.render import draw_mechanism
 from blockvis.studies import pictures
 from blockvis.studies.run_one import _shape
@@ -171,6 +172,15 @@ def test_widths_are_written_of_cracks_that_count(monkeypatch, tmp_path):
     monkeypatch.setattr(drawing, "cracks_of", lambda *_: cracks)
     draw_mechanism(response, tmp_path / "mechanism.png", size=SMALL)
     assert written == ["40 mm", "4 mm"]
+
+
+def test_widths_leave_hinges_free_where_there_is_room():
+    dot, place = np.array([[60.0, 50.0]]), np.array([[50.0, 50.0]])
+    for dots, hidden in ((dot, False), (np.zeros((0, 2)), True)):
+        picture = Image.new("RGB", (200, 100), "green")
+        write_labels(picture, place, ["9 mm"], 10, 1, dots)
+        assert (picture.getpixel((60, 50)) != (0, 128, 0)) is hidden
+        assert np.any(np.asarray(picture) != (0, 128, 0)), "it is written in any case"
 
 
 def test_picture_film_and_page_count_the_last_equilibrium_alike(monkeypatch):
