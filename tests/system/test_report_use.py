@@ -277,6 +277,9 @@ def test_dark_rooms_get_a_dark_page_and_those_who_ask_get_less_motion(tmp_path):
     light, dark = (np.asarray(Image.open(tmp_path / f"{name}.png").convert("L")) for name in ("light", "dark"))
     assert np.median(light) > 240
     assert np.median(dark) < 60
+    # Lines of the legend have a pale rim like dots: black is seen in the dark, too.
+    rim = 'out.rim = getComputedStyle(document.querySelector(".key.line")).boxShadow;'
+    assert "255, 255, 255" in told(page, tmp_path, rim)["rim"]
     # No picture between two increments is drawn: the blocks step.
     script = """const seen = new Set(); press("play");
       for (let k = 0; k < 60; k++) { await paused(25); seen.add(document.body.dataset.corners); }
