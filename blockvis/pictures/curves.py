@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw
 
 import solver
 from blockvis.atomic_files import whole_file
-from blockvis.results.about import about, collapse_mechanism
+from blockvis.results.about import about, collapse_mechanism, counts_text
 
 from . import palette
 from .captions import (
@@ -95,13 +95,13 @@ def draw_curve(
 
 
 def events_of(response: solver.Response) -> list[Event]:
-    """Where the set of hinges or sliding joints changes along the path.
+    """Where the set of hinges or sliding joints changes along the path; a collapse has a label and a count of its own.
 
     Parameters
     ----------
     response : solver.Response
     """
-    path = response.path
+    path = response.path[:-1] if _counts(response) else response.path
     total, values = response.parameters, response.values
     found = []
     # One mechanism per increment: its contact points may come from a file.
@@ -306,14 +306,11 @@ def _mark_collapse(
 
 
 def _counts(response: solver.Response) -> str:
-    """Count the hinges and sliding joints of the collapse mechanism, on a line of their own."""
+    """Count the parts, hinges and sliding joints of the collapse mechanism, on a line of their own."""
     mechanism = collapse_mechanism(response)
     if mechanism is None or response.collapse is None or response.collapse.lost != "equilibrium":
         return ""
-    hinges, sliding = map(len, _joints(mechanism))
-    found = [(hinges, "hinge"), (sliding, "sliding joint")]
-    words = ", ".join(f"{n} {word}{'' if n == 1 else 's'}" for n, word in found if n)
-    return f"\n{words}" if words else ""
+    return f"\n{counts_text(mechanism)}"
 
 
 def _mark_events(axes: Axes, response: solver.Response, factor: float, text: float) -> None:

@@ -45,7 +45,7 @@ from blockvis.pictures.captions import (
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
-from blockvis.results.about import about, loss_of
+from blockvis.results.about import about, counts_text, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.runs.kinds import KINDS
@@ -491,6 +491,11 @@ def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tu
         rows.append(
             ("falls", f"{force_text(loss.weight)} = {loss.share:.4f} W{', a local loss' if loss.local else ''}")
         )
+    swing = swing_of(response) if path else None
+    if swing is not None and swing.moves:
+        fails = response.collapse is not None or response.swings
+        counted = counts_text(solver.mechanism_of(assembly, swing.increment))
+        rows.append(("mechanism" if fails else "motion that would follow", counted))
     follows = f", {apart} {'of pseudo-motion' if response.swings else 'falling'}" if apart and fall is None else ""
     rows += [
         ("weight W", force_text(response.total_weight)),

@@ -88,6 +88,16 @@ def mechanism_text(response: solver.Response) -> str:
     return "" if response.collapse is None else response.collapse.words
 
 
+def counts_text(mechanism: solver.Mechanism) -> str:
+    """Count the moving parts, hinges and sliding joints of a mechanism."""
+    counted = (
+        (len(mechanism.motions), "moving part"),
+        (len(mechanism.hinges), "hinge"),
+        (len(mechanism.sliding), "sliding joint"),
+    )
+    return ", ".join(f"{n} {word}{'' if n == 1 else 's'}" for n, word in counted if n)
+
+
 @dataclass(frozen=True)
 class Loss:
     """What a collapse mechanism takes with it.

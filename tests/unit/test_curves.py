@@ -60,7 +60,7 @@ def test_a_failed_run_says_so_in_the_curve(tmp_path):
 
 
 def test_the_collapse_has_the_count_of_its_mechanism_and_the_case_its_name(tmp_path):
-    assert "5 hinges" in said(arch_response(), tmp_path / "curve.svg")
+    assert "4 moving parts, 5 hinges" in said(arch_response(), tmp_path / "curve.svg")
     (tmp_path / "garden.toml").write_text(
         '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.05\nlimit = 0.05\n'
         "[analysis]\nfalling_frames = 0\n[output]\nanimation = false\n",
@@ -68,6 +68,20 @@ def test_the_collapse_has_the_count_of_its_mechanism_and_the_case_its_name(tmp_p
     )
     run = blockvis.run_case(tmp_path / "garden.toml", tmp_path / "out")
     assert "garden" in said(run.response, tmp_path / "named.svg")
+
+
+def test_a_collapse_is_counted_once(tmp_path):
+    """Not as a change to no hinges as well, where the supports alone move at the last equilibrium."""
+    response = arch_response()
+    last = response.path[-1]
+    still = last.with_arrays(velocity=np.zeros_like(last.velocity), displacements=np.zeros_like(last.displacements))
+    increments = tuple(still if increment is last else increment for increment in response.increments)
+    told = said(replace(response, increments=increments), tmp_path / "curve.svg")
+    assert "4 moving parts, 5 hinges" in told
+    assert not any("no hinges" in line for line in told)
+    # Without a collapse it is a change like any other.
+    ends = replace(response, increments=(*response.path[:-1], still), collapse=None)
+    assert events_of(ends)[-1].text == "no hinges"
 
 
 def test_ticks_are_plain_numbers(tmp_path):

@@ -18,7 +18,7 @@ from blockvis import generators
 from blockvis.pictures import annotations
 from blockvis.pictures.curves import events_of
 from blockvis.pictures.swing import swing_of
-from blockvis.report.page import report_html
+from blockvis.report.page import report_html, summary_rows
 from blockvis.results.joints import initial_joints
 from blockvis.runs.kinds import KINDS
 
@@ -115,6 +115,10 @@ def test_collapse_has_one_count(name, tmp_path):
     assert counted(response, response.increments[len(response.path)]) == expected
     summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
     assert (summary["hinges"], summary["sliding_joints"]) == expected
+    parts = len(solver.mechanism_of(response.assembly, falling).motions)
+    counts = dict(summary_rows(response))["mechanism"]
+    assert summary["mechanism"].startswith(f"{parts} macro-blocks; ")
+    assert counts.startswith(f"{parts} moving parts, {expected[0]} hinges")
 
 
 @pytest.mark.thorough
