@@ -33,6 +33,22 @@ def arch_response() -> solver.Response:
 
 
 @cache
+def dropped_brick():
+    """A heavy block that stands, and beside it a brick over a gap that opens under it."""
+    outlines = [
+        [[0, 0], [4, 0], [4, 2], [0, 2]],
+        [[4.9, 0], [5.4, 0], [5.4, 0.2], [4.9, 0.2]],
+        [[-1, -1], [5, -1], [5, 0], [-1, 0]],
+        [[5.2, -1], [6, -1], [6, 0], [5.2, 0]],
+    ]
+    assembly = solver.Assembly.from_outlines(
+        outlines, names=["pier", "brick", "ground", "footing"], roles=["free", "free", "fixed", "moving"]
+    )
+    away = solver.Settlement(direction=(1, 0), increment=0.05, limit=1.0)
+    return solver.settle(assembly, away, friction_coefficient=0.6)
+
+
+@cache
 def vault_response() -> solver.Response:
     """An arch of 6 voussoirs in space, 0.5 m deep, whose right springer spreads until it collapses."""
     spread = solver.Settlement(direction=(1, 0, 0), increment=0.1, limit=0.8, tolerance=0.05)

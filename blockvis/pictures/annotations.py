@@ -16,7 +16,8 @@ from blockvis.results.joints import InitialJoints, faces_at
 #: edges have the colour of a crack: the wedge between them is open to the room.
 WIDEST, STEEPEST = 0.5, 0.5
 
-#: A sliding joint is marked over this length at least, in block sizes.
+#: A sliding joint is marked over this length at least, in block sizes; no further than the thinner block is thick, or
+#: the mark of a brick beside a large stone would lie outside both.
 SHORTEST = 0.3
 
 #: Resultants below this fraction of the largest are not drawn.
@@ -96,7 +97,7 @@ def marks_of(
         cracks=cracks,
         openings=openings,
         faces=faces,
-        sliding=_sliding(contacts, mechanism.sliding_points, points, assembly.block_size),
+        sliding=_sliding(contacts, mechanism.sliding_points, points, assembly),
         hinges=points[mechanism.hinge_points],
     )
 
@@ -164,7 +165,7 @@ def joint_marks(assembly: solver.Assembly, increment: solver.Increment) -> tuple
     """Where the hinges are, (n, 2) [m], and the ends of the sliding joints, (n, 2, 2) [m], at the increment's pose."""
     mechanism, contacts = solver.mechanism_of(assembly, increment), increment.contacts
     return contacts.points[mechanism.hinge_points], _sliding(
-        contacts, mechanism.sliding_points, contacts.points, assembly.block_size
+        contacts, mechanism.sliding_points, contacts.points, assembly
     )
 
 
@@ -209,7 +210,7 @@ def settlement_arrows(
     return blocks, places, np.divide(speeds, sizes, out=np.zeros_like(speeds), where=sizes > 0.0)
 
 
-def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray, size: float) -> np.ndarray:
+def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray, assembly: solver.Assembly) -> np.ndarray:
     """(n, 2, 2) array [m]: ends of the part of each sliding joint that slides.
 
     Parameters
@@ -219,8 +220,7 @@ def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray, size:
         Numbers of the contact points that slide.
     points : (n_contacts, 2) array [m]
         Where the contact points are drawn.
-    size : float [m]
-        Of a block.
+    assembly : solver.Assembly
     """
     if len(k) == 0:
         return np.zeros((0, 2, 2))
@@ -234,7 +234,8 @@ def _sliding(contacts: solver.Contacts, k: np.ndarray, points: np.ndarray, size:
     np.minimum.at(lowest, which, place)
     np.maximum.at(highest, which, place)
     # A joint that slides on one point only still needs a length to be seen, towards the others that it touches at.
-    short = np.maximum(SHORTEST * size - (highest - lowest), 0.0)
+    least = np.minimum(SHORTEST * assembly.block_size, assembly.widths[pairs].min(axis=1))
+    short = np.maximum(least - (highest - lowest), 0.0)
     face_low, face_high = _extents(contacts, points, pairs, points[first], tangent)
     alone = face_high - face_low < short
     lowest = np.where(alone, lowest - short / 2.0, np.maximum(lowest - short, np.minimum(face_low, lowest)))

@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from structures import BENT, arch_response, parted, wall
+from structures import BENT, arch_response, dropped_brick, parted, wall
 
 import solver
 from blockvis.numbers import rounded_length
@@ -116,6 +116,15 @@ def test_a_joint_that_slides_on_one_point_is_marked_over_a_length():
     lengths = np.hypot(*(lines[:, 1] - lines[:, 0]).T)
     assert len(lines) > 0
     assert lengths.min() >= 0.3 * response.assembly.block_size * (1 - 1e-9)
+
+
+def test_the_mark_of_a_brick_that_slides_beside_a_large_stone_stays_with_the_brick():
+    response = dropped_brick()
+    assembly, last = response.assembly, response.path[-1]
+    falls = solver.with_motion(last, response.collapse.mechanism)
+    lines = marks.marks_of(assembly, initial_joints(assembly), falls, last.pose).sliding
+    assert len(lines) == 1
+    assert np.hypot(*(lines[0, 1] - lines[0, 0])) <= 0.2, "the brick is 0.2 m thick, the stone 4 m wide"
 
 
 def test_joints_that_hardly_slide_are_not_marked():

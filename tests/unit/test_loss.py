@@ -3,10 +3,9 @@
 import json
 import re
 from dataclasses import replace
-from functools import cache
 
 import pytest
-from structures import arch_response
+from structures import arch_response, dropped_brick
 
 import blockvis
 import solver
@@ -15,22 +14,6 @@ from blockvis.pictures.curves import draw_curve
 from blockvis.report.page import report_html
 from blockvis.results.about import LOCAL, loss_of
 from blockvis.runs.kinds import KINDS
-
-
-@cache
-def dropped_brick():
-    """A heavy block that stands, and beside it a brick over a gap that opens under it."""
-    outlines = [
-        [[0, 0], [4, 0], [4, 2], [0, 2]],
-        [[4.9, 0], [5.4, 0], [5.4, 0.2], [4.9, 0.2]],
-        [[-1, -1], [5, -1], [5, 0], [-1, 0]],
-        [[5.2, -1], [6, -1], [6, 0], [5.2, 0]],
-    ]
-    assembly = solver.Assembly.from_outlines(
-        outlines, names=["pier", "brick", "ground", "footing"], roles=["free", "free", "fixed", "moving"]
-    )
-    away = solver.Settlement(direction=(1, 0), increment=0.05, limit=1.0)
-    return solver.settle(assembly, away, friction_coefficient=0.6)
 
 
 def test_a_brick_that_drops_is_a_local_loss():
