@@ -19,8 +19,9 @@ from .proofs import Proofs
 from .stepping import GROWTH, MECHANISM, Steps
 
 #: Largest step inside an increment: movement of the supports in block sizes. The smallest, in the same measure, ends
-#: the analysis where no step is solved.
-LARGEST_STEP, SMALLEST_STEP = 0.025, 1e-9
+#: the analysis where no step is solved: there the drag outweighs the give of the joints of the lightest block that is
+#: no chip, and a step has one solution.
+LARGEST_STEP, SMALLEST_STEP = 0.025, 1e-12
 
 #: Change of the velocities, as a part of them, from which on a step is taken again in shorter ones, down to this part
 #: of the largest.

@@ -27,6 +27,9 @@ from .step import Moved, NotSolved, Pattern, Step, paired
 #: Changes of state after which the equations are factorised anew.
 TAKEN_IN = 32
 
+#: A step is given up, for a shorter one, after so many changes more than half the contact points.
+MOST_MORE = 128
+
 #: What a change leaves of its own pivot: below this part, too few digits are left.
 DIGITS = 1e-6
 
@@ -56,7 +59,7 @@ def led(step: Step, pattern: Pattern, gone: np.ndarray, start: Moved) -> Moved:
     """
     way = _Way(step, pattern, gone, start)
     t, onwards = 0.0, 1.0
-    for _ in range(len(step.gap) // 2 + TAKEN_IN):
+    for _ in range(len(step.gap) // 2 + MOST_MORE):
         value, growth = way.measured[0] + t * way.measured[1], onwards * way.measured[1]
         ahead = np.full(value.shape, np.inf)
         np.divide(np.maximum(value, 0.0), -growth, out=ahead, where=growth < 0.0)
