@@ -34,9 +34,9 @@ ENCLOSED = 8.0
 #: many steps.
 FAST, STEPS_UNPROVED = 10.0, 16
 
-#: Steps that are tried from one increment to the next before an analysis ends: what creeps from one slip to another in
-#: steps of a hundred millionth of a block would take days.
-MOST_TRIED = 1000
+#: Steps that are tried within this part of an increment before an analysis ends: what creeps from one slip to another
+#: in steps of a hundred millionth of a block would take days.
+MOST_TRIED, ADVANCED = 1000, 0.02
 
 #: Force, in total loads, beyond which blocks wedged between supports count as locked.
 LOCKED_FORCE = 1e3
@@ -61,7 +61,7 @@ class Advance:
     marks : tuple of Place
         The last two that are a notable way apart.
     tried : int
-        Steps since the last increment.
+        Steps since ``tried_from``, the parameter of the last increment or a small part of one later.
     """
 
     def __init__(self, steps: Steps, proofs: Proofs, shorter: float = 1.0) -> None:
@@ -72,7 +72,7 @@ class Advance:
         self.smallest = SMALLEST_STEP * self.model.length / steps.lever
         self.barrier, self.works = np.inf, (0.0, 0.0, 0.0)
         self.marks: tuple[Place, ...] = ()
-        self.tried = 0
+        self.tried, self.tried_from = 0, 0.0
 
     def advanced(self, place: Place, target: float, step: float) -> tuple[Place, float]:
         """Goes towards a parameter in steps that suit the path, and stops early where a place is worth a proof.
@@ -98,9 +98,7 @@ class Advance:
                 break
             careful = place.s < self.steps.careful_until
             length = self._length(place, ahead, step)
-            self.tried += 1
-            if self.tried > MOST_TRIED:
-                raise NoStep(f"at {place.s:.6g} {self.driver.unit}: {MOST_TRIED} were tried since the last increment")
+            self._count(place)
             try:
                 new, motion = self.steps.careful_step(place, length) if careful else self.steps.step(place, length)
             except NotSolved as error:
@@ -129,6 +127,19 @@ class Advance:
                 if moved_by > 1e2 * GIVE and place.s > started:
                     break
         return place, step
+
+    def _count(self, place: Place) -> None:
+        """Count a step that is tried.
+
+        Raises
+        ------
+        NoStep
+        """
+        if place.s - self.tried_from > ADVANCED * self.driver.increment:
+            self.tried, self.tried_from = 0, place.s
+        self.tried += 1
+        if self.tried > MOST_TRIED:
+            raise NoStep(f"at {place.s:.6g} {self.driver.unit}: {MOST_TRIED} were tried since {self.tried_from:.6g}")
 
     def _length(self, place: Place, ahead: float, step: float) -> float:
         """Of the step to take, where so much is left to go and this is to be tried."""

@@ -175,7 +175,7 @@ class Falling:
     def _fall(self, place: Place) -> Generator[Increment, None, None]:
         """Pseudo-time frames: what falls sinks against the drag until it rests."""
         frames, start, total = 0, place, np.zeros_like(self.model.load)
-        for new, motion, length in islice(self.sinking(place), 4 * max(self.falling_frames, 4)):
+        for new, motion, length in islice(self.sinking(place), max(4 * self.falling_frames, FALL_STEPS)):
             total = total + motion
             moved_by = float(np.abs(total).max())
             at_rest = self._at_rest(motion, length)

@@ -227,7 +227,7 @@ class Path:
         first = place.s == 0.0 and self.model.live is None
         at_rest, onset = self._at_first(proved) if first else (np.nan, np.nan)
         found = self.reports.increment(proved, motion, self.advance.works)
-        self.advance.tried = 0
+        self.advance.tried, self.advance.tried_from = 0, place.s
         return replace(found, checkpoint=checkpoint, at_rest=at_rest, onset=onset)
 
     def _unreported(self, proved: Proved) -> Iterator[Increment]:
@@ -250,7 +250,11 @@ class Path:
         if self.model.live is not None or self.model.dimension == 3 or not light_blocks(self.model).any():
             return True
         self.steps.programs += 1
-        return not solve_program(self.model, pose).falling
+        try:
+            return not solve_program(self.model, pose).falling
+        except Locked:
+            # Forces without limit: what is wedged by the drawing does not fall.
+            return True
 
     def _beyond(self, place: Place) -> Place:
         """A place just beyond one from which the structure falls: reached by the longest step that is solved."""

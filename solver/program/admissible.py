@@ -33,13 +33,14 @@ class Admissible:
     unbalanced : float
         Least sum of unbalanced forces over the total load: zero where an equilibrium exists.
     low, high : float
-        Of the reaction [N or N·m], or of the live loads' multiplier; infinite where friction bounds neither; the
-        one that gives no forces is not a number where its program was not solved.
+        Of the reaction [N or N·m], or of the live loads' multiplier; infinite where friction bounds neither; one
+        whose program was not solved is not a number.
     gap : float
         Largest relative difference of the two objectives of the programs.
     programs : int
     forces : (n_contacts, d) array
-        Normal and shear forces of the least reaction or largest multiplier, in units of the program.
+        Normal and shear forces of the least reaction or largest multiplier, in units of the program; of another
+        equilibrium where that has no bound or was not found.
     others : (n_contacts, d) array, optional
         Those of the other bound, where there is one.
     """
@@ -123,10 +124,10 @@ def admissible(
     along_rows = along_structure(free_blocks(model.assembly), pose)
     routes = vertex_routes(rows) if vertex else None
 
-    def extreme(sign: float, *, slack: bool) -> LPSolution | ConicSolution | None:
-        """Least or, by sign, largest value, with or without unbalanced forces; None where it has no bound."""
+    def extreme(sign: float, *, slack: bool = True) -> LPSolution | ConicSolution | None:
+        """Least or, by sign, largest value, or 0 for any; with or without unbalanced forces; None without a bound."""
         cost = sign * objective
-        cost[n : n + 2 * rows] = UNBALANCED_COST
+        cost[n : n + 2 * rows] = UNBALANCED_COST if sign else 1.0
         matrix = with_slack(*columns)
         if not slack:
             kept = np.concatenate([np.arange(n), np.arange(n + 2 * rows, matrix.shape[1])])
@@ -136,19 +137,28 @@ def admissible(
         except Unbounded:
             return None
         except SolveError:
-            # The bound that gives no forces may stay unknown: what exists is proved without it.
-            if sign == with_forces:
+            # A bound may stay unknown, but for the load that a pushover is about: what exists is proved without it.
+            if sign == 0.0 or (sign == with_forces and live_size > 0.0):
                 raise
             unknown.add(sign)
             return None
 
     with_forces = 1.0 if live_size == 0.0 else -1.0
     unknown: set[float] = set()
-    found = {sign: extreme(sign, slack=True) for sign in (1.0, -1.0)}
-    out = {k: float(s.x[n : n + 2 * rows].sum()) / model.total_load for k, s in found.items() if s is not None}
-    unbalanced = min(out.values(), default=np.inf)
+    found = {sign: extreme(sign) for sign in (1.0, -1.0)}
     programs, values, gaps = 2, [], [0.0]
-    forces, others = np.zeros((len(contacts), d)), None
+    if found[with_forces] is None and (with_forces in unknown or found[-with_forces] is None):
+        # No forces yet: some that no bound asks for. Where both run away along wedged blocks, others may fall.
+        any_forces, programs = extreme(0.0), programs + 1
+    else:
+        any_forces = None
+    out = {
+        k: float(s.x[n : n + 2 * rows].sum()) / model.total_load
+        for k, s in {**found, 0.0: any_forces}.items()
+        if s is not None
+    }
+    unbalanced = min(out.values())
+    carried: dict[float, np.ndarray] = {}
     for sign, solution in found.items():
         balanced = objective
         if solution is not None and out[sign] > FALLING_FRACTION >= unbalanced:
@@ -160,12 +170,12 @@ def admissible(
             continue
         values.append(float(balanced @ solution.x) * unit)
         gaps.append(solution.gap)
-        carried = (rays @ solution.x[:n]).reshape(-1, d)
-        forces, others = (carried, others) if sign == with_forces else (forces, carried)
-    # Where both run away, forces without limit balance everything.
-    return Admissible(
-        0.0 if np.isinf(unbalanced) else unbalanced, values[0], values[1], max(gaps), programs, forces, others
-    )
+        carried[sign] = (rays @ solution.x[:n]).reshape(-1, d)
+    if any_forces is not None:
+        carried[0.0] = (rays @ any_forces.x[:n]).reshape(-1, d)
+    given = [carried[sign] for sign in (with_forces, -with_forces, 0.0) if sign in carried]
+    others = given[1] if len(given) > 1 else None
+    return Admissible(unbalanced, values[0], values[1], max(gaps), programs, given[0], others)
 
 
 def _solution(

@@ -66,3 +66,25 @@ def test_a_way_that_turns_back_beyond_its_step_is_followed():
     finding = tried("voronoi", 30152)
     assert finding.wrong == []
     assert finding.outcome == "limit reached"
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"),
+    [
+        ("cuts", 30139),  # Steps of 1e-9 block sizes had more than one solution.
+        ("stack", 60039),  # A bound of the reaction was found by no program.
+        ("courses", 60178),  # Without friction, forces in balance through what rounding left of level joints.
+        ("voronoi", 60176),  # Blocks wedged from the start beside light ones.
+    ],
+)
+def test_no_equilibrium_is_left_undecided(kind, seed):
+    finding = tried(kind, seed)
+    assert finding.wrong == []
+    assert finding.outcome in ("limit reached", "collapsed", "locked")
+
+
+def test_what_falls_beside_wedged_blocks_is_seen():
+    """Here the forces of wedged blocks, which have no limit, passed for an equilibrium of all."""
+    finding = tried("cuts", 60375)
+    assert finding.wrong == []
+    assert finding.outcome == "no initial equilibrium"

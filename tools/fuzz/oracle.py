@@ -108,7 +108,8 @@ class Verdict:
     """What the kinematic program says.
 
     ``falls`` is the work that gravity can do for nothing, relative to the weight; ``motion`` (n_blocks, 3) how all
-    blocks move with the supports, per unit of settlement.
+    blocks move with the supports, per unit of settlement. The reaction is -inf where no movement goes with theirs (forces
+    without limit keep the balance), None where no forces balance the weights.
     """
 
     falls: float
@@ -182,7 +183,9 @@ def judged(
             # Without friction, a face that is off the level by rounding lets a block slide as far as it may.
             found = _solved(gain, held, limits, FARTHEST)
         if found is not None:
-            reaction, motion = found[0] * mean, support_velocity.copy()
+            reaction = found[0] * mean
+        if found is not None and found[1] is not None:
+            motion = support_velocity.copy()
             motion[free] = found[1].reshape(-1, 3) / [1.0, 1.0, length]
     return Verdict(falls, reaction, motion)
 
@@ -196,16 +199,24 @@ def moved_on(rings: Sequence[np.ndarray], motion: np.ndarray) -> list[np.ndarray
     return moved
 
 
-def _solved(gain: np.ndarray, held, limits: np.ndarray, bound: float | None) -> tuple[float, np.ndarray] | None:
-    """The largest downward work and its movement, within a bound; None where there is none."""
-    result = linprog(
-        gain,
-        A_ub=held,
-        b_ub=limits,
-        bounds=(None if bound is None else -bound, bound),
-        method="highs",
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
+def _solved(gain: np.ndarray, held, limits: np.ndarray, bound: float | None) -> tuple[float, np.ndarray | None] | None:
+    """The largest downward work and its movement, within a bound; -inf where nothing can move so, None without limit."""
+    # Where it finds neither an answer nor that there is none, the tolerances may be too sharp.
+    for tolerance in (1e-10, 1e-7):
+        result = linprog(
+            gain,
+            A_ub=held,
+            b_ub=limits,
+            bounds=(None if bound is None else -bound, bound),
+            method="highs",
+            options={"primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance},
+        )
+        if result.status in (0, 2, 3):
+            break
+    else:
+        raise ArithmeticError("linprog could not decide how blocks move")
+    if result.status == 2:
+        return -np.inf, None
     if result.status != 0:
         return None
     return float(-result.fun), np.asarray(result.x)
