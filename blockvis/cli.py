@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import gc
 import glob
 import io
 import json
 import os
 import sys
+import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +25,12 @@ from .broken_pipes import is_broken_pipe
 from .extras import MissingExtra
 from .generators import LAYOUTS, help_text
 from .layout.views import VIEWS
+from .processes import cores
+
+if TYPE_CHECKING:
+    from .cases.contents import Case
+    from .runs.run import Run
+    from .runs.step_check import StepChecking
 
 #: Exit codes: bad input or a missing extra, a solver failure, everything written but the pictures, no equilibrium to
 #: start from, Ctrl-C.
@@ -36,6 +44,9 @@ EXIT_CODES = f"""exit codes:
   {NO_PICTURES}    everything is written but the pictures
   {NO_EQUILIBRIUM}    no initial equilibrium: the structure does not stand as drawn
   {INTERRUPTED}  interrupted by Ctrl-C; blockvis run --resume OUT goes on"""
+
+#: Seconds that a run waits at least for the path in shorter steps, which it otherwise gives as long as it took itself.
+PATIENCE = 5.0
 
 #: Pixels below which a picture has no room for its words.
 SMALLEST_PICTURE = 160
@@ -130,8 +141,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument(
         "--check-steps",
-        action="store_true",
-        help="follow the path again in steps half as long and say how far apart the two are",
+        action=argparse.BooleanOptionalAction,
+        help="follow the path a second time, in steps half as long, and say how far apart the two are (default: on "
+        "another core, where there is one, and if it does not take much longer than the run itself)",
     )
     run.set_defaults(verb=_run)
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
@@ -397,25 +409,56 @@ def _run(options: argparse.Namespace) -> int:
     from .runs.run import resume_run, run_case
 
     drawn = {"film": not options.no_film, "pictures": not options.no_pictures}
+    started = time.perf_counter()
     if options.resume is not None:
         if options.case is not None or options.output is not None or options.force or options.set:
             raise ValueError("--resume takes the results folder alone; the case is stored in it")
-        run = resume_run(options.resume, **drawn)
-        if run.had_finished:
-            print(f"blockvis: this run had finished ({run.response.stop}); nothing was left to solve", file=sys.stderr)
-    elif options.case is None:
+        with _checking(options, None) as checking:
+            run = resume_run(options.resume, **drawn)
+            if run.had_finished:
+                print(
+                    f"blockvis: this run had finished ({run.response.stop}); nothing was left to solve", file=sys.stderr
+                )
+            return _told(options, run, checking, started)
+    if options.case is None:
         raise ValueError("name a case file: blockvis run CASE.toml, or go on with a run: blockvis run --resume OUT")
-    else:
-        run = run_case(read_case(options.case, options.set), options.output, overwrite=options.force, **drawn)
-    print(_in_words(run.response, run.folder))
+    case = read_case(options.case, options.set)
+    with _checking(options, case) as checking:
+        run = run_case(case, options.output, overwrite=options.force, **drawn)
+        return _told(options, run, checking, started)
+
+
+@contextlib.contextmanager
+def _checking(options: argparse.Namespace, case: Case | None) -> Iterator[StepChecking | None]:
+    """Follow a path in shorter steps meanwhile, where there is a core for it or it is asked for."""
+    from .runs.step_check import StepChecking, has_steps, stored_case
+
+    folder, checking = None, None
+    if case is None:
+        folder = Path(options.resume)
+        # What is wrong with the folder is told by what reads it to go on.
+        with contextlib.suppress(ValueError, OSError):
+            case = stored_case(folder)
+    wanted = cores() > 1 if options.check_steps is None else options.check_steps
+    if case is not None and wanted and has_steps(case):
+        checking = StepChecking(case, folder)
+    try:
+        yield checking
+    finally:
+        if checking is not None:
+            checking.close()
+
+
+def _told(options: argparse.Namespace, run: Run, checking: StepChecking | None, started: float) -> int:
+    """Say what a run came to, and how exact it is; gives the exit code."""
+    print(_in_words(run.response, run.folder), flush=True)
     for problem in run.missing:
         print(f"blockvis: everything but the pictures is written: {problem}", file=sys.stderr)
     stop = run.response.stop
-    if options.check_steps and stop is not solver.Status.INTERRUPTED:
-        print(_step_check(run.folder))
     if stop is solver.Status.INTERRUPTED:
         print(f"blockvis: go on with it by blockvis run --resume {run.folder}", file=sys.stderr)
         return INTERRUPTED
+    _say_error(options, run, checking, max(time.perf_counter() - started, PATIENCE))
     if stop is solver.Status.SOLVER_FAILED:
         return SOLVER_FAILED
     if stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
@@ -423,17 +466,29 @@ def _run(options: argparse.Namespace) -> int:
     return NO_PICTURES if run.missing else 0
 
 
-def _step_check(folder: Path) -> str:
-    from .runs.step_check import NOTABLE, check_steps
+def _say_error(options: argparse.Namespace, run: Run, checking: StepChecking | None, patience: float) -> None:
+    """Say how far the path is from that in shorter steps, if it is asked for or known soon enough."""
+    from .runs.step_check import NOTABLE, STEP_CHECK, check_steps
 
-    check = check_steps(folder)
+    if run.had_finished and not options.check_steps and (run.folder / STEP_CHECK).is_file():
+        return
+    check = None
+    if checking is not None:
+        try:
+            check = checking.compared(run.folder, run.response, None if options.check_steps else patience)
+        except TimeoutError as late:
+            print(f"blockvis: error of the steps not known: {late}; --check-steps waits for it", file=sys.stderr)
+    if check is None and options.check_steps:
+        check = check_steps(run.folder)
+    if check is None:
+        return
+    print(check)
     if check.error > NOTABLE or check.stop != check.stop_of_check:
         warnings.warn(
             f"the steps matter by more than {100.0 * NOTABLE:g} %: where many joints slide, or stones slip off each "
             "other, a wall may have several paths; try half the increment, and give results with that range",
             stacklevel=2,
         )
-    return str(check)
 
 
 def _info(options: argparse.Namespace) -> int:

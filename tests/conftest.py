@@ -32,6 +32,8 @@ def undrawn() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(_RUN, "draw_results", lambda *_, **__: ())
         patched.setattr(_RUN, "started_film", lambda *_, **__: None)
+        # Nor do those of the command line called from here follow a second path in shorter steps.
+        patched.setattr("blockvis.cli.cores", lambda: 1)
         yield
 
 

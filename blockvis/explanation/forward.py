@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
@@ -17,6 +16,7 @@ import solver
 from blockvis.cases.build import case_interfaces, case_loads
 from blockvis.cases.contents import Case
 from blockvis.extras import require
+from blockvis.processes import cores
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.runs.progress import StudyProgress
 
@@ -265,11 +265,6 @@ def workers_for(runs: int, workers: int | None, scheduler: str | None) -> Iterat
                 child.terminate()
         raise
     processes.shutdown()
-
-
-def cores() -> int:
-    """Count the cores that processes of this machine may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _ignore_interrupts() -> None:

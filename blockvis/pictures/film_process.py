@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ import solver
 from blockvis.atomic_files import partial_of, remove
 from blockvis.broken_pipes import is_broken_pipe
 from blockvis.fall import Fall, fall_of
+from blockvis.processes import interpreter, unread
 from blockvis.results.increments import StoredIncrements
 from blockvis.results.viewer_files import ViewerFiles
 
@@ -43,18 +44,13 @@ class FilmProcess:
 
     Notes
     -----
-    It is a fresh interpreter, not a fork: a fork would share the solver's threads, and ``multiprocessing`` would run
-    the caller's script again. It ends where this process ends, however that happens. It is told which increments there
+    It ends where this process ends, however that happens. It is told which increments there
     are, and reads them from the results folder.
     """
 
     def __init__(self) -> None:
-        start = f"import sys; sys.path[:] = {sys.path!r}; from blockvis.pictures.film_process import main; main()"
         self._path: Path | None = None
-        with _deaf():
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", start], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-            )
+        self._process = interpreter("blockvis.pictures.film_process")
         self._said: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
         # What it says is read at once: it never waits for this process.
         threading.Thread(target=self._listen, daemon=True).start()
@@ -160,13 +156,13 @@ class FilmProcess:
                 # Windows ends a process without asking it; it then leaves its half-written film.
                 remove(partial_of(self._path))
         assert self._process.stdin is not None
-        with _unread():
+        with unread():
             self._process.stdin.close()
 
     def _say(self, what: str, about: Any) -> None:
         assert self._process.stdin is not None
         # A process that has ended says why where it is waited for.
-        with _unread():
+        with unread():
             if not self._process.stdin.closed:
                 pickle.dump((what, about), self._process.stdin)
                 self._process.stdin.flush()
@@ -200,31 +196,6 @@ class FilmProcess:
                 others[what](about)
 
 
-@contextlib.contextmanager
-def _deaf() -> Iterator[None]:
-    """Start processes that do not hear Ctrl-C, which reaches all of a terminal: the first decides, and ends them."""
-    if threading.current_thread() is not threading.main_thread():
-        # Signals are set by the main thread alone.
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        # None where a program around Python has set what happens.
-        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
-
-
-@contextlib.contextmanager
-def _unread() -> Iterator[None]:
-    """Go on where the other process reads no more."""
-    try:
-        yield
-    except OSError as error:
-        if not is_broken_pipe(error):
-            raise
-
-
 def main() -> None:
     """Do what comes in; what there is to say goes out."""
     # Where it was not started deaf, as on Windows.
@@ -239,7 +210,7 @@ def main() -> None:
     loading = threading.Thread(target=_load, daemon=True)
     loading.start()
     # Nobody listens where the first process has ended: the next word ends this one, and no half film stays.
-    with _unread():
+    with unread():
         while True:
             try:
                 what, about = pickle.load(sys.stdin.buffer)

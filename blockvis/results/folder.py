@@ -34,7 +34,11 @@ CHECKPOINT = "checkpoint.npz"
 LOCK = ".lock"
 
 #: Files that list or sum up others; what a run starts with; pictures of the results.
-_LISTS = ("summary.json", "response.csv", "joints.csv", "blocks.pvd", "contacts.pvd", "joints.pvd", *LIMIT_TABLES)
+STEP_CHECK = "step_check.json"
+_LISTS = (
+    *("summary.json", STEP_CHECK, "response.csv", "joints.csv", "blocks.pvd", "contacts.pvd", "joints.pvd"),
+    *LIMIT_TABLES,
+)
 _STARTED = (RECORD, CHECKPOINT, "assembly.npz")
 _PICTURES = (
     *("report.html", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
@@ -153,7 +157,7 @@ class ResultsFolder:
         results = cls.__new__(cls)
         results.path, results.parameter, results.shape = Path(path), parameter, shape
         results.record = read_record(results.path)
-        results.assembly = _stored_assembly(results.path)
+        results.assembly = stored_assembly(results.path)
         results._release = _held(results, results.path)
         results._files = StoredIncrements(results.path)
         results.increments, checkpoint, count = [], None, 0
@@ -297,7 +301,13 @@ def _lock(handle: int) -> None:
     fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def _stored_assembly(folder: Path) -> solver.Assembly:
+def stored_assembly(folder: Path) -> solver.Assembly:
+    """Read the assembly of a results folder.
+
+    Raises
+    ------
+    ValueError
+    """
     if not (folder / "assembly.npz").is_file():
         raise ValueError(f"'{folder}' holds no results (no assembly.npz in it); give the folder that a run wrote")
     try:
@@ -364,7 +374,7 @@ def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:
     ValueError
         If the folder holds no results.
     """
-    assembly = _stored_assembly(folder)
+    assembly = stored_assembly(folder)
     files = StoredIncrements(folder)
     increments = [files.opened(k) for k in range(len(files))]
     summary: dict[str, Any] = {}

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import pickle
+import queue
+import sys
+import threading
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,20 +16,28 @@ import numpy as np
 
 import solver
 from blockvis.atomic_files import write_whole
+from blockvis.cases.build import case_assembly
 from blockvis.cases.case import parse_case
+from blockvis.cases.contents import Case
+from blockvis.processes import interpreter, unread
+from blockvis.results.folder import STEP_CHECK, stored_assembly
 from blockvis.results.record import read_record
 
+from .kinds import KINDS
 from .plan import planned
 from .reopen import open_results
-
-#: Written beside the summary.
-FILE_NAME = "step_check.json"
 
 #: Increments at parameters no farther apart than this, as a fraction of the largest, are of the same place.
 SAME = 1e-9
 
-#: Difference that is worth a warning.
-NOTABLE = 0.01
+#: Difference that is worth a warning, and the smallest that is told.
+NOTABLE, SMALLEST = 0.01, 1e-4
+
+#: Seconds between looks for Ctrl-C while waiting.
+LOOK = 0.2
+
+#: How much less urgent the second path is, where the system knows such a thing: it is not to slow the first.
+LESS_URGENT = 10
 
 
 @dataclass(frozen=True)
@@ -61,12 +75,134 @@ class StepCheck:
 
     def __str__(self) -> str:
         """Say it in a line."""
-        parts = [f"{self.what} {100.0 * self.difference:.2g} % at {self.at:.4g} {self.unit}"]
+        parts = [f"{self.what} {_percent(self.difference)} at {self.at:.4g} {self.unit}"]
         if np.isfinite(self.collapse):
-            parts.append(f"collapse {100.0 * self.collapse:.2g} %")
+            parts.append(f"collapse {_percent(self.collapse)}")
         if self.stop != self.stop_of_check:
             parts.append(f"one ends as '{self.stop}', the other as '{self.stop_of_check}'")
         return f"error of the steps: {', '.join(parts)} (apart from a run in steps half as long)"
+
+
+@dataclass(frozen=True)
+class Traced:
+    """What is compared of a path.
+
+    Attributes
+    ----------
+    measured : list of (int, float, float)
+        Phase, parameter and what is measured at each equilibrium.
+    collapse : float, optional
+        Displacement at collapse.
+    stop : str
+    """
+
+    measured: list[tuple[int, float, float]]
+    collapse: float | None
+    stop: str
+
+
+class StepChecking:
+    """The same path in steps half as long, followed by a process of its own while this one follows the case.
+
+    Parameters
+    ----------
+    case : Case
+        That :func:`has_steps`.
+    folder : Path, optional
+        Where the assembly is stored, for a run that goes on.
+    """
+
+    def __init__(self, case: Case, folder: Path | None = None) -> None:
+        self._process = interpreter(__name__)
+        assert self._process.stdin is not None
+        with unread():
+            pickle.dump((case, folder), self._process.stdin)
+            self._process.stdin.flush()
+        self._found: queue.SimpleQueue[Traced | None] = queue.SimpleQueue()
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def compared(
+        self, folder: str | Path, response: solver.Response, patience: float | None = None
+    ) -> StepCheck | None:
+        """Wait for the other path, compare, and write ``step_check.json``; None where there is nothing to compare with.
+
+        Parameters
+        ----------
+        folder : str or Path
+        response : solver.Response
+            Of the case.
+        patience : float, optional [s]
+            How long to wait at most.
+
+        Raises
+        ------
+        TimeoutError
+        """
+        waited = 0.0
+        while True:
+            # Windows sees Ctrl-C between two waits only.
+            try:
+                other = self._found.get(timeout=LOOK)
+                break
+            except queue.Empty:
+                waited += LOOK
+                if patience is not None and waited > patience:
+                    raise TimeoutError(f"the path in steps half as long takes {patience:.0f} s more") from None
+        return None if other is None or not response.path else _written(Path(folder), compared(response, other))
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.wait()
+        assert self._process.stdin is not None
+        with unread():
+            self._process.stdin.close()
+
+    def _listen(self) -> None:
+        assert self._process.stdout is not None
+        found = None
+        with self._process.stdout as out, contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):
+            found = pickle.load(out)
+        self._found.put(found)
+
+
+def main() -> None:
+    """Follow the path of a case that comes in, and say what came out."""
+    case, folder = pickle.load(sys.stdin.buffer)
+    # Where the first process ends, however that happens, nobody waits for this one.
+    threading.Thread(target=lambda: (sys.stdin.buffer.read(), os._exit(0)), daemon=True).start()
+    with open(os.dup(1), "wb") as out, open(os.devnull, "wb") as nowhere:
+        # What HiGHS and warnings say is said by the first process.
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+        if hasattr(os, "nice"):
+            os.nice(LESS_URGENT)
+        found = None
+        with contextlib.suppress(Exception):
+            found = _finer(case, case_assembly(case) if folder is None else stored_assembly(folder))
+        with unread():
+            pickle.dump(found, out)
+            out.flush()
+    os._exit(0)
+
+
+def has_steps(case: Case) -> bool:
+    """Whether a case may have a path whose steps matter; with many blocks it has one of linear programs, without."""
+    return KINDS[case.analysis].course(case).parameter.is_path and case.controls.increments != "linear program"
+
+
+def stored_case(folder: Path) -> Case:
+    """Read the case of a results folder.
+
+    Raises
+    ------
+    ValueError
+        For a run without one.
+    """
+    record = read_record(folder)
+    if not record.case:
+        raise ValueError(f"'{folder}' was written from Python, without a case file; its steps cannot be checked")
+    return parse_case(record.case, Path(record.case_file or folder / "case.toml"))
 
 
 def check_steps(folder: str | Path) -> StepCheck:
@@ -83,49 +219,71 @@ def check_steps(folder: str | Path) -> StepCheck:
         For a run without a case file, or that has no steps: a limit load, or increments by linear program.
     """
     folder = Path(folder)
-    record, response = read_record(folder), open_results(folder)
-    if not record.case:
-        raise ValueError(f"'{folder}' was written from Python, without a case file; its steps cannot be checked")
-    case = parse_case(record.case, Path(record.case_file or folder / "case.toml"))
-    if not response.parameter.is_path or not response.path or np.isnan(response.path[0].least):
+    case, response, other = stored_case(folder), open_results(folder), None
+    if response.parameter.is_path and response.path and not np.isnan(response.path[0].least):
+        other = _finer(case, response.assembly)
+    if other is None:
         raise ValueError(
             f"'{folder}' has no path whose steps could be checked ({response.analysis}, {len(response.path)} "
             'increments); it takes a settlement or a pushover with [analysis] increments = "coulomb"'
         )
+    return _written(folder, compared(response, other))
+
+
+def traced(response: solver.Response) -> Traced:
+    """Take from a response what is compared."""
+    collapse = None if response.collapse is None else response.collapse.displacement
+    return Traced([(i.phase, i.parameter, i.measured) for i in response.path], collapse, str(response.stop))
+
+
+def _finer(case: Case, assembly: solver.Assembly) -> Traced | None:
+    """Follow the path of a case in steps half as long; None where it has no steps."""
     finer = replace(case.controls, shorter_steps=2.0 * case.controls.shorter_steps, falling_frames=1)
-    run = planned(replace(case, controls=finer), response.assembly)
-    found = []
+    run = planned(replace(case, controls=finer), assembly)
+    found: list[solver.Increment] = []
     while True:
         try:
             found.append(next(run.steps))
         except StopIteration as stop:
             ending: solver.Ending = stop.value
             break
-    check = compared(response, run.response(found, ending))
+        if np.isnan(found[0].least) and found[0].status == solver.Status.EQUILIBRIUM:
+            return None
+    return traced(run.response(found, ending))
+
+
+def _percent(part: float) -> str:
+    return "below 0.01 %" if part < SMALLEST else f"{100.0 * part:.2g} %"
+
+
+def _written(folder: Path, check: StepCheck) -> StepCheck:
     numbers = {**vars(check), "collapse": None if np.isnan(check.collapse) else check.collapse}
-    write_whole(folder / FILE_NAME, json.dumps(numbers, indent=2) + "\n")
+    write_whole(folder / STEP_CHECK, json.dumps(numbers, indent=2) + "\n")
     return check
 
 
-def compared(response: solver.Response, other: solver.Response) -> StepCheck:
+def compared(response: solver.Response, other: Traced) -> StepCheck:
     """Compare a run with another in shorter steps.
 
     Parameters
     ----------
-    response, other : solver.Response
+    response : solver.Response
+    other : Traced
         Of the same case.
     """
-    ours, theirs = ([(i.phase, i.parameter, i.measured) for i in one.path] for one in (response, other))
-    largest = max((abs(measured) for _, _, measured in ours), default=0.0)
-    near = SAME * max((abs(s) for _, s, _ in ours), default=0.0)
+    ours = traced(response)
+    largest = max((abs(measured) for _, _, measured in ours.measured), default=0.0)
+    near = SAME * max((abs(s) for _, s, _ in ours.measured), default=0.0)
     apart = [
-        (abs(a - b), s) for p, s, a in ours for q, t, b in theirs if p == q and abs(s - t) <= near and largest > 0.0
+        (abs(a - b), s)
+        for p, s, a in ours.measured
+        for q, t, b in other.measured
+        if p == q and abs(s - t) <= near and largest > 0.0
     ]
     difference, at = max(apart, default=(0.0, 0.0))
-    one, two = response.collapse, other.collapse
     collapse = np.nan
-    if one is not None and two is not None and one.displacement > 0.0:
-        collapse = abs(two.displacement - one.displacement) / one.displacement
+    if ours.collapse is not None and other.collapse is not None and ours.collapse > 0.0:
+        collapse = abs(other.collapse - ours.collapse) / ours.collapse
     driver = response.settlements[-1] if response.control is None and response.settlements else None
     return StepCheck(
         what=response.measured.name,
@@ -133,6 +291,6 @@ def compared(response: solver.Response, other: solver.Response) -> StepCheck:
         at=at,
         unit=response.parameter.unit if driver is None else driver.unit,
         collapse=collapse,
-        stop=str(response.stop),
-        stop_of_check=str(other.stop),
+        stop=ours.stop,
+        stop_of_check=other.stop,
     )

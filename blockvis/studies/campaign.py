@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from blockvis.extras import require
+from blockvis.processes import cores
 from blockvis.runs.progress import StudyProgress
 
 from .run_one import failed_row, run_once
@@ -179,13 +180,6 @@ def _keep(records: StudyFolder, run: int) -> None:
     case_file = folder.with_suffix(".toml")
     case_file.write_text(tomli_w.dumps(values), encoding="utf-8")
     run_case(parse_case(case_file.read_text(encoding="utf-8"), case_file), folder, overwrite=True)
-
-
-def cores() -> int:
-    """Count the cores that processes of this machine may use."""
-    from dask.system import CPU_COUNT
-
-    return int(CPU_COUNT)
 
 
 @contextmanager

@@ -9,7 +9,8 @@ import pytest
 
 import blockvis
 import solver
-from blockvis.runs.step_check import compared
+from blockvis.processes import cores
+from blockvis.runs.step_check import compared, traced
 
 CASE = """
 [geometry]
@@ -67,6 +68,30 @@ def test_the_command_says_how_much_the_steps_matter(tmp_path):
     assert "steps matter" not in done.stderr
 
 
+def test_a_run_says_so_without_being_asked_where_there_is_a_second_core(tmp_path):
+    done = run(tmp_path, CASE)
+    assert done.returncode == 0, done.stderr
+    said = "error of the steps" in done.stdout
+    assert said == (cores() > 1)
+    assert (tmp_path / "out" / "step_check.json").is_file() == said
+
+
+def test_no_steps_are_checked_where_none_are_to_be(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "step_check.json").write_text("{}", encoding="utf-8")
+    done = run(tmp_path, CASE, "--no-check-steps", "--force")
+    assert done.returncode == 0, done.stderr
+    assert "error of the steps" not in done.stdout
+    # That of results before is none of these.
+    assert not (tmp_path / "out" / "step_check.json").exists()
+
+
+def test_linear_programs_have_no_steps_that_could_be_checked(tmp_path):
+    done = run(tmp_path, CASE + '\n[analysis]\nincrements = "linear program"\n')
+    assert done.returncode == 0, done.stderr
+    assert "error of the steps" not in done.stdout + done.stderr
+
+
 @pytest.mark.thorough
 def test_what_has_no_steps_is_refused(tmp_path):
     done = run(tmp_path, LIMIT_LOAD, "--check-steps")
@@ -81,7 +106,7 @@ def test_reactions_are_compared_at_the_same_places_only():
     response = solver.settle(arch, settlement, friction_coefficient=2.0)
     heavier = [replace(i, measured=1.02 * i.measured, reaction=1.02 * i.reaction) for i in response.increments]
     elsewhere = [replace(i, parameter=i.parameter + 0.03) for i in response.increments[1:]]
-    check = compared(response, replace(response, increments=(*heavier[:2], *elsewhere)))
+    check = compared(response, traced(replace(response, increments=(*heavier[:2], *elsewhere))))
     assert check.at == pytest.approx(0.1)
     assert check.difference == pytest.approx(0.02 * response.reaction[1] / response.reaction.max())
     assert check.error == check.difference

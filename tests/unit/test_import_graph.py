@@ -47,6 +47,7 @@ ORDER = (
     "blockvis.numbers",
     "blockvis.toml_text",
     "blockvis.vtk_files",
+    "blockvis.processes",
     "blockvis.broken_pipes",
     "blockvis.atomic_files",
     "solver",

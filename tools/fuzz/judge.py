@@ -17,9 +17,9 @@ from blockvis.runs.run import AS_DRAWN
 #: Distance at which corners touch, in block sizes: above what the solver leaves open, below every real gap.
 NEAR = 1e-5
 
-#: Distance at which corners touch where a collapse is judged, in block sizes: it is enclosed in steps that leave no more,
-#: and corners that pass each other by less than the above would have faces between them that are not there.
-NEAR_AT_COLLAPSE = 1e-6
+#: Distance up to which a corner outside, or beyond the end of an edge, touches where a collapse is judged, in block
+#: sizes: what has just slipped off an edge falls, and it is enclosed in steps that leave no more.
+APART_AT_COLLAPSE = 1e-7
 
 #: Part of an increment's movement that may stay open at a joint that carries force: twice what the solver aims at.
 LEFT = 0.02
@@ -123,6 +123,8 @@ def _judge(given: Trial, response: solver.Response, finding: Finding) -> None:
         for g in (True, False)
     )
     failed = response.stop is solver.Status.SOLVER_FAILED and not response.path
+    # A chip that weighs less than rounding of the whole may fall.
+    lightest = float(weights[assembly.free].min()) / float(weights[assembly.free].sum())
     if not failed:
         nothing = response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM
         if loose.falls > FALLS:
@@ -133,7 +135,7 @@ def _judge(given: Trial, response: solver.Response, finding: Finding) -> None:
                 finding.counted("fell to an equilibrium less than half a block away")
             elif not nothing:
                 finding.wrong.append(f"stands at the start, but falls by the oracle ({loose.falls:.2e})")
-        elif tight.falls < STANDS:
+        elif tight.falls < min(STANDS, 0.1 * lightest):
             finding.counted("equilibrium at the start")
             if nothing:
                 finding.wrong.append(f"falls at the start, but stands by the oracle ({tight.falls:.2e})")
@@ -261,8 +263,9 @@ def _judge_collapse(given: Trial, response: solver.Response, weights: np.ndarray
     assembly = given.assembly
     fall = next(i for i in response.increments if i.status == solver.Status.FALLING)
     rings = _rings(assembly, fall.pose)
-    near = NEAR_AT_COLLAPSE * assembly.block_size + 8 * np.spacing(np.abs(assembly.vertices).max())
-    contacts = touching(rings, assembly.free, near, generous=True)
+    rounding = 8 * np.spacing(np.abs(assembly.vertices).max())
+    near, apart = (part * assembly.block_size + rounding for part in (NEAR, APART_AT_COLLAPSE))
+    contacts = touching(rings, assembly.free, near, generous=True, apart=apart)
     falls = judged(rings, assembly.free, weights, contacts, given.friction).falls
     if falls <= STANDS:
         falls = _falls_on(given, rings, weights, response.collapse.bracket)

@@ -35,7 +35,9 @@ class Touching:
     normals: np.ndarray
 
 
-def touching(rings: Sequence[np.ndarray], free: np.ndarray, near: float, *, generous: bool) -> Touching:
+def touching(
+    rings: Sequence[np.ndarray], free: np.ndarray, near: float, *, generous: bool, apart: float | None = None
+) -> Touching:
     """Contact points of convex blocks.
 
     Parameters
@@ -47,6 +49,8 @@ def touching(rings: Sequence[np.ndarray], free: np.ndarray, near: float, *, gene
         Distance up to which a corner touches.
     generous : bool
         Whether corners near corners count, with the normals of both.
+    apart : float, optional [m]
+        Distance up to which a corner outside, or beyond the end of an edge, touches, where that is less.
     """
     found: list[tuple[int, int, np.ndarray, np.ndarray]] = []
     boxes = [(ring.min(axis=0) - near, ring.max(axis=0) + near) for ring in rings]
@@ -56,7 +60,7 @@ def touching(rings: Sequence[np.ndarray], free: np.ndarray, near: float, *, gene
                 continue
             if (boxes[a][0] > boxes[b][1]).any() or (boxes[b][0] > boxes[a][1]).any():
                 continue
-            found += _corners_on_faces(rings[a], rings[b], a, b, near, generous)
+            found += _corners_on_faces(rings[a], rings[b], a, b, (near, near if apart is None else apart), generous)
     if not found:
         return Touching(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 2)))
     return Touching(
@@ -68,9 +72,9 @@ def touching(rings: Sequence[np.ndarray], free: np.ndarray, near: float, *, gene
 
 
 def _corners_on_faces(
-    corners: np.ndarray, ring: np.ndarray, a: int, b: int, near: float, generous: bool
+    corners: np.ndarray, ring: np.ndarray, a: int, b: int, within: tuple[float, float], generous: bool
 ) -> list[tuple[int, int, np.ndarray, np.ndarray]]:
-    found = []
+    found, (near, apart) = [], within
     inside = corners.mean(axis=0)
     for k in range(len(ring)):
         start, along = ring[k], ring[(k + 1) % len(ring)] - ring[k]
@@ -79,7 +83,7 @@ def _corners_on_faces(
         normal = np.array([along[1], -along[0]])
         for m, corner in enumerate(corners):
             gap, place = float((corner - start) @ normal), float((corner - start) @ along)
-            if abs(gap) > near or not -near <= place <= length + near:
+            if not -near <= gap <= apart or not -apart <= place <= length + apart:
                 continue
             if generous:
                 if (inside - corner) @ normal > 0.0:
