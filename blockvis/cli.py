@@ -142,8 +142,9 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--check-steps",
         action=argparse.BooleanOptionalAction,
-        help="follow the path a second time, in steps half as long, and say how far apart the two are (default: on "
-        "another core, where there is one, and if it does not take much longer than the run itself)",
+        help="follow the path a second time, in steps half as long or, by linear programs, with its blocks in another "
+        "order, and say how far apart the two are (default: on another core, where there is one, and if it does not "
+        "take much longer than the run itself)",
     )
     run.set_defaults(verb=_run)
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
@@ -431,7 +432,7 @@ def _run(options: argparse.Namespace) -> int:
 @contextlib.contextmanager
 def _checking(options: argparse.Namespace, case: Case | None) -> Iterator[StepChecking | None]:
     """Follow a path in shorter steps meanwhile, where there is a core for it or it is asked for."""
-    from .runs.step_check import StepChecking, has_steps, stored_case
+    from .runs.step_check import StepChecking, is_path, stored_case
 
     folder, checking = None, None
     if case is None:
@@ -440,7 +441,7 @@ def _checking(options: argparse.Namespace, case: Case | None) -> Iterator[StepCh
         with contextlib.suppress(ValueError, OSError):
             case = stored_case(folder)
     wanted = cores() > 1 if options.check_steps is None else options.check_steps
-    if case is not None and wanted and has_steps(case):
+    if case is not None and wanted and is_path(case):
         checking = StepChecking(case, folder)
     try:
         yield checking
@@ -468,7 +469,7 @@ def _told(options: argparse.Namespace, run: Run, checking: StepChecking | None, 
 
 def _say_error(options: argparse.Namespace, run: Run, checking: StepChecking | None, patience: float) -> None:
     """Say how far the path is from that in shorter steps, if it is asked for or known soon enough."""
-    from .runs.step_check import NOTABLE, STEP_CHECK, check_steps
+    from .runs.step_check import STEP_CHECK, check_steps
 
     if run.had_finished and not options.check_steps and (run.folder / STEP_CHECK).is_file():
         return
@@ -477,18 +478,14 @@ def _say_error(options: argparse.Namespace, run: Run, checking: StepChecking | N
         try:
             check = checking.compared(run.folder, run.response, None if options.check_steps else patience)
         except TimeoutError as late:
-            print(f"blockvis: error of the steps not known: {late}; --check-steps waits for it", file=sys.stderr)
+            print(f"blockvis: error not known: {late}; --check-steps waits for it", file=sys.stderr)
     if check is None and options.check_steps:
         check = check_steps(run.folder)
     if check is None:
         return
     print(check)
-    if check.error > NOTABLE or check.stop != check.stop_of_check:
-        warnings.warn(
-            f"the steps matter by more than {100.0 * NOTABLE:g} %: where many joints slide, or stones slip off each "
-            "other, a wall may have several paths; try half the increment, and give results with that range",
-            stacklevel=2,
-        )
+    if check.warning:
+        warnings.warn(check.warning, stacklevel=2)
 
 
 def _info(options: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""How much the length of the steps matters: the same run once more in steps half as long."""
+"""How exact a run is: the same path in steps half as long or, by linear programs, with its blocks in another order."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from blockvis.processes import interpreter, unread
 from blockvis.results.folder import STEP_CHECK, stored_assembly
 from blockvis.results.record import read_record
 
+from .kind import AnalysisRun
 from .kinds import KINDS
 from .plan import planned
 from .reopen import open_results
@@ -32,6 +33,22 @@ SAME = 1e-9
 
 #: Difference that is worth a warning, and the smallest that is told.
 NOTABLE, SMALLEST = 0.01, 1e-4
+
+#: What makes another run of the same case: what its difference is called, the other run, and a warning.
+WAYS = {
+    "steps": (
+        "error of the steps",
+        "in steps half as long",
+        "the steps matter by more than {percent:g} %: where many joints slide, or stones slip off each other, a wall "
+        "may have several paths; try half the increment, and give results with that range",
+    ),
+    "order": (
+        "error of rounding",
+        "with its blocks in another order",
+        "rounding matters by more than {percent:g} %: linear programs have several solutions where joints slide; give "
+        'results with that range, or take [analysis] increments = "coulomb", which takes many times as long',
+    ),
+}
 
 #: Seconds between looks for Ctrl-C while waiting.
 LOOK = 0.2
@@ -58,6 +75,8 @@ class StepCheck:
         Difference of the displacements at collapse, as a fraction; nan unless both collapse.
     stop, stop_of_check : str
         How both ended.
+    way : str
+        What makes the other: a key of ``WAYS``.
     """
 
     what: str
@@ -67,6 +86,7 @@ class StepCheck:
     collapse: float
     stop: str
     stop_of_check: str
+    way: str = "steps"
 
     @property
     def error(self) -> float:
@@ -80,7 +100,15 @@ class StepCheck:
             parts.append(f"collapse {_percent(self.collapse)}")
         if self.stop != self.stop_of_check:
             parts.append(f"one ends as '{self.stop}', the other as '{self.stop_of_check}'")
-        return f"error of the steps: {', '.join(parts)} (apart from a run in steps half as long)"
+        what, other, _ = WAYS[self.way]
+        return f"{what}: {', '.join(parts)} (apart from a run {other})"
+
+    @property
+    def warning(self) -> str:
+        """What there is to say where the difference matters; nothing where it does not."""
+        if self.error <= NOTABLE and self.stop == self.stop_of_check:
+            return ""
+        return WAYS[self.way][2].format(percent=100.0 * NOTABLE)
 
 
 @dataclass(frozen=True)
@@ -94,20 +122,23 @@ class Traced:
     collapse : float, optional
         Displacement at collapse.
     stop : str
+    way : str, optional
+        How it was followed: a key of ``WAYS``.
     """
 
     measured: list[tuple[int, float, float]]
     collapse: float | None
     stop: str
+    way: str = "steps"
 
 
 class StepChecking:
-    """The same path in steps half as long, followed by a process of its own while this one follows the case.
+    """The same path once more, followed by a process of its own while this one follows the case.
 
     Parameters
     ----------
     case : Case
-        That :func:`has_steps`.
+        That :func:`is_path`.
     folder : Path, optional
         Where the assembly is stored, for a run that goes on.
     """
@@ -179,16 +210,16 @@ def main() -> None:
             os.nice(LESS_URGENT)
         found = None
         with contextlib.suppress(Exception):
-            found = _finer(case, case_assembly(case) if folder is None else stored_assembly(folder))
+            found = _followed_again(case, case_assembly(case) if folder is None else stored_assembly(folder))
         with unread():
             pickle.dump(found, out)
             out.flush()
     os._exit(0)
 
 
-def has_steps(case: Case) -> bool:
-    """Whether a case may have a path whose steps matter; with many blocks it has one of linear programs, without."""
-    return KINDS[case.analysis].course(case).parameter.is_path and case.controls.increments != "linear program"
+def is_path(case: Case) -> bool:
+    """Whether a case follows a path, which can be compared with another."""
+    return KINDS[case.analysis].course(case).parameter.is_path
 
 
 def stored_case(folder: Path) -> Case:
@@ -216,16 +247,16 @@ def check_steps(folder: str | Path) -> StepCheck:
     Raises
     ------
     ValueError
-        For a run without a case file, or that has no steps: a limit load, or increments by linear program.
+        For a run without a case file, or that is no path, but a limit load.
     """
     folder = Path(folder)
     case, response, other = stored_case(folder), open_results(folder), None
-    if response.parameter.is_path and response.path and not np.isnan(response.path[0].least):
-        other = _finer(case, response.assembly)
+    if response.parameter.is_path and response.path:
+        other = _followed_again(case, response.assembly)
     if other is None:
         raise ValueError(
             f"'{folder}' has no path whose steps could be checked ({response.analysis}, {len(response.path)} "
-            'increments); it takes a settlement or a pushover with [analysis] increments = "coulomb"'
+            "increments); it takes a settlement or a pushover"
         )
     return _written(folder, compared(response, other))
 
@@ -236,20 +267,40 @@ def traced(response: solver.Response) -> Traced:
     return Traced([(i.phase, i.parameter, i.measured) for i in response.path], collapse, str(response.stop))
 
 
-def _finer(case: Case, assembly: solver.Assembly) -> Traced | None:
-    """Follow the path of a case in steps half as long; None where it has no steps."""
+def _followed_again(case: Case, assembly: solver.Assembly) -> Traced | None:
+    """Follow the path of a case in steps half as long, or otherwise where it has no steps; None where it is no path."""
     finer = replace(case.controls, shorter_steps=2.0 * case.controls.shorter_steps, falling_frames=1)
-    run = planned(replace(case, controls=finer), assembly)
+    found = _increments(planned(replace(case, controls=finer), assembly))
+    if found is None and assembly.dimension == 2:
+        linear = replace(case.controls, increments="linear program", falling_frames=1)
+        found = _increments(planned(replace(case, controls=linear), _reversed(assembly)), least=False)
+        return None if found is None else replace(found, way="order")
+    return found
+
+
+def _increments(run: AnalysisRun, *, least: bool = True) -> Traced | None:
+    """Follow a run; None where its equilibria have no least reaction, though asked for: it goes by linear programs."""
     found: list[solver.Increment] = []
     while True:
         try:
             found.append(next(run.steps))
         except StopIteration as stop:
             ending: solver.Ending = stop.value
-            break
-        if np.isnan(found[0].least) and found[0].status == solver.Status.EQUILIBRIUM:
+            return traced(run.response(found, ending))
+        if least and np.isnan(found[0].least) and found[0].status == solver.Status.EQUILIBRIUM:
             return None
-    return traced(run.response(found, ending))
+
+
+def _reversed(assembly: solver.Assembly) -> solver.Assembly:
+    """Turn the order of the blocks of an assembly in the plane around."""
+    return solver.Assembly.from_outlines(
+        [assembly.outline(block) for block in reversed(range(assembly.n_blocks))],
+        names=assembly.names[::-1],
+        roles=assembly.roles[::-1].tolist(),
+        density=assembly.density[::-1],
+        thickness=assembly.thickness[::-1],
+        materials=assembly.materials[::-1],
+    )
 
 
 def _percent(part: float) -> str:
@@ -293,4 +344,5 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
         collapse=collapse,
         stop=ours.stop,
         stop_of_check=other.stop,
+        way=other.way,
     )

@@ -10,7 +10,7 @@ import pytest
 import blockvis
 import solver
 from blockvis.processes import cores
-from blockvis.runs.step_check import compared, traced
+from blockvis.runs.step_check import StepCheck, compared, traced
 
 CASE = """
 [geometry]
@@ -86,10 +86,21 @@ def test_no_steps_are_checked_where_none_are_to_be(tmp_path):
     assert not (tmp_path / "out" / "step_check.json").exists()
 
 
-def test_linear_programs_have_no_steps_that_could_be_checked(tmp_path):
-    done = run(tmp_path, CASE + '\n[analysis]\nincrements = "linear program"\n')
+def test_linear_programs_are_compared_with_those_of_the_blocks_in_another_order(tmp_path):
+    done = run(tmp_path, CASE + '\n[analysis]\nincrements = "linear program"\n', "--check-steps")
     assert done.returncode == 0, done.stderr
-    assert "error of the steps" not in done.stdout + done.stderr
+    assert "error of rounding: reaction below 0.01 %" in done.stdout
+    assert "with its blocks in another order" in done.stdout
+    # An arch hinges: its programs have one solution.
+    assert "rounding matters" not in done.stderr
+
+
+def test_what_matters_is_warned_of():
+    check = StepCheck("reaction", 0.02, 0.1, "m", float("nan"), "collapsed", "collapsed", "order")
+    assert "rounding matters by more than 1 %" in check.warning
+    assert "several paths" in replace(check, way="steps").warning
+    assert replace(check, difference=0.009).warning == ""
+    assert replace(check, difference=0.009, stop_of_check="limit reached").warning
 
 
 @pytest.mark.thorough
