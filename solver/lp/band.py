@@ -327,7 +327,11 @@ def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float
 
 def _lengths(rates: np.ndarray, corrections: np.ndarray, weights: np.ndarray) -> list[float]:
     """Longest steps, up to 1, at relative changes corrected with each of the weights."""
-    return [1.0 / max(1.0, -float((rates + weight * corrections).min())) for weight in weights]
+    # Only what is used up within the step shortens it, and lies between what the first and the last weight make of it.
+    low = np.minimum(rates + weights[0] * corrections, rates + weights[-1] * corrections)
+    few = np.flatnonzero(low < -1.0)
+    steepest = (rates[few] + weights[:, None] * corrections[few]).min(axis=1, initial=-1.0)
+    return (-1.0 / steepest).tolist()
 
 
 def interior_point(
