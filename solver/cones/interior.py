@@ -1,4 +1,4 @@
-"""An interior point method for conic programs whose rows form a narrow band: the blocks of a wall or vault."""
+"""An interior point method for conic programs whose rows are those of blocks that touch few others."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import lapack
+import scipy.sparse.linalg as spl
 
-from solver.lp.band import OPERATIONS, NoProgress, narrowest
+from solver.lp.band import NoProgress
+from solver.lp.fill import least_fill
 from solver.lp.threads import NotLimited, one_thread
 
 from .problem import ConicProgram, ConicSolution, checked, raise_if_proved
@@ -77,70 +78,73 @@ class _Scaling:
 
 
 class _Normal:
-    """A H Aᵀ for a fixed A: a band of its rows, reordered; and its factor."""
+    """A H Aᵀ for a fixed A, its rows in an order that fills in little; and its factors."""
 
-    def __init__(self, matrix: sp.csc_array, k: int, size: int, along: np.ndarray | None) -> None:
+    def __init__(self, matrix: sp.csc_array, k: int, size: int) -> None:
         rows = matrix.shape[0]
-        self.rows, self.k, self.size = rows, k, size
+        self.k, self.size = k, size
         beside = sp.csc_array(matrix[:, k * size :])
         # A load on every block fills the matrix.
         if k == 0 or (np.diff(beside.indptr) > 1).any():
             raise NoProgress("no cones, or a column beside them with several rows")
-        self.order, place = narrowest(matrix, along)
         # Cones by the number of rows that any of their columns is in.
         entries = sp.coo_array(matrix[:, : k * size])
         cone, part = entries.coords[1] // size, entries.coords[1] % size
         pairs, which = np.unique(cone * rows + entries.coords[0], return_inverse=True)
         values = np.zeros((len(pairs), size))
         np.add.at(values, (which, part), entries.data)
-        of_cone, row = pairs // rows, place[pairs % rows]
+        of_cone, row = pairs // rows, pairs % rows
         number = np.bincount(of_cone, minlength=k)
         first = np.cumsum(number) - number
-        self.groups, at = [], []
+        self.groups, at = [], [np.arange(rows) * (rows + 1)]
         for count in np.unique(number[number > 0]):
             members = np.flatnonzero(number == count)
             mine = first[members][:, None] + np.arange(count)
-            # Cones of the same rows, those of a joint, are summed before they go into the band.
+            # Cones of the same rows, those of a joint, are summed before they go into the matrix.
             same, joint, together = np.unique(row[mine], axis=0, return_inverse=True, return_counts=True)
             in_order = np.argsort(joint.ravel(), kind="stable")
             starts = np.cumsum(together) - together
-            i, j = np.tril_indices(count)
             for several in np.unique(together):
                 chosen = np.flatnonzero(together == several)
                 which = in_order[starts[chosen][:, None] + np.arange(several)]
-                here, there = same[chosen][:, i], same[chosen][:, j]
-                at.append((np.minimum(here, there), np.abs(here - there)))
-                self.groups.append((members[which], values[mine[which]], i * count + j))
+                at.append((same[chosen][:, None, :] * rows + same[chosen][:, :, None]).ravel())
+                self.groups.append((members[which], values[mine[which]]))
+        filled = np.unique(np.concatenate(at))
+        self.order = least_fill(filled // rows, filled % rows, rows)
+        place = np.empty(rows, dtype=np.int64)
+        place[self.order] = np.arange(rows)
+        at = [place[one // rows] * rows + place[one % rows] for one in at]
+        filled, self.number = np.unique(np.concatenate(at[1:] + at[:1]), return_inverse=True)
+        self.indices = (filled % rows).astype(np.int32)
+        self.pointers = np.searchsorted(filled, np.arange(rows + 1) * rows).astype(np.int32)
         self.single = np.flatnonzero(np.diff(beside.indptr))
-        self.single_row, self.single_square = place[beside.indices], beside.data**2
-        self.width = max((int(gap.max(initial=0)) for _, gap in at), default=0) + 1
-        if rows * float(self.width) ** 2 > OPERATIONS:
-            raise NoProgress(f"{rows} rows in a band {self.width} wide")
-        self.at = np.concatenate([(low * self.width + gap).ravel() for low, gap in at])
-        self.factor = np.empty((0, 0))
+        self.single_row, self.single_square = beside.indices, beside.data**2
 
     def factorise(self, squares: np.ndarray, ratio: np.ndarray) -> None:
         """Factorise for W⁻² of the cones, (k, d, d), and x / s of all other columns, (n - k d,)."""
+        rows = len(self.order)
         sums = []
-        for members, values, lower in self.groups:
+        for members, values in self.groups:
             # (joints, cones, rows, d) to (joints, rows, cones d): one product for all cones of a joint.
-            joints, cones, rows, _ = values.shape
+            joints, cones, count, _ = values.shape
             side, other = (
-                part.swapaxes(1, 2).reshape(joints, rows, cones * self.size)
+                part.swapaxes(1, 2).reshape(joints, count, cones * self.size)
                 for part in (values @ squares[members], values)
             )
-            sums.append((side @ other.swapaxes(1, 2)).reshape(joints, rows * rows)[:, lower].ravel())
-        band: np.ndarray = np.bincount(self.at, np.concatenate(sums), self.rows * self.width)
-        band = band.reshape(self.rows, self.width)
-        band[:, 0] += np.bincount(self.single_row, ratio[self.single] * self.single_square, self.rows)
-        band[:, 0] += REGULAR
-        self.factor, failed = lapack.dpbtrf(band.T, lower=1, overwrite_ab=1)
-        if failed:
-            raise NoProgress("the normal equations are singular")
+            sums.append((side @ other.swapaxes(1, 2)).ravel())
+        sums.append(REGULAR + np.bincount(self.single_row, ratio[self.single] * self.single_square, rows))
+        whole = np.bincount(self.number, np.concatenate(sums), len(self.indices))
+        matrix = sp.csc_array((whole, self.indices, self.pointers), shape=(rows, rows))
+        try:
+            self.factors = spl.splu(
+                matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True, "Equil": False}
+            )
+        except RuntimeError:
+            raise NoProgress("the normal equations are singular") from None
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        solution = np.empty(self.rows)
-        solution[self.order] = lapack.dpbtrs(self.factor, right[self.order], lower=1)[0]
+        solution = np.empty(len(right))
+        solution[self.order] = self.factors.solve(right[self.order])
         return solution
 
 
@@ -163,7 +167,7 @@ class _Method:
         self.cost, self.right = program.cost * program.scale, program.right
         matrix = sp.csc_array(program.matrix @ sp.diags_array(program.scale))
         self.matrix, self.transposed = sp.csr_array(matrix), sp.csr_array(matrix.T)
-        self.normal = _Normal(matrix, self.k, self.size, program.along)
+        self.normal = _Normal(matrix, self.k, self.size)
         self.count = self.k + len(self.cost) - self.split
         self.point = self._start()
 
@@ -320,7 +324,7 @@ def _to_zero(values: np.ndarray, change: np.ndarray) -> float:
 
 
 def run_interior(program: ConicProgram) -> tuple[ConicSolution | None, str]:
-    """Solve a program in a band.
+    """Solve a program.
 
     Parameters
     ----------
@@ -342,7 +346,7 @@ def run_interior(program: ConicProgram) -> tuple[ConicSolution | None, str]:
     -----
     A primal-dual method with the scaling of Nesterov & Todd (1997), https://doi.org/10.1287/moor.22.1.1, predictor and
     corrector after Mehrotra (1992), https://doi.org/10.1137/0802028: every iteration factorises A W⁻² Aᵀ, whose blocks
-    of 6 × 6 are the blocks of the structure and their neighbours, as a band.
+    of 6 × 6 are the blocks of the structure and their neighbours, in an order of minimum degree.
     """
     started = time.perf_counter()
     try:

@@ -25,8 +25,6 @@ class ConicProgram:
         Of each cone: its first number times this is at least the length of its others, |T| ≤ μ N.
     size : int
         Numbers in a cone: cone i has the columns ``i * size`` to ``(i + 1) * size - 1``.
-    along : (m,) array, optional
-        Where the row's block lies along the structure; rows of neighbours are to have values near each other.
 
     Notes
     -----
@@ -38,7 +36,6 @@ class ConicProgram:
     right: np.ndarray
     friction: np.ndarray
     size: int = 3
-    along: np.ndarray | None = None
 
     @property
     def in_cones(self) -> int:

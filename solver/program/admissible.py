@@ -190,6 +190,6 @@ def _solution(
 ) -> LPSolution | ConicSolution:
     """Solve for forces that balance a load: a linear program in the plane, in space one over round cones."""
     if dimension == 3:
-        return solve_cones(ConicProgram(cost, matrix, -load, friction, along=along))
+        return solve_cones(ConicProgram(cost, matrix, -load, friction))
     lower, upper = -load - tolerance, -load + tolerance
     return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, along=along), routes)

@@ -10,6 +10,8 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
+from solver.lp.fill import least_fill
+
 #: Up to so many rows a dense factorisation is the faster.
 DENSE = 150
 
@@ -102,11 +104,4 @@ def _least_fill(pairs: bytes, dtype: str, n_blocks: int) -> np.ndarray:
     """(n_blocks,) array: order of the blocks by minimum degree of who touches whom."""
     touching = np.frombuffer(pairs, dtype=dtype).reshape(-1, 2)
     touching = touching[(touching >= 0).all(axis=1)]
-    ones = np.ones(len(touching))
-    near = sp.coo_array((ones, (touching[:, 0], touching[:, 1])), shape=(n_blocks, n_blocks))
-    graph = sp.csc_array(near + near.T)
-    graph.data[:] = -1.0
-    # Any matrix of this pattern that needs no pivots tells the order.
-    matrix = sp.csc_array(graph + sp.diags_array(1.0 - graph.sum(axis=0)))
-    found = spl.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return np.argsort(found.perm_c)
+    return least_fill(touching[:, 0], touching[:, 1], n_blocks)

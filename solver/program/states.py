@@ -16,8 +16,9 @@ STATES = 1e-9
 BALANCE, EQUATIONS = 1e-9, 1e-8
 
 #: Newton's method on the points' states: iterations after which it is given up, and times that what rounding has left
-#: out of balance is put on the blocks again, in the plane. Where more points change their state than the time before
-#: it goes round, and the second time it is left.
+#: out of balance is put on the blocks again; in space where nothing slides, since what is left of turning about a round
+#: cone is not of rounding. Where more points change their state than the time before it goes round, and the second time
+#: it is left.
 STATE_CHANGES, REFINED = 16, 2
 
 
@@ -65,7 +66,7 @@ def in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved) -> Mo
         stops = slides & ~smooth & (slid < -no_way / along)
         changed = opens | closes | starts | stops
         if not changed.any():
-            for _ in range(REFINED if d == 2 else 0):
+            for _ in range(REFINED if d == 2 or not slides.any() else 0):
                 if there.unbalanced() >= BALANCE:
                     there.refine()
             if there.unbalanced() < BALANCE:
