@@ -32,6 +32,9 @@ STANDS, FALLS = 1e-9, 1e-6
 #: where gaps that an increment has left enter.
 SAME, SAME_LATER = 1e-5, 1e-3
 
+#: Reaction that drives supports on, over the weight: beyond it blocks are wedged for all that matters.
+LOCKED = 1e3
+
 #: Seconds of processor time after which a trial counts as hanging.
 LONGEST = 240
 
@@ -135,7 +138,7 @@ def _judge(given: Trial, response: solver.Response, finding: Finding) -> None:
                 finding.counted("fell to an equilibrium less than half a block away")
             elif not nothing:
                 finding.wrong.append(f"stands at the start, but falls by the oracle ({loose.falls:.2e})")
-        elif tight.falls < min(STANDS, 0.1 * lightest):
+        elif tight.falls < min(STANDS, 0.01 * lightest):
             finding.counted("equilibrium at the start")
             if nothing:
                 finding.wrong.append(f"falls at the start, but stands by the oracle ({tight.falls:.2e})")
@@ -251,7 +254,9 @@ def _judge_locked(given: Trial, response: solver.Response, weights: np.ndarray, 
     velocity = support_velocities(
         rings, assembly.moving, settlement.direction, settlement.rotation_centre, settlement.rotation
     )
-    if judged(rings, assembly.free, weights, contacts, given.friction, velocity).reaction == -np.inf:
+    reaction = judged(rings, assembly.free, weights, contacts, given.friction, velocity).reaction
+    arm = max(float(np.hypot(*velocity[assembly.moving, :2].T).max()), 1e-300)
+    if reaction is not None and reaction < -LOCKED * float(weights[assembly.free].sum()) * arm:
         finding.counted("locked confirmed")
     else:
         finding.counted("locked not confirmed")
