@@ -1,6 +1,7 @@
 """The report as its readers use it: with mouse, finger, keyboard or screen reader, and what they take away."""
 
 import html
+import importlib.util
 import json
 import os
 import re
@@ -290,14 +291,23 @@ def test_dark_rooms_get_a_dark_page_and_those_who_ask_get_less_motion(tmp_path):
     assert usual > 2 * calm
 
 
+#: A wheel that brings axe-core along.
+WITH_AXE = importlib.util.find_spec("axe_playwright_python")
 AXE = next(
-    (file for file in (Path(os.environ.get("AXE", "")), Path("node_modules/axe-core/axe.min.js")) if file.is_file()),
+    (
+        file
+        for file in (
+            Path(os.environ.get("AXE", "")),
+            *(Path(folder) / "axe.min.js" for folder in (WITH_AXE.submodule_search_locations if WITH_AXE else ())),
+        )
+        if file.is_file()
+    ),
     None,
 )
 
 
 @browser
-@pytest.mark.skipif(AXE is None, reason="axe-core is not installed: npm install axe-core, or AXE=path of axe.min.js")
+@pytest.mark.skipif(AXE is None, reason="no axe-core: pip install --no-deps axe-playwright-python, or AXE=axe.min.js")
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing(scheme, tmp_path):
     response = replace(parted(wall(6, 5), 4, 3), message="made up")
