@@ -46,7 +46,7 @@ EXIT_CODES = f"""exit codes:
   {INTERRUPTED}  interrupted by Ctrl-C; blockvis run --resume OUT goes on"""
 
 #: Seconds that a run waits at least for the path in shorter steps, which it otherwise gives as long as it took itself.
-PATIENCE = 5.0
+PATIENCE = 10.0
 
 #: Pixels below which a picture has no room for its words.
 SMALLEST_PICTURE = 160
@@ -484,6 +484,10 @@ def _say_error(options: argparse.Namespace, run: Run, checking: StepChecking | N
     if check is None:
         return
     print(check)
+    if (run.folder / "report.html").is_file():
+        from .report.page import add_error
+
+        add_error(run.folder / "report.html", str(check))
     if check.warning:
         warnings.warn(check.warning, stacklevel=2)
 
@@ -538,12 +542,14 @@ def _render(options: argparse.Namespace) -> int:
     from .results.folder import stored_case
     from .runs.progress import DrawingProgress
     from .runs.reopen import open_results
+    from .runs.step_check import stored_check
 
     folder = Path(options.results)
     response = open_results(folder)
     size = _size(options.size)
     fall = stored_fall(folder) or fall_of(response)
-    write_report(response, folder / "report.html", stored_case(folder), fall=fall)
+    error = str(stored_check(folder) or "")
+    write_report(response, folder / "report.html", stored_case(folder), fall=fall, error=error)
     drawn = ["report.html"]
     if response.path:
         draw_curve(response, folder / "curve.png")

@@ -53,6 +53,9 @@ from blockvis.runs.kinds import KINDS
 from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, hexadecimals, rounded
 from .space import model_in_space
 
+#: Stands in a report for how exact it is, until that is known.
+ERROR_UNKNOWN = "<!-- error not known -->"
+
 #: Increments beyond this many are thinned out evenly; the page stays below 2 MB for a thousand blocks. Of more than
 #: four thousand blocks fewer are shown, so that poses times blocks stay what a browser can hold.
 MOST_FRAMES, MOST_POSES, FEWEST_FRAMES = 160, 640_000, 24
@@ -93,6 +96,7 @@ def write_report(
     *,
     title: str = "",
     fall: Fall | None = None,
+    error: str = "",
 ) -> Path:
     """Write the report.
 
@@ -106,15 +110,37 @@ def write_report(
         Of the page; the name of the case and what happened by default.
     fall : Fall, optional
         What comes after the last equilibrium, in time, instead of the frames without it.
+    error : str
+        What of and how large, "error of the steps: reaction 0.2 %"; :func:`add_error` may say it later.
 
     Returns
     -------
     pathlib.Path
     """
-    return write_whole(path, report_html(response, case_text, title=title, fall=fall))
+    return write_whole(path, report_html(response, case_text, title=title, fall=fall, error=error))
 
 
-def report_html(response: solver.Response, case_text: str = "", *, title: str = "", fall: Fall | None = None) -> str:
+def add_error(path: str | os.PathLike[str], error: str) -> None:
+    """Say in a report that has been written how exact it is.
+
+    Parameters
+    ----------
+    path : path
+    error : str
+        As of :func:`write_report`.
+    """
+    page = Path(path).read_text(encoding="utf-8")
+    write_whole(path, page.replace(ERROR_UNKNOWN, _error(error), 1))
+
+
+def _error(error: str) -> str:
+    name, _, value = error.partition(": ")
+    return html_rows([(name, value)]) if error else ERROR_UNKNOWN
+
+
+def report_html(
+    response: solver.Response, case_text: str = "", *, title: str = "", fall: Fall | None = None, error: str = ""
+) -> str:
     """Make the report as HTML text; parameters as those of :func:`write_report`.
 
     Notes
@@ -142,6 +168,7 @@ def report_html(response: solver.Response, case_text: str = "", *, title: str = 
         summary=html_rows(summary_rows(response, fall)),
         cracks=_cracks(response),
         certificate=html_rows(_certificate(response)),
+        error=_error(error),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
         case_open=" open" if case_text else "",
         model=data,

@@ -54,7 +54,7 @@ WAYS = {
 LOOK = 0.2
 
 #: How much less urgent the second path is, where the system knows such a thing: it is not to slow the first.
-LESS_URGENT = 10
+LESS_URGENT = 5
 
 
 @dataclass(frozen=True)
@@ -259,6 +259,14 @@ def check_steps(folder: str | Path) -> StepCheck:
             "increments); it takes a settlement or a pushover"
         )
     return _written(folder, compared(response, other))
+
+
+def stored_check(folder: Path) -> StepCheck | None:
+    """Read what a run was compared with, if it was."""
+    if not (folder / STEP_CHECK).is_file():
+        return None
+    numbers = json.loads((folder / STEP_CHECK).read_text(encoding="utf-8"))
+    return StepCheck(**{**numbers, "collapse": np.nan if numbers["collapse"] is None else numbers["collapse"]})
 
 
 def traced(response: solver.Response) -> Traced:
