@@ -16,9 +16,8 @@ STATES = 1e-9
 BALANCE, EQUATIONS = 1e-9, 1e-8
 
 #: Newton's method on the points' states: iterations after which it is given up, and times that what rounding has left
-#: out of balance is put on the blocks again; in space where nothing slides, since what is left of turning about a round
-#: cone is not of rounding. Where more points change their state than the time before it goes round, and the second time
-#: it is left.
+#: out of balance is put on the blocks again; where points slide in space, once their turning about round cones leaves
+#: no less. Where more points change their state than the time before it goes round, and the second time it is left.
 STATE_CHANGES, REFINED = 16, 2
 
 
@@ -66,12 +65,13 @@ def in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved) -> Mo
         stops = slides & ~smooth & (slid < -no_way / along)
         changed = opens | closes | starts | stops
         if not changed.any():
-            for _ in range(REFINED if d == 2 or not slides.any() else 0):
+            stalled = there.unbalanced() > 0.5 * out
+            for _ in range(REFINED if d == 2 or not slides.any() or stalled else 0):
                 if there.unbalanced() >= BALANCE:
                     there.refine()
             if there.unbalanced() < BALANCE:
                 return there.solution(iteration)
-            if there.unbalanced() > 0.5 * out:
+            if stalled:
                 # Rounding: next to nothing holds what moves.
                 return None
             out = there.unbalanced()
