@@ -473,14 +473,20 @@ def _say_error(options: argparse.Namespace, run: Run, checking: StepChecking | N
 
     if run.had_finished and not options.check_steps and (run.folder / STEP_CHECK).is_file():
         return
-    check = None
-    if checking is not None:
+    check, unknown = None, ""
+    if checking is not None and run.response.path:
         try:
-            check = checking.compared(run.folder, run.response, None if options.check_steps else patience)
+            most = None if options.check_steps else patience
+            check = checking.compared(run.folder, run.response, most, lambda: _say_waiting(most))
+            unknown = "" if check else "the same path once more came to nothing"
         except TimeoutError as late:
-            print(f"blockvis: error not known: {late}; --check-steps waits for it", file=sys.stderr)
-    if check is None and options.check_steps:
+            unknown = f"{late}; --check-steps waits for it"
+        except KeyboardInterrupt:
+            unknown = "interrupted; everything else is written"
+    if check is None and options.check_steps and not unknown.startswith("interrupted"):
         check = check_steps(run.folder)
+    if check is None and unknown:
+        print(f"blockvis: error not known: {unknown}", file=sys.stderr)
     if check is None:
         return
     print(check)
@@ -490,6 +496,11 @@ def _say_error(options: argparse.Namespace, run: Run, checking: StepChecking | N
         add_error(run.folder / "report.html", str(check))
     if check.warning:
         warnings.warn(check.warning, stacklevel=2)
+
+
+def _say_waiting(patience: float | None) -> None:
+    most = "" if patience is None else f", for {patience:.0f} s at most"
+    print(f"blockvis: waiting for the same path once more{most}; Ctrl-C leaves it", file=sys.stderr)
 
 
 def _info(options: argparse.Namespace) -> int:

@@ -9,6 +9,8 @@ import pickle
 import queue
 import sys
 import threading
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -50,8 +52,8 @@ WAYS = {
     ),
 }
 
-#: Seconds between looks for Ctrl-C while waiting.
-LOOK = 0.2
+#: Seconds between looks for Ctrl-C while waiting, and after which waiting is worth a word.
+LOOK, WORTH_A_WORD = 0.2, 2.0
 
 #: How much less urgent the second path is, where the system knows such a thing: it is not to slow the first.
 LESS_URGENT = 5
@@ -153,7 +155,11 @@ class StepChecking:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def compared(
-        self, folder: str | Path, response: solver.Response, patience: float | None = None
+        self,
+        folder: str | Path,
+        response: solver.Response,
+        patience: float | None = None,
+        waiting: Callable[[], None] = lambda: None,
     ) -> StepCheck | None:
         """Wait for the other path, compare, and write ``step_check.json``; None where there is nothing to compare with.
 
@@ -164,22 +170,26 @@ class StepChecking:
             Of the case.
         patience : float, optional [s]
             How long to wait at most.
+        waiting : callable, optional
+            Called once where it takes long.
 
         Raises
         ------
         TimeoutError
         """
-        waited = 0.0
+        began, told = time.monotonic(), False
         while True:
-            # Windows sees Ctrl-C between two waits only.
-            try:
+            with contextlib.suppress(queue.Empty):
+                # Windows sees Ctrl-C between two waits only.
                 other = self._found.get(timeout=LOOK)
                 break
-            except queue.Empty:
-                waited += LOOK
-                if patience is not None and waited > patience:
-                    raise TimeoutError(f"the path in steps half as long takes {patience:.0f} s more") from None
-        return None if other is None or not response.path else _written(Path(folder), compared(response, other))
+            waited = time.monotonic() - began
+            if patience is not None and waited > patience:
+                raise TimeoutError(f"the same path once more takes longer than {patience:.0f} s more")
+            if waited > WORTH_A_WORD and not told:
+                waiting()
+                told = True
+        return None if other is None else _written(Path(folder), compared(response, other))
 
     def close(self) -> None:
         """End the process."""
