@@ -190,7 +190,7 @@ class Advance:
             return False
         if self.model.dimension == 3:
             # What nothing can balance but the supports: forces that press on them without limit.
-            return bool(np.isinf(self.proofs.proved(place).bounds.low))
+            return bool(np.isinf(self.proofs.bounds(self.proofs.proved(place)).low))
         self.steps.programs += 1
         try:
             solve_program(self.model, place.pose, self.driver.rate(place.s) * length)

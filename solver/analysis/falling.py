@@ -64,7 +64,7 @@ class Falling:
             often = number & (number - 1) == 0 or number == steps or at_rest
             if speed * DRAG > CREEPING or not often:
                 continue
-            found = self.proofs.proved(sunk)
+            found = self.proofs.stands(sunk)
             if self.proofs.holds(found):
                 if way > JUMP * model.length:
                     self.reports.notes.append(Note(sunk.s, self.reports.jump(start, sunk.pose)))

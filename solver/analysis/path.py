@@ -73,7 +73,7 @@ class Path:
         for _ in range(2):
             place, _ = self.steps.step(place, self.model.length / self.steps.lever, still=True)
         unmoved = replace(place, pose=pose)
-        return unmoved if self.proofs.proved(unmoved).bounds.exists else place
+        return unmoved if self.proofs.proved(unmoved).exists else place
 
     def follow(self, start: Place, resume: Checkpoint | None = None) -> Generator[Increment, None, Ending]:
         """Yields the increments of the phase, returns how it ended and leaves the last place in ``self.last``."""
@@ -102,22 +102,22 @@ class Path:
         ValueError
             Where the multiplier has to turn around for the parameter to grow.
         """
-        start = proved.place
-        if not (proved.bounds.exists and self._light_blocks_stand(start.pose)):
+        start, bounds = proved.place, self.proofs.bounds(proved)
+        if not (proved.exists and self._light_blocks_stand(start.pose)):
             motion = next((motion for _, motion, _ in self.falling.sinking(start)), self.steps.drag)
             yield self.reports.falling(start, motion * self.model.lengths, start.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(self.model.assembly, motion))
-        if self.model.live is not None and not 0.0 < proved.bounds.high < np.inf:
-            if proved.bounds.high > 0.0:
+        if self.model.live is not None and not 0.0 < bounds.high < np.inf:
+            if bounds.high > 0.0:
                 return Ending(
                     Status.LOCKED, "at a control displacement of 0 m no live load of this pattern moves the structure"
                 )
             yield self.reports.falling(start, np.zeros_like(self.model.load), start.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
-        if self.model.live is None and np.isinf(proved.bounds.low):
+        if self.model.live is None and np.isinf(bounds.low):
             length = GIVE * self.model.length / self.steps.lever
             if self.advance.locks(start, length):
-                yield self.reports.increment(proved, self.driver.rate(start.s), self.advance.works)
+                yield self.reports.increment(proved, bounds, self.driver.rate(start.s), self.advance.works)
                 held = replace(start, contacts=proved.contacts, forces=proved.forces)
                 return Ending(Status.LOCKED, self.reports.locked(held))
         if self.model.live is not None:
@@ -226,20 +226,21 @@ class Path:
         )
         first = place.s == 0.0 and self.model.live is None
         at_rest, onset = self._at_first(proved) if first else (np.nan, np.nan)
-        found = self.reports.increment(proved, motion, self.advance.works)
+        found = self.reports.increment(proved, self.proofs.bounds(proved), motion, self.advance.works)
         self.advance.tried, self.advance.tried_from = 0, place.s
         return replace(found, checkpoint=checkpoint, at_rest=at_rest, onset=onset)
 
     def _unreported(self, proved: Proved) -> Iterator[Increment]:
         """The increment at the last equilibrium of the path, where none has been reported there."""
         if proved.place.s > self.reported:
-            yield self.reports.increment(proved, self._motion_at_last(proved.place), self.advance.works)
+            motion = self._motion_at_last(proved.place)
+            yield self.reports.increment(proved, self.proofs.bounds(proved), motion, self.advance.works)
 
     def _hold(self, new: Place) -> tuple[Proved | None, float | None]:
         """The equilibrium at a new place, or near it, if any; and what was measured where one exists at all."""
-        reached = self.proofs.proved(new)
+        reached = self.proofs.stands(new)
         crept: Proved | None = reached
-        lost = reached.measured if reached.bounds.exists else None
+        lost = reached.measured if reached.exists else None
         if not self.proofs.holds(reached) and lost is None and new.s > self.steps.careful_until:
             # What the drag holds back may only have to creep on.
             crept = self.falling.settles(new, CREEPS, JUMP)
@@ -276,8 +277,8 @@ class Path:
         try:
             begun, step = self._begin(place)
             self.begun = begun, step, self._known(), self.steps.programs - programs
-            there = self.proofs.proved(begun)
-            onset = there.measured if there.bounds.exists else np.nan
+            there = self.proofs.stands(begun)
+            onset = there.measured if there.exists else np.nan
         except (NoStep, Wedged):
             pass
         self._know(before)

@@ -92,14 +92,32 @@ class Checkpoint:
 
 @dataclass(frozen=True)
 class Proved:
-    """A place with what equilibrium says of it."""
+    """A place with what equilibrium says of it.
+
+    Attributes
+    ----------
+    place : Place
+    contacts : Contacts
+    friction : (n_contacts,) array
+    bounds : Admissible or None
+        None where balanced forces were found without them.
+    forces : (n_contacts, d) array
+        In equilibrium, where one exists; otherwise those of the path.
+    measured : float
+        Reaction [N or N·m] or multiplier of the live load.
+    """
 
     place: Place
     contacts: Contacts
     friction: np.ndarray
-    bounds: Admissible
+    bounds: Admissible | None
     forces: np.ndarray
     measured: float
+
+    @property
+    def exists(self) -> bool:
+        """Whether an equilibrium exists."""
+        return self.bounds is None or self.bounds.exists
 
 
 class Falls(Exception):

@@ -35,29 +35,72 @@ class Proofs:
 
     def __init__(self, steps: Steps) -> None:
         self.steps, self.model, self.driver = steps, steps.model, steps.driver
+        self.seen: tuple[Proved, float] | None = None
+
+    def stands(self, place: Place) -> Proved:
+        """Whether a place is in equilibrium within friction, and balanced forces near those of the path.
+
+        Forces that balance are proof enough; bounds are worked out only where none are found near those of the path.
+        """
+        seen = self._seen(place)
+        if seen is not None:
+            return seen
+        if place.s > 0.0:
+            contacts, friction, remembered = self._at(place)
+            near = self._balanced(place, contacts, friction, remembered, at_once=True)
+            if near is not None:
+                forces, multiplier = near
+                measured = self._reaction(place, contacts, forces) if self.model.live is None else multiplier
+                return self._see(Proved(place, contacts, friction, None, forces, measured))
+        return self.proved(place)
 
     def proved(self, place: Place) -> Proved:
         """What equilibrium within friction says of a place, and balanced forces near those of the path."""
-        model, assembly = self.model, self.model.assembly
-        contacts = self.steps.around(place.pose)
-        friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
+        seen = self._seen(place)
+        if seen is not None:
+            return seen if seen.bounds is not None else self._see(replace(seen, bounds=self.bounds(seen)))
+        contacts, friction, remembered = self._at(place)
+        bounds = self._bounds(place, contacts, friction)
+        if not bounds.exists:
+            return self._see(Proved(place, contacts, friction, bounds, remembered, place.multiplier))
+        if place.s == 0.0 and np.isfinite(bounds.low if self.model.live is None else bounds.high):
+            # Nothing has moved: what the first movement has to overcome, least reaction or largest multiplier.
+            forces, measured = bounds.forces, bounds.high
+        else:
+            near = self._balanced(place, contacts, friction, remembered)
+            forces, measured = near or self._between_bounds(place, contacts, bounds, remembered)
+        if self.model.live is None:
+            measured = self._reaction(place, contacts, forces)
+        return self._see(Proved(place, contacts, friction, bounds, forces, measured))
+
+    def bounds(self, proved: Proved) -> Admissible:
+        """The bounds that equilibrium sets at a place."""
+        return proved.bounds or self._bounds(proved.place, proved.contacts, proved.friction)
+
+    def _bounds(self, place: Place, contacts: Contacts, friction: np.ndarray) -> Admissible:
+        model = self.model
         rate = None if model.live is not None else self.driver.rate(place.s)
         bounds = admissible(
             model, place.pose, contacts, friction, rate, vertex=place.s == 0.0, gap=self._closed_gap(place)
         )
         self.steps.programs += bounds.programs
-        remembered = self.steps.remembered(place, contacts)
-        if not bounds.exists:
-            return Proved(place, contacts, friction, bounds, remembered, place.multiplier)
-        if place.s == 0.0 and np.isfinite(bounds.low if model.live is None else bounds.high):
-            # Nothing has moved: what the first movement has to overcome, least reaction or largest multiplier.
-            forces, multiplier = bounds.forces, bounds.high
-        else:
-            near = self._balanced(place, contacts, friction, remembered)
-            forces, multiplier = near or self._between_bounds(place, contacts, bounds, remembered)
-        if model.live is None:
-            multiplier = self._reaction(place, contacts, forces)
-        return Proved(place, contacts, friction, bounds, forces, multiplier)
+        return bounds
+
+    def _at(self, place: Place) -> tuple[Contacts, np.ndarray, np.ndarray]:
+        """The contact points at a place, their friction, and the forces that the place remembers there."""
+        contacts = self.steps.around(place.pose)
+        friction = self.model.interfaces.friction(self.model.assembly, contacts.block_a, contacts.block_b)
+        return contacts, friction, self.steps.remembered(place, contacts)
+
+    def _seen(self, place: Place) -> Proved | None:
+        """What was said of this place, where it was the last one asked for."""
+        if self.seen is None or self.seen[0].place is not place or self.seen[1] != self._closed_gap(place):
+            return None
+        return self.seen[0]
+
+    def _see(self, proved: Proved) -> Proved:
+        self.seen = proved, self._closed_gap(proved.place)
+        return proved
 
     def _reaction(self, place: Place, contacts: Contacts, forces: np.ndarray) -> float:
         return float((on_supports(self.model, contacts, place.pose, forces) * self.driver.rate(place.s)).sum())
@@ -82,7 +125,7 @@ class Proofs:
 
     def holds(self, proved: Proved | None) -> bool:
         """Whether equilibrium is possible there, under a live load with some of it."""
-        return proved is not None and proved.bounds.exists and (self.model.live is None or proved.measured > 0.0)
+        return proved is not None and proved.exists and (self.model.live is None or proved.measured > 0.0)
 
     def _closed_gap(self, place: Place) -> float:
         """Largest gap of contact points that may carry in an equilibrium at a place, in block sizes."""
@@ -92,9 +135,18 @@ class Proofs:
         return max(COMPUTED_GAP, min(CLOSING_GAP, self.driver.tolerance * self.steps.lever / self.model.length))
 
     def _balanced(
-        self, place: Place, contacts: Contacts, friction: np.ndarray, remembered: np.ndarray
+        self,
+        place: Place,
+        contacts: Contacts,
+        friction: np.ndarray,
+        remembered: np.ndarray,
+        *,
+        at_once: bool = False,
     ) -> tuple[np.ndarray, float] | None:
-        """Forces in equilibrium without the drag, near those remembered, or none; open points carry nothing."""
+        """Forces in equilibrium without the drag, near those remembered, or none; open points carry nothing.
+
+        ``at_once``: only where Newton's method finds them.
+        """
         model, free = self.model, self.model.assembly.free
         closed = np.flatnonzero(contacts.gaps <= self._closed_gap(place) * model.length)
         d = model.dimension
@@ -124,9 +176,11 @@ class Proofs:
             control=live[free].ravel() if model.live is not None else None,
         )
         forces = np.zeros_like(remembered)
-        for step in (still, replace(still, slip=np.zeros_like(on))):
+        for step in (still,) if at_once else (still, replace(still, slip=np.zeros_like(on))):
             try:
-                found = solve_step(step, np.zeros(len(load)), place.multiplier * live_size, by_way=False)
+                found = solve_step(
+                    step, np.zeros(len(load)), place.multiplier * live_size, by_way=False, at_once=at_once
+                )
             except NotSolved:
                 continue
             # Where no forces near are in equilibrium, what is left of the drag holds blocks that fly away.

@@ -10,6 +10,7 @@ from solver.assembly import Assembly
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose, moved_vertices, relative_velocities
+from solver.program.admissible import Admissible
 from solver.results.certificate import Certificate
 from solver.results.increment import Increment, State, Status
 from solver.tolerances import COMPUTED_GAP
@@ -38,7 +39,9 @@ class Reports:
         self.steps, self.model, self.driver, self.number = steps, steps.model, steps.driver, number
         self.notes: list[Note] = []
 
-    def increment(self, proved: Proved, velocity: np.ndarray, works: tuple[float, float, float]) -> Increment:
+    def increment(
+        self, proved: Proved, bounds: Admissible, velocity: np.ndarray, works: tuple[float, float, float]
+    ) -> Increment:
         """Of an equilibrium and the movement that follows, with all notes so far and the works done until then."""
         model, place, contacts = self.model, proved.place, proved.contacts
         resultant = (wrench_matrix(contacts, place.pose, model.length) @ proved.forces.ravel()).reshape(
@@ -54,7 +57,7 @@ class Reports:
         certificate = Certificate(
             equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
             largest_penetration=float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)),
-            duality_gap=proved.bounds.gap,
+            duality_gap=bounds.gap,
             complementarity=float(carried),
             kinematic_violation=0.0,
             energy_residual=abs(works[0] - works[1] - works[2]) / max(sum(map(abs, works)), 1e-12),
@@ -73,7 +76,7 @@ class Reports:
             certificate,
             Status.EQUILIBRIUM,
             notes,
-            (proved.bounds.low, proved.bounds.high),
+            (bounds.low, bounds.high),
         )
 
     def falling(self, place: Place, velocity: np.ndarray, s: float) -> Increment:

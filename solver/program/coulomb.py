@@ -83,7 +83,13 @@ INSIDE = 1e-20
 
 
 def solve_step(
-    step: Step, gone: np.ndarray, multiplier: float = 0.0, near: Moved | None = None, *, by_way: bool = True
+    step: Step,
+    gone: np.ndarray,
+    multiplier: float = 0.0,
+    near: Moved | None = None,
+    *,
+    by_way: bool = True,
+    at_once: bool = False,
 ) -> Moved:
     """Solves a step.
 
@@ -98,6 +104,8 @@ def solve_step(
         The solution at a geometry very near, with the same contact points.
     by_way : bool
         In the plane, of several solutions that to which the start of the step leads.
+    at_once : bool
+        Only where Newton's method on the points' states finds one.
 
     Raises
     ------
@@ -119,6 +127,8 @@ def solve_step(
             found = in_states(step, pattern, gone, led(step, pattern, gone, unmoved))
     if found is not None:
         return found
+    if at_once:
+        raise NotSolved("the points' states are not those of the start, or a few changes away")
     if near is not None:
         start = _centred(near, scale)
     else:

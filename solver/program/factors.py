@@ -15,6 +15,9 @@ from solver.lp.fill import least_fill
 #: Up to so many rows a dense factorisation is the faster.
 DENSE = 150
 
+#: Where less than this part of the entries is other than zero, the others are left out.
+SPARSE = 2.0 / 3.0
+
 #: A pivot on the diagonal is kept down to this part of the largest in its column.
 PIVOT = 0.01
 
@@ -43,26 +46,38 @@ class Coupling:
     """
 
     def __init__(self, pairs: np.ndarray, n_blocks: int, dof: int) -> None:
-        self.rows = rows = n_blocks * dof
-        self.dense = rows <= DENSE
-        order = np.arange(n_blocks) if self.dense else _least_fill(pairs.tobytes(), str(pairs.dtype), n_blocks)
+        self.rows = n_blocks * dof
+        self.dense = self.rows <= DENSE
+        touching = pairs[(pairs >= 0).all(axis=1)]
+        order = np.arange(n_blocks) if self.dense else least_fill(touching[:, 0], touching[:, 1], n_blocks)
         self.order = (order[:, None] * dof + np.arange(dof)).ravel()
         place = np.empty(n_blocks + 1, dtype=np.int64)
-        # What has no freedom goes into a column beyond the last.
-        place[order], place[-1] = np.arange(n_blocks), -rows * rows
-        freedoms = (place[pairs][:, :, None] * dof + np.arange(dof)).reshape(len(pairs), -1)
-        at = freedoms[:, None, :] * rows + freedoms[:, :, None]
-        held = at < 0
-        diagonal = np.arange(rows) * (rows + 1)
-        filled, number = np.unique(np.concatenate([at[~held], diagonal]), return_inverse=True)
-        self.entries = rows * rows if self.dense else len(filled)
-        numbered = filled[number] if self.dense else number
-        self.number = np.full(at.shape, self.entries)
-        self.number[~held] = numbered[: -rows or None]
-        self.number = self.number.ravel()
-        self.diagonal = numbered[len(numbered) - rows :]
-        self.indices = (filled % rows).astype(np.int32)
-        self.pointers = np.searchsorted(filled, np.arange(rows + 1) * rows).astype(np.int32)
+        place[order], place[-1] = np.arange(n_blocks), -1
+        placed = place[pairs]
+        held = (placed[:, :, None] < 0) | (placed[:, None, :] < 0)
+        # Small blocks of the matrix, column by column: of each contact point, and the diagonal.
+        at = np.concatenate(
+            [(placed[:, None, :] * n_blocks + placed[:, :, None])[~held], np.arange(n_blocks) * (n_blocks + 1)]
+        )
+        filled, number = (np.arange(n_blocks**2), at) if self.dense else np.unique(at, return_inverse=True)
+        column, row = filled // n_blocks, filled % n_blocks
+        high = np.bincount(column, minlength=n_blocks)
+        above = np.cumsum(high) - high
+        # Where the entries of a small block begin, and how far its columns are apart.
+        first, apart = dof**2 * above[column] + dof * (np.arange(len(filled)) - above[column]), dof * high[column]
+        freedom = np.arange(dof)
+        entry = first[:, None, None] + freedom[:, None] + apart[:, None, None] * freedom
+        self.entries = entry.size
+        self.indices = np.empty(self.entries, dtype=np.int32)
+        self.indices[entry] = (row[:, None] * dof + freedom)[:, :, None]
+        self.pointers = np.append(dof**2 * above[:, None] + dof * high[:, None] * freedom, self.entries).astype(
+            np.int32
+        )
+        # What has no freedom goes beyond the last.
+        numbers = np.full((*held.shape, dof, dof), self.entries)
+        numbers[~held] = entry[number[: len(number) - n_blocks]]
+        self.number = numbers.swapaxes(2, 3).ravel()
+        self.diagonal = np.einsum("bii->bi", entry[number[len(number) - n_blocks :]]).ravel()
 
     def factorised(self, each: np.ndarray, diagonal: np.ndarray) -> Solve:
         """Factorise a sum of contact points' matrices and a diagonal; gives what solves with it.
@@ -84,9 +99,15 @@ class Coupling:
             factors, pivots, _ = sla.lapack.dgetrf(values.reshape(shape).T, overwrite_a=True)
             return lambda right: np.asarray(sla.lapack.dgetrs(factors, pivots, right)[0])
         matrix = sp.csc_array((values, self.indices, self.pointers), shape=shape)
+        how = "NATURAL"
+        if np.count_nonzero(values) < SPARSE * self.entries:
+            # Of joints that are open nothing is left: their factors fill in less, in an order of their own.
+            matrix = matrix.copy()
+            matrix.eliminate_zeros()
+            how = "MMD_AT_PLUS_A"
         try:
             factor = spl.splu(
-                matrix, permc_spec="NATURAL", diag_pivot_thresh=PIVOT, options={"SymmetricMode": True, "Equil": False}
+                matrix, permc_spec=how, diag_pivot_thresh=PIVOT, options={"SymmetricMode": True, "Equil": False}
             )
         except RuntimeError as error:
             raise Singular(str(error)) from None
@@ -99,9 +120,11 @@ class Coupling:
         return solve
 
 
-@lru_cache(maxsize=8)
-def _least_fill(pairs: bytes, dtype: str, n_blocks: int) -> np.ndarray:
-    """(n_blocks,) array: order of the blocks by minimum degree of who touches whom."""
-    touching = np.frombuffer(pairs, dtype=dtype).reshape(-1, 2)
-    touching = touching[(touching >= 0).all(axis=1)]
-    return least_fill(touching[:, 0], touching[:, 1], n_blocks)
+@lru_cache(maxsize=2)
+def _coupling(pairs: bytes, dtype: str, n_blocks: int, dof: int) -> Coupling:
+    return Coupling(np.frombuffer(pairs, dtype=dtype).reshape(-1, 2), n_blocks, dof)
+
+
+def coupling(pairs: np.ndarray, n_blocks: int, dof: int) -> Coupling:
+    """The :class:`Coupling` of contact points; of the same pairs of blocks as of late the same one."""
+    return _coupling(pairs.tobytes(), str(pairs.dtype), n_blocks, dof)

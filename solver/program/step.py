@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .factors import Coupling, Singular, Solve
+from .factors import Singular, Solve, coupling
 
 
 class NotSolved(Exception):
@@ -90,7 +90,7 @@ class Pattern:
         rows = step.matrix.indices.reshape(n, step.matrix.shape[1] // n, 2, -1)[:, 0]
         dof = rows.shape[2]
         number = np.where(step.free, np.cumsum(step.free) - 1, -1)
-        self.coupling = Coupling(number[rows[:, :, 0]] // dof, len(step.load) // dof, dof)
+        self.coupling = coupling(number[rows[:, :, 0]] // dof, len(step.load) // dof, dof)
         self.rows = number[rows].reshape(n, -1)
         self.fill(step)
 
