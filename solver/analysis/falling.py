@@ -25,6 +25,9 @@ from .stepping import GROWTH, MECHANISM, Steps
 FALL_STEP = 0.1
 FALL_STEPS, CREEPS, FALL_FAILURES = 120, 16, 60
 
+#: Steps in which what falls is followed to where it may come to rest: after one that was not solved they grow slowly.
+SETTLING_STEPS = 1000
+
 #: Unbalanced force, in block weights, under which what creeps may have come to rest.
 CREEPING = 1e-2
 
@@ -49,10 +52,12 @@ class Falling:
         self.model, self.driver = steps.model, steps.driver
         self.sunk: tuple[Place, list[tuple[Place, np.ndarray, float]], Iterator[tuple[Place, np.ndarray, float]]] | None
         self.sunk = None
+        self.lost_at: tuple[Place, float] | None = None
 
-    def settles(self, place: Place, steps: int = FALL_STEPS, farthest: float = FARTHEST_FALL) -> Proved | None:
+    def settles(self, place: Place, steps: int | None = None, farthest: float = FARTHEST_FALL) -> Proved | None:
         """The equilibrium in which a structure that falls comes to rest, where it does so soon and near."""
-        model, start = self.model, place.pose
+        model, start, way, steps = self.model, place.pose, 0.0, steps or SETTLING_STEPS
+        self.lost_at = None
         for number, (sunk, motion, length) in enumerate(islice(self.sinking(place), steps), start=1):
             way = float(np.abs(sunk.pose.positions - start.positions).max())
             if way > farthest * model.length:
@@ -71,6 +76,8 @@ class Falling:
                 return found
             if at_rest:
                 return None
+        # Neither at rest nor far away: how it goes on is not known.
+        self.lost_at = place, way
         return None
 
     def _at_rest(self, motion: np.ndarray, length: float) -> bool:
@@ -127,6 +134,13 @@ class Falling:
         frames = list(self._alone()._fall(without))
         if not frames:
             frames = [self.reports.falling(without, np.zeros_like(model.load), without.s)]
+        doubt = ""
+        if self.lost_at is not None and self.lost_at[0] is without:
+            doubt = (
+                f"at {without.s:.6g} {driver.unit}: what falls could be followed by {self.lost_at[1]:.2g} m only; no "
+                "equilibrium exists there, but there may be one near, in which the structure stands on"
+            )
+            frames[0] = replace(frames[0], notes=(doubt,))
         # The first movement that is large against the give of the joints, and small enough to be one of velocities.
         sizes = [float(motion_size(frame.velocity, model.length).max()) for frame in frames]
         chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))
@@ -161,7 +175,7 @@ class Falling:
         while frames:
             yield frames.pop(0)
         if model.live is None:
-            return Ending(Status.COLLAPSED, str(collapse), collapse)
+            return Ending(Status.COLLAPSED, f"{collapse}; {doubt}" if doubt else str(collapse), collapse)
         what = "equilibrium is lost" if spent is None else "no capacity is left"
         return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)
 

@@ -82,6 +82,17 @@ def test_a_pebble_leans_on_the_wall_beside_on_the_path_of_coulomb_friction():
         assert increment.pose.rotations[0, 0] == pytest.approx(-leans, abs=1e-5)
 
 
+@pytest.mark.parametrize("falling_frames", [0, 3])
+def test_a_fall_that_cannot_be_followed_far_is_told(monkeypatch, falling_frames):
+    monkeypatch.setattr("solver.analysis.falling.SETTLING_STEPS", 1)
+    controls = solver.Controls(falling_frames=falling_frames)
+    response = solver.settle(_bench(wall=False), TILT, friction_coefficient=1.0, controls=controls)
+    assert response.stop is solver.Status.COLLAPSED
+    assert "what falls could be followed by" in response.message
+    assert all(response.message.endswith(note) for note in response.notes)
+    assert len(response.notes) == min(falling_frames, 1)
+
+
 @BOTH
 def test_a_pebble_that_nothing_catches_is_a_collapse(controls):
     response = solver.settle(_bench(wall=False), TILT, friction_coefficient=1.0, controls=controls)
