@@ -41,6 +41,14 @@ def test_blocks_wedged_by_rounding_are_no_failure(kind, seed):
     assert finding.outcome in ("limit reached", "locked")
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_what_flies_away_without_drag_warns_of_nothing():
+    """Here forces without the drag were looked for of a stack that falls, and numpy said that they are no numbers."""
+    finding = tried("stack", 130032)
+    assert finding.wrong == []
+    assert finding.outcome == "collapsed"
+
+
 def test_a_trial_is_made_from_its_kind_and_seed_alone():
     one, other = trial("voronoi", 7), trial("voronoi", 7)
     assert one.assembly.vertices.tobytes() == other.assembly.vertices.tobytes()
