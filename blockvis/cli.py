@@ -473,7 +473,7 @@ def _say_error(options: argparse.Namespace, run: Run, checking: StepChecking | N
 
     if run.had_finished and not options.check_steps and (run.folder / STEP_CHECK).is_file():
         return
-    check, unknown = None, ""
+    check, unknown, interrupted = None, "", False
     if checking is not None and run.response.path:
         try:
             most = None if options.check_steps else patience
@@ -482,8 +482,8 @@ def _say_error(options: argparse.Namespace, run: Run, checking: StepChecking | N
         except TimeoutError as late:
             unknown = f"{late}; --check-steps waits for it"
         except KeyboardInterrupt:
-            unknown = "interrupted; everything else is written"
-    if check is None and options.check_steps and not unknown.startswith("interrupted"):
+            unknown, interrupted = "interrupted; everything else is written", True
+    if check is None and options.check_steps and not interrupted:
         check = check_steps(run.folder)
     if check is None and unknown:
         print(f"blockvis: error not known: {unknown}", file=sys.stderr)

@@ -49,9 +49,7 @@ class Proofs:
             contacts, friction, remembered = self._at(place)
             near = self._balanced(place, contacts, friction, remembered, at_once=True)
             if near is not None:
-                forces, multiplier = near
-                measured = self._reaction(place, contacts, forces) if self.model.live is None else multiplier
-                return self._see(Proved(place, contacts, friction, None, forces, measured))
+                return self._standing(place, contacts, friction, None, *near)
         return self.proved(place)
 
     def proved(self, place: Place) -> Proved:
@@ -65,12 +63,22 @@ class Proofs:
             return self._see(Proved(place, contacts, friction, bounds, remembered, place.multiplier))
         if place.s == 0.0 and np.isfinite(bounds.low if self.model.live is None else bounds.high):
             # Nothing has moved: what the first movement has to overcome, least reaction or largest multiplier.
-            forces, measured = bounds.forces, bounds.high
+            found = bounds.forces, bounds.high
         else:
             near = self._balanced(place, contacts, friction, remembered)
-            forces, measured = near or self._between_bounds(place, contacts, bounds, remembered)
-        if self.model.live is None:
-            measured = self._reaction(place, contacts, forces)
+            found = near or self._between_bounds(place, contacts, bounds, remembered)
+        return self._standing(place, contacts, friction, bounds, *found)
+
+    def _standing(
+        self,
+        place: Place,
+        contacts: Contacts,
+        friction: np.ndarray,
+        bounds: Admissible | None,
+        forces: np.ndarray,
+        multiplier: float,
+    ) -> Proved:
+        measured = self._reaction(place, contacts, forces) if self.model.live is None else multiplier
         return self._see(Proved(place, contacts, friction, bounds, forces, measured))
 
     def bounds(self, proved: Proved) -> Admissible:

@@ -6,11 +6,11 @@ choose another way by a little; what equilibrium bounds is the same, and so is w
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from rubble import trial
 
 import solver
+from blockvis.layout.solids import extruded
 
 pytestmark = pytest.mark.path
 
@@ -20,15 +20,9 @@ SAME, NO_CHOICE = 1e-5, 1e-2
 CONTROLS = solver.Controls(falling_frames=1)
 
 
-def extruded(assembly):
+def in_space_of(assembly):
     """Extrude blocks along y by their size, the plane's y upwards."""
-    deep, solids = float(assembly.block_size), []
-    for block in range(assembly.n_blocks):
-        x, z = assembly.outline(block).T
-        n = len(x)
-        corners = np.concatenate([np.column_stack([x, np.full(n, y), z]) for y in (0.0, deep)])
-        sides = [[(k + 1) % n, k, k + n, (k + 1) % n + n] for k in range(n)]
-        solids.append((corners, [list(range(n)), list(range(2 * n - 1, n - 1, -1)), *sides]))
+    solids = [extruded(assembly.outline(block), 0.0, assembly.block_size) for block in range(assembly.n_blocks)]
     roles, names = list(assembly.roles), assembly.names
     return solver.Assembly.from_solids(solids, roles=roles, names=names, density=assembly.density)
 
@@ -50,7 +44,7 @@ def extruded(assembly):
 def test_extruded_structures_go_the_way_of_the_plane(kind, seed):
     given = trial(kind, seed)
     x, up = given.settlement.direction
-    in_space = extruded(given.assembly)
+    in_space = in_space_of(given.assembly)
     flat = solver.settle(given.assembly, given.settlement, friction_coefficient=given.friction, controls=CONTROLS)
     settlement = replace(given.settlement, direction=(x, 0.0, up))
     solid = solver.settle(in_space, settlement, friction_coefficient=given.friction, controls=CONTROLS)

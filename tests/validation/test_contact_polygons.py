@@ -11,6 +11,7 @@ import solver
 from blockvis import generators
 from blockvis.cases.build import case_assembly
 from blockvis.cases.case import read_case
+from blockvis.layout.solids import extruded
 from solver.kinematics import Pose, moved, moved_vertices, rotation_matrices
 
 #: Here coal 3.0.3 gives a polygon of half the area, whose corners are on no edge of the faces.
@@ -93,14 +94,8 @@ def test_polygons_are_those_of_coal(scene):
 THICKNESS = 0.3
 
 
-def extruded(assembly):
-    solids = []
-    for block in range(assembly.n_blocks):
-        x, z = assembly.outline(block).T
-        n = len(x)
-        corners = np.concatenate([np.column_stack([x, np.full(n, y), z]) for y in (0.0, THICKNESS)])
-        sides = [[(k + 1) % n, k, k + n, (k + 1) % n + n] for k in range(n)]
-        solids.append((corners, [list(range(n)), list(range(2 * n - 1, n - 1, -1)), *sides]))
+def in_space_of(assembly):
+    solids = [extruded(assembly.outline(block), 0.0, THICKNESS) for block in range(assembly.n_blocks)]
     return solver.Assembly.from_solids(solids, roles=list(assembly.roles), names=assembly.names)
 
 
@@ -126,7 +121,7 @@ def rows(contacts, plane):
 def test_extruded_structures_have_the_points_of_the_plane(name, size):
     """Also where blocks have moved: the same gaps, normals and places, once at either end of the thickness."""
     plane, random = getattr(generators, name)(), np.random.default_rng(19)
-    space = extruded(plane)
+    space = in_space_of(plane)
     motion = random.normal(size=(plane.n_blocks, 3)) * size * [plane.block_size, plane.block_size, 1.0]
     in_space = np.zeros((plane.n_blocks, 6))
     # Counter-clockwise in the plane x, z is clockwise about y.
@@ -160,7 +155,7 @@ def test_what_touches_in_the_plane_touches_there_in_space(name):
         plane = generators.build("facade", SMALL_FACADE)
     else:
         plane = generators.build(name) if name in PLANE else case_assembly(EXAMPLES[name])
-    space, reach = extruded(plane), 1e-6 * plane.block_size
+    space, reach = in_space_of(plane), 1e-6 * plane.block_size
     expected = rows(solver.find_contacts(plane, plane.vertices, reach), True)
     solid = solver.find_contacts(space, space.vertices, reach)
     weights = np.array([1, 1, 1, 1, 1e-2, 1e-2, 1])
