@@ -82,6 +82,7 @@ FIRST_PART, SHORTER, LEAST_PART, LEAST_PARTS = 0.25, 4.0, 0.004, 4
 INSIDE = 1e-20
 
 
+@np.errstate(all="ignore")  # A step that leaves the numbers is seen by what it gives.
 def solve_step(
     step: Step,
     gone: np.ndarray,
@@ -239,7 +240,6 @@ def _unmoved(step: Step, multiplier: float) -> Moved:
     return Moved(np.zeros(len(step.load)), step.normal, step.shear, multiplier, 0, forces, distances)
 
 
-@np.errstate(all="ignore")  # A step that leaves the numbers is seen by what it gives.
 def _followed(
     step: Step,
     pattern: Pattern,

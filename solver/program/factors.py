@@ -96,7 +96,9 @@ class Coupling:
         values[self.diagonal] += diagonal[self.order]
         shape = (self.rows, self.rows)
         if self.dense:
-            factors, pivots, _ = sla.lapack.dgetrf(values.reshape(shape).T, overwrite_a=True)
+            factors, pivots, singular = sla.lapack.dgetrf(values.reshape(shape).T, overwrite_a=True)
+            if singular:
+                raise Singular(f"no pivot is left in row {singular}")
             return lambda right: np.asarray(sla.lapack.dgetrs(factors, pivots, right)[0])
         matrix = sp.csc_array((values, self.indices, self.pointers), shape=shape)
         how = "NATURAL"

@@ -21,7 +21,6 @@ BALANCE, EQUATIONS = 1e-9, 1e-8
 STATE_CHANGES, REFINED = 16, 2
 
 
-@np.errstate(all="ignore")  # What flies away leaves the numbers: no equation of it is met then.
 def in_states(step: Step, pattern: Pattern, gone: np.ndarray, near: Moved) -> Moved | None:
     """Newton's method on which points are open, stick or slide, and where to; None where it goes round.
 

@@ -36,7 +36,8 @@ def test_what_solves_with_contact_points_is_that_of_the_whole_matrix(n_blocks, d
     assert coupling(pairs.copy(), n_blocks, dof) is found
 
 
-def test_nothing_on_the_diagonal_has_no_inverse():
-    found = coupling(np.array([[0, 1]]), 60, 3)
+@pytest.mark.parametrize("n_blocks", [3, 60], ids=["dense", "sparse"])
+def test_nothing_on_the_diagonal_has_no_inverse(n_blocks):
+    found = coupling(np.array([[0, 1]]), n_blocks, 3)
     with pytest.raises(Singular):
-        found.factorised(np.zeros((1, 6, 6)), np.zeros(180))
+        found.factorised(np.zeros((1, 6, 6)), np.zeros(3 * n_blocks))
