@@ -37,15 +37,15 @@ class LinearProgram:
     cost : (n,) array
     matrix : (m, n) sparse array, by columns
     lower, upper : (m,) arrays
-    along : (m,) array, optional
-        Where the row's block lies along the structure; rows of neighbours are to have values near each other.
+    places : (m, dim) array, optional
+        Where the row's block is.
     """
 
     cost: np.ndarray
     matrix: sp.csc_array
     lower: np.ndarray
     upper: np.ndarray
-    along: np.ndarray | None = None
+    places: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> L
 def _in_band(program: LinearProgram) -> tuple[LPSolution | None, str]:
     started = time.perf_counter()
     try:
-        x, y, iterations = interior_point(program.cost, program.matrix, program.lower, program.upper, program.along)
+        x, y, iterations = interior_point(program.cost, program.matrix, program.lower, program.upper, program.places)
     except Diverges as found:
         raise_if_proved(program, found.ray)
         return None, str(found)

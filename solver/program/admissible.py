@@ -16,7 +16,7 @@ from solver.lp.problem import LinearProgram, LPSolution, SolveError, Unbounded
 from solver.lp.solve import solve_lp, vertex_routes
 from solver.tolerances import BALANCE_TOLERANCE, COMPUTED_GAP, FALLING_FRACTION
 
-from .increment import along_structure
+from .increment import places_of_rows
 from .macroblocks import free_blocks
 from .model import Model
 
@@ -121,7 +121,7 @@ def admissible(
         along = along / fastest
         objective = np.concatenate([rays.T @ (matrix.T @ np.where(free, 0.0, along)), np.zeros(2 * rows)])
         unit = model.force * model.length * fastest
-    along_rows = along_structure(free_blocks(model.assembly), pose)
+    places = places_of_rows(free_blocks(model.assembly), pose)
     routes = vertex_routes(rows) if vertex else None
 
     def extreme(sign: float, *, slack: bool = True) -> LPSolution | ConicSolution | None:
@@ -133,7 +133,7 @@ def admissible(
             kept = np.concatenate([np.arange(n), np.arange(n + 2 * rows, matrix.shape[1])])
             cost, matrix = cost[kept], matrix[:, kept]
         try:
-            return _solution(d, cost, matrix, load, tolerance, friction[closed], along_rows, routes)
+            return _solution(d, cost, matrix, load, tolerance, friction[closed], places, routes)
         except Unbounded:
             return None
         except SolveError:
@@ -185,11 +185,11 @@ def _solution(
     load: np.ndarray,
     tolerance: float,
     friction: np.ndarray,
-    along: np.ndarray | None,
+    places: np.ndarray | None,
     routes: tuple[str, ...] | None,
 ) -> LPSolution | ConicSolution:
     """Solve for forces that balance a load: a linear program in the plane, in space one over round cones."""
     if dimension == 3:
         return solve_cones(ConicProgram(cost, matrix, -load, friction))
     lower, upper = -load - tolerance, -load + tolerance
-    return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, along=along), routes)
+    return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper, places=places), routes)

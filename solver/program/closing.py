@@ -27,7 +27,7 @@ from solver.tolerances import (
     ROUNDING,
 )
 
-from .increment import Solved, along_structure, distances_of, solved_or_left_wedged
+from .increment import Solved, distances_of, places_of_rows, solved_or_left_wedged
 from .macroblocks import MacroBlocks, free_blocks
 from .model import Model, largest_movement
 
@@ -114,7 +114,7 @@ def closing_program(
         matrix=with_slack(balance),
         lower=load - resistance,
         upper=load + resistance,
-        along=along_structure(parts, pose),
+        places=places_of_rows(parts, pose),
     )
     routes = None if bodies is None else INTERIOR_ROUTES
     try:

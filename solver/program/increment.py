@@ -149,7 +149,7 @@ def solve_program(
         matrix=with_slack(*columns),
         lower=-external - tolerance,
         upper=-external + tolerance,
-        along=along_structure(free_blocks(assembly), pose),
+        places=places_of_rows(free_blocks(assembly), pose),
     )
     try:
         program, solution, distance = solved_or_left_wedged(
@@ -199,13 +199,13 @@ def solve_program(
     )
 
 
-def along_structure(parts: MacroBlocks, pose: Pose) -> np.ndarray:
-    """(n_dof n_parts,) array [m]: where each part lies along the longest side of the structure, for each freedom."""
+def places_of_rows(parts: MacroBlocks, pose: Pose) -> np.ndarray:
+    """(n_dof n_parts, dim) array [m]: where each part is, for each of its freedoms."""
     moving = parts.part >= 0
     part, places = parts.part[moving], pose.positions[moving]
-    axis = int(np.argmax(np.ptp(places, axis=0))) if len(places) else 0
-    mean = np.bincount(part, places[:, axis], parts.n_parts) / np.maximum(np.bincount(part, minlength=parts.n_parts), 1)
-    return np.repeat(mean, places.shape[1] + pose.rotations.shape[1])
+    blocks = np.maximum(np.bincount(part, minlength=parts.n_parts), 1)
+    mean = np.stack([np.bincount(part, place, parts.n_parts) for place in places.T], axis=1) / blocks[:, None]
+    return np.repeat(mean, places.shape[1] + pose.rotations.shape[1], axis=0)
 
 
 def solved_or_left_wedged(

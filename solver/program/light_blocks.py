@@ -70,7 +70,7 @@ def with_light_blocks(
         matrix=sp.csc_array(sp.diags_array(1.0 / own) @ program.matrix @ sp.diags_array(factor)),
         lower=(middle - half) / own,
         upper=(middle + half) / own,
-        along=program.along,
+        places=program.places,
     )
     try:
         found = solve_lp(scaled)

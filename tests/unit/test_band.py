@@ -230,9 +230,9 @@ def test_an_order_of_the_rows_makes_no_difference_but_the_width():
     order = np.random.default_rng(0).permutation(40)
     rows = (3 * order[:, None] + np.arange(3)).ravel()
     shuffled = problem.LinearProgram(
-        program.cost, sp.csc_array(program.matrix[rows]), program.lower[rows], program.upper[rows], np.repeat(order, 3)
+        program.cost, sp.csc_array(program.matrix[rows]), program.lower[rows], program.upper[rows], np.repeat(order, 3)[:, None]
     )
     first, second = solved(program), solve_lp(shuffled, (BAND,))
     assert second.objective == pytest.approx(first.objective, abs=1e-7 * (1 + abs(first.objective)))
     whole = sp.csc_array(sp.hstack([shuffled.matrix, sp.eye_array(120)]))
-    assert _Band(whole, shuffled.along).width == 6
+    assert _Band(whole, shuffled.places).width == 6
