@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,13 @@ WIDE, PIECE = 64, 12
 #: Rows are put in order along the longest side, by lines that lean by this much. Upright ones come to be shuffled as bricks
 #: move that stand one above the other, and the band half as wide again.
 TILTS = (0.01, 0.1, 0.3)
+
+#: A border is tried of so many rows, as long as each has this many times as many neighbours as most have.
+BORDERS, MANY = (3, 6, 12, 24, 48), 1.3
+
+#: What a factorisation takes besides the square of the width, times the width: LAPACK is slower at narrow bands, and goes
+#: through the band once for each row of the border.
+WORK = 100.0, 6.5
 
 #: Half the width that a row has at least: an equation has no inside.
 LEAST_WIDTH = 1e-11
@@ -93,30 +101,38 @@ class _Point:
 
 
 class _Band:
-    """A D Aᵀ for a fixed A, its rows reordered so that what is not zero lies near the diagonal; and its factor."""
+    """A D Aᵀ for a fixed A, and its factor.
+
+    Its rows are reordered so that what is not zero lies near the diagonal, but for those of the border, which come last:
+    many other rows have a part in them, as all that lies beside a crack in the part of the wall that moves as one.
+    """
 
     def __init__(self, matrix: sp.csc_array, places: np.ndarray | None) -> None:
         self.rows = rows = matrix.shape[0]
         counts = np.diff(matrix.indptr)
         # Each column is as wide as it has entries, at least: a load on every block fills the matrix.
         self._refuse_wide(int(counts.max(initial=0)))
-        self.order, self.width = narrowest(matrix, places)
+        self.order, self.border, self.width = narrowest(matrix, places)
         self._refuse_wide(self.width)
+        inside = rows - self.border
         place = np.empty(rows, dtype=np.int64)
         place[self.order] = np.arange(rows)
+        # Where the column of a row begins: those inside by their diagonals, those of the border from their first row on.
+        begins = np.arange(rows) * self.width
+        begins[inside:] = inside * self.width + rows * np.arange(self.border)
         slots, weights, columns, pairs = [], [], [], []
         for count in np.unique(counts[counts > 0]):
             members = np.flatnonzero(counts == count)
             entries = matrix.indptr[members][:, None] + np.arange(count)
             at, value = place[matrix.indices[entries]], matrix.data[entries]
             first, second = np.tril_indices(count)
-            one, other = at[:, first], at[:, second]
-            slots.append((np.minimum(one, other) * self.width + np.abs(one - other)).ravel())
+            i, j = np.maximum(at[:, first], at[:, second]), np.minimum(at[:, first], at[:, second])
+            slots.append(np.where(i < inside, begins[j] + i - j, begins[i] + j).ravel())
             weights.append((value[:, first] * value[:, second]).ravel())
             columns.append(members)
             pairs.append(np.full(len(members), len(first)))
         self.columns, slot = np.concatenate(columns), np.concatenate(slots)
-        self.values = np.zeros(rows * self.width)
+        self.values = np.zeros(inside * self.width + rows * self.border)
         self.values[slot] = 1.0
         self.filled = np.flatnonzero(self.values)
         number = np.empty(len(self.values), dtype=np.int32)
@@ -126,8 +142,6 @@ class _Band:
             (np.concatenate(weights), number[slot], np.concatenate([[0], np.cumsum(np.concatenate(pairs))])),
             shape=(len(self.filled), len(self.columns)),
         )
-        self.factor = np.empty((0, 0))
-
     def _refuse_wide(self, width: int) -> None:
         if self.rows * float(width) ** 2 > OPERATIONS:
             raise NoProgress(f"{self.rows} rows in a band {width} wide")
@@ -135,13 +149,26 @@ class _Band:
     def factorise(self, diagonal: np.ndarray) -> None:
         self.values[:] = 0.0
         self.values[self.filled] = self.sums @ diagonal[self.columns]
-        self.factor, failed = lapack.dpbtrf(self.values.reshape(self.rows, self.width).T, lower=1, overwrite_ab=1)
+        inside = self.rows - self.border
+        band, border = np.split(self.values, [inside * self.width])
+        self.factor, failed = lapack.dpbtrf(band.reshape(inside, self.width).T, lower=1, overwrite_ab=1)
+        if not failed and self.border:
+            border = border.reshape(self.border, self.rows).T
+            self.beside, _ = lapack.dtbtrs(self.factor, border[:inside], uplo="L")
+            self.corner, failed = lapack.dpotrf(border[inside:] - self.beside.T @ self.beside)
         if failed:
             raise NoProgress("the normal equations are singular")
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         solution = np.empty(self.rows)
-        solution[self.order] = lapack.dpbtrs(self.factor, right[self.order], lower=1)[0]
+        right, inside = right[self.order], self.rows - self.border
+        if self.border:
+            half, _ = lapack.dtbtrs(self.factor, right[:inside], uplo="L")
+            last, _ = lapack.dpotrs(self.corner, right[inside:] - self.beside.T @ half)
+            first, _ = lapack.dtbtrs(self.factor, half - self.beside @ last, uplo="L", trans="T")
+            solution[self.order] = np.concatenate([first, last])
+        else:
+            solution[self.order] = lapack.dpbtrs(self.factor, right, lower=1)[0]
         return solution
 
 
@@ -307,23 +334,32 @@ class _Method:
         return corrected, (by_primal[p], by_dual[d])
 
 
-def narrowest(matrix: sp.csc_array, places: np.ndarray | None) -> tuple[np.ndarray, int]:
-    """Choose the order of the rows that makes the narrowest band; and tell how wide it is."""
+def narrowest(matrix: sp.csc_array, places: np.ndarray | None) -> tuple[np.ndarray, int, int]:
+    """Choose an order of the rows: (m,) array, how many at its end are the border, and how wide the others' band is."""
     pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape[::-1])
-    orders = [reverse_cuthill_mckee(sp.csr_matrix(pattern.T @ pattern), symmetric_mode=True)]
-    if places is not None:
-        axis = int(np.argmax(np.ptp(places, axis=0)))
-        across = np.delete(places, axis, axis=1).sum(axis=1)
-        orders += [np.argsort(places[:, axis] + tilt * across, kind="stable") for tilt in TILTS]
-    starts = matrix.indptr[:-1][np.diff(matrix.indptr) > 0]
-    found = []
-    for order in orders:
-        place = np.empty(matrix.shape[0], dtype=np.int64)
-        place[order] = np.arange(matrix.shape[0])
-        of_entries = place[matrix.indices]
-        widths = np.maximum.reduceat(of_entries, starts) - np.minimum.reduceat(of_entries, starts)
-        found.append(int(widths.max(initial=0)) + 1)
-    return orders[int(np.argmin(found))], min(found)
+    joined = sp.csr_array(pattern.T @ pattern)
+    neighbours = np.diff(joined.indptr)
+    many = np.argsort(-neighbours, kind="stable")
+    most = int((neighbours > MANY * np.median(neighbours)).sum())
+    chosen, least = None, math.inf
+    for border in (0, *(border for border in BORDERS if border <= most)):
+        inside = np.sort(many[border:])
+        among = joined if border == 0 else joined[inside][:, inside]
+        orders = [reverse_cuthill_mckee(sp.csr_matrix(among), symmetric_mode=True)]
+        if places is not None and border == 0:
+            axis = int(np.argmax(np.ptp(places, axis=0)))
+            across = np.delete(places, axis, axis=1).sum(axis=1)
+            orders += [np.argsort(places[:, axis] + tilt * across, kind="stable") for tilt in TILTS]
+        row = np.repeat(np.arange(len(inside)), np.diff(among.indptr))
+        for order in orders:
+            place = np.empty(len(inside), dtype=np.int64)
+            place[order] = np.arange(len(inside))
+            width = int(np.abs(place[row] - place[among.indices]).max(initial=0)) + 1
+            work = len(inside) * width * (width + WORK[0] + WORK[1] * border)
+            if work < least:
+                chosen, least = (np.concatenate([inside[order], many[:border]]), border, width), work
+    assert chosen is not None
+    return chosen
 
 
 def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float:
@@ -403,7 +439,7 @@ def _solved_in_pieces(
     """Solve with wide columns cut into pieces along the rows, and equations that all pieces of one are the same."""
     rows, columns = matrix.shape
     narrow = np.delete(np.arange(columns), wide)
-    order, _ = narrowest(sp.csc_array(matrix[:, narrow]), places)
+    order, _, _ = narrowest(sp.csc_array(matrix[:, narrow]), places)
     place = np.empty(rows)
     place[order] = np.arange(rows)
     piece = (place // PIECE).astype(np.int64)
