@@ -29,15 +29,15 @@ OPERATIONS = 1e10
 #: pieces of so many rows that lie beside each other, which equations chain together.
 WIDE, PIECE = 64, 12
 
-#: Rows are put in order along the longest side, by lines that lean by this much. Upright ones come to be shuffled as bricks
-#: move that stand one above the other, and the band half as wide again.
+#: Rows are put in order along the longest side, by lines that lean by this much. Upright ones come to be shuffled as
+#: bricks move that stand one above the other, and the band half as wide again.
 TILTS = (0.01, 0.1, 0.3)
 
 #: A border is tried of so many rows, as long as each has this many times as many neighbours as most have.
 BORDERS, MANY = (3, 6, 12, 24, 48), 1.3
 
-#: What a factorisation takes besides the square of the width, times the width: LAPACK is slower at narrow bands, and goes
-#: through the band once for each row of the border.
+#: What a factorisation takes besides the square of the width, times the width: LAPACK is slower at narrow bands, and
+#: goes through the band once for each row of the border.
 WORK = 100.0, 6.5
 
 #: Half the width that a row has at least: an equation has no inside.
@@ -49,6 +49,10 @@ PROXIMAL = 1e-11
 
 #: Where the method starts: multipliers, slack beyond what balances them, and least reduced cost.
 START, START_SLACK, START_COST = 1.0, 0.1, 0.03
+
+#: The first iterate whose products are below this on average is kept: a program much like this one may start from it.
+#: Later ones are too near the boundary, and take longer than a start from nothing.
+EARLY = 1e-3
 
 #: Part of the way to the boundary that a step takes.
 TO_BOUNDARY = 0.9995
@@ -91,20 +95,25 @@ class NoProgress(Exception):
     """The method does not apply, or came to no solution."""
 
 
-@dataclass
-class _Point:
-    """Iterate: ``primal`` is x, then how far rows are from their lower and upper bounds; ``dual`` what prices them."""
+@dataclass(frozen=True)
+class Iterate:
+    """Where the method is: x, then how far rows are from their lower and upper bounds; and what prices them."""
 
     primal: np.ndarray
     dual: np.ndarray
     row_dual: np.ndarray
 
+    def fits(self, matrix: sp.csc_array) -> bool:
+        """Whether it may be an iterate of a program with such a matrix."""
+        rows, columns = matrix.shape
+        return len(self.row_dual) == rows and len(self.primal) == columns + 2 * rows
+
 
 class _Band:
     """A D Aᵀ for a fixed A, and its factor.
 
-    Its rows are reordered so that what is not zero lies near the diagonal, but for those of the border, which come last:
-    many other rows have a part in them, as all that lies beside a crack in the part of the wall that moves as one.
+    Its rows are reordered so that what is not zero lies near the diagonal, but for those of the border, which come
+    last: many others meet them, as all that lies beside a crack meets the part of the wall that moves as one.
     """
 
     def __init__(self, matrix: sp.csc_array, places: np.ndarray | None) -> None:
@@ -117,7 +126,7 @@ class _Band:
         inside = rows - self.border
         place = np.empty(rows, dtype=np.int64)
         place[self.order] = np.arange(rows)
-        # Where the column of a row begins: those inside by their diagonals, those of the border from their first row on.
+        # Where the column of a row begins: inside with its diagonal, in the border with the first row.
         begins = np.arange(rows) * self.width
         begins[inside:] = inside * self.width + rows * np.arange(self.border)
         slots, weights, columns, pairs = [], [], [], []
@@ -142,6 +151,7 @@ class _Band:
             (np.concatenate(weights), number[slot], np.concatenate([[0], np.cumsum(np.concatenate(pairs))])),
             shape=(len(self.filled), len(self.columns)),
         )
+
     def _refuse_wide(self, width: int) -> None:
         if self.rows * float(width) ** 2 > OPERATIONS:
             raise NoProgress(f"{self.rows} rows in a band {width} wide")
@@ -182,6 +192,7 @@ class _Method:
         lower: np.ndarray,
         upper: np.ndarray,
         places: np.ndarray | None,
+        start: Iterate | None = None,
     ) -> None:
         rows, columns = matrix.shape
         if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
@@ -193,10 +204,11 @@ class _Method:
         self.x = slice(0, columns)
         self.below, self.above = slice(columns, columns + rows), slice(columns + rows, columns + 2 * rows)
         self.band = _Band(sp.csc_array(sp.hstack([matrix, sp.eye_array(rows)])), places)
-        self.point = self._start(matrix)
+        self.point = self._start(matrix) if start is None else self._continued(start)
+        self.early: Iterate | None = None
         self.tried = 0
 
-    def _start(self, matrix: sp.csc_array) -> _Point:
+    def _start(self, matrix: sp.csc_array) -> Iterate:
         """Start from equal multipliers, the rows balanced by their unit columns where they have any."""
         middle = (self.lower + self.upper) / 2.0
         single = np.flatnonzero(np.diff(matrix.indptr) == 1)
@@ -215,11 +227,19 @@ class _Method:
         x[single] += START_SLACK
         reduced = np.maximum(self.cost, START_COST)
         price = np.minimum(float(x @ reduced) / len(x) / (middle - self.lower), reduced.max())
-        return _Point(
+        return Iterate(
             np.concatenate([x, middle - self.lower, self.upper - middle]),
             np.concatenate([reduced, price, price]),
             np.zeros(len(middle)),
         )
+
+    def _continued(self, start: Iterate) -> Iterate:
+        """Go on from an iterate of a program much like this one; each row lies between its bounds as it did there."""
+        primal = start.primal.copy()
+        wider = (self.upper - self.lower) / (primal[self.below] + primal[self.above])
+        primal[self.below] *= wider
+        primal[self.above] *= wider
+        return Iterate(primal, start.dual, start.row_dual)
 
     def residuals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of the rows, of the reduced costs, and of the rows' prices."""
@@ -247,6 +267,8 @@ class _Method:
         step = self._direction(residuals, -primal * dual)
         lengths = _longest(primal, step.primal), _longest(dual, step.dual)
         mean = float(primal @ dual) / len(primal)
+        if mean < EARLY and self.early is None:
+            self.early = self.point
         predicted = float((primal + lengths[0] * step.primal) @ (dual + lengths[1] * step.dual)) / len(primal)
         target = (predicted / mean) ** 3 * mean
         nothing = tuple(np.zeros_like(part) for part in residuals)
@@ -265,7 +287,7 @@ class _Method:
             step, lengths = corrected, longer
         by_primal = TO_BOUNDARY * _longest(primal, step.primal, 1.0 / TO_BOUNDARY)
         by_dual = TO_BOUNDARY * _longest(dual, step.dual, 1.0 / TO_BOUNDARY)
-        self.point = _Point(
+        self.point = Iterate(
             primal + by_primal * step.primal, dual + by_dual * step.dual, self.point.row_dual + by_dual * step.row_dual
         )
         self.tried = self.tried + 1 if min(by_primal, by_dual) < SHORT else 0
@@ -289,7 +311,7 @@ class _Method:
             if np.abs(self.matrix @ ray).max() < PROVES * ray.max() and self.cost @ ray < 0.0:
                 raise Diverges(ray / ray.max())
 
-    def _direction(self, residuals: tuple[np.ndarray, ...], products: np.ndarray) -> _Point:
+    def _direction(self, residuals: tuple[np.ndarray, ...], products: np.ndarray) -> Iterate:
         """Newton's direction that removes the residuals and changes the products primal · dual by those given."""
         primal, dual = self.point.primal, self.point.dual
         rows, costs, prices = residuals
@@ -305,7 +327,7 @@ class _Method:
             if attempt == REFINEMENTS or np.abs(residual).max(initial=0.0) <= enough:
                 break
             row_dual = row_dual + self.band.solve(residual)
-        return _Point(
+        return Iterate(
             np.concatenate([x, w, -w]),
             np.concatenate(
                 [
@@ -318,15 +340,15 @@ class _Method:
         )
 
     def _weighted(
-        self, step: _Point, correction: _Point, lengths: tuple[float, float]
-    ) -> tuple[_Point, tuple[float, float]]:
+        self, step: Iterate, correction: Iterate, lengths: tuple[float, float]
+    ) -> tuple[Iterate, tuple[float, float]]:
         """Add as much of a correction to a step as makes it longest (Colombo & Gondzio 2008)."""
         primal, dual = self.point.primal, self.point.dual
         weights = max(lengths[0] * lengths[1], 0.05) * (1.0 - WEIGHTS) + WEIGHTS
         by_primal = _lengths(step.primal / primal, correction.primal / primal, weights)
         by_dual = _lengths(step.dual / dual, correction.dual / dual, weights)
         p, d = int(np.argmax(by_primal)), int(np.argmax(by_dual))
-        corrected = _Point(
+        corrected = Iterate(
             step.primal + weights[p] * correction.primal,
             step.dual + weights[d] * correction.dual,
             step.row_dual + weights[d] * correction.row_dual,
@@ -383,7 +405,8 @@ def interior_point(
     lower: np.ndarray,
     upper: np.ndarray,
     places: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray, int]:
+    start: Iterate | None = None,
+) -> tuple[np.ndarray, np.ndarray, int, Iterate | None]:
     """Minimise cost · x subject to lower ≤ A x ≤ upper and x ≥ 0.
 
     Parameters
@@ -393,8 +416,10 @@ def interior_point(
     lower, upper : (m,) arrays
         Finite.
     places : (m, dim) array, optional
-        Where each row's block is: for orders of the rows to try beside that of Cuthill & McKee. Along the longer side of
-        a wall it makes a band two thirds as wide.
+        Where each row's block is: for orders of the rows to try beside that of Cuthill & McKee. Along the longer side
+        of a wall it makes a band two thirds as wide.
+    start : Iterate, optional
+        Early iterate of a program of the same size that is much like this one.
 
     Returns
     -------
@@ -402,6 +427,8 @@ def interior_point(
         In the interior of the optimal face.
     row_dual : (m,) array
     iterations : int
+    early : Iterate or None
+        From which a program much like this one may start.
 
     Raises
     ------
@@ -423,7 +450,7 @@ def interior_point(
             wide = np.flatnonzero(np.diff(matrix.indptr) > WIDE)
             if len(wide):
                 return _solved_in_pieces(cost, matrix, lower, upper, places, wide)
-            return _solved(_Method(cost, matrix, lower, upper, places))
+            return _solved(_Method(cost, matrix, lower, upper, places, start))
     except (NotLimited, FloatingPointError) as error:
         raise NoProgress(str(error)) from None
 
@@ -435,7 +462,7 @@ def _solved_in_pieces(
     upper: np.ndarray,
     places: np.ndarray | None,
     wide: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, int]:
+) -> tuple[np.ndarray, np.ndarray, int, None]:
     """Solve with wide columns cut into pieces along the rows, and equations that all pieces of one are the same."""
     rows, columns = matrix.shape
     narrow = np.delete(np.arange(columns), wide)
@@ -461,10 +488,10 @@ def _solved_in_pieces(
         np.concatenate([place, np.tile((np.arange(n - 1) + 1.0) * PIECE - 0.5, len(wide))])[:, None],
     )
     try:
-        found, row_dual, iterations = _solved(method)
+        found, row_dual, iterations, _ = _solved(method)
     except Diverges as error:
         raise Diverges(_folded(error.ray, narrow, wide)) from None
-    return _folded(found, narrow, wide), row_dual[:rows], iterations
+    return _folded(found, narrow, wide), row_dual[:rows], iterations, None
 
 
 def _folded(x: np.ndarray, narrow: np.ndarray, wide: np.ndarray) -> np.ndarray:
@@ -475,11 +502,11 @@ def _folded(x: np.ndarray, narrow: np.ndarray, wide: np.ndarray) -> np.ndarray:
     return whole
 
 
-def _solved(method: _Method) -> tuple[np.ndarray, np.ndarray, int]:
+def _solved(method: _Method) -> tuple[np.ndarray, np.ndarray, int, Iterate | None]:
     for iteration in range(ITERATIONS):
         residuals = method.residuals()
         if method.optimal(residuals):
-            return method.point.primal[method.x], method.point.row_dual, iteration
+            return method.point.primal[method.x], method.point.row_dual, iteration, method.early
         method.iterate(residuals)
         if iteration % RAY_EVERY == 0:
             method.refuse_ray()

@@ -9,6 +9,8 @@ import scipy.sparse as sp
 
 from solver.tolerances import ACCEPTED_GAP, ACCEPTED_VIOLATION
 
+from .band import Iterate
+
 
 class SolveError(RuntimeError):
     """No route gave a solution that passes its check. Not a statement about the structure."""
@@ -39,6 +41,8 @@ class LinearProgram:
     lower, upper : (m,) arrays
     places : (m, dim) array, optional
         Where the row's block is.
+    start : Iterate, optional
+        Early iterate of a program much like this one, from which the method for bands may start.
     """
 
     cost: np.ndarray
@@ -46,6 +50,7 @@ class LinearProgram:
     lower: np.ndarray
     upper: np.ndarray
     places: np.ndarray | None = None
+    start: Iterate | None = None
 
 
 @dataclass(frozen=True)
@@ -67,6 +72,8 @@ class LPSolution:
         How it was found.
     iterations : int
     seconds : float
+    early : Iterate or None
+        From which a program much like this one may start.
     """
 
     x: np.ndarray
@@ -78,6 +85,7 @@ class LPSolution:
     route: str
     iterations: int
     seconds: float
+    early: Iterate | None = None
 
     @property
     def gap(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 from .band import Diverges, NoProgress, interior_point
 from .highs import run_highs
@@ -67,11 +68,19 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None) -> L
 
 def _in_band(program: LinearProgram) -> tuple[LPSolution | None, str]:
     started = time.perf_counter()
+    given = program.cost, program.matrix, program.lower, program.upper, program.places
+    start = program.start if program.start is not None and program.start.fits(program.matrix) else None
     try:
-        x, y, iterations = interior_point(program.cost, program.matrix, program.lower, program.upper, program.places)
+        try:
+            x, y, iterations, early = interior_point(*given, start)
+        except (Diverges, NoProgress):
+            if start is None:
+                raise
+            x, y, iterations, early = interior_point(*given)
     except Diverges as found:
         raise_if_proved(program, found.ray)
         return None, str(found)
     except NoProgress as reason:
         return None, str(reason)
-    return checked(program, x, y, BAND, iterations, time.perf_counter() - started), "solved"
+    solution = checked(program, x, y, BAND, iterations, time.perf_counter() - started)
+    return replace(solution, early=early), "solved"

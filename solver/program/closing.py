@@ -115,6 +115,7 @@ def closing_program(
         lower=load - resistance,
         upper=load + resistance,
         places=places_of_rows(parts, pose),
+        start=before.early,
     )
     routes = None if bodies is None else INTERIOR_ROUTES
     try:
@@ -140,6 +141,7 @@ def closing_program(
         sliding=np.zeros(len(contacts)),
         sticking=sticking & (forces[:, 0] > 0.0),
         falling=False,
+        early=solution.early,
     )
 
 

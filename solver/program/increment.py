@@ -11,6 +11,7 @@ from solver.assembly import find_contacts
 from solver.equilibrium import friction_rays, with_slack, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose, moved_vertices, unit_lengths
+from solver.lp.band import Iterate
 from solver.lp.problem import LinearProgram, LPSolution, SolveError, Unbounded
 from solver.lp.solve import solve_lp
 from solver.results.certificate import Certificate
@@ -55,6 +56,8 @@ class Solved:
     support_forces : (n_blocks, 3) array [N, N, N·m]
     multiplier : float
         Of the model's live load; 0 where it has none.
+    early : Iterate or None
+        From which the next closing of the same gaps may start.
     """
 
     pose: Pose
@@ -70,6 +73,7 @@ class Solved:
     certificate: Certificate
     support_forces: np.ndarray
     multiplier: float = 0.0
+    early: Iterate | None = None
 
 
 def solve_program(
