@@ -68,11 +68,11 @@ class Coupling:
         freedom = np.arange(dof)
         entry = first[:, None, None] + freedom[:, None] + apart[:, None, None] * freedom
         self.entries = entry.size
-        self.indices = np.empty(self.entries, dtype=np.int32)
-        self.indices[entry] = (row[:, None] * dof + freedom)[:, :, None]
-        self.pointers = np.append(dof**2 * above[:, None] + dof * high[:, None] * freedom, self.entries).astype(
-            np.int32
-        )
+        indices = np.empty(self.entries, dtype=np.int32)
+        indices[entry] = (row[:, None] * dof + freedom)[:, :, None]
+        pointers = np.append(dof**2 * above[:, None] + dof * high[:, None] * freedom, self.entries).astype(np.int32)
+        # Its numbers are put in anew for each factorisation.
+        self.matrix = sp.csc_array((np.zeros(self.entries), indices, pointers), shape=(self.rows, self.rows))
         # What has no freedom goes beyond the last.
         numbers = np.full((*held.shape, dof, dof), self.entries)
         numbers[~held] = entry[number[: len(number) - n_blocks]]
@@ -94,13 +94,14 @@ class Coupling:
         """
         values = np.bincount(self.number, each.ravel(), self.entries + 1)[:-1]
         values[self.diagonal] += diagonal[self.order]
-        shape = (self.rows, self.rows)
         if self.dense:
-            factors, pivots, singular = sla.lapack.dgetrf(values.reshape(shape).T, overwrite_a=True)
+            columns = values.reshape(self.rows, self.rows).T
+            factors, pivots, singular = sla.lapack.dgetrf(columns, overwrite_a=True)
             if singular:
                 raise Singular(f"no pivot is left in row {singular}")
             return lambda right: np.asarray(sla.lapack.dgetrs(factors, pivots, right)[0])
-        matrix = sp.csc_array((values, self.indices, self.pointers), shape=shape)
+        matrix = self.matrix
+        matrix.data = values
         how = "NATURAL"
         if np.count_nonzero(values) < SPARSE * self.entries:
             # Of joints that are open nothing is left: their factors fill in less, in an order of their own.

@@ -107,8 +107,18 @@ class _Way:
             np.stack([normal - apart, shear]),
             -np.stack([step.gap - gap, step.slip[:, 0]]) / self.give,
         )
-        self.functions = np.zeros((2, 2, len(normal)))
-        self._set_functions(slice(None))
+        # What each function takes of a point's normal and of its shear force: open, stuck, sliding either way.
+        one, none, smooth = np.ones_like(mu), np.zeros_like(mu), np.where(mu > 0.0, 1.0, 0.0)
+        self.in_state = np.array(
+            [
+                [[-one, none], [none, none]],
+                [[mu, mu], [-one, one]],
+                [[one, -mu], [none, -smooth]],
+                [[one, -mu], [none, smooth]],
+            ]
+        )
+        state = np.where(self.closed, np.where(self.slides, np.where(self.sense < 0.0, 2, 3), 1), 0)
+        self.functions = self.in_state[state, :, :, np.arange(len(mu))].transpose(1, 2, 0).copy()
         self._factorise()
         self._measure()
 
@@ -137,7 +147,8 @@ class _Way:
             self.closed[number] = self.slides[number] = closes
             grows = 0
             put, read = np.array([1.0, friction * self.sense[number]]), np.array([1.0 if closes else -1.0, 0.0])
-        self._set_functions(slice(number, number + 1))
+        state = (3 if self.sense[number] > 0.0 else 2) if self.slides[number] else 1
+        self.functions[:, :, number] = self.in_state[state if self.closed[number] else 0, :, :, number]
         if self.taken_in == TAKEN_IN or not self._taken_in(number, put, read):
             self._factorise()
         self._measure()
@@ -164,16 +175,6 @@ class _Way:
         taken = self.parts.T @ self.taken[:m].reshape(m, self.base[0].size)
         self.forces = self.base - taken.reshape(self.base.shape)
         self.measured = self.functions[0] * self.forces[:, :1] + self.functions[1] * self.forces[:, 1:]
-
-    def _set_functions(self, numbers: slice) -> None:
-        mu, sense = self.step.friction[numbers], self.sense[numbers]
-        closed, slides = self.closed[numbers], self.slides[numbers]
-        sticks, slides = closed & ~slides, closed & slides
-        of_normal, of_shear = self.functions
-        of_normal[0, numbers] = np.where(sticks, mu, np.where(closed, 1.0, -1.0))
-        of_normal[1, numbers] = np.where(sticks, mu, np.where(slides, -mu, 0.0))
-        of_shear[0, numbers] = np.where(sticks, -1.0, 0.0)
-        of_shear[1, numbers] = np.where(sticks, 1.0, np.where(slides & (mu > 0.0), sense, 0.0))
 
     def _factorise(self) -> None:
         step, n = self.step, len(self.closed)
