@@ -16,7 +16,7 @@ from scipy.optimize import linprog
 from structures import wall
 
 import solver
-from solver.lp import problem
+from solver.lp import band, problem
 from solver.lp.band import Diverges, NoProgress, _Band, interior_point
 from solver.lp.solve import BAND, solve_lp
 from solver.lp.threads import one_thread
@@ -263,14 +263,14 @@ def with_a_hub(seed, blocks):
 @settings(max_examples=10, deadline=None)
 def test_what_meets_a_part_that_all_others_meet_is_still_a_narrow_band(seed, blocks):
     matrix = with_a_hub(seed, blocks)
-    band = _Band(matrix, None)
-    assert band.border >= 3
-    assert band.width <= 12
+    found = _Band(matrix, None)
+    assert found.border >= 3
+    assert found.width <= 12
     random = np.random.default_rng(seed)
     diagonal, right = random.uniform(0.1, 10.0, matrix.shape[1]), random.standard_normal(matrix.shape[0])
-    band.factorise(diagonal)
+    found.factorise(diagonal)
     whole = (matrix @ sp.diags_array(diagonal) @ matrix.T).toarray()
-    assert band.solve(right) == pytest.approx(np.linalg.solve(whole, right), rel=1e-8, abs=1e-8)
+    assert found.solve(right) == pytest.approx(np.linalg.solve(whole, right), rel=1e-8, abs=1e-8)
 
 
 def test_a_program_starts_from_an_early_iterate_of_one_much_like_it():
@@ -295,3 +295,11 @@ def test_a_start_that_leads_nowhere_is_given_up_for_one_from_nothing():
     nowhere = replace(first.early, primal=np.full_like(first.early.primal, 1e-300))
     found = solve_lp(replace(program, start=nowhere), (BAND,))
     assert found.x == pytest.approx(first.x, abs=0.0)
+
+
+def test_what_comes_no_nearer_is_taken_where_the_check_accepts_it(monkeypatch):
+    """A tolerance below rounding is never reached; what was nearest passes the check."""
+    monkeypatch.setattr(band, "TOLERANCE", 1e-30)
+    found = solved(chain(5, 60))
+    assert found.accepted
+    assert found.iterations < 60
