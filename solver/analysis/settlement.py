@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose
 from solver.loads import Loads, Settlement, checked_loads
 from solver.lp.problem import SolveError
+from solver.lp.threads import NotLimited, one_thread
 from solver.program.model import Model
 from solver.program.step import NotSolved
 from solver.results.increment import Increment, Status
@@ -225,11 +227,18 @@ def model_of(assembly: Assembly, loads: Loads, interfaces: Interfaces, live: np.
 
 
 def timed(steps: Generator[Increment, None, Ending]) -> Generator[Increment, None, Ending]:
-    """The same increments with the seconds each took, not counting what whoever listens takes in between."""
+    """The same increments with the seconds each took, not counting what whoever listens takes in between.
+
+    The linear algebra keeps to one thread while they are worked out, where it can be limited: of several, all but one
+    wait by counting, on a core that another process could have.
+    """
     while True:
         started = time.perf_counter()
         try:
-            increment = next(steps)
+            with ExitStack() as limits:
+                with suppress(NotLimited):
+                    limits.enter_context(one_thread())
+                increment = next(steps)
         except StopIteration as stop:
             ending: Ending = stop.value
             return ending
