@@ -141,7 +141,8 @@ def closing_program(
         sliding=np.zeros(len(contacts)),
         sticking=sticking & (forces[:, 0] > 0.0),
         falling=False,
-        early=solution.early,
+        # Blocks that each move for themselves may come to rest in another way than from nothing, and less well.
+        early=None if bodies is None else solution.early,
     )
 
 
