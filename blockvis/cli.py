@@ -66,7 +66,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         Those of the process by default.
     """
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options, left = parser.parse_known_args(arguments)
+    if options.verb is _layout and not any(word.startswith("-") for word in left):
+        # Parameters on either side of an option.
+        options.parameters += left
+    elif left:
+        parser.error(f"unrecognized arguments: {' '.join(left)}")
     warnings.showwarning = _notes_said_once()
     try:
         code: int = options.verb(options)

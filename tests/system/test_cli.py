@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from blockvis import cli
+from blockvis import cli, generators
 from blockvis.cases.case import read_case
 from blockvis.cli import main
 from blockvis.generators import LAYOUTS, parameters_of
@@ -181,6 +181,30 @@ def test_help_says_what_every_exit_code_means(arguments, capsys):
     codes = {cli.BAD_INPUT, cli.SOLVER_FAILED, cli.NO_PICTURES, cli.NO_EQUILIBRIUM, cli.INTERRUPTED}
     assert set(map(int, listed)) == {0} | codes
     assert "interrupted" in listed["130"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["wall", "bricks=4", "courses=3", "-o"],
+        ["wall", "-o", None, "bricks=4", "courses=3"],
+        ["wall", "bricks=4", "-o", None, "courses=3"],
+        ["-o", None, "wall", "bricks=4", "courses=3"],
+    ],
+)
+def test_parameters_of_a_layout_stand_on_either_side_of_options(words, tmp_path, capsys):
+    file = str(tmp_path / "wall.msh")
+    given = [file if word is None else word for word in words] + ([file] if None not in words else [])
+    assert main(["layout", *given]) == 0
+    blocks = generators.build("wall", {"bricks": 4, "courses": 3}).n_blocks
+    assert f"{blocks} blocks written" in capsys.readouterr().out
+
+
+def test_what_a_verb_does_not_know_is_refused(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["layout", "wall", "--set", "bricks=4", "-o", "wall.msh"])
+    assert ended.value.code == 2
+    assert "--set bricks=4" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
