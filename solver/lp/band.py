@@ -130,8 +130,7 @@ class _Band:
         self.order, self.border, self.width = narrowest(matrix, places)
         self._refuse_wide(self.width)
         inside = rows - self.border
-        place = np.empty(rows, dtype=np.int64)
-        place[self.order] = np.arange(rows)
+        place = _places_in(self.order)
         # Where the column of a row begins: inside with its diagonal, in the border with the first row.
         begins = np.arange(rows) * self.width
         begins[inside:] = inside * self.width + rows * np.arange(self.border)
@@ -381,14 +380,20 @@ def narrowest(matrix: sp.csc_array, places: np.ndarray | None) -> tuple[np.ndarr
             orders += [np.argsort(places[:, axis] + tilt * across, kind="stable") for tilt in TILTS]
         row = np.repeat(np.arange(len(inside)), np.diff(among.indptr))
         for order in orders:
-            place = np.empty(len(inside), dtype=np.int64)
-            place[order] = np.arange(len(inside))
+            place = _places_in(order)
             width = int(np.abs(place[row] - place[among.indices]).max(initial=0)) + 1
             work = len(inside) * width * (width + WORK[0] + WORK[1] * border)
             if work < least:
                 chosen, least = (np.concatenate([inside[order], many[:border]]), border, width), work
     assert chosen is not None
     return chosen
+
+
+def _places_in(order: np.ndarray) -> np.ndarray:
+    """(m,) int array: where in an order each row comes."""
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    return place
 
 
 def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float:
@@ -474,9 +479,8 @@ def _solved_in_pieces(
     rows, columns = matrix.shape
     narrow = np.delete(np.arange(columns), wide)
     order, _, _ = narrowest(sp.csc_array(matrix[:, narrow]), places)
-    place = np.empty(rows)
-    place[order] = np.arange(rows)
-    piece = (place // PIECE).astype(np.int64)
+    place = _places_in(order)
+    piece = place // PIECE
     n = int(piece.max()) + 1
     each = sp.csc_array((np.ones(rows), (np.arange(rows), piece)), shape=(rows, n))
     cut = [sp.diags_array(matrix[:, [k]].toarray()[:, 0]) @ each for k in wide]

@@ -117,8 +117,7 @@ class _Way:
                 [[one, -mu], [none, smooth]],
             ]
         )
-        state = np.where(self.closed, np.where(self.slides, np.where(self.sense < 0.0, 2, 3), 1), 0)
-        self.functions = self.in_state[state, :, :, np.arange(len(mu))].transpose(1, 2, 0).copy()
+        self.functions = self.in_state[self._states(slice(None)), :, :, np.arange(len(mu))].transpose(1, 2, 0).copy()
         self._factorise()
         self._measure()
 
@@ -147,8 +146,7 @@ class _Way:
             self.closed[number] = self.slides[number] = closes
             grows = 0
             put, read = np.array([1.0, friction * self.sense[number]]), np.array([1.0 if closes else -1.0, 0.0])
-        state = (3 if self.sense[number] > 0.0 else 2) if self.slides[number] else 1
-        self.functions[:, :, number] = self.in_state[state if self.closed[number] else 0, :, :, number]
+        self.functions[:, :, number] = self.in_state[self._states(number), :, :, number]
         if self.taken_in == TAKEN_IN or not self._taken_in(number, put, read):
             self._factorise()
         self._measure()
@@ -168,6 +166,10 @@ class _Way:
         return Moved(
             none, normal, shear[:, None], multiplier, 0, np.stack([normal, tau]), np.stack([gap, abs(slipped), slipped])
         )
+
+    def _states(self, numbers: slice | int) -> np.ndarray:
+        """Which of the four states points are in."""
+        return np.asarray(self.closed[numbers] * (1 + self.slides[numbers] * (1 + (self.sense[numbers] > 0.0))))
 
     def _measure(self) -> None:
         m = self.taken_in
