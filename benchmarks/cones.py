@@ -1,9 +1,9 @@
-"""Conic programs of walls in space: processor seconds of each way to a solution, and what its check says.
+"""Conic programs of walls in space: processor seconds, and what the check of the solution says.
 
-    python benchmarks/cones.py [BLOCKS ...] [--ways WAY ...]
+    python benchmarks/cones.py [BLOCKS ...]
 
 The program is that of the least reaction as half of the base of a running-bond wall begins to sink: 6 rows per free
-block, a round cone per contact point. Ways are those of ``solver.cones.solve``; by default our own and Clarabel.
+block, a round cone per contact point.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import numpy as np
 
 import solver
 import solver.program.admissible as admissible
-from solver.cones.problem import ConicProgram, ConicSolution
-from solver.cones.solve import OWN, solve_cones
 from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose
 from solver.program.model import Model
+from solver.programs.problem import ConicProgram, Solution
+from solver.programs.solve import solve_cones
 
 LENGTH, HEIGHT, THICKNESS, FRICTION = 0.25, 0.06, 0.12, 0.6
 
@@ -61,7 +61,7 @@ def program_of(assembly: solver.Assembly) -> tuple[ConicProgram, int]:
     sinks[assembly.moving, 2] = -1.0
     stated: list[ConicProgram] = []
 
-    def kept(program: ConicProgram) -> ConicSolution:
+    def kept(program: ConicProgram) -> Solution:
         stated.append(program)
         raise StopIteration
 
@@ -71,23 +71,21 @@ def program_of(assembly: solver.Assembly) -> tuple[ConicProgram, int]:
 
 
 def main() -> None:
-    """Solve each wall's program by each way."""
+    """Solve each wall's program."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("blocks", nargs="*", type=int, default=[40, 300, 1000])
-    parser.add_argument("--ways", nargs="*", default=[OWN, "clarabel"])
     arguments = parser.parse_args()
-    print(f"{'blocks':>7} {'points':>7}  {'way':<10} {'seconds':>8} {'iterations':>10} {'violation':>9} {'gap':>8}")
+    print(f"{'blocks':>7} {'points':>7} {'seconds':>8} {'iterations':>10} {'violation':>9} {'gap':>8}")
     for blocks in arguments.blocks:
         assembly = wall(blocks)
         program, points = program_of(assembly)
-        for way in arguments.ways:
-            started = time.process_time()
-            found = solve_cones(program, (way,))
-            seconds = time.process_time() - started
-            print(
-                f"{int(assembly.free.sum()):7} {points:7}  {way:<10} {seconds:8.2f} {found.iterations:10} "
-                f"{found.violation:9.1e} {found.gap:8.1e}   {found.objective:.9g}"
-            )
+        started = time.process_time()
+        found = solve_cones(program)
+        seconds = time.process_time() - started
+        print(
+            f"{int(assembly.free.sum()):7} {points:7} {seconds:8.2f} {found.iterations:10} "
+            f"{found.violation:9.1e} {found.gap:8.1e}   {found.objective:.9g}"
+        )
 
 
 if __name__ == "__main__":

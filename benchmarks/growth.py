@@ -27,7 +27,7 @@ import scipy
 import blockvis
 import solver
 from blockvis import generators
-from solver.program import closing, increment, light_blocks
+from solver.path import stepping
 
 SIZES = (50, 100, 200, 400, 800, 1600, 3200, 6400, 12800)
 BRICK = 0.25, 0.125  # m
@@ -73,10 +73,8 @@ class Clock:
 def one_size(blocks: int, increments: int) -> dict[str, Any]:
     """Measures one wall."""
     clock = Clock()
-    for module in (increment, light_blocks):
-        module.solve_lp = clock.timed("programs", module.solve_lp)
-    for module in (increment, closing):
-        module.find_contacts = clock.timed("contacts", module.find_contacts)
+    stepping.minimise = clock.timed("programs", stepping.minimise)
+    stepping.find_contacts = clock.timed("contacts", stepping.find_contacts)
     assembly = wall_of(blocks)
     told = []
 
@@ -85,8 +83,7 @@ def one_size(blocks: int, increments: int) -> dict[str, Any]:
 
     started = time.process_time()
     settlement = solver.Settlement(direction=(0.0, -1.0), increment=INCREMENT, limit=increments * INCREMENT)
-    controls = solver.Controls(increments="linear program")
-    response = solver.settle(assembly, settlement, friction_coefficient=0.6, controls=controls, on_increment=tell)
+    response = solver.settle(assembly, settlement, friction_coefficient=0.6, on_increment=tell)
     solved = time.process_time() - started
     written = time.process_time()
     with tempfile.TemporaryDirectory() as folder:

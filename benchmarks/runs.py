@@ -17,7 +17,7 @@ from growth import INCREMENT, Clock, wall_of
 
 import blockvis
 import solver
-from solver.program import increment, light_blocks
+from solver.path import stepping
 
 ARCH = Path(__file__).parents[1] / "assets" / "semicircular_arch.msh"
 
@@ -44,8 +44,7 @@ def arch(repeats: int = 7) -> None:
 def wall(increments: int, blocks: int) -> None:
     """A running-bond wall; where the seconds of an increment go."""
     clock = Clock()
-    for module in (increment, light_blocks):
-        module.solve_lp = clock.timed("programs", module.solve_lp)
+    stepping.minimise = clock.timed("programs", stepping.minimise)
     assembly = wall_of(blocks)
     weight = solver.total_weight(assembly)
     last = [time.process_time(), 0.0, 0]
