@@ -148,9 +148,8 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--check-steps",
         action=argparse.BooleanOptionalAction,
-        help="follow the path a second time, in steps half as long or, by linear programs, with its blocks in another "
-        "order, and say how far apart the two are (default: on another core, where there is one, and if it does not "
-        "take much longer than the run itself)",
+        help="follow the path a second time, with half the step tolerance, and say how far apart the two are (default: "
+        "on another core, where there is one, and if it does not take much longer than the run itself)",
     )
     run.set_defaults(verb=_run)
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
@@ -438,7 +437,7 @@ def _run(options: argparse.Namespace) -> int:
 @contextlib.contextmanager
 def _checking(options: argparse.Namespace, case: Case | None) -> Iterator[StepChecking | None]:
     """Follow a path in shorter steps meanwhile, where there is a core for it or it is asked for."""
-    from .runs.step_check import StepChecking, is_path, stored_case
+    from .runs.step_check import StepChecking, stored_case, takes_steps
 
     folder, checking = None, None
     if case is None:
@@ -447,7 +446,7 @@ def _checking(options: argparse.Namespace, case: Case | None) -> Iterator[StepCh
         with contextlib.suppress(ValueError, OSError):
             case = stored_case(folder)
     wanted = cores() > 1 if options.check_steps is None else options.check_steps
-    if case is not None and wanted and is_path(case):
+    if case is not None and wanted and takes_steps(case):
         checking = StepChecking(case, folder)
     try:
         yield checking
@@ -654,10 +653,13 @@ def _in_words(response: solver.Response, folder: Path) -> str:
     lines += kind.lines(response)
     worst = solver.worst_of(i.certificate for i in response.path)
     if worst is not None:
-        lines.append(
-            f"certificate: equilibrium residual {worst.equilibrium_residual:.1e} W, "
-            f"duality gap {worst.duality_gap:.1e}, penetration {worst.largest_penetration:.1e} m"
-        )
+        measures = {
+            "equilibrium residual {:.1e} W": worst.equilibrium_residual,
+            "friction exceeded by {:.1e} W": worst.friction_excess,
+            "duality gap {:.1e}": worst.duality_gap,
+            "penetration {:.1e} m": worst.largest_penetration,
+        }
+        lines.append(f"certificate: {', '.join(t.format(v) for t, v in measures.items() if np.isfinite(v))}")
     lines.append(f"results in {folder}/")
     return "\n".join(lines)
 

@@ -12,10 +12,7 @@ Conventions, written once:
 This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 """
 
-from .analysis.controls import INCREMENTS, Controls, Ending
-from .analysis.drivers import ControlDisplacement
 from .analysis.limit_load import limit_load, limit_load_envelope
-from .analysis.place import Checkpoint
 from .analysis.pushover import pushover, pushover_increments
 from .analysis.settlement import check_settlement, settle, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly, find_contacts, measure_contacts
@@ -29,7 +26,10 @@ from .geometry.shapes import Shapes
 from .interfaces import InterfaceLaw, Interfaces, JointScatter
 from .kinematics import Pose, carried, carried_between, motion_size, moved_vertices, point_velocities, swung, turned
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
-from .lp.problem import SolveError
+from .path.controls import INCREMENTS, Controls, Ending
+from .path.drivers import ControlDisplacement
+from .path.state import PathState
+from .programs.problem import SolveError
 from .results.certificate import Certificate, worst_of
 from .results.increment import ContactState, Increment, State, Status, StoredState
 from .results.limit import Envelope, LimitLoad, LimitStatus
@@ -61,7 +61,6 @@ __all__ = [
     "SETTLEMENT",
     "Assembly",
     "Certificate",
-    "Checkpoint",
     "Collapse",
     "ContactState",
     "Contacts",
@@ -78,6 +77,7 @@ __all__ = [
     "LimitStatus",
     "Loads",
     "Mechanism",
+    "PathState",
     "Polygons",
     "Polyhedra",
     "Pose",

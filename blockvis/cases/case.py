@@ -190,7 +190,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         loads=tuple(_load(entry) for entry in top.tables("loads")),
         analysis=kind.name,
         settings=settings[kind.name],
-        controls=_controls(analysis, geometry.number("overlap_tolerance", positive=True)),
+        controls=_controls(top, analysis, geometry.number("overlap_tolerance", positive=True)),
         explain=read_explain(top.table("explain")),
         animation=animation or None,
         vtu=output.text("vtu", "moved", among=("moved", "undeformed")),
@@ -329,6 +329,8 @@ def _settlement(table: Table) -> tuple[solver.Settlement, Profile | None]:
         "limit": table.number("limit", 1.0, positive=True),
         "tolerance": table.number("tolerance", positive=True),
     }
+    # Read with the controls.
+    table.take("step_tolerance")
     profile = read_profile(table)
     table.finish()
     if keys["limit"] / keys["increment"] > MOST_STEPS:
@@ -412,23 +414,16 @@ def _positions(table: Table) -> tuple[float, ...]:
     return tuple(np.linspace(given[0], given[1], int(given[2])).tolist())
 
 
-def _controls(table: Table, overlap_tolerance: float | None) -> solver.Controls:
-    default = solver.Controls()
-    counts = {}
-    for key in ("event_refinement", "correctors", "falling_frames"):
-        value = table.number(key, getattr(default, key))
-        if value is None:
-            continue
-        if value < (0 if key == "falling_frames" else 1) or value != int(value):
-            raise table.error(key, f"is {value:g}; give a whole number")
-        if value > MOST_STEPS:
-            raise table.error(key, f"is {value:g}; give at most {MOST_STEPS}")
-        counts[key] = int(value)
+def _controls(top: Table, analysis: Table, overlap_tolerance: float | None) -> solver.Controls:
+    frames = analysis.number("falling_frames")
+    if frames is not None and not (frames == int(frames) and 0 <= frames <= MOST_STEPS):
+        raise analysis.error("falling_frames", f"is {frames:g}; give a whole number from 0 to {MOST_STEPS}")
+    # What drives a path says how exact its steps are to be; a case has one path.
+    tables = (*top.tables("settlement"), top.table("control"))
+    tolerances = [table.fraction("step_tolerance") for table in tables]
     return solver.Controls(
-        increments=table.text("increments", default.increments, among=solver.INCREMENTS),
+        increments=analysis.text("increments", "coulomb", among=solver.INCREMENTS),
         overlap_tolerance=overlap_tolerance,
-        falling_frames=counts.get("falling_frames"),
-        trust_region=table.number("trust_region", positive=True),
-        event_refinement=counts["event_refinement"],
-        correctors=counts["correctors"],
+        falling_frames=None if frames is None else int(frames),
+        step_tolerance=min((t for t in tolerances if t is not None), default=solver.Controls.step_tolerance),
     )

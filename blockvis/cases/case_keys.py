@@ -18,6 +18,7 @@ from .distributions import KINDS as DISTRIBUTIONS
 from .explain_settings import DIRECTIONS, ExplainSettings
 from .imperfections import IMPERFECTIONS
 from .key import (
+    FRACTION,
     NOT_NEGATIVE,
     NUMBER,
     NUMBERS,
@@ -290,6 +291,8 @@ SETTLEMENT = Section(
             "m", 1.0),
         Key("tolerance", POSITIVE, "Width of the bracket of the collapse; of a rotation alone in rad", 1e-4, "m",
             otherwise="a hundredth of the increment"),
+        Key("step_tolerance", FRACTION, "Relative error of the reaction that steps aim for; the smallest of several "
+            "holds", 0.002, default=_CONTROLS.step_tolerance),
         Key("profile", _PROFILE, "How far each support goes, in proportion: a Gaussian trough or heave along x, points "
             "of a table, or one vector and rotation per support; s is the largest displacement of a support's centroid",
             {"kind": "gaussian", "centre": 1.5, "inflection": 0.8}, "m", otherwise="all go as far"),
@@ -335,16 +338,9 @@ ANALYSIS = Section(
         Key("increments", one_of(solver.INCREMENTS),
             'How increments are found: "coulomb", the path that friction without lift leaves, or "linear program", one '
             "per increment (Portioli and Cascini, 2017), of settlements only", "coulomb",
-            otherwise='"coulomb"; of settlements of more than 500 free blocks "linear program"'),
-        Key("event_refinement", whole(1, MOST_STEPS),
-            "Where the mechanism changes, an increment is taken again in steps down to one part in so many", 8,
-            default=_CONTROLS.event_refinement),
-        Key("correctors", whole(1, MOST_STEPS), "Largest number of corrections within an increment", 25,
-            default=_CONTROLS.correctors),
+            default="coulomb"),
         Key("falling_frames", whole(0, MOST_STEPS), "Frames of the mechanism after collapse", 20,
             otherwise=f"{_CONTROLS.frames(2)} in the plane, {_CONTROLS.frames(3)} in space"),
-        Key("trust_region", POSITIVE, "Largest movement of a block within one program", 0.1, "m",
-            otherwise="the block size, or ten increments where that is more"),
     ),
 )  # fmt: skip
 

@@ -50,6 +50,13 @@ class Table:
             raise self.error(key, f"is {value:g}; give a positive number")
         return float(value)
 
+    def fraction(self, key: str) -> float | None:
+        """Read a number between 0 and 1, neither of them itself; None if it is missing."""
+        value = self.number(key)
+        if value is not None and not 0.0 < value < 1.0:
+            raise self.error(key, f"is {value:g}; give a number above 0 and below 1")
+        return None if value is None else float(value)
+
     def pair(self, key: str, default: tuple[float, float] | None = None, words: str = "[x, y]") -> Any:
         """Read two finite numbers; ``words`` says in the error what they are."""
         value = self.take(key, default)

@@ -20,6 +20,25 @@ FAILED_BADGE = "SOLVER FAILED"
 #: without limit.
 MOST_OVER_LOWEST = 8.0
 
+#: Change of the reaction up to the first increment, as a part of the largest, that is seen in a curve.
+NOTABLE = 0.05
+
+
+def leaves_rest(response: solver.Response) -> bool:
+    """Whether the reaction has left that at rest by the first increment: it does so at once, not along a line.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    path = response.path
+    if len(path) < 2 or not response.measured.is_force or not response.parameter.is_path:
+        return False
+    # Increments by linear program have no reaction at rest, and no upper bound.
+    if path[0].parameter != 0.0 or np.isnan(path[0].largest):
+        return False
+    return bool(abs(path[1].measured - path[0].measured) > NOTABLE * np.abs(response.values).max())
+
 
 def in_one_unit(response: solver.Response, phase: int | None = None) -> solver.Response:
     """Leave out the phases that another unit parts from a given one: distances and rotations share no axis.

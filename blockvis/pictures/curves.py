@@ -23,6 +23,7 @@ from .captions import (
     collapse_places,
     force_unit,
     in_one_unit,
+    leaves_rest,
     lost_text,
     parameter_label,
     parameter_text,
@@ -192,10 +193,7 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
     if not response.parameter.is_path and len(path) == 1:
         _draw_single(axes, known, text)
         return
-    blue = palette.hexadecimal(palette.FORCE)
-    axes.plot(total, values, "-", color=blue, linewidth=2.0, zorder=3)
-    if events:
-        axes.plot(total, values, "o", color=blue, markersize=3.0, zorder=3)
+    _draw_line(axes, response, total, values, text if events else None)
     axes.set_xlabel(parameter_label(response), fontsize=text)
     axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5))
     if not moment and response.measured.is_force and response.total_weight > 0:
@@ -218,6 +216,24 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
         _mark_collapse(axes, response, total, values, text, events)
     if response.stop is solver.Status.SOLVER_FAILED:
         _mark_failure(axes, response, total, values, text, events)
+
+
+def _draw_line(
+    axes: Axes, response: solver.Response, total: np.ndarray, values: np.ndarray, text: float | None
+) -> None:
+    """Draw the path, in a file of its own with a dot at each increment and words of the size of ``text``."""
+    blue = palette.hexadecimal(palette.FORCE)
+    first = 1 if leaves_rest(response) else 0
+    axes.plot(total[first:], values[first:], "-", color=blue, linewidth=2.0, zorder=3)
+    axes.plot(total[: 2 * first], values[: 2 * first], ":", color=blue, linewidth=1.2, zorder=3)
+    if text is None:
+        return
+    axes.plot(total, values, "o", color=blue, markersize=3.0, zorder=3)
+    if first:
+        axes.annotate(
+            "at rest", (total[0], values[0]), xytext=(8, 0), textcoords="offset points", va="center",
+            fontsize=0.9 * text,
+        )  # fmt: skip
 
 
 def _mark_failure(

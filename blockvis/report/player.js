@@ -189,9 +189,14 @@
     // An unbounded multiplier is null: the line stops before it and starts again after it.
     if (!c.single) c.settlement.forEach((s, i) => {
       if (c.reaction[i] === null) return;
-      if (i && c.reaction[i - 1] !== null) pen.lineTo(X(s), Y(c.reaction[i])); else pen.moveTo(X(s), Y(c.reaction[i]));
+      if (i > (c.rest ? 1 : 0) && c.reaction[i - 1] !== null) pen.lineTo(X(s), Y(c.reaction[i])); else pen.moveTo(X(s), Y(c.reaction[i]));
     });
-    pen.stroke(); pen.restore();
+    pen.stroke();
+    if (c.rest) {
+      pen.lineWidth = 1.2; pen.setLineDash([2, 4]);
+      pen.beginPath(); pen.moveTo(X(c.settlement[0]), Y(c.reaction[0])); pen.lineTo(X(c.settlement[1]), Y(c.reaction[1])); pen.stroke(); pen.setLineDash([]);
+    }
+    pen.restore();
     if (c.collapse !== null) {
       pen.strokeStyle = model.colours.warning; pen.lineWidth = 1; pen.setLineDash([5, 4]);
       pen.beginPath(); pen.moveTo(X(c.collapse), top); pen.lineTo(X(c.collapse), h - bottom); pen.stroke(); pen.setLineDash([]);

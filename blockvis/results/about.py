@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,6 +61,22 @@ def about(response: solver.Response) -> About:
         finished=stamp.replace("T", " ").replace("Z", " UTC"),
         version=f"blockvis {record.versions.get('blockvis', '')}".strip(),
     )
+
+
+def least_reaction(first: solver.Increment) -> float:
+    """Find the reaction [N or N·m] that a first movement of the supports has to overcome.
+
+    Parameters
+    ----------
+    first : solver.Increment
+        Of a settlement, before anything has moved.
+
+    Returns
+    -------
+    float
+        The least that equilibrium allows there; the reaction at rest where equilibrium sets no bound.
+    """
+    return float(first.least if math.isfinite(first.least) else first.reaction)
 
 
 def collapse_mechanism(response: solver.Response) -> solver.Mechanism | None:

@@ -12,6 +12,9 @@ import solver
 
 from .joint_faces import InitialJoints, Rings, faces_of, grouped_by_face, initial_joints, lines
 
+#: Opening and slip, in block sizes, up to which a joint has not moved: equilibria are that exact.
+CLOSED = 1e-6
+
 
 @dataclass(frozen=True)
 class Faces:
@@ -280,6 +283,8 @@ class LargestMovements:
             place = sizes[here] @ middles[here] / sizes[here].sum()
             widest = here[self._largest[here].argmax(axis=0)]
             largest, at = (values[widest, [0, 1]] for values in (self._largest, self._at))
+            seen = largest > CLOSED * self.assembly.block_size
+            largest, at = np.where(seen, largest, 0.0), np.where(seen, at, 0.0)
             rows.append((f"{names[a]} | {names[b]}", *place, sizes[here].sum(), largest[0], at[0], largest[1], at[1]))
         rows.sort(key=lambda row: -max(row[d + 2], row[d + 4]))
         text = io.StringIO()
@@ -287,6 +292,5 @@ class LargestMovements:
         opening, slip = (f"{self.parameter.name} at largest {what}{unit}" for what in ("opening", "slip"))
         head = ("joint", *(f"{axis} [m]" for axis in "xyz"[:d]), "length [m]" if d == 2 else "area [m²]")
         table.writerow((*head, "largest opening [m]", opening, "largest slip [m]", slip))
-        # To the nanometre: what is smaller is rounding.
-        table.writerows((name, *(f"{round(number, 9) + 0.0:.6g}" for number in numbers)) for name, *numbers in rows)
+        table.writerows((name, *(f"{number + 0.0:.6g}" for number in numbers)) for name, *numbers in rows)
         return text.getvalue()

@@ -12,8 +12,11 @@ import numpy as np
 
 import solver
 
-from .about import collapse_mechanism, loss_of, mechanism_text
+from .about import collapse_mechanism, least_reaction, loss_of, mechanism_text
 from .record import Record
+
+#: Measures of the certificate of an increment.
+MEASURES = tuple(field.name for field in fields(solver.Certificate))
 
 #: Columns of response.csv.
 COLUMNS = (
@@ -25,12 +28,7 @@ COLUMNS = (
     "load_multiplier",
     "least_admissible",
     "largest_admissible",
-    "equilibrium_residual",
-    "largest_penetration",
-    "duality_gap",
-    "complementarity",
-    "kinematic_violation",
-    "energy_residual",
+    *MEASURES,
     "contacts_open",
     "contacts_sticking",
     "contacts_sliding",
@@ -60,7 +58,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
     """
     path, collapse = response.path, response.collapse
     worst = solver.worst_of(i.certificate for i in path)
-    residuals = {f.name: getattr(worst, f.name, math.nan) for f in fields(solver.Certificate)}
+    residuals = {name: getattr(worst, name, math.nan) for name in MEASURES}
     return {
         "status": str(response.stop),
         "message": response.message,
@@ -68,9 +66,8 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "collapse_displacement": collapse.displacement if collapse else None,
         "collapse_bracket": list(collapse.bracket) if collapse else None,
         "settlement_unit": response.settlements[-1].unit if response.settlements else response.parameter.unit,
-        "initial_reaction": path[0].reaction if path else None,
-        "reaction_at_rest": _known(path[0].at_rest) if path else None,
-        "onset_reaction": _known(path[0].onset) if path else None,
+        "initial_reaction": _initial_reaction(response),
+        "reaction_at_rest": path[0].reaction if path else None,
         "collapse_reaction": collapse.reaction if collapse else None,
         "mechanism": mechanism_text(response) if collapse else None,
         **_joint_counts(response),
@@ -95,9 +92,12 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
     }
 
 
-def _known(value: float) -> float | None:
-    """Give a number, or None where it was not worked out."""
-    return float(value) if np.isfinite(value) else None
+def _initial_reaction(response: solver.Response) -> float | None:
+    """Find the least reaction before anything has moved; bounds of a pushover are not of its reaction."""
+    if not response.path:
+        return None
+    first = response.path[0]
+    return least_reaction(first) if response.measured.is_force else first.reaction
 
 
 def _joint_counts(response: solver.Response) -> dict[str, int | None]:
@@ -154,12 +154,7 @@ def row_of_increment(
         repr(float(increment.load_multiplier)),
         repr(float(increment.least)),
         repr(float(increment.largest)),
-        f"{certificate.equilibrium_residual:.3e}",
-        f"{certificate.largest_penetration:.3e}",
-        f"{certificate.duality_gap:.3e}",
-        f"{certificate.complementarity:.3e}",
-        f"{certificate.kinematic_violation:.3e}",
-        f"{certificate.energy_residual:.3e}",
+        *(f"{getattr(certificate, name):.3e}" for name in MEASURES),
         *(int(counts[state]) for state in (0, 1, 2, 3)),
         len(mechanism.hinges),
         len(mechanism.sliding),

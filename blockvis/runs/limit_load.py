@@ -67,14 +67,14 @@ class LimitLoadCheckpoint:
     ----------
     limits : tuple of solver.LimitLoad
         Found so far, in the order of the increments that report them; numbers alone.
-    settlement : solver.Checkpoint, optional
+    settlement : solver.PathState, optional
         Where the settlement stands along which they are asked for.
     pose : solver.Pose, optional
         Where the settlement ended that comes before the places of a load.
     """
 
     limits: tuple[solver.LimitLoad, ...]
-    settlement: solver.Checkpoint | None = None
+    settlement: solver.PathState | None = None
     pose: solver.Pose | None = None
 
 
@@ -422,7 +422,7 @@ def _read_for_multipliers(increment: solver.Increment) -> solver.Increment:
 
 
 def _checkpoint(
-    run: AnalysisRun, *, settlement: solver.Checkpoint | None = None, pose: solver.Pose | None = None
+    run: AnalysisRun, *, settlement: solver.PathState | None = None, pose: solver.Pose | None = None
 ) -> LimitLoadCheckpoint:
     return LimitLoadCheckpoint(tuple(replace(limit, held=None) for limit in run.limits), settlement, pose)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 import solver
 from blockvis.cases.contents import Case
-from blockvis.cases.key import POSITIVE, TEXT, VECTOR, Key, Section
+from blockvis.cases.key import FRACTION, POSITIVE, TEXT, VECTOR, Key, Section
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import mechanism_text
 from blockvis.suggestions import nearest
@@ -31,6 +31,8 @@ CONTROL = Section(
         Key("limit", POSITIVE, "Displacement at which to stop if capacity is left", 0.5, "m", 1.0),
         Key("tolerance", POSITIVE, "Width of the bracket of the displacement at zero capacity", 1e-4, "m",
             otherwise="a hundredth of the increment"),
+        Key("step_tolerance", FRACTION, "Relative error of the multiplier that steps aim for; a smaller one of "
+            "[settlement] holds over it", 0.002, default=solver.Controls.step_tolerance),
     ),
 )  # fmt: skip
 
@@ -41,7 +43,7 @@ class PushoverKind(AnalysisKind):
     name = "pushover"
     parameter = solver.CONTROL_DISPLACEMENT
     measured = solver.LOAD_MULTIPLIER
-    checkpoint = solver.Checkpoint
+    checkpoint = solver.PathState
     lost = "capacity"
     sections = (CONTROL,)
 
@@ -58,6 +60,8 @@ class PushoverKind(AnalysisKind):
             "tolerance": table.number("tolerance", positive=True),
         }
         block = table.text("block")
+        # Read with the controls.
+        table.take("step_tolerance")
         table.finish()
         if block is None:
             raise table.error("block", "is missing; name the block whose displacement grows")
@@ -161,7 +165,7 @@ def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDis
     return control
 
 
-def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.Checkpoint | None) -> Steps:
+def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.PathState | None) -> Steps:
     case = given.case
     pose, steps = None, settlement_steps(given)
     # A pushover that has begun has its settlement behind it.

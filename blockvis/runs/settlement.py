@@ -12,14 +12,14 @@ import numpy as np
 import solver
 from blockvis.cases.contents import Case
 from blockvis.numbers import force_text
-from blockvis.results.about import loss_of, mechanism_text
+from blockvis.results.about import least_reaction, loss_of, mechanism_text
 
 from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, needs_dry_joints
 
 #: The methods in words, as ``[analysis] increments`` has them.
 COULOMB, LINEAR_PROGRAM = solver.INCREMENTS
 
-#: Difference of two reactions, in weights, that is worth a line.
+#: Difference of two reactions, in weights, of moments at a block's length, that is worth a line.
 NOTABLE = 1e-3
 
 
@@ -29,7 +29,7 @@ class SettlementKind(AnalysisKind):
     name = "settlement"
     parameter = solver.SETTLEMENT
     measured = solver.REACTION
-    checkpoint = solver.Checkpoint
+    checkpoint = solver.PathState
     in_studies = True
 
     def checked(self, case: Case) -> Case:
@@ -81,11 +81,11 @@ class SettlementKind(AnalysisKind):
         if _method(response) == LINEAR_PROGRAM:
             lines.append("increments by linear program: reactions are the least that equilibrium allows")
         if path:
-            lines.append(f"first reaction       {reaction(path[0].reaction, path[0])}")
-            onset = path[0].onset
-            if abs(onset - path[0].reaction) > NOTABLE * weight:
+            first = least_reaction(path[0])
+            lines.append(f"first reaction       {reaction(first, path[0])}")
+            if _rests_elsewhere(response):
                 lines[-1] += "   the least that equilibrium allows"
-                lines.append(f"reaction at onset    {reaction(onset, path[0])}   where friction leaves it")
+                lines.append(f"reaction at rest     {reaction(path[0].reaction, path[0])}   before anything moves")
         if response.collapse is not None:
             low, high = response.collapse.bracket
             at = response.collapse.displacement
@@ -118,8 +118,8 @@ class SettlementKind(AnalysisKind):
         """Give the settlement at collapse, first and last reaction."""
         path, weight, c = response.path, response.total_weight, response.collapse
 
-        def reaction(increment: solver.Increment) -> str:
-            value, moment = increment.reaction, _is_moment(response, increment)
+        def reaction(value: float, increment: solver.Increment) -> str:
+            moment = _is_moment(response, increment)
             over = "" if moment or weight <= 0 else f" = {value / weight:.4f} W"
             return force_text(value, moment) + over
 
@@ -128,8 +128,10 @@ class SettlementKind(AnalysisKind):
             rows.append(("collapse displacement", f"{c.displacement:.6g} {c.unit}"))
             rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))
         if path:
-            rows.append(("first reaction", reaction(path[0])))
-            rows.append(("last reaction", reaction(path[-1])))
+            rows.append(("first reaction", reaction(least_reaction(path[0]), path[0])))
+            if _rests_elsewhere(response):
+                rows.append(("reaction at rest", reaction(path[0].reaction, path[0])))
+            rows.append(("last reaction", reaction(path[-1].reaction, path[-1])))
         return rows
 
 
@@ -147,25 +149,32 @@ def stored_settlements(summary: Mapping[str, Any]) -> tuple[solver.Settlement, .
     return tuple(solver.Settlement(**motion) for motion in motions)
 
 
+def _rests_elsewhere(response: solver.Response) -> bool:
+    """Whether the reaction at rest is notably above the least that equilibrium allows there."""
+    first = response.path[0]
+    size = response.total_weight * (response.assembly.block_size if _is_moment(response, first) else 1.0)
+    return abs(first.reaction - least_reaction(first)) > NOTABLE * size
+
+
 def _is_moment(response: solver.Response, increment: solver.Increment) -> bool:
     """Whether the supports rotate in the phase of an increment: what resists them is a moment."""
     return response.settlements[increment.phase].unit == "rad"
 
 
 def _method(response: solver.Response) -> str | None:
-    """Name the method of the increments: only the path of Coulomb friction bounds its reactions."""
+    """Name the method of the increments: only the path of Coulomb friction has an upper bound of its reactions."""
     if not response.path:
         return None
-    return LINEAR_PROGRAM if np.isnan(response.path[0].least) else COULOMB
+    return LINEAR_PROGRAM if np.isnan(response.path[0].largest) else COULOMB
 
 
-def settlement_steps(given: RunInput, resume: solver.Checkpoint | None = None) -> Steps:
+def settlement_steps(given: RunInput, resume: solver.PathState | None = None) -> Steps:
     """Follow the settlements of a case under the dead load alone; without settlements there are no increments.
 
     Parameters
     ----------
     given : RunInput
-    resume : solver.Checkpoint, optional
+    resume : solver.PathState, optional
     """
     case = given.case
     if not case.settlements:

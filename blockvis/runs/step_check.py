@@ -1,4 +1,4 @@
-"""How exact a run is: the same path in steps half as long or, by linear programs, with its blocks in another order."""
+"""How exact a run is: the same path with half the error that its steps aim for."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,6 @@ from blockvis.processes import interpreter, unread
 from blockvis.results.folder import STEP_CHECK, stored_assembly
 from blockvis.results.record import read_record
 
-from .kind import AnalysisRun
 from .kinds import KINDS
 from .plan import planned
 from .reopen import open_results
@@ -36,21 +35,8 @@ SAME = 1e-9
 #: Difference that is worth a warning, and the smallest that is told.
 NOTABLE, SMALLEST = 0.01, 1e-4
 
-#: What makes another run of the same case: what its difference is called, the other run, and a warning.
-WAYS = {
-    "steps": (
-        "error of the steps",
-        "in steps half as long",
-        "the steps matter by more than {percent:g} %: where many joints slide, or stones slip off each other, a wall "
-        "may have several paths; try half the increment, and give results with that range",
-    ),
-    "order": (
-        "error of rounding",
-        "with its blocks in another order",
-        "rounding matters by more than {percent:g} %: linear programs have several solutions where joints slide; give "
-        'results with that range, or take [analysis] increments = "coulomb", which takes many times as long',
-    ),
-}
+#: The way to find increments that has no steps of its own.
+LINEAR_PROGRAM = solver.INCREMENTS[1]
 
 #: Seconds between looks for Ctrl-C while waiting, and after which waiting is worth a word.
 LOOK, WORTH_A_WORD = 0.2, 2.0
@@ -61,7 +47,7 @@ LESS_URGENT = 5
 
 @dataclass(frozen=True)
 class StepCheck:
-    """How far a run and another in steps half as long are apart.
+    """How far a run and another with half the step tolerance are apart.
 
     Attributes
     ----------
@@ -77,8 +63,6 @@ class StepCheck:
         Difference of the displacements at collapse, as a fraction; nan unless both collapse.
     stop, stop_of_check : str
         How both ended.
-    way : str
-        What makes the other: a key of ``WAYS``.
     """
 
     what: str
@@ -88,7 +72,6 @@ class StepCheck:
     collapse: float
     stop: str
     stop_of_check: str
-    way: str = "steps"
 
     @property
     def error(self) -> float:
@@ -102,15 +85,17 @@ class StepCheck:
             parts.append(f"collapse {_percent(self.collapse)}")
         if self.stop != self.stop_of_check:
             parts.append(f"one ends as '{self.stop}', the other as '{self.stop_of_check}'")
-        what, other, _ = WAYS[self.way]
-        return f"{what}: {', '.join(parts)} (apart from a run {other})"
+        return f"error of the steps: {', '.join(parts)} (apart from a run with half the step tolerance)"
 
     @property
     def warning(self) -> str:
         """What there is to say where the difference matters; nothing where it does not."""
         if self.error <= NOTABLE and self.stop == self.stop_of_check:
             return ""
-        return WAYS[self.way][2].format(percent=100.0 * NOTABLE)
+        return (
+            f"the steps matter by more than {100.0 * NOTABLE:g} %: take a smaller step_tolerance; where that changes "
+            "nothing, as where stones slip off each other, a wall may have several paths: give results with that range"
+        )
 
 
 @dataclass(frozen=True)
@@ -124,14 +109,11 @@ class Traced:
     collapse : float, optional
         Displacement at collapse.
     stop : str
-    way : str, optional
-        How it was followed: a key of ``WAYS``.
     """
 
     measured: list[tuple[int, float, float]]
     collapse: float | None
     stop: str
-    way: str = "steps"
 
 
 class StepChecking:
@@ -140,7 +122,7 @@ class StepChecking:
     Parameters
     ----------
     case : Case
-        That :func:`is_path`.
+        That :func:`takes_steps`.
     folder : Path, optional
         Where the assembly is stored, for a run that goes on.
     """
@@ -227,9 +209,9 @@ def main() -> None:
     os._exit(0)
 
 
-def is_path(case: Case) -> bool:
-    """Whether a case follows a path, which can be compared with another."""
-    return KINDS[case.analysis].course(case).parameter.is_path
+def takes_steps(case: Case) -> bool:
+    """Whether a case follows a path in steps that choose themselves: a linear program per increment has none."""
+    return case.controls.increments != LINEAR_PROGRAM and KINDS[case.analysis].course(case).parameter.is_path
 
 
 def stored_case(folder: Path) -> Case:
@@ -247,7 +229,7 @@ def stored_case(folder: Path) -> Case:
 
 
 def check_steps(folder: str | Path) -> StepCheck:
-    """Follow the run of a results folder again in steps half as long, compare, and write ``step_check.json``.
+    """Follow the run of a results folder again with half the step tolerance, compare, and write ``step_check.json``.
 
     Parameters
     ----------
@@ -257,18 +239,17 @@ def check_steps(folder: str | Path) -> StepCheck:
     Raises
     ------
     ValueError
-        For a run without a case file, or that is no path, but a limit load.
+        For a run without a case file, or that takes no steps: a limit load, or increments by linear program.
     """
     folder = Path(folder)
-    case, response, other = stored_case(folder), open_results(folder), None
-    if response.parameter.is_path and response.path:
-        other = _followed_again(case, response.assembly)
-    if other is None:
+    case, response = stored_case(folder), open_results(folder)
+    if not (takes_steps(case) and response.path):
+        by = ", by linear program" if case.controls.increments == LINEAR_PROGRAM else ""
         raise ValueError(
             f"'{folder}' has no path whose steps could be checked ({response.analysis}, {len(response.path)} "
-            "increments); it takes a settlement or a pushover"
+            f"increments{by}); it takes a settlement or a pushover"
         )
-    return _written(folder, compared(response, other))
+    return _written(folder, compared(response, _followed_again(case, response.assembly)))
 
 
 def stored_check(folder: Path) -> StepCheck | None:
@@ -276,7 +257,8 @@ def stored_check(folder: Path) -> StepCheck | None:
     if not (folder / STEP_CHECK).is_file():
         return None
     numbers = json.loads((folder / STEP_CHECK).read_text(encoding="utf-8"))
-    return StepCheck(**{**numbers, "collapse": np.nan if numbers["collapse"] is None else numbers["collapse"]})
+    known = {field.name: numbers[field.name] for field in fields(StepCheck)}
+    return StepCheck(**{**known, "collapse": np.nan if known["collapse"] is None else known["collapse"]})
 
 
 def traced(response: solver.Response) -> Traced:
@@ -285,19 +267,10 @@ def traced(response: solver.Response) -> Traced:
     return Traced([(i.phase, i.parameter, i.measured) for i in response.path], collapse, str(response.stop))
 
 
-def _followed_again(case: Case, assembly: solver.Assembly) -> Traced | None:
-    """Follow the path of a case in steps half as long, or otherwise where it has no steps; None where it is no path."""
-    finer = replace(case.controls, shorter_steps=2.0 * case.controls.shorter_steps, falling_frames=1)
-    found = _increments(planned(replace(case, controls=finer), assembly))
-    if found is None and assembly.dimension == 2:
-        linear = replace(case.controls, increments="linear program", falling_frames=1)
-        found = _increments(planned(replace(case, controls=linear), _reversed(assembly)), least=False)
-        return None if found is None else replace(found, way="order")
-    return found
-
-
-def _increments(run: AnalysisRun, *, least: bool = True) -> Traced | None:
-    """Follow a run; None where its equilibria have no least reaction, though asked for: it goes by linear programs."""
+def _followed_again(case: Case, assembly: solver.Assembly) -> Traced:
+    """Follow the path of a case in steps whose error is to be half of that which the case asks for."""
+    finer = replace(case.controls, step_tolerance=0.5 * case.controls.step_tolerance, falling_frames=1)
+    run = planned(replace(case, controls=finer), assembly)
     found: list[solver.Increment] = []
     while True:
         try:
@@ -305,20 +278,6 @@ def _increments(run: AnalysisRun, *, least: bool = True) -> Traced | None:
         except StopIteration as stop:
             ending: solver.Ending = stop.value
             return traced(run.response(found, ending))
-        if least and np.isnan(found[0].least) and found[0].status == solver.Status.EQUILIBRIUM:
-            return None
-
-
-def _reversed(assembly: solver.Assembly) -> solver.Assembly:
-    """Turn the order of the blocks of an assembly in the plane around."""
-    return solver.Assembly.from_outlines(
-        [assembly.outline(block) for block in reversed(range(assembly.n_blocks))],
-        names=assembly.names[::-1],
-        roles=assembly.roles[::-1].tolist(),
-        density=assembly.density[::-1],
-        thickness=assembly.thickness[::-1],
-        materials=assembly.materials[::-1],
-    )
 
 
 def _percent(part: float) -> str:
@@ -332,7 +291,7 @@ def _written(folder: Path, check: StepCheck) -> StepCheck:
 
 
 def compared(response: solver.Response, other: Traced) -> StepCheck:
-    """Compare a run with another in shorter steps.
+    """Compare a run with another of shorter steps.
 
     Parameters
     ----------
@@ -362,5 +321,4 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
         collapse=collapse,
         stop=ours.stop,
         stop_of_check=other.stop,
-        way=other.way,
     )

@@ -16,7 +16,7 @@ import solver
 from blockvis.cases.build import case_assembly, case_interfaces, case_loads, case_settlements
 from blockvis.cases.case import Case, case_of
 from blockvis.pictures.annotations import settlement_arrows
-from blockvis.results.about import loss_in
+from blockvis.results.about import least_reaction, loss_in
 
 from .study_file import run_values
 
@@ -126,7 +126,7 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
         "message": ending.message if ending.collapse is None else "",
         "unit": case.settlements[-1].unit,
         "last_settlement": float(last.settlement + before[last.phase]) if last else 0.0,
-        "initial_reaction": float(first.reaction) if first else None,
+        "initial_reaction": least_reaction(first) if first else None,
         "collapse_reaction": None,
         "total_weight": solver.total_weight(assembly),
         "increments": n_path,

@@ -9,17 +9,17 @@ import numpy as np
 import scipy.sparse as sp
 
 from solver.assembly import Assembly, check_blocks, find_contacts
-from solver.cones.solve import solve_between
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose, dimension_of, moved_vertices, unit_lengths
 from solver.loads import Loads, checked_loads
-from solver.lp.problem import Unbounded
 from solver.program.strength import Admissible, point_strength
 from solver.program.torsion import POINTS, TORSIONS, UNIFORM, Faces, face_wrench_matrix, point_forces
 from solver.program.without_dilatancy import solve_without_dilatancy
-from solver.results.certificate import Certificate
+from solver.programs.problem import Unbounded
+from solver.programs.solve import solve_between
+from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.limit import Envelope, LimitLoad, LimitStatus, limit_state
 from solver.tolerances import COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
 
@@ -395,7 +395,6 @@ class _Problem:
         kinematic = (taken - float(self.dead @ velocity)) / live_power if live_power > 0.0 else np.inf
         kinematic += float(self.price @ state.forces[:, 0])
         room = relative[:, 0] + closer - slope * slip
-        lost = (state.forces * relative).sum(axis=1) + drag * slip + crushed
         balance = self.matrix @ state.forces.ravel() + self.dead + multiplier * self.live
         total = float(np.abs(self.dead).sum()) or 1.0
         units = 1.0 / unit_lengths(self.pose.positions.shape[1] + self.pose.rotations.shape[1], self.length)
@@ -411,9 +410,10 @@ class _Problem:
             bounds=(static, kinematic / self.live_size) if found else (nothing, nothing),
             certificate=Certificate(
                 equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / total,
-                largest_penetration=float(np.maximum(-self.contacts.gaps, 0.0).max(initial=0.0)),
+                friction_excess=friction_excess(state.forces, self.friction, self.cohesion) / total,
+                carrying_gap=carrying_gap(self.contacts, state.forces),
+                largest_penetration=largest_penetration(self.contacts),
                 duality_gap=abs(kinematic - multiplier) / (1.0 + abs(multiplier)) if found else state.gap,
-                complementarity=float(np.abs(lost).sum()) / (1.0 + abs(multiplier)) if found else 0.0,
                 kinematic_violation=float(np.maximum(-room, 0.0).max(initial=0.0)) / size,
             ),
             status=status,

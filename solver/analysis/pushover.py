@@ -8,17 +8,16 @@ from solver.assembly import Assembly, check_blocks
 from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose
 from solver.loads import Loads
-from solver.lp.problem import SolveError
-from solver.program.step import NotSolved
+from solver.path.controls import LINEAR_PROGRAM, Controls, Ending
+from solver.path.drivers import ControlDisplacement, ControlledLoad
+from solver.path.path import Path
+from solver.path.state import PathState
+from solver.programs.problem import SolveError
 from solver.results.increment import Increment, Status
 from solver.results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER
 from solver.results.response import Response
 
-from .controls import LINEAR_PROGRAM, Controls, Ending
-from .drivers import ControlDisplacement, ControlledLoad
 from .limit_load import checked_live
-from .path import Path
-from .place import Checkpoint, Falls
 from .settlement import drained, model_of, timed
 
 
@@ -65,7 +64,7 @@ def pushover(
 
     Notes
     -----
-    The path is that of a settlement, see :mod:`solver.analysis.path`, with the multiplier as one more unknown and the
+    The path is that of a settlement, see :mod:`solver.path.path`, with the multiplier as one more unknown and the
     control displacement as one more equation.
     """
     interfaces = interfaces or Interfaces(InterfaceLaw(friction_coefficient))
@@ -95,7 +94,7 @@ def pushover_increments(
     interfaces: Interfaces,
     controls: Controls | None = None,
     pose: Pose | None = None,
-    resume: Checkpoint | None = None,
+    resume: PathState | None = None,
 ) -> Generator[Increment, None, Ending]:
     """The increment loop of :func:`pushover` as a generator: yields each Increment, returns the Ending.
 
@@ -103,7 +102,7 @@ def pushover_increments(
 
     Parameters
     ----------
-    resume : Checkpoint, optional
+    resume : PathState, optional
         Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
         for bit as if the loop had not been interrupted. ``pose`` is not looked at then.
     """
@@ -131,21 +130,17 @@ def _increments(
     interfaces: Interfaces,
     controls: Controls,
     pose: Pose | None,
-    resume: Checkpoint | None,
+    resume: PathState | None,
 ) -> Generator[Increment, None, Ending]:
     start = Pose.initial(assembly) if pose is None else pose
     if resume is not None:
         start = resume.start
     model = model_of(assembly, loads, interfaces, loads.live)
     path = Path(model, ControlledLoad(assembly, control, start), 0, controls)
-    place = path.steps.at_start(start)
-    if resume is None:
-        try:
-            place = path.rested(start)
-        except (NotSolved, Falls):
-            # A pose that is given may stand with its live load only.
-            place = path.steps.at_start(start)
+    at = 0.0
     try:
-        return (yield from path.follow(place, resume))
+        state = path.begin(start) if resume is None else resume
+        at = state.place.s
+        return (yield from path.follow(state, resume is not None))
     except SolveError as error:
-        return Ending(Status.SOLVER_FAILED, f"at a control displacement of {path.last.s:.6g} m: {error}")
+        return Ending(Status.SOLVER_FAILED, f"at a control displacement of {at:.6g} m: {error}")

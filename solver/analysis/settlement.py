@@ -13,20 +13,18 @@ from solver.assembly import Assembly, check_blocks
 from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose
 from solver.loads import Loads, Settlement, checked_loads
-from solver.lp.problem import SolveError
-from solver.lp.threads import NotLimited, one_thread
+from solver.paper_method import linear_program_increments
+from solver.path.controls import LINEAR_PROGRAM, Controls, Ending
+from solver.path.drivers import SupportMotion
+from solver.path.local_origin import at_origin, told_from, without_origin
+from solver.path.path import Path
+from solver.path.state import PathState, Place
 from solver.program.model import Model
-from solver.program.step import NotSolved
+from solver.programs.problem import SolveError
+from solver.programs.threads import NotLimited, one_thread
 from solver.results.increment import Increment, Status
 from solver.results.quantities import reaction_to, settlement_in
 from solver.results.response import Response
-
-from .controls import LARGEST_FOLLOWED, LINEAR_PROGRAM, Controls, Ending
-from .drivers import SupportMotion
-from .linear_program import linear_program_increments
-from .local_origin import at_origin, told_from, without_origin
-from .path import Path
-from .place import Checkpoint, Falls, Place
 
 
 def settle(
@@ -115,7 +113,7 @@ def settlement_increments(
     interfaces: Interfaces,
     loads: Loads,
     controls: Controls | None = None,
-    resume: Checkpoint | None = None,
+    resume: PathState | None = None,
 ) -> Generator[Increment, None, Ending]:
     """The increment loop of :func:`settle` as a generator: yields each Increment, returns the Ending.
 
@@ -123,58 +121,28 @@ def settlement_increments(
 
     Parameters
     ----------
-    resume : Checkpoint, optional
+    resume : PathState, optional
         Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
         for bit as if the loop had not been interrupted.
     """
     controls = controls or Controls()
     check_settlement(assembly, phases, controls)
     interfaces.refuse_strength("a settlement")
-    by_program = controls.increments == LINEAR_PROGRAM or (
-        controls.increments is None and assembly.dimension == 2 and int(assembly.free.sum()) > LARGEST_FOLLOWED
-    )
+    by_program = controls.increments == LINEAR_PROGRAM
     if by_program and assembly.dimension == 3:
         raise ValueError("increments = 'linear program' is for blocks in the plane; leave it out for blocks in space")
-    if resume is not None and (
-        resume.phase > len(phases) - (resume.program is None) or len(resume.start.rotations) != assembly.n_blocks
-    ):
+    if resume is not None and (resume.phase >= len(phases) or len(resume.start.rotations) != assembly.n_blocks):
         raise ValueError(
             f"the checkpoint is of phase {resume.phase + 1} with {len(resume.start.rotations)} blocks; there are "
             f"{len(phases)} phases and {assembly.n_blocks} blocks: it belongs to another run"
         )
     origin = at_origin(assembly)
     near, local = (assembly, phases) if not origin.any() else without_origin(origin, assembly, phases)
-    if resume is not None and by_program != (resume.program is not None):
+    if resume is not None and resume.place.s > 0.0 and by_program != (resume.place.contacts is None):
         raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
-    if by_program:
-        steps = timed(_by_program(near, local, interfaces, loads, controls, resume))
-    else:
-        steps = timed(_increments(near, local, interfaces, loads, controls, resume))
+    found = linear_program_increments if by_program else _increments
+    steps = timed(found(near, local, interfaces, loads, controls, resume))
     return (yield from (steps if not origin.any() else told_from(steps, origin)))
-
-
-def _by_program(
-    assembly: Assembly,
-    phases: Sequence[Settlement],
-    interfaces: Interfaces,
-    loads: Loads,
-    controls: Controls,
-    resume: Checkpoint | None,
-) -> Generator[Increment, None, Ending]:
-    """Yield the increments by linear program, their checkpoints in those of every settlement."""
-    from_there = None if resume is None else resume.program
-    steps = linear_program_increments(assembly, phases, interfaces, loads, controls, from_there)
-    while True:
-        try:
-            increment = next(steps)
-        except StopIteration as stop:
-            ending: Ending = stop.value
-            return ending
-        found = increment.checkpoint
-        if found is not None:
-            place = Place(found.here.s, found.here.pose, None, np.zeros((0, assembly.dimension)))
-            found = Checkpoint(found.phase, found.start, place, found.step, found.first_without, program=found)
-        yield replace(increment, checkpoint=found)
 
 
 def _increments(
@@ -183,37 +151,25 @@ def _increments(
     interfaces: Interfaces,
     loads: Loads,
     controls: Controls,
-    resume: Checkpoint | None,
+    resume: PathState | None,
 ) -> Generator[Increment, None, Ending]:
     first = 0 if resume is None else resume.phase
-    place: Place | None = None
+    before: Place | None = None
     ending = Ending(Status.LIMIT_REACHED, "the settlement has reached its limit")
     for number, phase in enumerate(phases[first:], start=first):
-        start = Pose.initial(assembly) if place is None else place.pose
-        if resume is not None:
-            start = resume.start
-        driver = SupportMotion(assembly, phase, start)
-        path = Path(model_of(assembly, loads, interfaces), driver, number, controls)
-        if resume is not None:
-            place = resume.place
-        elif place is None:
-            try:
-                place = path.rested(start)
-            except (NotSolved, Falls):
-                place = path.steps.at_start(start)
-            except SolveError as error:
-                return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
-        else:
-            # Joints remember what they carried in the phase before; the way they moved is another.
-            place = replace(place, s=0.0, velocity=None)
+        start = Pose.initial(assembly) if before is None else before.pose
+        start = start if resume is None else resume.start
+        path = Path(model_of(assembly, loads, interfaces), SupportMotion(assembly, phase, start), number, controls)
+        at = 0.0
         try:
-            ending = yield from path.follow(place, resume)
+            state = path.begin(start, before) if resume is None else resume
+            at = state.place.s
+            ending = yield from path.follow(state, resume is not None)
         except SolveError as error:
-            return Ending(Status.SOLVER_FAILED, f"at a settlement of {path.last.s:.6g} {phase.unit}: {error}")
-        resume = None
+            return Ending(Status.SOLVER_FAILED, f"at a settlement of {at:.6g} {phase.unit}: {error}")
+        resume, before = None, path.state.place
         if ending.stop is not Status.LIMIT_REACHED:
             return ending
-        place = path.last
     return ending
 
 
@@ -223,7 +179,7 @@ def model_of(assembly: Assembly, loads: Loads, interfaces: Interfaces, live: np.
     if force == 0.0:
         raise ValueError("no load acts on any free block; give them a weight")
     length = assembly.block_size
-    return Model(assembly, interfaces, loads.dead, length, force, length, length / 4.0, live=live)
+    return Model(assembly, interfaces, loads.dead, length, force, length / 4.0, live=live)
 
 
 def timed(steps: Generator[Increment, None, Ending]) -> Generator[Increment, None, Ending]:

@@ -321,42 +321,6 @@ def _once(
     return vertex[first], edge[first], corner[first]
 
 
-def feature_pairs(shapes: Outlines, contacts: Contacts) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of the corner-edge pairs that each contact stands for.
-
-    Returns
-    -------
-    own : (n,) int array
-        The corner on the edge.
-    reverse : (n,) int array
-        Where a corner stands on a corner, the other corner on the other face; -1 elsewhere.
-    """
-    n = len(shapes.vertices)
-    vertex, edge, corner = corners_and_edges(contacts.features)
-    own = vertex.astype(np.int64) * n + edge
-    reverse = np.full(len(contacts), -1, dtype=np.int64)
-    k = np.flatnonzero(corner >= 0)
-    reverse[k] = corner[k].astype(np.int64) * n + _facing_edge(shapes, vertex[k], edge[k], corner[k])
-    return own, reverse
-
-
-def past_the_end(shapes: Outlines, contacts: Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """How far contact points are beyond the end of the edge they are on.
-
-    Returns
-    -------
-    past : (n,) array [m]
-        Negative before the end; of a corner on a corner, its distance from there.
-    zone : (n,) array [m]
-        How near the end a corner counts as standing on the corner there.
-    on_corner : (n,) bool array
-    """
-    vertex, edge, corner = corners_and_edges(contacts.features)
-    along = contacts.slip[:, 0]
-    far = np.where(corner >= 0, 0.0, shapes.edge_lengths[edge])
-    return np.maximum(-along, along - far), end_zone(shapes, vertex, edge), corner >= 0
-
-
 def _facing_edge(shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
     """Find the edge of the corner's block that lies over ``edge`` where ``vertex`` stands on ``corner``.
 

@@ -2,26 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from solver.assembly import Assembly
 from solver.interfaces import Interfaces
-from solver.kinematics import dimension_of, motion_size, unit_lengths
-from solver.lp.solve import SIMPLEX_ROWS
-
-
-@dataclass
-class Tally:
-    """Programs solved since the last increment."""
-
-    programs: int = 0
-
-    def take(self) -> int:
-        """What has been counted; starts again from zero."""
-        counted, self.programs = self.programs, 0
-        return counted
+from solver.kinematics import dimension_of, unit_lengths
 
 
 @dataclass(frozen=True)
@@ -37,11 +24,8 @@ class Model:
     length : float [m]
     force : float [N]
         Block size and mean load of a free block: the program is written in these units.
-    trust : float [m]
-        Largest movement of a block in one program.
     reach : float [m]
         Largest gap of a contact point that is kept.
-    tally : Tally
     live : (n_blocks, n_dof) array [N, N·m], optional
         Where given, loads whose multiplier is an unknown of every program: it takes the value that lets the program
         do its work.
@@ -52,9 +36,7 @@ class Model:
     load: np.ndarray
     length: float
     force: float
-    trust: float
     reach: float
-    tally: Tally = field(default_factory=Tally)
     live: np.ndarray | None = None
 
     @property
@@ -66,11 +48,6 @@ class Model:
     def dimension(self) -> int:
         """2 in the plane, 3 in space."""
         return dimension_of(self.n_dof)
-
-    @property
-    def large(self) -> bool:
-        """Whether programs are too large for vertex solutions, and corrections therefore stop before they are exact."""
-        return self.n_dof * int(self.assembly.free.sum()) > SIMPLEX_ROWS
 
     @property
     def lengths(self) -> np.ndarray:
@@ -101,8 +78,3 @@ class Model:
     def live_force(self) -> float:
         """Resultant of the live loads at a multiplier of 1 [N]; zero without."""
         return 0.0 if self.live is None else float(np.linalg.norm(self.live[:, : self.dimension].sum(axis=0)))
-
-
-def largest_movement(model: Model, motion: np.ndarray) -> float:
-    """Largest movement of a block [m], rotations times the unit of length."""
-    return float(motion_size(motion, model.length).max(initial=0.0))

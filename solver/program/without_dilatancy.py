@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from solver.cones.problem import ConicSolution
-from solver.cones.solve import solve_between
-from solver.lp.problem import LPSolution
+from solver.programs.problem import Solution
+from solver.programs.solve import solve_between
 
 #: Cost of unbalanced force, in multipliers: far above that of any real mechanism.
 UNBALANCED_COST = 1e3
@@ -27,14 +26,14 @@ class Found:
         The shear force that each point has whatever its normal force is.
     unbalanced : float
         Largest unbalanced force.
-    solution : LPSolution or ConicSolution
+    solution : Solution
     """
 
     forces: np.ndarray
     multiplier: float
     constant: np.ndarray
     unbalanced: float
-    solution: LPSolution | ConicSolution
+    solution: Solution
 
 
 def solve_without_dilatancy(

@@ -1,44 +1,74 @@
-"""Certificate: the measures by which an increment proves itself."""
+"""Certificate: the measures by which a result proves itself, each recomputed from forces, geometry and loads."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from solver.geometry.contacts import Contacts
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """Measures by which an increment proves itself.
+    """Measures by which a result proves itself: with W the total load on the free blocks, n and t contact forces.
 
     Attributes
     ----------
     equilibrium_residual : float
-        Largest unbalanced force on a free block (moments over the block size), relative to the total weight.
+        max |A f + loads| / W over the free blocks, moments over the block size: largest force out of balance.
+    friction_excess : float
+        max (|T| - μ N - c) / W over the contact points, at least 0: shear force beyond friction and cohesion; the
+        resultant of a face where torsion is that of a uniform pressure.
+    carrying_gap : float [m]
+        Largest gap of a contact point that carries more than a millionth of the largest normal force.
     largest_penetration : float [m]
-        Deepest overlap at a contact point after the geometry has been updated.
+        max (-gap, 0): deepest overlap at a contact point after the geometry has been updated.
     duality_gap : float
-        Difference between the static (lower bound) and the kinematic (upper bound) objective, relative.
-    complementarity : float
-        Σ force · distance from sliding or opening over all contact points, relative like the gap.
-    kinematic_violation : float
-        Largest violation of N + g ≥ μ|T|, relative to the block size.
+        Relative difference of the static and the kinematic value of the programs that bound the result.
     energy_residual : float
-        Work of the loads since the start of the phase, less the work done on the supports and that of friction,
-        relative to the three: what drag, give and the steps have taken. 0 where it was not worked out: in falls, and by
-        the linear program.
+        |works of dead and live loads - on the supports - of friction| / the sum of their sizes, since the start of the
+        phase: what viscosity, compliance and steps have taken. Not a number where no path led there.
+    kinematic_violation : float
+        max (μ |T(q)| - N(q), 0) / max |q| of the mechanism q of a limit load. Not a number where there is none.
     """
 
-    equilibrium_residual: float
-    largest_penetration: float
-    duality_gap: float
-    complementarity: float
-    kinematic_violation: float
-    energy_residual: float = 0.0
+    equilibrium_residual: float = math.nan
+    friction_excess: float = math.nan
+    carrying_gap: float = math.nan
+    largest_penetration: float = math.nan
+    duality_gap: float = math.nan
+    energy_residual: float = math.nan
+    kinematic_violation: float = math.nan
+
+
+#: A contact point carries from this part of the largest normal force on, where its gap is looked at.
+CARRIES = 1e-6
+
+
+def carrying_gap(contacts: Contacts, forces: np.ndarray) -> float:
+    """Largest gap [m] of the contact points that carry, from their (n, d) forces in any unit."""
+    normal = forces[:, 0]
+    return float(contacts.gaps[normal > CARRIES * normal.max(initial=0.0)].max(initial=0.0))
+
+
+def friction_excess(forces: np.ndarray, friction: np.ndarray, cohesion: np.ndarray | float = 0.0) -> float:
+    """Largest shear force beyond friction and cohesion, from (n, d) forces, in their unit."""
+    shear = np.linalg.norm(forces[:, 1:], axis=1)
+    return float((shear - friction * forces[:, 0] - cohesion).max(initial=0.0))
+
+
+def largest_penetration(contacts: Contacts) -> float:
+    """Deepest overlap at a contact point [m]."""
+    return float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0))
 
 
 def worst_of(certificates: Iterable[Certificate]) -> Certificate | None:
-    """Largest of each measure over some increments, nan where none has it; None without an increment."""
+    """Largest of each measure over some results, nan where none has it; None without a result."""
     found = tuple(certificates)
     if not found:
         return None

@@ -143,13 +143,11 @@ class Increment:
     least, largest : float
         Bounds of what is measured over all forces in equilibrium within friction at this pose; infinite where friction
         sets none, nan where they were not worked out.
-    at_rest, onset : float [N or N·m]
-        Of the first increment of a settlement: reaction of the structure at rest, and once it has begun to move.
     notes : tuple of str
         Events on the way to it that forces and poses do not show: blocks that fell and were caught.
     checkpoint : optional
-        Where the loop that yields the increment goes on after it: :class:`Checkpoint` of a settlement,
-        :class:`PushoverCheckpoint` of a pushover. A :class:`Response` keeps none.
+        Where the loop that yields the increment goes on after it, a :class:`PathState`. A :class:`Response` keeps
+        none.
     """
 
     parameter: float
@@ -164,8 +162,6 @@ class Increment:
     held: State | StoredState = field(repr=False, compare=False)
     least: float = field(default=np.nan, compare=False)
     largest: float = field(default=np.nan, compare=False)
-    at_rest: float = field(default=np.nan, compare=False)
-    onset: float = field(default=np.nan, compare=False)
     notes: tuple[str, ...] = ()
     checkpoint: Any = field(default=None, repr=False, compare=False)
 

@@ -172,6 +172,12 @@ class Response:
         return np.array([i.reaction for i in self.path])
 
     @property
+    def initial_reaction(self) -> float:
+        """Least reaction [N or N·m] that equilibrium allows before anything moves: what a first movement overcomes."""
+        first = self.path[0]
+        return first.least if np.isfinite(first.least) and self.control is None else first.reaction
+
+    @property
     def load_multiplier(self) -> np.ndarray:
         """(n,) array: load multiplier of each increment in equilibrium."""
         return np.array([i.load_multiplier for i in self.path])

@@ -40,6 +40,7 @@ rotation = 1.0
 increment = 0.01
 limit = 0.5
 tolerance = 1e-4
+step_tolerance = 0.01
 blocks = "right springer"
 [[loads]]
 kind = "dead"
@@ -50,10 +51,7 @@ point = [0.0, 1.0]
 moment = 0.0
 [analysis]
 kind = "settlement"
-event_refinement = 8
-correctors = 25
 falling_frames = 40
-trust_region = 1.0
 [output]
 animation = "collapse.mp4"
 """

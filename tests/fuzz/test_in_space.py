@@ -38,7 +38,7 @@ def in_space_of(assembly):
         ("stack", 1017),
         ("stack", 1023),
         ("voronoi", 1002),
-        ("voronoi", 1006),
+        pytest.param("voronoi", 1006, marks=pytest.mark.slow),
     ],
 )
 def test_extruded_structures_go_the_way_of_the_plane(kind, seed):

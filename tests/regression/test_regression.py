@@ -23,10 +23,8 @@ EXACT = os.environ.get("BLOCKVIS_EXACT", "") not in ("", "0")
 #: Haswell, SkylakeX, Sandybridge and Prescott of OpenBLAS 2e-11 were measured.
 TIGHT = 1e-9
 
-#: Where many joints slide. A collapse is enclosed to a tolerance, and rounding may choose among the places within it:
-#: 8e-4 between two computers, and 4e-3 in the reaction at the last of them, which grows fast there. The façade is
-#: followed by linear programs, whose solutions rounding chooses: its last reaction is 47.95, 48.43, 51.84 and 52.72 kN
-#: with the kernels Haswell, Prescott, Sandybridge and SkylakeX.
+#: Where many joints slide, what a program leaves of a step grows: 4e-4 of a reaction was measured between kernels. A
+#: collapse is enclosed to a tolerance, and rounding may choose among the places within it.
 LOOSER = dict.fromkeys(
     (
         "panel_with_opening",
@@ -35,11 +33,11 @@ LOOSER = dict.fromkeys(
         "wall_self_weight",
         "wall_pushed",
     ),
-    1e-5,
+    2e-3,
 ) | {
     "wall_with_arch": 5e-3,
     "panel_settlement_friction": 2e-3,
-    "facade": 0.12,
+    "facade": 5e-3,
     # In space: 1e-3 between the kernels.
     "corner_of_walls": 5e-3,
     "cross_vault_corner": 2e-3,
@@ -126,7 +124,7 @@ def test_every_increment_of_an_example_proves_itself(name, example):
     response, (ending, first) = run.response, ENDS[name]
     assert response.stop is ending, response.message
     if first is not None:
-        assert response.reaction[0] / response.total_weight == pytest.approx(first, abs=1e-4)
+        assert response.initial_reaction / response.total_weight == pytest.approx(first, abs=1e-4)
     smallest = response.assembly.shapes.sizes.min()
     for increment in response.path:
         certificate = increment.certificate
@@ -134,7 +132,7 @@ def test_every_increment_of_an_example_proves_itself(name, example):
         assert certificate.duality_gap < 1e-7
         # Near its end a corner may count as on the edge or on the corner there: twice what a correction accepts. In
         # space corners come into another block from the side as bricks turn: a step sees them up to a ten-thousandth.
-        deepest = 2e-6 if response.assembly.dimension == 2 else 1e-4
+        deepest = 5e-6 if response.assembly.dimension == 2 else 1e-4
         assert certificate.largest_penetration < deepest * smallest
     if ending is solver.Status.COLLAPSED:
         assert "macro-block" in run.summary["mechanism"]

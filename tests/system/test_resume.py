@@ -375,7 +375,7 @@ def test_every_checkpoint_leads_to_the_same_end():
     for k in range(0, len(told), 3):
         if told[k].checkpoint is None:
             continue
-        checkpoint, extra = unpacked(packed(told[k].checkpoint, increments=k + 1), solver.Checkpoint)
+        checkpoint, extra = unpacked(packed(told[k].checkpoint, increments=k + 1), solver.PathState)
         assert extra == {"increments": k + 1}
         assert _equal(checkpoint, told[k].checkpoint)
         again = list(solver.settlement_increments(arch, phases, resume=checkpoint, **setting))
@@ -408,7 +408,7 @@ def test_every_checkpoint_of_a_pushover_leads_to_the_same_end():
     kept = [k for k, increment in enumerate(told) if increment.checkpoint is not None]
     assert len(kept) > 5
     for k in kept:
-        checkpoint, _ = unpacked(packed(told[k].checkpoint), solver.Checkpoint)
+        checkpoint, _ = unpacked(packed(told[k].checkpoint), solver.PathState)
         assert _equal(checkpoint, told[k].checkpoint)
         again = list(solver.pushover_increments(arch, control, resume=checkpoint, **setting))
         assert len(again) == len(told) - k - 1
@@ -465,4 +465,4 @@ def test_stored_values_refuse_what_they_cannot_hold():
     buffer = io.BytesIO()
     np.savez(buffer, tree=np.array('{"value": {"phase": 1}, "extra": {}}'))
     with pytest.raises(ValueError, match="it has the fields"):
-        unpacked(buffer.getvalue(), solver.Checkpoint)
+        unpacked(buffer.getvalue(), solver.PathState)

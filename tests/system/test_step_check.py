@@ -1,4 +1,4 @@
-"""``blockvis run --check-steps``: the same path in steps half as long, through the real entry point."""
+"""``blockvis run --check-steps``: the same path with half the step tolerance, through the real entry point."""
 
 import json
 import subprocess
@@ -10,7 +10,7 @@ import pytest
 import blockvis
 import solver
 from blockvis.processes import cores
-from blockvis.runs.step_check import StepCheck, compared, traced
+from blockvis.runs.step_check import StepCheck, compared, stored_check, traced
 
 CASE = """
 [geometry]
@@ -102,21 +102,31 @@ def test_no_steps_are_checked_where_none_are_to_be(tmp_path):
     assert not (tmp_path / "out" / "step_check.json").exists()
 
 
-def test_linear_programs_are_compared_with_those_of_the_blocks_in_another_order(tmp_path):
-    done = run(tmp_path, CASE + '\n[analysis]\nincrements = "linear program"\n', "--check-steps")
+def test_linear_programs_take_no_steps_that_could_be_compared(tmp_path):
+    text = CASE + '\n[analysis]\nincrements = "linear program"\n'
+    done = run(tmp_path, text)
     assert done.returncode == 0, done.stderr
-    assert "error of rounding: reaction below 0.01 %" in done.stdout
-    assert "with its blocks in another order" in done.stdout
-    # An arch hinges: its programs have one solution.
-    assert "rounding matters" not in done.stderr
+    assert "error" not in done.stdout + done.stderr
+    assert not (tmp_path / "out" / "step_check.json").exists()
+    done = run(tmp_path, text, "--check-steps", "--force")
+    assert done.returncode == 2
+    assert "has no path whose steps could be checked (settlement, 4 increments, by linear program)" in done.stderr
 
 
 def test_what_matters_is_warned_of():
-    check = StepCheck("reaction", 0.02, 0.1, "m", float("nan"), "collapsed", "collapsed", "order")
-    assert "rounding matters by more than 1 %" in check.warning
-    assert "several paths" in replace(check, way="steps").warning
+    check = StepCheck("reaction", 0.02, 0.1, "m", float("nan"), "collapsed", "collapsed")
+    assert str(check) == "error of the steps: reaction 2 % at 0.1 m (apart from a run with half the step tolerance)"
+    assert "the steps matter by more than 1 %: take a smaller step_tolerance" in check.warning
+    assert "collapse 0.3 % (apart" in str(replace(check, collapse=0.003))
     assert replace(check, difference=0.009).warning == ""
     assert replace(check, difference=0.009, stop_of_check="limit reached").warning
+
+
+def test_a_check_is_read_as_it_was_written(tmp_path):
+    check = StepCheck("reaction", 0.02, 0.1, "m", float("nan"), "collapsed", "collapsed")
+    numbers = {**vars(check), "collapse": None, "way": "steps"}
+    (tmp_path / "step_check.json").write_text(json.dumps(numbers), encoding="utf-8")
+    assert str(stored_check(tmp_path)) == str(check)
 
 
 @pytest.mark.thorough

@@ -1,6 +1,7 @@
 """Joints, cracks, hinges, resultants and the parts of a mechanism."""
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
@@ -118,6 +119,7 @@ def test_a_joint_that_slides_on_one_point_is_marked_over_a_length():
     assert lengths.min() >= 0.3 * response.assembly.block_size * (1 - 1e-9)
 
 
+@pytest.mark.thorough
 def test_the_mark_of_a_brick_that_slides_beside_a_large_stone_stays_with_the_brick():
     response = dropped_brick()
     assembly, last = response.assembly, response.path[-1]

@@ -133,7 +133,7 @@ def test_what_a_power_cut_has_left_of_the_files_of_increments_is_made_again(tmp_
     (folder / "contacts_00001.vtu").unlink()
     (tmp_path / "out" / "blocks.pvd").write_bytes(b"")
     untouched = (folder / "contacts_00002.vtu").stat().st_mtime_ns
-    again, _ = ResultsFolder.reopened(tmp_path / "out", solver.SETTLEMENT, solver.Checkpoint)
+    again, _ = ResultsFolder.reopened(tmp_path / "out", solver.SETTLEMENT, solver.PathState)
     assert len(again.increments) == 3
     assert {file.name: file.read_bytes() for file in (*folder.glob("*.vtu"), tmp_path / "out" / "blocks.pvd")} == whole
     assert (folder / "contacts_00002.vtu").stat().st_mtime_ns == untouched

@@ -142,3 +142,30 @@ def test_every_example_is_a_value_of_its_kind():
             if key.default is not None:
                 default = list(key.default) if isinstance(key.default, tuple) else key.default
                 jsonschema.validate(default, dict(key.kind.schema))
+
+
+@pytest.mark.parametrize(
+    ("settlements", "control", "holds"),
+    [
+        ([{}], {}, solver.Controls.step_tolerance),
+        ([{"step_tolerance": 0.02}], {}, 0.02),
+        ([{"step_tolerance": 0.02}, {}, {"step_tolerance": 0.001}], {}, 0.001),
+        ([{"step_tolerance": 0.02}], {"step_tolerance": 0.01}, 0.01),
+        ([{}], {"step_tolerance": 0.03}, 0.03),
+    ],
+)
+def test_the_smallest_step_tolerance_holds(settlements, control, holds):
+    phases = [{"direction": [0, -1]} | one for one in settlements]
+    values = EVERY_TABLE | {"settlement": phases, "control": {"block": "brick 1-1"} | control}
+    assert case_of(values, Path("case.toml")).controls.step_tolerance == holds
+
+
+@pytest.mark.parametrize(("number", "words"), [(0, "is 0;"), (1.0, "is 1;"), (-0.1, "is -0.1;"), (2, "is 2;")])
+@pytest.mark.parametrize("table", ["settlement", "control"])
+def test_a_step_tolerance_that_is_none_is_refused(table, number, words):
+    values = EVERY_TABLE | {table: {"direction": [0, -1], "block": "brick 1-1", "step_tolerance": number}}
+    if table == "settlement":
+        del values[table]["block"]
+    with pytest.raises(ValueError) as error:
+        case_of(values, Path("case.toml"))
+    assert str(error.value) == f"case.toml: [{table}] step_tolerance {words} give a number above 0 and below 1"

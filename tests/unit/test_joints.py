@@ -163,7 +163,7 @@ def test_joints_csv_names_the_widest_crack_first(tmp_path):
     assert float(rows[0]["y [m]"]) == pytest.approx(1.0, rel=0.02)
     openings = [float(row["largest opening [m]"]) for row in rows]
     assert openings == sorted(openings, reverse=True)
-    assert openings[3] == 0.0, "rounding is no opening"
+    assert openings[3] == 0.0, "what a step leaves is no opening"
 
 
 def test_the_table_is_the_same_after_a_run_has_gone_on(tmp_path):

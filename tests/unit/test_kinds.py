@@ -176,7 +176,7 @@ def test_the_bar_shows_the_quantities_of_the_kind(analysis, extra, line, tmp_pat
         text += '[control]\nblock = "block 1"\n'
     course = KINDS[analysis].course(parse_case(text, tmp_path / "case.toml"))
     stream = Terminal()
-    certificate = solver.Certificate(0.0, 0.0, 0.0, 0.0, 0.0)
+    certificate = solver.Certificate()
     nothing = np.zeros((0, 2))
     state = solver.State(None, None, nothing, nothing, nothing, nothing, nothing)
     standing = solver.Increment(0.05, 7.0, 0, 7.0, 7.0, certificate, solver.Status.EQUILIBRIUM, 1, 0.1, state)

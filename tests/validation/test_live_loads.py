@@ -132,15 +132,15 @@ def test_overturning_block_and_stack(n):
     multiplier = np.array([i.load_multiplier for i in response.path])
     assert response.stop is solver.Status.COLLAPSED
     assert d[:19] == pytest.approx(0.01 * np.arange(19), abs=1e-9)
-    # Far below the half per cent asked for: the geometry is exact, and the program leaves 1e-9 of the weight.
-    assert multiplier == pytest.approx(np.tan(np.arctan(0.2) - np.arcsin(d)), abs=5e-7)
+    # Far below the half per cent asked for: what is left is what the joints give along themselves.
+    assert multiplier == pytest.approx(np.tan(np.arctan(0.2) - np.arcsin(d)), abs=1e-5)
     for at, expected in ((0.05, 0.14845), (0.10, 0.09754), (0.15, 0.04686)):
         assert np.interp(at, d, multiplier) == pytest.approx(expected, abs=1e-5)
     low, high = response.collapse.bracket
     zero = np.sin(np.arctan(0.2))
     assert low <= zero <= high
     assert high - low <= 1e-4 * (1 + 1e-6)
-    assert response.collapse.displacement == pytest.approx(zero, abs=1e-6)
+    assert response.collapse.displacement == pytest.approx(zero, abs=5e-6)
 
 
 def test_a_sliding_block_keeps_its_multiplier_and_its_height():

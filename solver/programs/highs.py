@@ -2,40 +2,34 @@
 
 from __future__ import annotations
 
-import time
-
 import highspy
 import numpy as np
 
 from solver.tolerances import FEASIBILITY_TOLERANCE, INTERIOR_TOLERANCE
 
-from .problem import LinearProgram, LPSolution, checked, raise_if_proved
+from .problem import LinearProgram, Solution
 
 #: Iterations after which a route is given up: twenty times what interior methods need, and simplex iterations per row
 #: and column.
 IPM_ITERATIONS, SIMPLEX_ITERATIONS = 1000, 200
 
-INTERIOR: dict[str, object] = {
-    "primal_feasibility_tolerance": INTERIOR_TOLERANCE,
-    "dual_feasibility_tolerance": INTERIOR_TOLERANCE,
-    "ipm_optimality_tolerance": INTERIOR_TOLERANCE,
-    # Trying out the other system first takes a fifth of the time, and it is never the better one here.
-    "hipo_system": "normaleq",
-}
-
 #: Ways through HiGHS: (name, options). Each is judged by our own check, so the order is a matter of speed only.
 ROUTES: dict[str, dict[str, object]] = {
     "simplex": {"solver": "simplex"},
-    "simplex without presolve": {"solver": "simplex", "presolve": "off"},
-    "hipo": {"solver": "hipo", "run_crossover": "off", **INTERIOR},
-    "hipo without presolve": {"solver": "hipo", "run_crossover": "off", "presolve": "off", **INTERIOR},
-    "hipo with crossover": {"solver": "hipo", "run_crossover": "on"},
-    "ipx": {"solver": "ipx", "run_crossover": "off"},
-    "ipx with crossover": {"solver": "ipx", "run_crossover": "on"},
+    "hipo": {
+        "solver": "hipo",
+        "run_crossover": "off",
+        "primal_feasibility_tolerance": INTERIOR_TOLERANCE,
+        "dual_feasibility_tolerance": INTERIOR_TOLERANCE,
+        "ipm_optimality_tolerance": INTERIOR_TOLERANCE,
+        # Trying out the other system first takes a fifth of the time, and it is never the better one here.
+        "hipo_system": "normaleq",
+    },
+    "crossover": {"solver": "hipo", "run_crossover": "on"},
 }
 
 
-def run_highs(program: LinearProgram, route: str) -> tuple[LPSolution | None, str]:
+def run_highs(program: LinearProgram, route: str) -> tuple[Solution | None, str]:
     """Solve a program by one route.
 
     Parameters
@@ -46,7 +40,7 @@ def run_highs(program: LinearProgram, route: str) -> tuple[LPSolution | None, st
 
     Returns
     -------
-    LPSolution or None
+    Solution or None
         None where HiGHS has none; its check is up to the caller.
     str
         What HiGHS says of it.
@@ -56,7 +50,6 @@ def run_highs(program: LinearProgram, route: str) -> tuple[LPSolution | None, st
     Unbounded
         If a ray proves that the program has no minimum.
     """
-    started = time.perf_counter()
     highs = highspy.Highs()
     options: dict[str, object] = {
         "output_flag": False,
@@ -94,7 +87,7 @@ def run_highs(program: LinearProgram, route: str) -> tuple[LPSolution | None, st
     if highs.getModelStatus() == highspy.HighsModelStatus.kUnbounded:
         _, has_ray, ray = highs.getPrimalRay()
         if has_ray:
-            raise_if_proved(program, np.asarray(ray))
+            program.raise_if_proved(np.asarray(ray))
         return None, status
     found = highs.getSolution()
     if not (found.value_valid and found.dual_valid):
@@ -104,4 +97,4 @@ def run_highs(program: LinearProgram, route: str) -> tuple[LPSolution | None, st
     # Interior solutions stray below zero by their tolerance; what they gain from it shows up as row violation.
     x = np.maximum(np.asarray(found.col_value), 0.0)
     y = np.asarray(found.row_dual)
-    return checked(program, x, y, route, int(iterations), time.perf_counter() - started), status
+    return program.checked(x, y, route, int(iterations)), status

@@ -10,15 +10,13 @@ from solver.assembly import Assembly
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose, moved_vertices, relative_velocities
-from solver.program.admissible import Admissible
-from solver.results.certificate import Certificate
+from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.increment import Increment, State, Status
-from solver.tolerances import COMPUTED_GAP
 
 from .controls import Ending
-from .place import Note, Place, Proved
-from .proofs import on_supports
-from .stepping import Steps
+from .equilibrium_check import on_supports
+from .state import EquilibriumCheck, Note, Place
+from .stepping import Stepper
 
 #: Blocks that a message names.
 NAMED = 4
@@ -29,47 +27,44 @@ class Reports:
 
     Parameters
     ----------
-    steps : Steps
+    stepper : Stepper
         That led to what is told; their programs are counted.
     number : int
         Of the phase.
     """
 
-    def __init__(self, steps: Steps, number: int) -> None:
-        self.steps, self.model, self.driver, self.number = steps, steps.model, steps.driver, number
+    def __init__(self, stepper: Stepper, number: int) -> None:
+        self.stepper, self.model, self.driver, self.number = stepper, stepper.model, stepper.driver, number
         self.notes: list[Note] = []
 
     def increment(
-        self, proved: Proved, bounds: Admissible, velocity: np.ndarray, works: tuple[float, float, float]
+        self, check: EquilibriumCheck, velocity: np.ndarray, works: tuple[float, float, float, float]
     ) -> Increment:
         """Of an equilibrium and the movement that follows, with all notes so far and the works done until then."""
-        model, place, contacts = self.model, proved.place, proved.contacts
-        resultant = (wrench_matrix(contacts, place.pose, model.length) @ proved.forces.ravel()).reshape(
-            model.load.shape
-        )
+        bounds = check.bounds
+        model, place, contacts = self.model, check.place, check.contacts
+        resultant = (wrench_matrix(contacts, place.pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
         live, live_size = model.scaled_live
-        measured = proved.measured
+        measured = check.measured
         balance = (
-            resultant + model.scaled_load + (proved.measured * live_size if model.live is not None else 0.0) * live
+            resultant + model.scaled_load + (check.measured * live_size if model.live is not None else 0.0) * live
         )[model.assembly.free]
-        gaps = contacts.gaps / model.length
-        carried = np.where(gaps > COMPUTED_GAP, proved.forces[:, 0] * gaps, 0.0).sum()
         certificate = Certificate(
             equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
-            largest_penetration=float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)),
+            friction_excess=friction_excess(check.forces, check.friction) / model.total_load,
+            carrying_gap=carrying_gap(contacts, check.forces),
+            largest_penetration=largest_penetration(contacts),
             duality_gap=bounds.gap,
-            complementarity=float(carried),
-            kinematic_violation=0.0,
-            energy_residual=abs(works[0] - works[1] - works[2]) / max(sum(map(abs, works)), 1e-12),
+            energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
         )
-        support_forces = on_supports(model, contacts, place.pose, proved.forces)
+        support_forces = on_supports(model, contacts, place.pose, check.forces)
         notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
         self.notes = []
         return self.reported(
             place,
             contacts,
-            proved.forces,
-            proved.friction,
+            check.forces,
+            check.friction,
             velocity,
             measured,
             support_forces,
@@ -82,13 +77,13 @@ class Reports:
     def falling(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
         """Of a place that is no equilibrium."""
         model, assembly = self.model, self.model.assembly
-        contacts = self.steps.around(place.pose)
+        contacts = self.stepper.contacts(place.pose)
         friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-        none = Certificate(0.0, float(np.maximum(-contacts.gaps, 0.0).max(initial=0.0)), 0.0, 0.0, 0.0)
+        none = Certificate(largest_penetration=largest_penetration(contacts))
         return self.reported(
             replace(place, s=s),
             contacts,
-            self.steps.remembered(place, contacts),
+            self.stepper.remembered(place, contacts)[0],
             friction,
             velocity,
             0.0,
@@ -114,7 +109,7 @@ class Reports:
     ) -> Increment:
         """As given, with the programs since the last."""
         pushed = self.model.live is not None
-        programs, self.steps.programs = self.steps.programs, 0
+        programs, self.stepper.programs = self.stepper.programs, 0
         return Increment(
             parameter=place.s,
             measured=measured,

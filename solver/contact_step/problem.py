@@ -1,0 +1,136 @@
+"""The convex program of a step, and its solution.
+
+Over the movement v of the free blocks at a linearised geometry, with the movement g of the step so far::
+
+    minimise  1/2 (g + v - h V)ᵀ (D/h) (g + v - h V) - fᵀ v + Σ c_n/2 N(v)² + Σ c_t H(P(v); B)
+
+    N = max(N⁰ - (gap + n·v) / c_n, 0)      normal force: a spring that pushes only
+    P = T⁰ - (slip + t·v) / c_t             trial shear force
+    T = P min(1, B / |P|)                   shear force within the friction bound B, H Huber's function of |P|
+
+D is the viscosity, V the velocity of the steps before (both are in ``load`` and ``viscosity``), c_n and c_t the
+compliance of the contact point, N⁰ and T⁰ the forces before, so that the give is taken back by the next program. In a
+step B is given, so that the function is strictly convex and its minimum, forces and movement, unique. The same form
+with a bound that lags by a step: Castro et al., https://arxiv.org/abs/2312.03908, and Li et al. (2020),
+https://doi.org/10.1145/3386569.3392425.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .stiffness import ContactRows
+
+
+class NotSolved(Exception):
+    """The minimum of a step's program was not found."""
+
+
+@dataclass(frozen=True)
+class ContactProblem:
+    """The program of a step, in its units: lengths in block sizes, forces in mean block weights.
+
+    Attributes
+    ----------
+    rows : ContactRows
+        How forces at the contact points act on the n_dof freedoms of the free blocks.
+    gap : (n,) array
+    slip : (n, d - 1) array
+        Where the free blocks now are, with the supports at the end of the step; slip counts from the step's start.
+    forces : (n, d) array
+        N⁰ and T⁰.
+    bound : (n,) array
+        B.
+    compliance : (n, d) array
+        c_n, then c_t for each tangent.
+    load : (n_dof,) array
+    viscosity : (n_dof,) array
+        Force per movement.
+    motion_so_far : (n_dof,) array
+        g.
+    size : float
+        Movement of the supports in the step.
+    live : (n_dof,) array, optional
+        Load whose multiplier is one more unknown.
+    control : (n_dof,) array, optional
+        Weights of the movements that make up the control displacement: one more equation.
+    wanted : float
+        Control displacement still to come.
+    """
+
+    rows: ContactRows
+    gap: np.ndarray
+    slip: np.ndarray
+    forces: np.ndarray
+    bound: np.ndarray
+    compliance: np.ndarray
+    load: np.ndarray
+    viscosity: np.ndarray
+    motion_so_far: np.ndarray
+    size: float
+    live: np.ndarray | None = None
+    control: np.ndarray | None = None
+    wanted: float = 0.0
+
+    def trial(self, motion: np.ndarray) -> np.ndarray:
+        """(n, d) array: forces of the springs after a movement, whatever contact and friction allow."""
+        distance = np.column_stack([self.gap, self.slip]) + self.rows.relative(motion)
+        return np.asarray(self.forces - distance / self.compliance)
+
+    def allowed(self, trial: np.ndarray) -> np.ndarray:
+        """(n, d) array: the forces nearest to trial forces that push and stay within the friction bound."""
+        shear = trial[:, 1:]
+        part = np.minimum(1.0, self.bound / np.maximum(_lengths(shear), 1e-300))
+        return np.column_stack([np.maximum(trial[:, 0], 0.0), shear * part[:, None]])
+
+    def stiffness(self, trial: np.ndarray) -> np.ndarray:
+        """(n, d, d) array: derivative of the allowed forces by movements, times -1; symmetric and positive."""
+        size = _lengths(trial[:, 1:])
+        part = np.minimum(1.0, self.bound / np.maximum(size, 1e-300))
+        along = trial[:, 1:] / np.maximum(size, 1e-300)[:, None]
+        d = trial.shape[1]
+        out = np.zeros((len(trial), d, d))
+        out[:, 0, 0] = (trial[:, 0] > 0.0) / self.compliance[:, 0]
+        k = part / self.compliance[:, 1]
+        out[:, 1:, 1:] = k[:, None, None] * np.eye(d - 1)
+        out[:, 1:, 1:] -= (np.where(part < 1.0, k, 0.0)[:, None] * along)[:, :, None] * along[:, None, :]
+        return out
+
+    def status(self, trial: np.ndarray) -> np.ndarray:
+        """(n,) int array: which points push, and which slide."""
+        return 2 * (trial[:, 0] > 0.0) + (_lengths(trial[:, 1:]) > self.bound)
+
+    def unbalanced(self, motion: np.ndarray, forces: np.ndarray, multiplier: float) -> np.ndarray:
+        """(n_dof,) array: what loads, viscosity and contact forces leave out of balance."""
+        out = self.load - self.viscosity * (self.motion_so_far + motion) + self.rows.resultant(forces)
+        return np.asarray(out if self.live is None else out + multiplier * self.live)
+
+
+@dataclass(frozen=True)
+class StepSolution:
+    """The minimum of a step's program.
+
+    Attributes
+    ----------
+    motion : (n_dof,) array
+        Movement of the free blocks.
+    forces : (n, d) array
+    trial : (n, d) array
+        Forces of the springs before contact and friction cut them: where the next program starts.
+    multiplier : float
+        Of the live load.
+    factorisations : int
+    """
+
+    motion: np.ndarray
+    forces: np.ndarray
+    trial: np.ndarray
+    multiplier: float
+    factorisations: int
+
+
+def _lengths(vectors: np.ndarray) -> np.ndarray:
+    """(n,) array: lengths of vectors; of single numbers their absolute values."""
+    return np.abs(vectors[:, 0]) if vectors.shape[1] == 1 else np.linalg.norm(vectors, axis=1)

@@ -1,0 +1,132 @@
+"""How contact points act on the free blocks, and the Cholesky factors of their stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import lapack
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+#: What is added to the diagonal, as a part of its largest entry: blocks that nothing holds stay where they are.
+LEAST_STIFFNESS = 1e-14
+
+Solve = Callable[[np.ndarray], np.ndarray]
+
+
+class Singular(ArithmeticError):
+    """The matrix is not positive definite, by rounding."""
+
+
+class Band:
+    """Where the small matrices of contact points between pairs of blocks go in a symmetric band.
+
+    Parameters
+    ----------
+    pairs : (n, 2) int array
+        Numbers of the two blocks of each contact point; -1 for a support.
+    n_blocks, dof : int
+
+    Notes
+    -----
+    Blocks in the order of reverse Cuthill-McKee; the band is stored as LAPACK's ``pbtrf`` wants it, lower, by columns.
+    """
+
+    def __init__(self, pairs: np.ndarray, n_blocks: int, dof: int) -> None:
+        touching = pairs[(pairs >= 0).all(axis=1)]
+        graph = sp.csr_array((np.ones(len(touching)), touching.T), shape=(n_blocks, n_blocks))
+        order = reverse_cuthill_mckee(sp.csr_matrix(graph + graph.T), symmetric_mode=True)
+        place = np.full(n_blocks + 1, -1)
+        place[order] = np.arange(n_blocks)
+        self.order = (order[:, None] * dof + np.arange(dof)).ravel()
+        placed = place[pairs]
+        both = (placed >= 0).all(axis=1)
+        apart = int(np.abs(placed[:, 0] - placed[:, 1])[both].max(initial=0))
+        self.shape = (n_blocks * dof, dof * (apart + 1))
+        rows = (placed[:, :, None] * dof + np.arange(dof)).reshape(len(pairs), 2 * dof)
+        held = np.repeat(placed < 0, dof, axis=1)
+        i, j = rows[:, :, None], rows[:, None, :]
+        lower = (~held[:, :, None] & ~held[:, None, :] & (i >= j)).ravel()
+        self.kept = np.flatnonzero(lower)
+        self.entry = (j * self.shape[1] + i - j).ravel()[self.kept]
+
+    def factorised(self, matrices: np.ndarray, diagonal: np.ndarray) -> Solve:
+        """Factorise the sum of the points' matrices, (n, 2 dof, 2 dof), and a diagonal; gives what solves with it.
+
+        Raises
+        ------
+        Singular
+        """
+        size, width = self.shape
+        band = np.bincount(self.entry, matrices.ravel()[self.kept], size * width).reshape(self.shape).T
+        band[0] += diagonal[self.order] + LEAST_STIFFNESS * band[0].max()
+        factor, bad = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
+        if bad:
+            raise Singular(f"pivot {bad} of {size} is not positive")
+
+        def solve(right: np.ndarray) -> np.ndarray:
+            solution, _ = lapack.dpbtrs(factor, right[self.order], lower=1)
+            out = np.empty_like(solution)
+            out[self.order] = solution
+            return out
+
+        return solve
+
+
+@lru_cache(maxsize=4)
+def _band(pairs: bytes, n_blocks: int, dof: int) -> Band:
+    return Band(np.frombuffer(pairs, dtype=np.int64).reshape(-1, 2), n_blocks, dof)
+
+
+class ContactRows:
+    """What contact points do to the free blocks, and movements of the blocks to the contact points.
+
+    Parameters
+    ----------
+    matrix : (dof n_blocks, d n) sparse array
+        Of :func:`solver.equilibrium.wrench_matrix`.
+    free : (n_blocks,) bool array
+    """
+
+    def __init__(self, matrix: sp.csc_array, free: np.ndarray) -> None:
+        dof = matrix.shape[0] // len(free)
+        d = 2 if dof == 3 else 3
+        n = matrix.shape[1] // d
+        rows = matrix.indices.reshape(n, d, 2 * dof)[:, 0].astype(np.int64)
+        number = np.append(np.where(free, np.cumsum(free) - 1, -1), -1)
+        self.pairs = number[rows[:, [0, dof]] // dof]
+        self.n_dof = dof * int(free.sum())
+        self.dof = dof
+        # Rows of supports go beyond the last.
+        at = self.pairs[:, :, None] * dof + np.arange(dof)
+        self.rows = np.where(self.pairs[:, :, None] < 0, self.n_dof, at).reshape(n, 2 * dof)
+        self.blocks = matrix.data.reshape(n, d, 2 * dof)
+
+    def __getitem__(self, chosen: np.ndarray) -> ContactRows:
+        """Choose some of the contact points, by a mask or their numbers."""
+        one = object.__new__(ContactRows)
+        one.pairs, one.n_dof, one.dof = self.pairs[chosen], self.n_dof, self.dof
+        one.rows, one.blocks = self.rows[chosen], self.blocks[chosen]
+        return one
+
+    def relative(self, motion: np.ndarray) -> np.ndarray:
+        """(n, d) array: opening and slip of each contact point in a movement (n_dof,) of the free blocks."""
+        return np.einsum("nij,nj->ni", self.blocks, np.append(motion, 0.0)[self.rows])
+
+    def resultant(self, forces: np.ndarray) -> np.ndarray:
+        """(n_dof,) array: what forces (n, d) put on the free blocks."""
+        each = np.einsum("nij,ni->nj", self.blocks, forces)
+        return np.bincount(self.rows.ravel(), each.ravel(), self.n_dof + 1)[:-1]
+
+    def factorised(self, stiffness: np.ndarray, diagonal: np.ndarray) -> Solve:
+        """Factorise the stiffness (n, d, d) of the contact points and a diagonal (n_dof,); gives what solves with it.
+
+        Raises
+        ------
+        Singular
+        """
+        weighted = np.matmul(stiffness, self.blocks)
+        band = _band(self.pairs.astype(np.int64).tobytes(), self.n_dof // self.dof, self.dof)
+        return band.factorised(np.matmul(self.blocks.transpose(0, 2, 1), weighted), diagonal)

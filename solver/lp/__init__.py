@@ -1,1 +1,0 @@
-"""Linear programs: stated, solved and checked. Knows no masonry."""

@@ -1,0 +1,1 @@
+"""The path of a structure under a driver: steps, equilibrium checks, collapse."""

@@ -1,0 +1,160 @@
+"""What equilibrium within friction says of a place of the path."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from solver.contact_step.balance import nearest_equilibrium
+from solver.contact_step.problem import NotSolved
+from solver.contact_step.stiffness import ContactRows
+from solver.equilibrium import block_forces, wrench_matrix
+from solver.geometry.contacts import Contacts
+from solver.kinematics import Pose
+from solver.program.admissible import Admissible, admissible, in_equilibrium
+from solver.program.model import Model
+from solver.tolerances import COMPUTED_GAP
+
+from .state import EquilibriumCheck, Place
+from .stepping import Stepper
+
+#: Bounds of a reaction that differ by no more than this part of it leave nothing to choose.
+DETERMINED = 1e-6
+
+
+def on_supports(model: Model, contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarray:
+    """(n_blocks, n_dof) array [N, N, N·m]: what the structure does to each support; zero for free blocks."""
+    resultant = block_forces(contacts, pose, forces) * model.force
+    return np.where(model.assembly.free[:, None], 0.0, resultant)
+
+
+class EquilibriumChecks:
+    """Equilibria within exact Coulomb friction, without viscosity, at places that steps lead to.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    """
+
+    def __init__(self, stepper: Stepper) -> None:
+        self.stepper, self.model, self.driver = stepper, stepper.model, stepper.driver
+
+    def in_equilibrium(self, place: Place, gap: float) -> bool:
+        """Whether an equilibrium exists at a place, under a live load with some of it.
+
+        Parameters
+        ----------
+        place : Place
+        gap : float
+            Of contact points that may carry, in block sizes.
+        """
+        contacts, friction = self._at(place)
+        if self.model.live is not None:
+            bounds = self._bounds(place, contacts, friction, gap)
+            return bounds.exists and bounds.high > 0.0
+        self.stepper.programs += 1
+        return in_equilibrium(self.model, place.pose, contacts, friction, gap)
+
+    def nearest(self, place: Place, gap: float, reaction: float | None = None, at_rest: bool = False) -> np.ndarray:
+        """(n_contacts, d) array: forces in equilibrium nearest to those of a place, in units of the program.
+
+        Parameters
+        ----------
+        place : Place
+        gap : float
+        reaction : float, optional [N or N·m]
+            That they are to have.
+        at_rest : bool
+            Of least elastic energy.
+
+        Raises
+        ------
+        NotSolved
+        """
+        model, free = self.model, self.stepper.free
+        contacts, friction = self._at(place)
+        closed = contacts.gaps <= gap * model.length
+        matrix = wrench_matrix(contacts, place.pose, model.length)
+        live, live_size = model.scaled_live
+        load = (model.scaled_load + place.multiplier * live_size * live)[free].ravel()
+        near = np.zeros_like(contacts.points) if at_rest else self.stepper.remembered(place, contacts)[0]
+        along = None if reaction is None else self._reaction_rows(place, matrix, len(contacts))[closed]
+        self.stepper.programs += 1
+        forces = np.zeros_like(near)
+        forces[closed] = nearest_equilibrium(
+            ContactRows(matrix, free)[closed],
+            near[closed],
+            self.stepper.compliance(contacts)[closed],
+            friction[closed],
+            load,
+            along,
+            0.0 if reaction is None else reaction / (model.force * self.stepper.lever),
+        )
+        return forces
+
+    def check(self, place: Place, reaction: float, gap: float = COMPUTED_GAP) -> EquilibriumCheck:
+        """Bounds at a place, and forces in equilibrium with the reaction of the path, or with its multiplier.
+
+        Parameters
+        ----------
+        place : Place
+        reaction : float [N or N·m]
+            Of the path; not looked at under a live load.
+        """
+        contacts, friction = self._at(place)
+        bounds = self._bounds(place, contacts, friction, gap)
+        remembered = self.stepper.remembered(place, contacts)[0]
+        wanted = place.multiplier if self.model.live is not None else reaction
+        if not bounds.exists:
+            return EquilibriumCheck(place, contacts, friction, remembered, wanted, bounds)
+        low, high = (value if np.isfinite(value) else wanted for value in (bounds.low, bounds.high))
+        measured = float(np.clip(wanted, low, max(low, high)))
+        determined = high - low <= DETERMINED * max(abs(low), abs(high))
+        try:
+            forces = self._with(place, measured, determined, gap)
+        except NotSolved:
+            forces = self._between_bounds(contacts, place, bounds, measured)
+        return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
+
+    def _with(self, place: Place, measured: float, determined: bool, gap: float) -> np.ndarray:
+        """Forces with what is measured."""
+        if self.model.live is None:
+            return self.nearest(place, gap, None if determined else measured)
+        return self.nearest(replace(place, multiplier=measured), gap)
+
+    def _between_bounds(self, contacts: Contacts, place: Place, bounds: Admissible, measured: float) -> np.ndarray:
+        """(n_contacts, d) array: a mean of the forces of the two bounds, which are in equilibrium, too."""
+        if bounds.others is None:
+            return bounds.forces
+        if self.model.live is None:
+            one, other = (self.reaction(place, contacts, f) for f in (bounds.forces, bounds.others))
+        else:
+            one, other = bounds.high, bounds.low
+        part = 0.0 if one == other else float(np.clip((measured - one) / (other - one), 0.0, 1.0))
+        return (1.0 - part) * bounds.forces + part * bounds.others
+
+    def reaction(self, place: Place, contacts: Contacts, forces: np.ndarray) -> float:
+        """Reaction of forces in units of the program [N or N·m]."""
+        return float((on_supports(self.model, contacts, place.pose, forces) * self.driver.rate(place.s)).sum())
+
+    def _reaction_rows(self, place: Place, matrix: sp.csc_array, n: int) -> np.ndarray:
+        """(n, d) array: reaction of unit forces, in units of the program, where the fastest support moves."""
+        model = self.model
+        rate = np.where(model.assembly.free[:, None], 0.0, self.driver.rate(place.s)) / model.lengths * model.length
+        return np.asarray(matrix.T @ rate.ravel()).reshape(n, -1) / self.stepper.lever
+
+    def bounds(self, place: Place, gap: float = COMPUTED_GAP) -> Admissible:
+        """The bounds that equilibrium sets at a place."""
+        return self._bounds(place, *self._at(place), gap)
+
+    def _bounds(self, place: Place, contacts: Contacts, friction: np.ndarray, gap: float) -> Admissible:
+        rate = None if self.model.live is not None else self.driver.rate(place.s)
+        bounds = admissible(self.model, place.pose, contacts, friction, rate, gap=gap)
+        self.stepper.programs += bounds.programs
+        return bounds
+
+    def _at(self, place: Place) -> tuple[Contacts, np.ndarray]:
+        contacts = self.stepper.contacts(place.pose)
+        return contacts, self.stepper.friction(contacts)

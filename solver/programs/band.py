@@ -1,0 +1,368 @@
+"""An interior point method for programs whose rows form a narrow band: the blocks of a wall, one beside the other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import lapack
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from solver.tolerances import ACCEPTED_GAP
+
+from .problem import LinearProgram, Solution, Unbounded
+from .threads import NotLimited, one_thread
+
+#: Violation of rows and reduced costs, absolute, and relative difference of the objectives at which a point is optimal.
+TOLERANCE = 1e-8
+
+#: A point that has come so near, half of what our own check accepts, is taken if so many iterations find none better:
+#: forces move on among those that cost the same, and what they cost is lost in rounding.
+GOOD, PATIENCE = ACCEPTED_GAP / 2.0, 5
+
+#: Iterations after which it is given up, and how many in a row may be shorter than a thousandth of the way: walls of
+#: 6,500 blocks take 90.
+ITERATIONS, SHORT_STEPS = 200, 20
+
+#: Largest number of operations of one factorisation, rows times the square of the band's width; walls of 10,000 blocks
+#: need 2e9, a tenth of a second. They grow with the square of the blocks: larger programs go to HiGHS.
+OPERATIONS = 1e10
+
+#: A column with more entries than the first number, such as a load on every block, would fill the band: it is cut into
+#: pieces of so many rows that lie beside each other, which equations chain together.
+WIDE, PIECE = 64, 12
+
+#: Rows are put in order along the longest side, by lines that lean by this much: upright ones come to be shuffled as
+#: bricks move that stand one above the other, and the band half as wide again.
+TILTS = (0.01, 0.1, 0.3)
+
+#: Half the width that a row has at least: an equation has no inside.
+LEAST_WIDTH = 1e-11
+
+#: Weight of the proximal term. Without it the multipliers that carry force weigh 1e16 at the end, and the balance of
+#: the blocks is lost in rounding at 1e-6; with it the point strays from dual feasibility by this times the last step.
+PROXIMAL = 1e-11
+
+#: Where the method starts: multipliers, slack beyond what balances them, and least reduced cost.
+START, START_SLACK, START_COST = 1.0, 0.1, 0.03
+
+#: Part of the way to the boundary that a step takes.
+TO_BOUNDARY = 0.9995
+
+#: A solution is refined once where its residual is above this and above a hundredth of what it is to remove.
+RESIDUAL = 1e-9
+
+#: Multipliers of this size are looked at, every so many iterations, for a ray along which the objective falls without
+#: limit; as many passes remove its unbalanced part, with this on the diagonal beside its weights.
+RAY_SIZE, RAY_EVERY, RAY_PASSES, RAY_DIAGONAL = 1e3, 5, 3, 1e-16
+
+
+class NoProgress(Exception):
+    """The method does not apply, or came to no solution."""
+
+
+@dataclass(frozen=True)
+class _Point:
+    """An iterate, or its change: x, then how far rows are from their lower and upper bounds; and what prices them."""
+
+    primal: np.ndarray
+    dual: np.ndarray
+    row_dual: np.ndarray
+
+    def moved(self, step: _Point, primal: float, dual: float) -> _Point:
+        return _Point(
+            self.primal + primal * step.primal, self.dual + dual * step.dual, self.row_dual + dual * step.row_dual
+        )
+
+
+class _Band:
+    """A D Aᵀ for a fixed A, its rows in an order that keeps what is not zero near the diagonal; and its factor."""
+
+    def __init__(self, matrix: sp.csc_array, places: np.ndarray | None) -> None:
+        self.rows = matrix.shape[0]
+        counts = np.diff(matrix.indptr)
+        # Each column is as wide as it has entries, at least: a load on every block fills the matrix.
+        self._refuse_wide(int(counts.max(initial=0)))
+        self.order, self.width = narrowest(matrix, places)
+        self._refuse_wide(self.width)
+        place = places_in(self.order)
+        slots, weights, columns, pairs = [], [], [], []
+        for count in np.unique(counts[counts > 0]):
+            members = np.flatnonzero(counts == count)
+            entries = matrix.indptr[members][:, None] + np.arange(count)
+            at, value = place[matrix.indices[entries]], matrix.data[entries]
+            first, second = np.tril_indices(count)
+            i, j = np.maximum(at[:, first], at[:, second]), np.minimum(at[:, first], at[:, second])
+            slots.append((j * self.width + i - j).ravel())
+            weights.append((value[:, first] * value[:, second]).ravel())
+            columns.append(members)
+            pairs.append(np.full(len(members), len(first)))
+        self.columns, slot = np.concatenate(columns), np.concatenate(slots)
+        number = np.zeros(self.rows * self.width, dtype=np.int32)
+        number[slot] = 1
+        self.filled = np.flatnonzero(number)
+        number[self.filled] = np.arange(len(self.filled))
+        # By columns, as they come: sorted by slots it would take as long as two factorisations.
+        self.sums = sp.csc_array(
+            (np.concatenate(weights), number[slot], np.concatenate([[0], np.cumsum(np.concatenate(pairs))])),
+            shape=(len(self.filled), len(self.columns)),
+        )
+
+    def _refuse_wide(self, width: int) -> None:
+        if self.rows * float(width) ** 2 > OPERATIONS:
+            raise NoProgress(f"{self.rows} rows in a band {width} wide")
+
+    def factorise(self, diagonal: np.ndarray) -> None:
+        values = np.zeros(self.rows * self.width)
+        values[self.filled] = self.sums @ diagonal[self.columns]
+        self.factor, failed = lapack.dpbtrf(values.reshape(self.rows, self.width).T, lower=1, overwrite_ab=1)
+        if failed:
+            raise NoProgress("the normal equations are singular")
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        solution = np.empty(self.rows)
+        solution[self.order] = lapack.dpbtrs(self.factor, right[self.order], lower=1)[0]
+        return solution
+
+
+class _Method:
+    """The program with its rows as unknowns of their own: A x - w = 0, x ≥ 0, lower ≤ w ≤ upper."""
+
+    def __init__(self, program: LinearProgram) -> None:
+        rows, columns = program.matrix.shape
+        middle = (program.lower + program.upper) / 2.0
+        self.program, self.cost = program, program.cost
+        self.lower = np.minimum(program.lower, middle - LEAST_WIDTH)
+        self.upper = np.maximum(program.upper, middle + LEAST_WIDTH)
+        self.matrix, self.transposed = sp.csr_array(program.matrix), sp.csr_array(program.matrix.T)
+        self.x = slice(0, columns)
+        self.below, self.above = slice(columns, columns + rows), slice(columns + rows, columns + 2 * rows)
+        self.band = _Band(sp.csc_array(sp.hstack([program.matrix, sp.eye_array(rows)])), program.places)
+        self.point = self._start(program.matrix)
+        self.tried = 0
+
+    def _start(self, matrix: sp.csc_array) -> _Point:
+        """Start from equal multipliers, the rows balanced by their unit columns where they have any."""
+        middle = (self.lower + self.upper) / 2.0
+        single = np.flatnonzero(np.diff(matrix.indptr) == 1)
+        row, value = matrix.indices[matrix.indptr[single]], matrix.data[matrix.indptr[single]]
+        # The last one of a row where there are several.
+        units = np.full((2, len(middle)), -1)
+        for unit, of_sign in zip(units, (value > 0.0, value < 0.0), strict=True):
+            unit[row[of_sign]] = single[of_sign]
+        rows = np.flatnonzero((units >= 0).all(axis=0))
+        single = single[np.isin(row, rows)]
+        x = np.full(matrix.shape[1], START)
+        x[single] = 0.0
+        missing = (middle - matrix @ x)[rows]
+        for unit, sign in zip(units[:, rows], (1.0, -1.0), strict=True):
+            x[unit] = np.maximum(sign * missing, 0.0) / np.abs(matrix.data[matrix.indptr[unit]])
+        x[single] += START_SLACK
+        reduced = np.maximum(self.cost, START_COST)
+        price = np.minimum(float(x @ reduced) / len(x) / (middle - self.lower), reduced.max())
+        return _Point(
+            np.concatenate([x, middle - self.lower, self.upper - middle]),
+            np.concatenate([reduced, price, price]),
+            np.zeros(len(middle)),
+        )
+
+    def residuals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of the rows, of the reduced costs, and of the rows' prices."""
+        primal, dual, row_dual = self.point.primal, self.point.dual, self.point.row_dual
+        return (
+            self.lower + primal[self.below] - self.matrix @ primal[self.x],
+            self.cost - self.transposed @ row_dual - dual[self.x],
+            dual[self.below] - dual[self.above] - row_dual,
+        )
+
+    def error(self, residuals: tuple[np.ndarray, np.ndarray, np.ndarray]) -> float:
+        """Largest of the residuals and of the relative difference of the objectives."""
+        objective, row_dual = float(self.cost @ self.point.primal[self.x]), self.point.row_dual
+        bound = float(np.maximum(row_dual, 0.0) @ self.lower + np.minimum(row_dual, 0.0) @ self.upper)
+        gap = abs(objective - bound) / (1.0 + abs(objective))
+        return max(gap, *(float(np.abs(part).max(initial=0.0)) for part in residuals))
+
+    def iterate(self, residuals: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+        """One factorisation, predictor and corrector."""
+        primal, dual = self.point.primal, self.point.dual
+        self.pivot = dual[self.x] + PROXIMAL * primal[self.x]
+        self.slack = 1.0 / (dual[self.below] / primal[self.below] + dual[self.above] / primal[self.above])
+        self.band.factorise(np.concatenate([primal[self.x] / self.pivot, self.slack]))
+        step = self._direction(residuals, -primal * dual)
+        end = self.point.moved(step, _longest(primal, step.primal), _longest(dual, step.dual))
+        mean = float(primal @ dual) / len(primal)
+        target = (float(end.primal @ end.dual) / len(primal) / mean) ** 3 * mean
+        step = self._direction(residuals, target - primal * dual - step.primal * step.dual)
+        lengths = [
+            TO_BOUNDARY * _longest(u, v, 1.0 / TO_BOUNDARY) for u, v in ((primal, step.primal), (dual, step.dual))
+        ]
+        self.point = self.point.moved(step, *lengths)
+        self.tried = self.tried + 1 if min(lengths) < 1e-3 else 0
+
+    def show_ray(self) -> None:
+        """Raise ``Unbounded`` where the multipliers point along a ray, once they are corrected until they balance."""
+        x = self.point.primal[self.x]
+        size = float(x.max())
+        if size < RAY_SIZE or self.cost @ x >= 0.0:
+            return
+        weight, ray = (x / size) ** 2, x / size
+        try:
+            self.band.factorise(np.concatenate([weight, np.full(self.matrix.shape[0], RAY_DIAGONAL)]))
+        except NoProgress:
+            # Blocks that the ray leaves alone have nothing else on their diagonal.
+            return
+        for _ in range(RAY_PASSES):
+            ray = np.maximum(ray - weight * (self.transposed @ self.band.solve(self.matrix @ ray)), 0.0)
+        self.program.raise_if_proved(ray)
+
+    def _direction(self, residuals: tuple[np.ndarray, ...], products: np.ndarray) -> _Point:
+        """Newton's direction that removes the residuals and changes the products primal · dual by those given."""
+        primal, dual = self.point.primal, self.point.dual
+        rows, costs, prices = residuals
+        below, above = products[self.below] / primal[self.below], products[self.above] / primal[self.above]
+        free, moved = prices + below - above, products[self.x] / self.pivot
+        weight = primal[self.x] / self.pivot
+        row_dual = self.band.solve(rows - self.matrix @ (moved - weight * costs) + free * self.slack)
+        enough = max(RESIDUAL, 1e-2 * float(np.abs(rows).max(initial=0.0)))
+        for refine in (True, False):
+            reduced = costs - self.transposed @ row_dual
+            x, w = moved - weight * reduced, (free - row_dual) * self.slack
+            residual = rows - (self.matrix @ x - w)
+            if not refine or np.abs(residual).max(initial=0.0) <= enough:
+                break
+            row_dual = row_dual + self.band.solve(residual)
+        return _Point(
+            np.concatenate([x, w, -w]),
+            np.concatenate(
+                [
+                    reduced + PROXIMAL * x,
+                    below - dual[self.below] / primal[self.below] * w,
+                    above + dual[self.above] / primal[self.above] * w,
+                ]
+            ),
+            row_dual,
+        )
+
+
+def narrowest(matrix: sp.csc_array, places: np.ndarray | None) -> tuple[np.ndarray, int]:
+    """Choose an order of the rows: (m,) array, and how wide their band is in it."""
+    pattern = sp.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape[::-1])
+    joined = sp.csr_array(pattern.T @ pattern)
+    orders = [reverse_cuthill_mckee(sp.csr_matrix(joined), symmetric_mode=True)]
+    if places is not None:
+        axis = int(np.argmax(np.ptp(places, axis=0)))
+        across = np.delete(places, axis, axis=1).sum(axis=1)
+        orders += [np.argsort(places[:, axis] + tilt * across, kind="stable") for tilt in TILTS]
+    row = np.repeat(np.arange(matrix.shape[0]), np.diff(joined.indptr))
+    found = [(order, places_in(order)) for order in orders]
+    widths = [int(np.abs(place[row] - place[joined.indices]).max(initial=0)) + 1 for _, place in found]
+    least = int(np.argmin(widths))
+    return orders[least], widths[least]
+
+
+def places_in(order: np.ndarray) -> np.ndarray:
+    """(m,) int array: where in an order each row comes."""
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    return place
+
+
+def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float:
+    """Largest multiple of a change, up to ``most``, that leaves no positive value negative."""
+    fastest = float((change / values).min())
+    return min(most, -1.0 / fastest) if fastest < 0.0 else most
+
+
+def run_band(program: LinearProgram) -> tuple[Solution | None, str]:
+    """Solve a program whose rows form a narrow band.
+
+    Parameters
+    ----------
+    program : LinearProgram
+        Its places are for orders of the rows to try beside that of Cuthill & McKee: along the longer side of a wall
+        they make a band two thirds as wide.
+
+    Returns
+    -------
+    Solution or None
+        None where it comes to nothing; its check is up to the caller.
+    str
+        What came of it.
+
+    Raises
+    ------
+    Unbounded
+        If a ray proves that the program has no minimum.
+
+    Notes
+    -----
+    A primal-dual method: every iteration factorises A D Aᵀ, whose blocks of 3 × 3 are the blocks of the structure and
+    their neighbours, as a band in the order given or that of Cuthill & McKee (1969). After Mehrotra
+    (1992), https://doi.org/10.1137/0802028, with a proximal term (Friedlander & Orban 2012,
+    https://doi.org/10.1007/s12532-012-0035-2).
+    """
+    wide = np.flatnonzero(np.diff(program.matrix.indptr) > WIDE)
+    try:
+        with one_thread(), np.errstate(divide="raise", over="raise", invalid="raise"):
+            x, y, iterations = _solved_in_pieces(program, wide) if len(wide) else _solved(program)
+    except (NoProgress, NotLimited, FloatingPointError) as reason:
+        return None, str(reason)
+    return program.checked(x, y, "band", iterations), "solved"
+
+
+def _solved_in_pieces(program: LinearProgram, wide: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Solve with wide columns cut into pieces along the rows, and equations that all pieces of one are the same."""
+    rows, columns = program.matrix.shape
+    narrow = np.delete(np.arange(columns), wide)
+    place = places_in(narrowest(sp.csc_array(program.matrix[:, narrow]), program.places)[0])
+    n = int(place.max()) // PIECE + 1
+    each = sp.csc_array((np.ones(rows), (np.arange(rows), place // PIECE)), shape=(rows, n))
+    cut = [sp.diags_array(program.matrix[:, [k]].toarray()[:, 0]) @ each for k in wide]
+    chain = sp.diags_array([np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1], shape=(n - 1, n))
+    links = sp.block_diag([chain] * len(wide))
+    nothing = np.zeros(links.shape[0])
+    # The cost of a wide column is that of its first piece.
+    costs = np.zeros((len(wide), n))
+    costs[:, 0] = program.cost[wide]
+    between = np.tile((np.arange(n - 1) + 1.0) * PIECE - 0.5, len(wide))
+    unfolded = replace(
+        program,
+        cost=np.concatenate([program.cost[narrow], costs.ravel()]),
+        matrix=sp.csc_array(sp.block_array([[program.matrix[:, narrow], sp.hstack(cut)], [None, links]])),
+        lower=np.concatenate([program.lower, nothing]),
+        upper=np.concatenate([program.upper, nothing]),
+        places=np.concatenate([place, between])[:, None],
+    )
+
+    def folded(x: np.ndarray) -> np.ndarray:
+        whole = np.empty(columns)
+        whole[narrow] = x[: len(narrow)]
+        whole[wide] = x[len(narrow) :].reshape(len(wide), -1).mean(axis=1)
+        return whole
+
+    try:
+        found, row_dual, iterations = _solved(unfolded)
+    except Unbounded as ray:
+        program.raise_if_proved(folded(ray.x))
+        raise NoProgress("a ray of the pieces is none of the program") from None
+    return folded(found), row_dual[:rows], iterations
+
+
+def _solved(program: LinearProgram) -> tuple[np.ndarray, np.ndarray, int]:
+    method = _Method(program)
+    least, best, at = math.inf, method.point, 0
+    for iteration in range(ITERATIONS):
+        residuals = method.residuals()
+        error = method.error(residuals)
+        if error < least:
+            least, best, at = error, method.point, iteration
+        if error < TOLERANCE or (least < GOOD and iteration - at >= PATIENCE):
+            return best.primal[method.x], best.row_dual, iteration
+        method.iterate(residuals)
+        if iteration % RAY_EVERY == 0:
+            method.show_ray()
+        if method.tried >= SHORT_STEPS:
+            raise NoProgress(f"the steps became too short after {iteration + 1} iterations")
+    raise NoProgress(f"no solution after {ITERATIONS} iterations")

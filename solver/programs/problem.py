@@ -1,0 +1,225 @@
+"""Linear and conic programs and their solutions, with the check that every solution has to pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from solver.tolerances import ACCEPTED_GAP, ACCEPTED_VIOLATION, RAY_BALANCE
+
+
+class SolveError(RuntimeError):
+    """No route gave a solution that passes its check. Not a statement about the structure."""
+
+
+class Unbounded(Exception):
+    """The objective falls without limit, and a ray that we have checked proves it.
+
+    Attributes
+    ----------
+    x : (n,) array
+        The ray: A x = 0, x ≥ 0 or in the cones, cost · x < 0.
+    """
+
+    def __init__(self, x: np.ndarray) -> None:
+        super().__init__("the program is unbounded")
+        self.x = x
+
+
+@dataclass(frozen=True)
+class LinearProgram:
+    """Minimise cost · x subject to lower ≤ A x ≤ upper and x ≥ 0.
+
+    Attributes
+    ----------
+    cost : (n,) array
+    matrix : (m, n) sparse array, by columns
+    lower, upper : (m,) arrays
+        Finite; equations where they are equal.
+    places : (m, dim) array, optional
+        Where the row's block is.
+    """
+
+    cost: np.ndarray
+    matrix: sp.csc_array
+    lower: np.ndarray
+    upper: np.ndarray
+    places: np.ndarray | None = None
+
+    def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
+        """Measure a solution by the program alone; violations are absolute.
+
+        Parameters
+        ----------
+        x : (n,) array
+        y : (m,) array
+            Multipliers of the rows.
+        route, iterations
+            As of :class:`Solution`.
+        """
+        activity = self.matrix @ x
+        off = np.maximum(self.lower - activity, activity - self.upper).max(initial=0.0)
+        return Solution(
+            x=x,
+            row_dual=y,
+            objective=float(self.cost @ x),
+            dual_objective=float(np.where(y > 0, y * self.lower, y * self.upper).sum()),
+            primal_violation=max(float(off), float(-x.min(initial=0.0))),
+            dual_violation=float(-(self.cost - self.matrix.T @ y).min(initial=0.0)),
+            route=route,
+            iterations=iterations,
+        )
+
+    def raise_if_proved(self, ray: np.ndarray) -> None:
+        """Raise ``Unbounded`` where the ray, (n,), proves it by our own check, whatever its solver says."""
+        x = np.maximum(ray, 0.0)
+        size = float(np.abs(x).max(initial=0.0))
+        if size == 0.0:
+            return
+        x /= size
+        if np.abs(self.matrix @ x).max(initial=0.0) <= 1e-9 and self.cost @ x < -1e-9:
+            raise Unbounded(x)
+
+
+@dataclass(frozen=True)
+class ConicProgram:
+    """Minimise cost · x subject to A x = right, the first columns in round friction cones and x ≥ 0 in the others.
+
+    Attributes
+    ----------
+    cost : (n,) array
+    matrix : (m, n) sparse array, by columns
+    right : (m,) array
+    friction : (k,) array
+        Of each cone: its first number times this is at least the length of its others, |T| ≤ μ N.
+    size : int
+        Numbers in a cone: cone i has the columns ``i * size`` to ``(i + 1) * size - 1``.
+
+    Notes
+    -----
+    Its dual: maximise right · y with c - Aᵀ y in the dual cones, N ≥ μ |T|, and at least 0 in the other columns.
+    """
+
+    cost: np.ndarray
+    matrix: sp.csc_array
+    right: np.ndarray
+    friction: np.ndarray
+    size: int = 3
+
+    @property
+    def in_cones(self) -> int:
+        """How many columns are in cones: those that come first."""
+        return self.size * len(self.friction)
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """(n,) array: x is this times a point of cones of slope 1, a reduced cost divided by this one of their duals.
+
+        As long for every friction coefficient, so that a large one does not unbalance the program.
+        """
+        scale = np.ones(len(self.cost))
+        of_cone = scale[: self.in_cones].reshape(-1, self.size)
+        of_cone[:, 1:] = self.friction[:, None]
+        of_cone /= np.hypot(1.0, self.friction)[:, None]
+        return scale
+
+    def outside(self, x: np.ndarray) -> float:
+        """How far x, (n,), leaves the cones and goes below 0, at most."""
+        cones = x[: self.in_cones].reshape(-1, self.size)
+        beyond = np.linalg.norm(cones[:, 1:], axis=1) - self.friction * cones[:, 0]
+        beyond = np.maximum(beyond / np.hypot(1.0, self.friction), -cones[:, 0])
+        return max(float(beyond.max(initial=0.0)), float(-x[self.in_cones :].min(initial=0.0)))
+
+    def outside_dual(self, reduced: np.ndarray) -> float:
+        """How far reduced costs, (n,), leave the dual cones and go below 0, at most."""
+        cones = reduced[: self.in_cones].reshape(-1, self.size)
+        beyond = self.friction * np.linalg.norm(cones[:, 1:], axis=1) - cones[:, 0]
+        beyond /= np.hypot(1.0, self.friction)
+        return max(float(beyond.max(initial=0.0)), float(-reduced[self.in_cones :].min(initial=0.0)))
+
+    def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
+        """Measure a solution by the program alone; violations are relative to 1 + the largest number of their kind.
+
+        Parameters
+        ----------
+        x : (n,) array
+        y : (m,) array
+            Multipliers of the rows.
+        route, iterations
+            As of :class:`Solution`.
+        """
+        off = float(np.abs(self.matrix @ x - self.right).max(initial=0.0))
+        return Solution(
+            x=x,
+            row_dual=y,
+            objective=float(self.cost @ x),
+            dual_objective=float(self.right @ y),
+            primal_violation=max(
+                off / (1.0 + float(np.abs(self.right).max(initial=0.0))),
+                self.outside(x) / (1.0 + float(np.abs(x).max(initial=0.0))),
+            ),
+            dual_violation=self.outside_dual(self.cost - self.matrix.T @ y) / (1.0 + float(np.abs(y).max(initial=0.0))),
+            route=route,
+            iterations=iterations,
+        )
+
+    def raise_if_proved(self, ray: np.ndarray) -> None:
+        """Raise ``Unbounded`` where the ray, (n,), proves it by our own check, whatever its solver says."""
+        size = float(np.abs(ray).max(initial=0.0))
+        if not (np.isfinite(size) and size > 0.0):
+            return
+        x = ray / size
+        left, outside = np.abs(self.matrix @ x), self.outside(x)
+        if max(float(left.max(initial=0.0)), outside) > RAY_BALANCE:
+            return
+        # It has to gain far more than what it is off by could cost.
+        off = float(left.sum()) + outside * len(self.friction)
+        if self.cost @ x < -RAY_BALANCE - 10.0 * off * float(np.abs(self.cost).max(initial=0.0)):
+            raise Unbounded(x)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solution of a program together with the measures by which it proves itself.
+
+    Attributes
+    ----------
+    x : (n,) array
+    row_dual : (m,) array
+        Multipliers of the rows.
+    objective, dual_objective : float
+    primal_violation : float
+        Largest violation of a row, of a cone or of x ≥ 0.
+    dual_violation : float
+        How far the reduced costs leave the dual cones or go below 0 at most.
+    route : str
+        How it was found.
+    iterations : int
+    """
+
+    x: np.ndarray
+    row_dual: np.ndarray
+    objective: float
+    dual_objective: float
+    primal_violation: float
+    dual_violation: float
+    route: str
+    iterations: int
+
+    @property
+    def gap(self) -> float:
+        """Difference of the two objectives relative to 1 + their size."""
+        return abs(self.objective - self.dual_objective) / (1.0 + abs(self.objective))
+
+    @property
+    def violation(self) -> float:
+        """The larger of the two violations."""
+        return max(self.primal_violation, self.dual_violation)
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the solution passes our own check, whatever its solver says about it."""
+        return self.violation <= ACCEPTED_VIOLATION and self.gap <= ACCEPTED_GAP

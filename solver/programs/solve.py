@@ -1,0 +1,133 @@
+"""Which ways to a solution are tried, and in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+
+from .band import run_band
+from .clarabel import ROUTES as CONIC_ROUTES
+from .clarabel import run_clarabel
+from .highs import run_highs
+from .problem import ConicProgram, LinearProgram, Solution, SolveError
+
+#: Up to this many rows the simplex method is the fastest, and gives a vertex.
+SIMPLEX_ROWS = 250
+
+#: Up to this many rows crossover from an interior solution to a vertex may be asked for: it takes as long again at
+#: 1,200 rows or eight times as long, and more beyond.
+CROSSOVER_ROWS = 1500
+
+#: Our own way, for programs whose rows form a band.
+BAND = "band"
+
+#: The ladders: of small programs, of those of which a vertex is wanted, of all others. HiPO takes what is no
+#: narrow band, or where that makes no progress; then the simplex method alone gives a ray.
+SMALL_LADDER = ("simplex", "hipo")
+VERTEX_LADDER = ("crossover", "simplex")
+LADDER = (BAND, "hipo", "simplex")
+
+
+def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, vertex: bool = False) -> Solution:
+    """Solve a linear program, trying one route after another until a solution passes its check.
+
+    Parameters
+    ----------
+    program : LinearProgram
+    routes : tuple of str, optional
+        ``BAND`` or names out of ``ROUTES``, in the order to try; chosen by size by default.
+    vertex : bool
+        Whether a vertex is looked for, up to ``CROSSOVER_ROWS`` rows.
+
+    Raises
+    ------
+    Unbounded
+        If the program has no minimum, proved by a ray.
+    SolveError
+        If no route gives a solution that passes; the message lists what each of them ended with.
+    """
+    rows, columns = program.matrix.shape
+    if routes is None:
+        routes = VERTEX_LADDER if vertex and rows <= CROSSOVER_ROWS else LADDER
+        routes = SMALL_LADDER if rows <= SIMPLEX_ROWS else routes
+    ways = {route: partial(run_band, program) if route == BAND else partial(run_highs, program, route)
+            for route in routes}  # fmt: skip
+    return _first_accepted(ways, f"linear program with {rows} rows and {columns} columns")
+
+
+def solve_cones(program: ConicProgram) -> Solution:
+    """Solve a conic program by Clarabel, trying one route after another until a solution passes its check.
+
+    Parameters
+    ----------
+    program : ConicProgram
+
+    Raises
+    ------
+    Unbounded
+        If the program has no minimum, proved by a ray.
+    SolveError
+        If no route gives a solution that passes; the message lists what each of them ended with.
+    """
+    what = f"conic program with {program.matrix.shape[0]} rows and {len(program.friction)} cones"
+    return _first_accepted({route: partial(run_clarabel, program, route) for route in CONIC_ROUTES}, what)
+
+
+def _first_accepted(ways: Mapping[str, Callable[[], tuple[Solution | None, str]]], what: str) -> Solution:
+    outcomes = []
+    for route, run in ways.items():
+        solution, status = run()
+        if solution is not None and solution.accepted:
+            return solution
+        if solution is not None:
+            status += f", violation {solution.violation:.1e}, gap {solution.gap:.1e}"
+        outcomes.append(f"{route}: {status}")
+    raise SolveError(f"no solution of the {what} passed its check ({'; '.join(outcomes)})")
+
+
+def solve_between(
+    cost: np.ndarray, matrix: sp.csc_array, lower: np.ndarray, upper: np.ndarray, friction: np.ndarray, size: int
+) -> Solution:
+    """Minimise cost · x with lower ≤ A x ≤ upper, the first columns in round cones: without any, a linear program.
+
+    Parameters
+    ----------
+    cost : (n,) array
+    matrix : (m, n) sparse array, by columns
+    lower, upper : (m,) arrays
+        Equations where they are equal.
+    friction : (k,) array
+    size : int
+        As of :class:`ConicProgram`.
+
+    Returns
+    -------
+    Solution
+        With cones, the first n numbers of x are those of the program, and the first multipliers those of the
+        equations; what is left of a row to its bounds follows.
+
+    Raises
+    ------
+    Unbounded, SolveError
+        As of :func:`solve_lp` and :func:`solve_cones`.
+    """
+    if len(friction) == 0:
+        # Of limit loads: a vertex is one mechanism, an interior point a mean of several: fixed points wander from it.
+        return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper), vertex=True)
+    by_row, equal = sp.csr_array(matrix), lower == upper
+    below, above = np.flatnonzero(~equal & np.isfinite(lower)), np.flatnonzero(~equal & np.isfinite(upper))
+    rows = sp.vstack([by_row[equal], by_row[below], by_row[above]])
+    left = np.concatenate([np.full(len(below), -1.0), np.ones(len(above))])
+    left_at = sp.vstack([sp.csr_array((int(equal.sum()), len(left))), sp.diags_array(left)])
+    return solve_cones(
+        ConicProgram(
+            cost=np.concatenate([cost, np.zeros(len(left))]),
+            matrix=sp.csc_array(sp.hstack([rows, left_at], format="csc")),
+            right=np.concatenate([lower[equal], lower[below], upper[above]]),
+            friction=friction,
+            size=size,
+        )
+    )
