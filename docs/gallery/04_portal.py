@@ -14,9 +14,9 @@ portal = generators.portal(span=2.0, height=2.4, column_width=0.5, column_blocks
 sink = solver.Settlement(direction=(0, -1), increment=0.05, limit=0.6)
 response = solver.settle(portal, sink, friction_coefficient=0.6)
 print(response)
-print(f"reaction at first {response.reaction[0]:.0f} N of {response.total_weight:.0f} N")
+print(f"reaction at first {response.initial_reaction:.0f} N of {response.total_weight:.0f} N")
 assert response.stop is solver.Status.LIMIT_REACHED
-assert 0.3 < response.reaction[0] / response.total_weight < 0.5 + 1e-9
+assert 0.3 < response.initial_reaction / response.total_weight < 0.5 + 1e-9
 
 # %%
 # Forces at the contact points, and what each joint does, after 0.3 m and after 0.6 m.

@@ -50,6 +50,6 @@ sink = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.05)
 response = solver.settle(wall, sink, friction_coefficient=0.6)
 print(response)
 assert response.stop is solver.Status.LIMIT_REACHED
-assert 0.05 < response.reaction[0] / response.total_weight < 0.5
+assert 0.05 < response.initial_reaction / response.total_weight < 0.5
 blockvis.draw_still(response, len(response.path) - 1, "wall.png")
 shutil.rmtree(folder)

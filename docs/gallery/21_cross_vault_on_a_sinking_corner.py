@@ -16,8 +16,13 @@ response = solver.settle(vault, sink, friction_coefficient=0.7)
 print(response)
 assert response.stop is solver.Status.LIMIT_REACHED
 assert response.path[-1].certificate.equilibrium_residual < 1e-8
-first, last = response.reaction[[0, -1]] / response.total_weight
-print(f"reaction {first:.3f} W at first, {last:.3f} W in the end")
+
+# %%
+# At rest each corner carries a quarter. As one begins to sink it keeps what equilibrium allows at the least.
+rest, last = response.reaction[[0, -1]] / response.total_weight
+first = response.initial_reaction / response.total_weight
+print(f"reaction {rest:.3f} W at rest, at least {first:.3f} W as it begins to sink, {last:.3f} W in the end")
+assert abs(rest - 0.25) < 1e-4
 assert 0.12 < first < 0.125
 
 blockvis.draw_still(response, len(response.path) - 1, "vault.png")

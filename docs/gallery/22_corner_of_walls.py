@@ -17,6 +17,6 @@ print(response)
 assert response.stop is solver.Status.LIMIT_REACHED
 for increment in response.path:
     print(f"{increment.parameter:.2f} m  {increment.reaction / response.total_weight:.3f} W")
-assert abs(response.reaction[0] / response.total_weight - 0.164516) < 1e-5
+assert abs(response.initial_reaction / response.total_weight - 0.164516) < 1e-5
 
 blockvis.draw_still(response, len(response.path) - 1, "corner.png")
