@@ -105,10 +105,11 @@ class EquilibriumChecks:
         """
         contacts, friction = self._at(place)
         bounds = self._bounds(place, contacts, friction, gap)
-        remembered = self.stepper.remembered(place, contacts)[0]
         wanted = place.multiplier if self.model.live is not None else reaction
         if not bounds.exists:
-            return EquilibriumCheck(place, contacts, friction, remembered, wanted, bounds)
+            # Those of the program that comes nearest to balance, never forces that nothing has balanced.
+            nearest = bounds.high if self.model.live is not None else self.reaction(place, contacts, bounds.forces)
+            return EquilibriumCheck(place, contacts, friction, bounds.forces, nearest, bounds)
         low, high = (value if np.isfinite(value) else wanted for value in (bounds.low, bounds.high))
         measured = float(np.clip(wanted, low, max(low, high)))
         determined = high - low <= DETERMINED * max(abs(low), abs(high))
