@@ -31,9 +31,7 @@ def test_a_sliver_that_tips_does_not_end_the_run():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("kind", "seed"), [("arch", 100004), ("courses", 100125), ("courses", 100231)]
-)
+@pytest.mark.parametrize(("kind", "seed"), [("arch", 100004), ("courses", 100125), ("courses", 100231)])
 def test_blocks_wedged_by_rounding_are_no_failure(kind, seed):
     """Here HiGHS found programs unbounded by less than their ray proves."""
     finding = tried(kind, seed)
