@@ -117,6 +117,8 @@ class StudyFolder:
         finished : sequence of (dict, bytes)
             Rows and shapes of :func:`blockvis.studies.run_one.run_once`.
         """
+        # In memory before on the disk: an interruption between the two would leave a row out of the table that is kept.
+        self.rows |= {row["run"]: row for row, _ in finished}
         for row, shape in finished:
             if shape:
                 self._add_shape(row, shape)
@@ -131,7 +133,6 @@ class StudyFolder:
             os.fsync(stream.fileno())
         if not begun:
             flush(self.folder)
-        self.rows |= {row["run"]: row for row, _ in finished}
 
     def _add_shape(self, row: Mapping[str, Any], shape: bytes) -> None:
         file = self.shape_file(row["mechanism_class"])
