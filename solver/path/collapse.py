@@ -12,7 +12,7 @@ from solver.kinematics import motion_size
 from solver.results.increment import Increment, Status
 from solver.results.mechanism import mechanism_of
 from solver.results.response import Collapse
-from solver.tolerances import COMPUTED_GAP, FARTHEST_FALL, JUMP, VISCOSITY
+from solver.tolerances import COMPUTED_GAP, FARTHEST_FALL
 
 from .controls import Ending
 from .equilibrium_check import EquilibriumChecks
@@ -20,20 +20,20 @@ from .reports import Reports
 from .state import EquilibriumCheck, Place
 from .stepping import Stepper
 
-#: Viscosity that is left where a collapse is enclosed and where blocks come to rest.
+#: Viscosity that is left where a collapse is enclosed.
 REFINED = 1e-3
 
-#: Movement in a step, in block sizes, above which it is taken again, a third as long; steps, with those that are taken
-#: again; growth of the steps while blocks move by less than a third of it.
-HASTY, RELAXATIONS, GROWTH = 0.03, 200, 3.0
+#: Movement in a step in time, in block sizes, above which it is taken again, shorter by the second more than that asks
+#: for; steps, with those that are taken again; growth of the steps while blocks move by less than a third of it.
+HASTY, SHORTER, STEPS_IN_TIME, GROWTH = 0.03, 0.8, 400, 2.0
 
-#: First of these steps, and the longest, as movements of the supports in block sizes.
-FIRST_RELAXATION, LONGEST_RELAXATION = 1e-3, 1e2
+#: First and longest step in time, in units of √(block size / g).
+FIRST_TIME, LONGEST_TIME = 0.02, 1e4
 
-#: Unbalanced force, in block weights, under which what creeps may have come to rest, and what has jumped.
-SLOW, STOPPED = 1e-2, 1e-5
+#: Acceleration, in units of g, and speed, in units of √(block size · g), under which what has moved may be at rest.
+STOPPED, SLOW = 1e-3, 1e-3
 
-#: At rest: movement of a block, in block sizes, in a step as long as a block size.
+#: At rest: movement of a block, in block sizes, in the longest step.
 AT_REST = 1e-7
 
 #: A frame of the fall is a movement of this, in block sizes, the first one of that: large against the compliance of the
@@ -57,43 +57,44 @@ class Falling:
         self.stepper, self.checks, self.reports, self.falling_frames = stepper, checks, reports, falling_frames
         self.model, self.driver = stepper.model, stepper.driver
 
-    def relaxation(
-        self, place: Place, viscosity: float = REFINED, longest: float = HASTY
-    ) -> Iterator[tuple[Place, np.ndarray, float]]:
-        """Steps with the supports at rest, in each of which blocks move by a little.
+    def in_time(self, place: Place, longest: float = HASTY) -> Iterator[tuple[Place, np.ndarray, float, float]]:
+        """Steps in time from rest, the supports at rest, in each of which blocks move by a little.
 
         Yields
         ------
         place : Place
         motion : (n_blocks, n_dof) array
             In units of the program.
-        unbalanced : float
-            Largest force against which blocks move, in block weights.
+        acceleration : float
+            Largest, in units of g.
+        speed : float
+            Of the fastest block, in units of √(block size · g).
         """
-        size, largest = FIRST_RELAXATION, LONGEST_RELAXATION
-        for _ in range(RELAXATIONS):
+        place, time = replace(place, velocity=None), FIRST_TIME
+        for _ in range(STEPS_IN_TIME):
             try:
-                new, motion, error = self.stepper.step(place, size * self.stepper.unit, still=True, viscosity=viscosity)
-            except NotSolved:
-                new = None
-            if new is None or error.moved > longest:
-                size /= 3.0
+                new, motion, error = self.stepper.step(place, time, in_time=True)
+                moved = error.moved
+            except NotSolved as failure:
+                new, moved = None, getattr(failure, "moved", 0.0)
+            if new is None or moved > longest:
+                time *= min(0.5, SHORTER * np.sqrt(longest / max(moved, longest)))
                 continue
             place = new
-            yield place, motion, VISCOSITY * viscosity / size * error.moved
-            if size >= 1.0 and error.moved < AT_REST:
+            yield place, motion, error.turn / time**2, moved / time
+            if time >= LONGEST_TIME and moved < AT_REST:
                 return
-            size = min(size * (GROWTH if error.moved < longest / 3.0 else 1.0), largest)
+            time = min(time * (GROWTH if moved < longest / 3.0 else 1.0), LONGEST_TIME)
 
     def at_rest(self, place: Place, farthest: float = FARTHEST_FALL, gap: float = COMPUTED_GAP) -> Place | None:
         """The equilibrium in which what falls comes to rest with the supports still; None where it goes farther."""
         start = place.pose
-        for rest, _, unbalanced in self.relaxation(place):
+        for rest, _, acceleration, speed in self.in_time(place):
             way = float(np.abs(start.movement_to(rest.pose) / self.model.lengths).max())
             if way > farthest:
                 return None
-            if unbalanced < (SLOW if way <= JUMP else STOPPED) and self.checks.in_equilibrium(rest, gap):
-                return rest
+            if acceleration < STOPPED and speed < SLOW and self.checks.in_equilibrium(rest, gap):
+                return replace(rest, velocity=None)
         return None
 
     def movement(self, one: Place, other: Place) -> float:
@@ -165,10 +166,10 @@ class Falling:
         return Falling(stepper, EquilibriumChecks(stepper), Reports(stepper, self.reports.number), self.falling_frames)
 
     def _fall(self, place: Place) -> Iterator[Increment]:
-        """Pseudo-time frames: what falls sinks against the viscosity until it rests."""
+        """Frames of the fall, each a movement of the same size, until what falls rests."""
         for least in (MECHANISM, *[FRAME] * max(self.falling_frames - 1, 0)):
             start, total = place, np.zeros_like(self.model.load)
-            for moved, motion, _ in self.relaxation(start, viscosity=1.0, longest=2.0 * least):
+            for moved, motion, _, _ in self.in_time(start, 2.0 * least):
                 place, total = moved, total + motion
                 if np.abs(total).max() > least:
                     break

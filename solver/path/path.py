@@ -175,7 +175,7 @@ class Path:
         check = self._checked(place)
         bounds = check.bounds
         if not bounds.exists:
-            motion = next((motion for _, motion, _ in self.falling.relaxation(place, 1.0)), self.stepper.weights)
+            motion = next((motion for _, motion, *_ in self.falling.in_time(place)), self.stepper.weights)
             yield self.reports.falling(place, motion * model.lengths, place.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, motion))
         if model.live is not None and not 0.0 < bounds.high < np.inf:

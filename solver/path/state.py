@@ -32,7 +32,7 @@ class Place:
     multiplier : float
         Of the live load.
     velocity : (n_blocks, n_dof) array, optional
-        In the steps that led here, per unit of the parameter; None where nothing moved with it.
+        In the steps that led here, per unit of the parameter, or of time where blocks fall; None where nothing moved.
     works : tuple of float
         Of dead and live loads, on supports and of friction since the start of the phase, in units of the program.
     """

@@ -55,12 +55,18 @@ TOUCHES = 1e-4
 SLIDES = 0.99
 
 #: Part of the way to μ N that a friction bound follows in a step at most: more goes to and fro where the normal force
-#: falls as the bound grows. And in a step with the supports at rest.
+#: falls as the bound grows. And in a step in time.
 AT_ONCE = 0.5
-AT_REST = 0.9
+IN_TIME = 0.9
 
-#: Movement, in block sizes, that the program of a step with the supports at rest is solved to a small part of.
-STILL_SIZE = 1e-3
+#: Gap, in block sizes, at which half the friction that a contact point remembers is lost in a step.
+OPEN = 1e-6
+
+#: Damping of steps in time, in units of mass · √(g / block size): critical for a block that rocks.
+DAMPING = 2.0
+
+#: Movement, in block sizes, that the program of a step in time is solved to a small part of.
+SMALL = 1e-3
 
 #: Least part of a joint that a contact point stands for.
 LEAST_SHARE = 0.05
@@ -70,7 +76,11 @@ LEAST_WEIGHT = 1e-3
 
 
 class Unseen(NotSolved):
-    """Blocks came into each other where the step saw no contact point."""
+    """Blocks came into each other where the step saw no contact point, in a movement of so many block sizes."""
+
+    def __init__(self, moved: float) -> None:
+        super().__init__("a corner comes into a block from the side")
+        self.moved = moved
 
 
 @dataclass(frozen=True)
@@ -199,16 +209,17 @@ class Stepper:
         return forces, trial, followed, fresh
 
     def step(
-        self, place: Place, length: float, *, still: bool = False, viscosity: float = 1.0
+        self, place: Place, length: float, *, in_time: bool = False, viscosity: float = 1.0
     ) -> tuple[Place, np.ndarray, StepError]:
-        """Take one step of the driver, or one with the supports at rest in which blocks move as slowly.
+        """Take one step of the driver, or one in time with the supports at rest.
 
         Parameters
         ----------
         place : Place
         length : float [m or rad]
-        still : bool
-            The driver stands still: what is not in equilibrium moves.
+            In time in units of √(block size / g).
+        in_time : bool
+            The driver stands still, and what is not in equilibrium moves against its inertia: M/h² for the viscosity.
         viscosity : float
             Times the model's; and the imperfection times the model's.
 
@@ -225,18 +236,15 @@ class Stepper:
         """
         model, assembly, driver, free = self.model, self.model.assembly, self.driver, self.free
         scales, n_dof = model.lengths, len(model.lengths)
-        s, size = place.s if still else place.s + length, length / self.unit
+        s, size = (place.s, SMALL) if in_time else (place.s + length, length / self.unit)
         supports = driver.supports(s)
         start = self.contacts(place.pose)
         forces, trial, followed, fresh = self.remembered(place, start)
         friction, compliance = self.friction(start), self.compliance(start)
         bound = friction * followed
-        resisting = VISCOSITY * viscosity / size * self.weights[free].ravel()
-        load = (model.scaled_load + viscosity * self.imperfection)[free].ravel()
-        before = np.zeros_like(load)
-        if place.velocity is not None and not still:
-            before = (place.velocity / scales * length)[free].ravel()
-        closed = np.inf if still or viscosity == 1.0 else EXACT
+        resisting, before = self._resistance(place, length, in_time, viscosity)
+        load = (model.scaled_load + (0.0 if in_time else viscosity) * self.imperfection)[free].ravel()
+        closed = np.inf if in_time or viscosity == 1.0 else EXACT
         live, live_size = model.scaled_live
         multiplier = place.multiplier * live_size
         motion_so_far, shear = np.zeros_like(load), forces[:, 1:]
@@ -256,7 +264,7 @@ class Stepper:
                 load=load + resisting * before,
                 viscosity=resisting,
                 motion_so_far=motion_so_far,
-                size=min(size, STILL_SIZE) if still else size,
+                size=size,
                 live=live[free].ravel() if control is not None else None,
                 control=None if control is None else (control * scales / model.length)[free].ravel(),
                 wanted=0.0 if control is None else (s - driver.gone(pose)) / model.length,
@@ -284,9 +292,9 @@ class Stepper:
             raise NotSolved("the movement is not finite")
         moved_by = float(np.abs(motion_so_far).max(initial=0.0))
         if moved_by > UNSEEN:
-            self._refuse_unseen(start, pose)
-        share = AT_REST if still else min(AT_ONCE, size / (size + min(FRICTION_MEMORY, s / self.unit)))
-        lag, followed = self._follow(forces, friction, bound, followed, fresh, share)
+            self._refuse_unseen(start, pose, moved_by)
+        share = IN_TIME if in_time else min(AT_ONCE, size / (size + min(FRICTION_MEMORY, s / self.unit)))
+        lag, followed = self._follow(forces, np.maximum(gap, 0.0), friction, bound, followed, fresh, share)
         motion = np.where(free[:, None], full, place.pose.movement_to(pose))
         new = Place(
             s,
@@ -296,33 +304,50 @@ class Stepper:
             trial,
             followed,
             multiplier / (live_size or 1.0),
-            place.velocity if still else self._velocity(place, motion, length),
+            motion / length if in_time else self._velocity(place, motion, length),
         )
-        turn = 0.0 if place.velocity is None else float(np.abs(motion_so_far - before).max(initial=0.0))
+        turn = 0.0
+        if in_time or place.velocity is not None:
+            turn = float(np.abs(motion_so_far - before).max(initial=0.0))
         return new, motion / scales, StepError(lag, turn, moved_by, float(-gap[carries].min(initial=0.0)))
+
+    def _resistance(
+        self, place: Place, length: float, in_time: bool, viscosity: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(n_dof,) arrays: force per movement by viscosity or inertia, and the movement that meets none of it."""
+        weights, kept = self.weights[self.free].ravel(), 1.0
+        resisting = VISCOSITY * viscosity * self.unit / length * weights
+        if in_time:
+            resisting, kept = (1.0 / length**2 + DAMPING / length) * weights, 1.0 / (1.0 + DAMPING * length)
+        if place.velocity is None:
+            return resisting, np.zeros_like(resisting)
+        return resisting, kept * (place.velocity / self.model.lengths * length)[self.free].ravel()
 
     def _follow(
         self,
         forces: np.ndarray,
+        gap: np.ndarray,
         friction: np.ndarray,
         bound: np.ndarray,
         followed: np.ndarray,
         fresh: np.ndarray,
-        share: float,
+        share: float | np.ndarray,
     ) -> tuple[float, np.ndarray]:
         """Let the friction bounds follow a share of the way; how much those of sliding points change, and followed."""
         drag, push = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0]
         sliding = ((drag >= SLIDES * bound) | (drag > friction * push)) & ~fresh
-        lag = share * float((friction * np.abs(push - followed))[sliding].sum()) / self.weight
+        # Where a joint opens friction goes with the gap: the less a point can carry, the sooner.
+        share = np.maximum(share, gap / (gap + OPEN))
         # What is new has all the friction of its normal force at once.
-        return lag, np.where(fresh, push, followed + share * (push - followed))
+        after = np.where(fresh, push, followed + share * (push - followed))
+        return float((friction * np.abs(after - followed))[sliding].sum()) / self.weight, after
 
     def _velocity(self, place: Place, motion: np.ndarray, length: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity after a step, in it and in those before."""
         before = np.zeros_like(motion) if place.velocity is None else place.velocity
         return before + (motion - length * before) / (length + VELOCITY_MEMORY * self.unit)
 
-    def _refuse_unseen(self, start: Contacts, pose: Pose) -> None:
+    def _refuse_unseen(self, start: Contacts, pose: Pose, moved_by: float) -> None:
         """Refuse a step at whose end a corner is in a block, deeper than at its start.
 
         Raises
@@ -335,7 +360,7 @@ class Stepper:
             number, same = matched_contacts(end, start)
             before = np.where(same, np.minimum(start.gaps[number], 0.0), 0.0)
         if (end.gaps - before).min(initial=0.0) < -UNSEEN * self.model.length:
-            raise Unseen("a corner comes into a block from the side")
+            raise Unseen(moved_by)
 
     def _with_supports(self, pose: Pose, supports: Pose) -> Pose:
         free = self.free[:, None]
