@@ -76,6 +76,7 @@ __all__ = [
     "LimitLoad",
     "LimitStatus",
     "Loads",
+    "LocalLoss",
     "Mechanism",
     "PathState",
     "Polygons",

@@ -34,7 +34,7 @@ def arch_response() -> solver.Response:
 
 
 @cache
-def dropped_brick():
+def dropped_brick(local_loss=0.0):
     """A heavy block that stands, and beside it a brick over a gap that opens under it."""
     outlines = [
         [[0, 0], [4, 0], [4, 2], [0, 2]],
@@ -46,7 +46,7 @@ def dropped_brick():
         outlines, names=["pier", "brick", "ground", "footing"], roles=["free", "free", "fixed", "moving"]
     )
     away = solver.Settlement(direction=(1, 0), increment=0.05, limit=1.0)
-    return solver.settle(assembly, away, friction_coefficient=0.6)
+    return solver.settle(assembly, away, friction_coefficient=0.6, controls=solver.Controls(local_loss=local_loss))
 
 
 @cache

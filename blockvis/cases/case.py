@@ -331,6 +331,7 @@ def _settlement(table: Table) -> tuple[solver.Settlement, Profile | None]:
     }
     # Read with the controls.
     table.take("step_tolerance")
+    table.take("local_loss")
     profile = read_profile(table)
     table.finish()
     if keys["limit"] / keys["increment"] > MOST_STEPS:
@@ -421,9 +422,11 @@ def _controls(top: Table, analysis: Table, overlap_tolerance: float | None) -> s
     # What drives a path says how exact its steps are to be; a case has one path.
     tables = (*top.tables("settlement"), top.table("control"))
     tolerances = [table.fraction("step_tolerance") for table in tables]
+    losses = [table.share("local_loss") for table in top.tables("settlement")]
     return solver.Controls(
         increments=analysis.text("increments", "coulomb", among=solver.INCREMENTS),
         overlap_tolerance=overlap_tolerance,
         falling_frames=None if frames is None else int(frames),
         step_tolerance=min((t for t in tolerances if t is not None), default=solver.Controls.step_tolerance),
+        local_loss=min((loss for loss in losses if loss is not None), default=solver.Controls.local_loss),
     )

@@ -25,6 +25,7 @@ from .key import (
     OUTLINE,
     PAIR,
     POSITIVE,
+    SHARE,
     TEXT,
     TEXTS,
     TRIPLE,
@@ -293,6 +294,8 @@ SETTLEMENT = Section(
             otherwise="a hundredth of the increment"),
         Key("step_tolerance", FRACTION, "Relative error of the reaction that steps aim for; the smallest of several "
             "holds", 0.002, default=_CONTROLS.step_tolerance),
+        Key("local_loss", SHARE, "Share of the weight up to which blocks that leave for good are let go and the path "
+            "goes on without them; 0 ends it at the first", 0.0, default=_CONTROLS.local_loss),
         Key("profile", _PROFILE, "How far each support goes, in proportion: a Gaussian trough or heave along x, points "
             "of a table, or one vector and rotation per support; s is the largest displacement of a support's centroid",
             {"kind": "gaussian", "centre": 1.5, "inflection": 0.8}, "m", otherwise="all go as far"),

@@ -35,6 +35,7 @@ def _list_of(item: Mapping[str, Any], least: int = 0, most: int | None = None) -
 NUMBER = ValueKind("number", {"type": "number"})
 POSITIVE = ValueKind("number above 0", {"type": "number", "exclusiveMinimum": 0})
 FRACTION = ValueKind("number above 0 and below 1", {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1})
+SHARE = ValueKind("number from 0 to 1", {"type": "number", "minimum": 0, "maximum": 1})
 NOT_NEGATIVE = ValueKind("number of at least 0", {"type": "number", "minimum": 0})
 TEXT = ValueKind("text", {"type": "string"})
 TEXTS = ValueKind(

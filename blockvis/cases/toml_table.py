@@ -57,6 +57,13 @@ class Table:
             raise self.error(key, f"is {value:g}; give a number above 0 and below 1")
         return None if value is None else float(value)
 
+    def share(self, key: str) -> float | None:
+        """Read a number from 0 to 1; None if it is missing."""
+        value = self.number(key)
+        if value is not None and not 0.0 <= value <= 1.0:
+            raise self.error(key, f"is {value:g}; give a number from 0 to 1")
+        return None if value is None else float(value)
+
     def pair(self, key: str, default: tuple[float, float] | None = None, words: str = "[x, y]") -> Any:
         """Read two finite numbers; ``words`` says in the error what they are."""
         value = self.take(key, default)

@@ -172,6 +172,7 @@ class Drawer:
         frame = frame.holding(self.live.tails)
         fill = palette.block_colours(assembly.materials, assembly.free)
         self.fill = fill
+        self._loses = bool(response.losses)
         self.tints: np.ndarray | None = None
         self.scene = Scene(assembly, frame, self.sheet.inside_size, fill)
         self.force_scale, self.force_shown = self._force_scale()
@@ -234,7 +235,7 @@ class Drawer:
         true = increment.pose if pose is None else pose
         shown = magnified(self.assembly, true, self.look.magnification)
         at = increment.with_arrays(pose=true, contacts=contacts_at(increment, true)) if pose is not None else increment
-        self.scene.pose(shown, self._block_colours(true))
+        self.scene.pose(shown, self._block_colours(true, increment.fallen))
         hinges = np.zeros((0, 2))
         if blocks_only:
             self.scene.clear(*OF_STATICS)
@@ -361,7 +362,13 @@ class Drawer:
         governs = self._swing is not None and increment is self.response.governing
         return self._swing.increment if self._swing is not None and governs else increment
 
-    def _block_colours(self, pose: solver.Pose) -> np.ndarray | None:
+    def _block_colours(self, pose: solver.Pose, fallen: np.ndarray) -> np.ndarray | None:
+        colours = self._standing_colours(pose)
+        if not self._loses:
+            return colours
+        return palette.pale(self.fill if colours is None else colours, fallen)
+
+    def _standing_colours(self, pose: solver.Pose) -> np.ndarray | None:
         if self.look.colour_by != "displacement":
             return self.tints
         moved = pose.displacements(self.assembly)[:, :2]

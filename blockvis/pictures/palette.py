@@ -78,6 +78,17 @@ def block_colours(materials: tuple[str, ...], free: np.ndarray) -> np.ndarray:
     return np.clip(np.rint(colours), 0, 255).astype(np.uint8)
 
 
+def pale(fill: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+    """(n_blocks, 3) uint8 array: fills with some blocks, (n_blocks,) bool, nearly as light as the paper.
+
+    Parameters
+    ----------
+    fill : (n_blocks, 3) uint8 array
+    blocks : (n_blocks,) bool array
+    """
+    return np.where(blocks[:, None], np.rint(0.25 * fill + 0.75 * np.array(PAPER)), fill).astype(np.uint8)
+
+
 def part_colours(fill: np.ndarray, parts: np.ndarray) -> np.ndarray:
     """(n_blocks, 3) uint8 array: fills with the parts of a mechanism tinted.
 

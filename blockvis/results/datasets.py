@@ -62,7 +62,8 @@ def block_dataset(
     -------
     pyvista.UnstructuredGrid
         Cell arrays ``block_id``, ``name``, ``role`` (number), ``role_name``, ``material_id``, ``material``,
-        ``displacement`` (n_blocks, 3) of the centroids [m] and ``rotation`` [rad], in space a vector; point arrays
+        ``fallen`` (1 for blocks that have left for good), ``displacement`` (n_blocks, 3) of the centroids [m] and
+        ``rotation`` [rad], in space a vector; point arrays
         ``displacement`` (n_vertices, 3) [m], ``reference``, the coordinates in the layout [m], and of moved shapes
         ``to_reference``, the vector back to them [m]; field arrays ``units`` as "displacement [m]", ``settlement`` (the
         parameter: of a pushover the control displacement, of a load that moves its position), ``phase``,
@@ -105,6 +106,7 @@ def block_grid(
     grid.GetFieldData().AddArray(_strings("role_names", solver.ROLES))
     grid.GetFieldData().AddArray(_strings("material_names", materials))
     if increment is not None:
+        add_arrays(grid.GetCellData(), {"fallen": increment.fallen.astype(np.int32)})
         _describe(grid, increment)
     _state_units(grid)
     return grid

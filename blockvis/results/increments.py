@@ -170,7 +170,7 @@ def _arrays_of(state: solver.State) -> dict[str, np.ndarray]:
 
 
 def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
-    named = dict(arrays) | {name: arrays[stored] for name, stored in _STORED_AS.items()}
+    named = {"fell_at": np.zeros(0), **arrays} | {name: arrays[stored] for name, stored in _STORED_AS.items()}
     if "features" not in arrays:
         named["features"] = solver.features_of(arrays["vertex"], arrays["edge"], arrays["corner"])
         named["slip"], named["rotations"] = arrays["along"][:, None], arrays["rotations"][:, None]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
@@ -72,6 +72,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "mechanism": mechanism_text(response) if collapse else None,
         **_joint_counts(response),
         **_loss(response),
+        "losses": [asdict(loss) for loss in response.losses],
         "analysis": response.analysis,
         "parameter": response.parameter.name,
         **own,

@@ -345,7 +345,7 @@ def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, foun
         shown = _limit_state(run, run.given.loads, None, None, 0)
         yield replace(shown, checkpoint=_checkpoint(run))
     before = None if resume is None else resume.settlement
-    steps = settlement_steps(run.given, before)
+    steps = settlement_steps(run.given, before, whole=True)
     programs = 0
     while True:
         try:
@@ -381,7 +381,7 @@ def _over_places(
     """Limit states for each place of a moving load at the end of the settlements; then the mechanism of the lowest."""
     standing, programs = run.given.loads, 0
     pose = None if resume is None else resume.pose
-    steps = settlement_steps(run.given)
+    steps = settlement_steps(run.given, whole=True)
     while resume is None:
         try:
             increment = next(steps)

@@ -167,7 +167,7 @@ def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDis
 
 def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.PathState | None) -> Steps:
     case = given.case
-    pose, steps = None, settlement_steps(given)
+    pose, steps = None, settlement_steps(given, whole=True)
     # A pushover that has begun has its settlement behind it.
     before = solver.Ending(solver.Status.LIMIT_REACHED)
     while resume is None:

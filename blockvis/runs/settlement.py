@@ -77,7 +77,7 @@ class SettlementKind(AnalysisKind):
                 return f"{value:12.6g} N·m"
             return f"{value:12.6g} N   {value / weight:.6f} W"
 
-        lines = []
+        lines = [f"loss: {note}" for note in losses_of(response)]
         if _method(response) == LINEAR_PROGRAM:
             lines.append("increments by linear program: reactions are the least that equilibrium allows")
         if path:
@@ -124,6 +124,7 @@ class SettlementKind(AnalysisKind):
             return force_text(value, moment) + over
 
         rows = []
+        rows += [("loss", note) for note in losses_of(response)]
         if c is not None:
             rows.append(("collapse displacement", f"{c.displacement:.6g} {c.unit}"))
             rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))
@@ -133,6 +134,18 @@ class SettlementKind(AnalysisKind):
                 rows.append(("reaction at rest", reaction(path[0].reaction, path[0])))
             rows.append(("last reaction", reaction(path[-1].reaction, path[-1])))
         return rows
+
+
+def losses_of(response: solver.Response) -> list[str]:
+    """Say where blocks left for good while the structure stood, which, and what they weigh."""
+    unit = response.settlements[0].unit
+    said = []
+    for loss in response.losses:
+        names, more = ", ".join(loss.blocks[:4]), len(loss.blocks) - 4
+        names += f" and {more} more" if more > 0 else ""
+        weight = f"{force_text(loss.weight)}, {100.0 * loss.share:.2g} % of the weight"
+        said.append(f"{names} at {loss.settlement:.6g} {unit}, {weight}; the structure stands without")
+    return said
 
 
 def settlement_course(settlements: tuple[solver.Settlement, ...]) -> Course:
@@ -168,13 +181,15 @@ def _method(response: solver.Response) -> str | None:
     return LINEAR_PROGRAM if np.isnan(response.path[0].largest) else COULOMB
 
 
-def settlement_steps(given: RunInput, resume: solver.PathState | None = None) -> Steps:
+def settlement_steps(given: RunInput, resume: solver.PathState | None = None, *, whole: bool = False) -> Steps:
     """Follow the settlements of a case under the dead load alone; without settlements there are no increments.
 
     Parameters
     ----------
     given : RunInput
     resume : solver.PathState, optional
+    whole : bool
+        Whether the first loss of a block ends it, because what comes after is asked of the whole structure.
     """
     case = given.case
     if not case.settlements:
@@ -185,7 +200,7 @@ def settlement_steps(given: RunInput, resume: solver.PathState | None = None) ->
             case.settlements,
             interfaces=given.interfaces,
             loads=given.loads,
-            controls=case.controls,
+            controls=replace(case.controls, local_loss=0.0) if whole else case.controls,
             resume=resume,
         )
     )

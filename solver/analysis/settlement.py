@@ -18,7 +18,7 @@ from solver.path.controls import LINEAR_PROGRAM, Controls, Ending
 from solver.path.drivers import SupportMotion
 from solver.path.local_origin import at_origin, told_from, without_origin
 from solver.path.path import Path
-from solver.path.state import PathState, Place
+from solver.path.state import PathState
 from solver.program.model import Model
 from solver.programs.problem import SolveError
 from solver.programs.threads import NotLimited, one_thread
@@ -154,10 +154,10 @@ def _increments(
     resume: PathState | None,
 ) -> Generator[Increment, None, Ending]:
     first = 0 if resume is None else resume.phase
-    before: Place | None = None
+    before: PathState | None = None
     ending = Ending(Status.LIMIT_REACHED, "the settlement has reached its limit")
     for number, phase in enumerate(phases[first:], start=first):
-        start = Pose.initial(assembly) if before is None else before.pose
+        start = Pose.initial(assembly) if before is None else before.place.pose
         start = start if resume is None else resume.start
         path = Path(model_of(assembly, loads, interfaces), SupportMotion(assembly, phase, start), number, controls)
         at = 0.0
@@ -167,7 +167,7 @@ def _increments(
             ending = yield from path.follow(state, resume is not None)
         except SolveError as error:
             return Ending(Status.SOLVER_FAILED, f"at a settlement of {at:.6g} {phase.unit}: {error}")
-        resume, before = None, path.state.place
+        resume, before = None, path.state
         if ending.stop is not Status.LIMIT_REACHED:
             return ending
     return ending

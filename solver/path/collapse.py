@@ -88,18 +88,23 @@ class Falling:
 
     def at_rest(self, place: Place, farthest: float = FARTHEST_FALL, gap: float = COMPUTED_GAP) -> Place | None:
         """The equilibrium in which what falls comes to rest with the supports still; None where it goes farther."""
-        start = place.pose
-        for rest, _, acceleration, speed in self.in_time(place):
-            way = float(np.abs(start.movement_to(rest.pose) / self.model.lengths).max())
-            if way > farthest:
-                return None
-            if acceleration < STOPPED and speed < SLOW and self.checks.in_equilibrium(rest, gap):
-                return replace(rest, velocity=None)
-        return None
+        end, rests = self.end(place, farthest, gap)
+        return replace(end, velocity=None) if rests else None
 
-    def movement(self, one: Place, other: Place) -> float:
-        """Largest movement of a block from one place to another, in block sizes."""
-        return float(np.abs(one.pose.movement_to(other.pose) / self.model.lengths)[self.stepper.free].max(initial=0.0))
+    def end(self, place: Place, farthest: float = FARTHEST_FALL, gap: float = COMPUTED_GAP) -> tuple[Place, bool]:
+        """Where what falls ends with the supports still, and whether it rests there or goes farther."""
+        end = place
+        for end, _, acceleration, speed in self.in_time(place):
+            if self.ways(place, end).max() > farthest:
+                return end, False
+            if acceleration < STOPPED and speed < SLOW and self.checks.in_equilibrium(end, gap):
+                return end, True
+        return end, False
+
+    def ways(self, one: Place, other: Place) -> np.ndarray:
+        """(n_blocks,) array: largest component of the movement of free blocks from place to place, in block sizes."""
+        movement = np.abs(one.pose.movement_to(other.pose) / self.model.lengths).max(axis=1)
+        return np.where(self.stepper.free, movement, 0.0)
 
     def collapse(
         self, last: EquilibriumCheck, beyond: Place, upper_bound: float, multiplier_beyond: float | None
@@ -163,7 +168,12 @@ class Falling:
         if self.model.live is None:
             return self
         stepper = Stepper(replace(self.model, live=None), self.driver)
-        return Falling(stepper, EquilibriumChecks(stepper), Reports(stepper, self.reports.number), self.falling_frames)
+        return Falling(
+            stepper,
+            EquilibriumChecks(stepper),
+            Reports(stepper, self.reports.number, self.reports.fell_at),
+            self.falling_frames,
+        )
 
     def _fall(self, place: Place) -> Iterator[Increment]:
         """Frames of the fall, each a movement of the same size, until what falls rests."""

@@ -31,17 +31,20 @@ class Controls:
         to follow it in space.
     step_tolerance : float
         Relative error of the reaction that the steps of the path are chosen for.
+    local_loss : float
+        Share of the weight up to which blocks that leave for good are let go, and the path goes on without them.
 
     Raises
     ------
     ValueError
-        For an unknown way to find increments, or a step_tolerance that is none.
+        For an unknown way to find increments, a step_tolerance or a local_loss that is none.
     """
 
     increments: str | None = None
     overlap_tolerance: float | None = None
     falling_frames: int | None = None
     step_tolerance: float = 0.005
+    local_loss: float = 0.05
 
     def __post_init__(self) -> None:
         """Refuse an unknown way to find increments, and a tolerance that is none."""
@@ -50,6 +53,12 @@ class Controls:
         if not 0.0 < self.step_tolerance < 1.0:
             raise ValueError(
                 f"step_tolerance is {self.step_tolerance:g}; it is a number between 0 and 1, by default 0.005"
+            )
+
+        if not 0.0 <= self.local_loss <= 1.0:
+            raise ValueError(
+                f"local_loss is {self.local_loss:g}; it is a share of the weight from 0, which ends at the first "
+                "loss, to 1, by default 0.05"
             )
 
     def frames(self, dimension: int) -> int:

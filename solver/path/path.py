@@ -12,6 +12,7 @@ from solver.assembly import measure_contacts
 from solver.contact_step.problem import NotSolved
 from solver.equilibrium import wrench_matrix
 from solver.kinematics import Pose, moved_vertices
+from solver.loads import GRAVITY
 from solver.program.model import Model
 from solver.results.increment import Increment, Status
 from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, JUMP
@@ -50,6 +51,9 @@ ENCLOSED = 8.0
 #: Penetration, in block sizes, and normal force, in total loads, at which blocks may be wedged.
 PRESSED, LOCKED_FORCE = 1e-5, 1e2
 
+#: Movement, in block sizes, of what has left for good when the first block has gone as far as none comes back from.
+LEAVES = 0.1
+
 #: Movement of the supports, in block sizes, in which the joints' compliance is used up.
 ONSET = 1e-3
 
@@ -77,22 +81,30 @@ class Path:
     """
 
     def __init__(self, model: Model, driver: Driver, number: int, controls: Controls) -> None:
-        self.model, self.driver, self.number = model, driver, number
-        self.stepper = Stepper(model, driver)
-        self.checks = EquilibriumChecks(self.stepper)
-        self.reports = Reports(self.stepper, number)
-        self.falling = Falling(self.stepper, self.checks, self.reports, controls.frames(model.dimension))
+        self.whole, self.driver, self.number = model, driver, number
+        self.frames, self.local_loss = controls.frames(model.dimension), controls.local_loss
+        self._follow_without(np.zeros(0))
         self.largest_lag = LAG_PER_ERROR * controls.step_tolerance
         self.largest_turn = TURN_PER_ERROR * controls.step_tolerance
         self.reported, self.failure, self.pressed = -np.inf, "", Place.unloaded(driver.supports(0.0))
 
+    def _follow_without(self, fell_at: np.ndarray) -> None:
+        """Follow the structure without blocks that have left; (n_blocks,) array as in ``PathState.fell_at``."""
+        self.model = self.whole if not len(fell_at) else self.whole.without(~np.isnan(fell_at))
+        self.stepper = Stepper(self.model, self.driver)
+        self.checks = EquilibriumChecks(self.stepper)
+        self.reports = Reports(self.stepper, self.number, fell_at)
+        self.falling = Falling(self.stepper, self.checks, self.reports, self.frames)
+
     # The start ---------------------------------------------------------------------------------------------------
 
-    def begin(self, start: Pose, before: Place | None = None) -> PathState:
+    def begin(self, start: Pose, before: PathState | None = None) -> PathState:
         """The state at the start of the phase: of the drawing at rest, or after the phase before."""
+        fell_at = np.zeros(0)
         if before is not None:
             # Joints remember what they carried in the phase before; the way blocks moved is another.
-            place = replace(before, s=0.0, velocity=None, works=(0.0, 0.0, 0.0, 0.0))
+            place, fell_at = replace(before.place, s=0.0, velocity=None, works=(0.0, 0.0, 0.0, 0.0)), before.fell_at
+            self._follow_without(fell_at)
         else:
             place = Place.unloaded(start)
             rest = self._at_rest(place)
@@ -101,7 +113,7 @@ class Path:
                 closed = self.falling.at_rest(place, JUMP)
                 rest = None if closed is None else self._at_rest(replace(closed, contacts=None, velocity=None))
             place = rest or place
-        return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,))
+        return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,), fell_at=fell_at)
 
     def _at_rest(self, place: Place) -> Place | None:
         """The place with the forces of least elastic energy in equilibrium; None where there are none."""
@@ -134,6 +146,7 @@ class Path:
         """
         self.state = state
         if resumed:
+            self._follow_without(state.fell_at)
             self.reported = state.place.s
         else:
             ending = yield from self._begun(state)
@@ -152,15 +165,16 @@ class Path:
                 yield from self._unreported(state)
                 return Ending(Status.SOLVER_FAILED, self.reports.no_step(self.failure))
             beyond = self._beyond(state)
-            rest = self.falling.at_rest(beyond)
-            if rest is None:
+            end, rests = self.falling.end(beyond)
+            going_on = self._from(state, replace(end, velocity=None)) if rests else self._let_go(state, end)
+            if going_on is None:
                 yield from self._unreported(state)
                 check, lost = self._checked(state.place), None
                 if self.model.live is not None:
                     bounds = self.checks.bounds(beyond, CLOSING_GAP)
                     lost = bounds.high if bounds.exists and bounds.high <= 0.0 else None
                 return (yield from self.falling.collapse(check, beyond, state.upper_bound, lost))
-            self.state = self._from(state, rest)
+            self.state = going_on
         return self.reports.reached()
 
     def _begun(self, state: PathState) -> Generator[Increment, None, Ending | None]:
@@ -204,7 +218,7 @@ class Path:
             self.state = self._back(state, place.s)
             return
         ended = place.s >= self.driver.limit * (1.0 - 1e-12)
-        if self.falling.movement(place, rest) > JUMP:
+        if self.falling.ways(place, rest).max() > JUMP:
             state = self._from(state, rest)
         self.state = state = replace(state, history=(replace(rest, works=place.works),), ended=ended)
         yield self._report(state, self._checked(rest, self._reaction(place)))
@@ -363,7 +377,7 @@ class Path:
 
     def _from(self, state: PathState, rest: Place) -> PathState:
         """Go on from where blocks came to rest."""
-        if self.falling.movement(state.place, rest) > JUMP:
+        if self.falling.ways(state.place, rest).max() > JUMP:
             self.reports.notes.append(Note(rest.s, self.reports.jump(state.place.pose, rest.pose)))
         place = replace(rest, velocity=None, works=state.place.works)
         return replace(
@@ -374,6 +388,36 @@ class Path:
             refined=False,
             history=(place,),
         )
+
+    def _let_go(self, state: PathState, end: Place) -> PathState | None:
+        """Go on without the blocks that have left for good; None where they are too many, or the others fall, too."""
+        if self.model.live is not None:
+            return None
+        weights = self.model.assembly.masses * self.model.assembly.free * GRAVITY
+        leaving = self.falling.ways(state.place, end) > LEAVES
+        fell_at = np.where(leaving, state.place.s, state.fell_at if len(state.fell_at) else np.nan)
+        if weights[~np.isnan(fell_at)].sum() > self.local_loss * weights.sum():
+            return None
+        before, notes, programs = state.fell_at, self.reports.notes, self.stepper.programs
+        lost = float(weights[leaving].sum())
+        words = self.reports.loss(leaving, lost, lost / float(weights.sum()))
+        self._follow_without(fell_at)
+        self.reports.notes, self.stepper.programs = [*notes, Note(state.place.s, words)], programs
+        fallen = leaving[:, None]
+        pose = Pose(
+            np.where(fallen, end.pose.positions, state.place.pose.positions),
+            np.where(fallen, end.pose.rotations, state.place.pose.rotations),
+        )
+        without = replace(state, place=replace(state.place, pose=pose, velocity=None), fell_at=fell_at)
+        rests = self._stands(without.place)
+        end = without.place
+        if not rests:
+            end, rests = self.falling.end(end)
+        going_on = self._from(without, replace(end, velocity=None)) if rests else self._let_go(without, end)
+        if going_on is None:
+            self._follow_without(before)
+            self.reports.notes = notes
+        return going_on
 
     def _beyond(self, state: PathState) -> Place:
         """A place beyond the last equilibrium, at the upper bound or as near as a step is solved."""

@@ -31,11 +31,14 @@ class Reports:
         That led to what is told; their programs are counted.
     number : int
         Of the phase.
+    fell_at : (n_blocks,) array
+        As in :class:`solver.results.increment.State`.
     """
 
-    def __init__(self, stepper: Stepper, number: int) -> None:
+    def __init__(self, stepper: Stepper, number: int, fell_at: np.ndarray) -> None:
         self.stepper, self.model, self.driver, self.number = stepper, stepper.model, stepper.driver, number
         self.notes: list[Note] = []
+        self.fell_at = fell_at
 
     def increment(
         self, check: EquilibriumCheck, velocity: np.ndarray, works: tuple[float, float, float, float]
@@ -128,6 +131,7 @@ class Reports:
                 friction=friction,
                 velocity=velocity,
                 support_forces=support_forces,
+                fell_at=self.fell_at,
             ),
             least=bounds[0],
             largest=bounds[1],
@@ -163,6 +167,14 @@ class Reports:
         np.maximum.at(way, assembly.block_of_vertex, np.where(assembly.free[assembly.block_of_vertex], far, 0.0))
         fell = np.flatnonzero(way > 0.1 * way.max())
         return f"{self._named(fell)} moved by up to {way.max():.2g} m at once to the next equilibrium"
+
+    def loss(self, fallen: np.ndarray, weight: float, share: float) -> str:
+        """Which blocks leave for good."""
+        falls = "falls" if fallen.sum() == 1 else "fall"
+        return (
+            f"{self._named(np.flatnonzero(fallen))} {falls}, {weight:.4g} N, {100.0 * share:.2g} % of the weight; "
+            "the path goes on without"
+        )
 
     def _named(self, blocks: np.ndarray) -> str:
         shown = ", ".join(f"'{self.model.assembly.names[i]}'" for i in blocks[:NAMED])

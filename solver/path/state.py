@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -77,6 +77,8 @@ class PathState:
         Places passed of late, oldest first, to go back to from where no equilibrium exists.
     ended : bool
         The phase has reached its limit.
+    fell_at : (n_blocks,) array
+        As in :class:`solver.results.increment.State`.
     """
 
     phase: int
@@ -88,6 +90,7 @@ class PathState:
     refine_until: float = -np.inf
     history: tuple[Place, ...] = ()
     ended: bool = False
+    fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)

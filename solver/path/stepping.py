@@ -150,7 +150,10 @@ class Stepper:
         """Return the contact points at a pose; those at the last one asked for are remembered."""
         if self._seen is None or self._seen[0] is not pose:
             model = self.model
-            self._seen = pose, find_contacts(model.assembly, moved_vertices(model.assembly, pose), model.reach)
+            found = find_contacts(model.assembly, moved_vertices(model.assembly, pose), model.reach)
+            if model.fallen is not None:
+                found = found[~(model.fallen[found.block_a] | model.fallen[found.block_b])]
+            self._seen = pose, found
         return self._seen[1]
 
     def friction(self, contacts: Contacts) -> np.ndarray:

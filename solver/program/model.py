@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,8 @@ class Model:
     live : (n_blocks, n_dof) array [N, N·m], optional
         Where given, loads whose multiplier is an unknown of every program: it takes the value that lets the program
         do its work.
+    fallen : (n_blocks,) bool array, optional
+        Blocks that are out of the structure: nothing loads or touches them.
     """
 
     assembly: Assembly
@@ -38,6 +40,11 @@ class Model:
     force: float
     reach: float
     live: np.ndarray | None = None
+    fallen: np.ndarray | None = None
+
+    def without(self, fallen: np.ndarray) -> Model:
+        """Return the model once blocks, (n_blocks,) bool array, have left it."""
+        return replace(self, load=np.where(fallen[:, None], 0.0, self.load), fallen=fallen)
 
     @property
     def n_dof(self) -> int:

@@ -95,6 +95,8 @@ class State:
         Movement of each block in the increment that follows, per unit of the parameter; in a fall, per frame.
     support_forces : (n_blocks, 3) array [N, N, N·m]
         Resultant of the structure on each support about its centroid; zero for free blocks.
+    fell_at : (n_blocks,) array
+        Parameter at which blocks that have left for good were let go, nan for those that stand; empty where all stand.
     """
 
     pose: Pose
@@ -104,6 +106,7 @@ class State:
     friction: np.ndarray
     velocity: np.ndarray
     support_forces: np.ndarray
+    fell_at: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 class StoredState(Protocol):
@@ -226,6 +229,12 @@ class Increment:
     def support_forces(self) -> np.ndarray:
         """(n_blocks, 3) array [N, N, N·m]: resultant of the structure on each support; see :class:`State`."""
         return self.state.support_forces
+
+    @property
+    def fallen(self) -> np.ndarray:
+        """(n_blocks,) bool array: blocks that have left for good, and are out of the structure."""
+        fell_at = self.state.fell_at
+        return ~np.isnan(fell_at) if len(fell_at) else np.zeros(len(self.pose.positions), dtype=bool)
 
     @property
     def states(self) -> np.ndarray:

@@ -56,6 +56,26 @@ class Collapse:
         )
 
 
+@dataclass(frozen=True)
+class LocalLoss:
+    """Blocks that left for good while the structure stood.
+
+    Attributes
+    ----------
+    settlement : float [m or rad]
+        Parameter, within its phase, at which they fell.
+    blocks : tuple of str
+    weight : float [N]
+    share : float
+        Of the weight of all free blocks.
+    """
+
+    settlement: float
+    blocks: tuple[str, ...]
+    weight: float
+    share: float
+
+
 class Control(Protocol):
     """What drives an analysis that no settlement drives: how far it goes, and in which unit."""
 
@@ -126,6 +146,19 @@ class Response:
     def notes(self) -> tuple[str, ...]:
         """Notes of the increments, in their order."""
         return tuple(note for increment in self.increments for note in increment.notes)
+
+    @property
+    def losses(self) -> tuple[LocalLoss, ...]:
+        """Blocks that left for good along the path, in the order in which they fell."""
+        fell_at = self.path[-1].state.fell_at if self.path else np.zeros(0)
+        weights = self.assembly.masses * GRAVITY
+        losses = []
+        for value in np.unique(fell_at[~np.isnan(fell_at)]):
+            fallen = np.flatnonzero(fell_at == value)
+            weight = float(weights[fallen].sum())
+            names = tuple(self.assembly.names[k] for k in fallen)
+            losses.append(LocalLoss(float(value), names, weight, weight / self.total_weight))
+        return tuple(losses)
 
     @property
     def parameters(self) -> np.ndarray:

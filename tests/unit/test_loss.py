@@ -4,7 +4,9 @@ import json
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from PIL import Image
 from structures import arch_response, dropped_brick
 
 import blockvis
@@ -13,6 +15,7 @@ from blockvis.pictures.captions import lost_text
 from blockvis.pictures.curves import draw_curve
 from blockvis.report.page import report_html
 from blockvis.results.about import LOCAL, loss_of
+from blockvis.results.datasets import block_dataset
 from blockvis.runs.kinds import KINDS
 
 
@@ -56,3 +59,22 @@ def test_summary_console_report_and_curve_tell_them_apart(tmp_path):
         (blockvis.write(arch_response(), tmp_path / "arch") / "summary.json").read_text(encoding="utf-8")
     )
     assert (other["loss"], other["falling_share"]) == ("structure", pytest.approx(1.0))
+
+
+def test_what_is_let_go_is_told_and_drawn_pale(tmp_path):
+    response = dropped_brick(0.05)
+    assert response.stop is solver.Status.LIMIT_REACHED
+    out = blockvis.write(response, tmp_path / "out")
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    (loss,) = summary["losses"]
+    assert (loss["blocks"], loss["weight"]) == (["brick"], pytest.approx(1962, abs=1))
+    assert loss["settlement"] == pytest.approx(response.losses[0].settlement)
+    (line,) = (line for line in KINDS["settlement"].lines(response) if line.startswith("loss: "))
+    assert re.fullmatch(r"loss: brick at 0\.15\d+ m, 1\.962 kN, 1\.2 % of the weight; the structure stands .*", line)
+    assert "the structure stands without" in report_html(response)
+    assert blockvis.open_results(out).losses == response.losses, "the files keep what fell"
+    blocks = block_dataset(response.assembly, response.path[-1])
+    assert blocks.cell_data["fallen"].tolist() == [0, 1, 0, 0]
+    still = Image.open(blockvis.draw_still(response, tmp_path / "last.png", increment=-1)).convert("RGB")
+    standing = Image.open(blockvis.draw_still(response, tmp_path / "first.png", increment=0)).convert("RGB")
+    assert np.asarray(still).mean() > np.asarray(standing).mean()
