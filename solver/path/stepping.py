@@ -21,7 +21,7 @@ from solver.contact_step.minimise import minimise
 from solver.contact_step.problem import ContactProblem, NotSolved
 from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
-from solver.geometry.contacts import Contacts, matched_contacts
+from solver.geometry.contacts import Contacts, joined_contacts, matched_contacts
 from solver.kinematics import Pose, moved, moved_vertices
 from solver.program.model import Model
 from solver.tolerances import (
@@ -212,7 +212,13 @@ class Stepper:
         return forces, trial, followed, fresh
 
     def step(
-        self, place: Place, length: float, *, in_time: bool = False, viscosity: float = 1.0
+        self,
+        place: Place,
+        length: float,
+        *,
+        in_time: bool = False,
+        viscosity: float = 1.0,
+        among: Contacts | None = None,
     ) -> tuple[Place, np.ndarray, StepError]:
         """Take one step of the driver, or one in time with the supports at rest.
 
@@ -225,6 +231,8 @@ class Stepper:
             The driver stands still, and what is not in equilibrium moves against its inertia: M/h² for the viscosity.
         viscosity : float
             Times the model's; and the imperfection times the model's.
+        among : Contacts, optional
+            Contact points that the step has to see; by default those at the place.
 
         Returns
         -------
@@ -241,7 +249,7 @@ class Stepper:
         scales, n_dof = model.lengths, len(model.lengths)
         s, size = (place.s, SMALL) if in_time else (place.s + length, length / self.unit)
         supports = driver.supports(s)
-        start = self.contacts(place.pose)
+        start = self.contacts(place.pose) if among is None else among
         forces, trial, followed, fresh = self.remembered(place, start)
         friction, compliance = self.friction(start), self.compliance(start)
         bound = friction * followed
@@ -295,7 +303,10 @@ class Stepper:
             raise NotSolved("the movement is not finite")
         moved_by = float(np.abs(motion_so_far).max(initial=0.0))
         if moved_by > UNSEEN:
-            self._refuse_unseen(start, pose, moved_by)
+            unseen = self._unseen(start, place.pose, pose, moved_by)
+            if len(unseen):
+                among = joined_contacts([start, unseen])
+                return self.step(place, length, in_time=in_time, viscosity=viscosity, among=among)
         share = IN_TIME if in_time else min(AT_ONCE, size / (size + min(FRICTION_MEMORY, s / self.unit)))
         lag, followed = self._follow(forces, np.maximum(gap, 0.0), friction, bound, followed, fresh, share)
         motion = np.where(free[:, None], full, place.pose.movement_to(pose))
@@ -350,20 +361,25 @@ class Stepper:
         before = np.zeros_like(motion) if place.velocity is None else place.velocity
         return before + (motion - length * before) / (length + VELOCITY_MEMORY * self.unit)
 
-    def _refuse_unseen(self, start: Contacts, pose: Pose, moved_by: float) -> None:
-        """Refuse a step at whose end a corner is in a block, deeper than at its start.
+    def _unseen(self, seen: Contacts, before: Pose, pose: Pose, moved_by: float) -> Contacts:
+        """Contact points that a step has to see, too, where they were before it: at its end a corner is in a block.
 
         Raises
         ------
         Unseen
+            Where that corner was behind the edge already, or the step has seen it.
         """
         end = self.contacts(pose)
-        before = np.zeros(len(end))
-        if len(end) and len(start):
-            number, same = matched_contacts(end, start)
-            before = np.where(same, np.minimum(start.gaps[number], 0.0), 0.0)
-        if (end.gaps - before).min(initial=0.0) < -UNSEEN * self.model.length:
+        earlier, known = np.zeros(len(end)), np.zeros(len(end), dtype=bool)
+        if len(end) and len(seen):
+            number, known = matched_contacts(end, seen)
+            earlier = np.where(known, np.minimum(seen.gaps[number], 0.0), 0.0)
+        deepest = -UNSEEN * self.model.length
+        deep = end.gaps - earlier < deepest
+        found = measure_contacts(self.model.assembly, moved_vertices(self.model.assembly, before), end[deep])
+        if known[deep].any() or (found.gaps < deepest).any():
             raise Unseen(moved_by)
+        return found
 
     def _with_supports(self, pose: Pose, supports: Pose) -> Pose:
         free = self.free[:, None]
