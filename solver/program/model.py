@@ -29,6 +29,8 @@ class Model:
     live : (n_blocks, n_dof) array [N, N·m], optional
         Where given, loads whose multiplier is an unknown of every program: it takes the value that lets the program
         do its work.
+    compliance, imperfection : float
+        Times those of :mod:`solver.tolerances`.
     """
 
     assembly: Assembly
@@ -38,6 +40,8 @@ class Model:
     force: float
     reach: float
     live: np.ndarray | None = None
+    compliance: float = 1.0
+    imperfection: float = 1.0
 
     @property
     def n_dof(self) -> int:
