@@ -446,7 +446,7 @@ def _run(options: argparse.Namespace) -> int:
 def _checking(options: argparse.Namespace, case: Case | None) -> Iterator[StepChecking | None]:
     """Follow a path in shorter steps meanwhile, unless it is not wanted."""
     from .runs.once_more import takes_steps
-    from .runs.step_check import StepChecking, stored_case
+    from .runs.step_check import STEP_CHECK, StepChecking, stored_case
 
     folder, checking = None, None
     if case is None:
@@ -454,7 +454,9 @@ def _checking(options: argparse.Namespace, case: Case | None) -> Iterator[StepCh
         # What is wrong with the folder is told by what reads it to go on.
         with contextlib.suppress(ValueError, OSError):
             case = stored_case(folder)
-    if case is not None and options.check_steps is not False and takes_steps(case):
+    known = folder is not None and (folder / STEP_CHECK).is_file()
+    wanted = not known if options.check_steps is None else options.check_steps
+    if case is not None and wanted and takes_steps(case):
         checking = StepChecking(case, folder)
     try:
         yield checking

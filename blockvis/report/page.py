@@ -52,6 +52,7 @@ from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.runs.kinds import KINDS
+from blockvis.runs.path_range import WORDS
 
 from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, hexadecimals, rounded
 from .space import model_in_space
@@ -144,6 +145,11 @@ def _error(error: str) -> str:
     return html_rows([(name, value)]) if error else ERROR_UNKNOWN
 
 
+def _band(band: ReactionRange | None) -> str:
+    """Say what the band behind the curve is."""
+    return "" if band is None else html_rows([("band behind the curve", f"{band.runs.max(initial=0)} runs: {WORDS}")])
+
+
 def report_html(
     response: solver.Response,
     case_text: str = "",
@@ -180,7 +186,7 @@ def report_html(
         summary=html_rows(summary_rows(response, fall)),
         cracks=_cracks(response),
         certificate=html_rows(_certificate(response)),
-        error=_error(error),
+        error=_error(error) + _band(band),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
         case_open=" open" if case_text else "",
         model=data,

@@ -124,6 +124,7 @@ def test_the_band_of_a_later_phase_lies_behind_those_before():
     assert drawn.get_paths()[0].get_extents().x1 == pytest.approx(100.0)
     assert axes.get_ylim()[1] > drawn.get_paths()[0].get_extents().y1
     assert '"band":[[0.0,' in report_html(response, band=band)
+    assert f"<td>1 runs: {ALL[1:-1]}</td>" in report_html(response, band=band)
     assert '"band":[]' in report_html(response)
 
 
