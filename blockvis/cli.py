@@ -8,6 +8,7 @@ import gc
 import glob
 import io
 import json
+import math
 import os
 import sys
 import time
@@ -25,10 +26,10 @@ from .broken_pipes import is_broken_pipe
 from .extras import MissingExtra
 from .generators import LAYOUTS, help_text
 from .layout.views import VIEWS
-from .processes import cores
 
 if TYPE_CHECKING:
     from .cases.contents import Case
+    from .fall import Fall
     from .runs.run import Run
     from .runs.step_check import StepChecking
 
@@ -45,8 +46,8 @@ EXIT_CODES = f"""exit codes:
   {NO_EQUILIBRIUM}    no initial equilibrium: the structure does not stand as drawn
   {INTERRUPTED}  interrupted by Ctrl-C; blockvis run --resume OUT goes on"""
 
-#: Seconds that a run waits at least for the path in shorter steps, which it otherwise gives as long as it took itself.
-PATIENCE = 10.0
+#: How long a run waits for the path in shorter steps: so many times what it took itself, and at least so many seconds.
+PATIENCE, LEAST_PATIENCE = 3.0, 60.0
 
 #: Pixels below which a picture has no room for its words.
 SMALLEST_PICTURE = 160
@@ -148,8 +149,15 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--check-steps",
         action=argparse.BooleanOptionalAction,
-        help="follow the path a second time, with half the step tolerance, and say how far apart the two are (default: "
-        "on another core, where there is one, and if it does not take much longer than the run itself)",
+        help="follow the path a second time, with half the step tolerance, and say the error that follows (default: in "
+        f"a process of its own, given up after {PATIENCE:g} times what the run took, at least {LEAST_PATIENCE:g} s; "
+        "--check-steps waits to its end)",
+    )
+    run.add_argument(
+        "--range",
+        action="store_true",
+        help="follow a settlement eight times more, with friction, compliance of the joints and imperfection varied, "
+        "and give the range of collapse and reaction; as [analysis] range = true",
     )
     run.set_defaults(verb=_run)
     info = verbs.add_parser("info", help="blocks, names, roles, unit, areas, overlaps and mortar joints of a layout")
@@ -428,7 +436,7 @@ def _run(options: argparse.Namespace) -> int:
             return _told(options, run, checking, started)
     if options.case is None:
         raise ValueError("name a case file: blockvis run CASE.toml, or go on with a run: blockvis run --resume OUT")
-    case = read_case(options.case, options.set)
+    case = read_case(options.case, [*options.set, *(["analysis.range=true"] if options.range else [])])
     with _checking(options, case) as checking:
         run = run_case(case, options.output, overwrite=options.force, **drawn)
         return _told(options, run, checking, started)
@@ -436,8 +444,9 @@ def _run(options: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def _checking(options: argparse.Namespace, case: Case | None) -> Iterator[StepChecking | None]:
-    """Follow a path in shorter steps meanwhile, where there is a core for it or it is asked for."""
-    from .runs.step_check import StepChecking, stored_case, takes_steps
+    """Follow a path in shorter steps meanwhile, unless it is not wanted."""
+    from .runs.once_more import takes_steps
+    from .runs.step_check import STEP_CHECK, StepChecking, stored_case
 
     folder, checking = None, None
     if case is None:
@@ -445,7 +454,8 @@ def _checking(options: argparse.Namespace, case: Case | None) -> Iterator[StepCh
         # What is wrong with the folder is told by what reads it to go on.
         with contextlib.suppress(ValueError, OSError):
             case = stored_case(folder)
-    wanted = cores() > 1 if options.check_steps is None else options.check_steps
+    known = folder is not None and (folder / STEP_CHECK).is_file()
+    wanted = not known if options.check_steps is None else options.check_steps
     if case is not None and wanted and takes_steps(case):
         checking = StepChecking(case, folder)
     try:
@@ -464,7 +474,8 @@ def _told(options: argparse.Namespace, run: Run, checking: StepChecking | None, 
     if stop is solver.Status.INTERRUPTED:
         print(f"blockvis: go on with it by blockvis run --resume {run.folder}", file=sys.stderr)
         return INTERRUPTED
-    _say_error(options, run, checking, max(time.perf_counter() - started, PATIENCE))
+    _say_error(options, run, checking, max(PATIENCE * (time.perf_counter() - started), LEAST_PATIENCE))
+    _say_range(options, run)
     if stop is solver.Status.SOLVER_FAILED:
         return SOLVER_FAILED
     if stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
@@ -483,9 +494,9 @@ def _say_error(options: argparse.Namespace, run: Run, checking: StepChecking | N
         try:
             most = None if options.check_steps else patience
             check = checking.compared(run.folder, run.response, most, lambda: _say_waiting(most))
-            unknown = "" if check else "the same path once more came to nothing"
+            unknown = "" if check else "the same path in shorter steps came to nothing"
         except TimeoutError as late:
-            unknown = f"{late}; --check-steps waits for it"
+            unknown = f"{late}; --check-steps waits for it, --no-check-steps does without"
         except KeyboardInterrupt:
             unknown, interrupted = "interrupted; everything else is written", True
     if check is None and options.check_steps and not interrupted:
@@ -505,7 +516,63 @@ def _say_error(options: argparse.Namespace, run: Run, checking: StepChecking | N
 
 def _say_waiting(patience: float | None) -> None:
     most = "" if patience is None else f", for {patience:.0f} s at most"
-    print(f"blockvis: waiting for the same path once more{most}; Ctrl-C leaves it", file=sys.stderr)
+    print(f"blockvis: waiting for the same path in shorter steps{most}; Ctrl-C leaves it", file=sys.stderr)
+
+
+def _say_range(options: argparse.Namespace, run: Run) -> None:
+    """Find and say the range of a path where it is asked for and not known."""
+    from .results.folder import RANGE
+    from .runs.path_range import find_range, wants_range
+    from .runs.step_check import stored_case
+
+    # What has no path has no range, and says why.
+    stopped = run.response.stop in (solver.Status.NO_INITIAL_EQUILIBRIUM, solver.Status.SOLVER_FAILED)
+    asked = options.range or wants_range(stored_case(run.folder))
+    if stopped or not asked or (run.had_finished and not options.range and (run.folder / RANGE).is_file()):
+        return
+    seconds = sum(increment.seconds for increment in run.response.increments)
+
+    def waiting(runs: int, at_once: int) -> None:
+        about = math.ceil(runs / at_once) * seconds
+        print(
+            f"blockvis: range: {runs} more runs, {at_once} at a time, about {about:.0f} s; Ctrl-C leaves them, "
+            f"blockvis run --resume {run.folder} --range makes them later",
+            file=sys.stderr,
+        )
+
+    try:
+        print(find_range(run.folder, waiting))
+    except KeyboardInterrupt:
+        print("blockvis: range not known: interrupted; everything else is written", file=sys.stderr)
+        return
+    if (run.folder / "curve.png").is_file():
+        _draw_curve(run.response, run.folder, ("curve.png",))
+    if (run.folder / "report.html").is_file():
+        _write_report(run.response, run.folder)
+
+
+def _draw_curve(response: solver.Response, folder: Path, names: Sequence[str]) -> None:
+    """Draw the curve of a results folder, with what is known of its range."""
+    from .pictures.curves import draw_curve
+    from .results.reaction_range import stored_range
+
+    for name in names:
+        draw_curve(response, folder / name, band=stored_range(folder))
+
+
+def _write_report(response: solver.Response, folder: Path) -> Fall | None:
+    """Write the report of a results folder, with what is known of its error and range; returns its fall."""
+    from .fall import fall_of
+    from .report.page import write_report
+    from .results.fall_files import stored_fall
+    from .results.folder import stored_case
+    from .results.reaction_range import stored_range
+    from .runs.step_check import stored_check
+
+    fall = stored_fall(folder) or fall_of(response)
+    error, band = str(stored_check(folder) or ""), stored_range(folder)
+    write_report(response, folder / "report.html", stored_case(folder), fall=fall, error=error, band=band)
+    return fall
 
 
 def _info(options: argparse.Namespace) -> int:
@@ -550,27 +617,19 @@ def _layout(options: argparse.Namespace) -> int:
 
 
 def _render(options: argparse.Namespace) -> int:
-    from .fall import fall_of
-    from .pictures.curves import draw_curve
     from .pictures.render import animate, draw_mechanism, draw_still
-    from .report.page import write_report
-    from .results.fall_files import stored_fall
-    from .results.folder import stored_case
     from .runs.progress import DrawingProgress
     from .runs.reopen import open_results
-    from .runs.step_check import stored_check
 
     folder = Path(options.results)
     response = open_results(folder)
     size = _size(options.size)
-    fall = stored_fall(folder) or fall_of(response)
-    error = str(stored_check(folder) or "")
-    write_report(response, folder / "report.html", stored_case(folder), fall=fall, error=error)
+    fall = _write_report(response, folder)
     drawn = ["report.html"]
     if response.path:
-        draw_curve(response, folder / "curve.png")
-        draw_curve(response, folder / "curve.svg")
-        drawn += ["curve.png", "curve.svg"]
+        curves = ["curve.png", "curve.svg"]
+        _draw_curve(response, folder, curves)
+        drawn += curves
     look = {
         "magnification": options.magnification,
         "colour_by": options.colour_by,

@@ -4,6 +4,7 @@ import os
 import shutil
 import sys
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 # pytest-xdist has a worker for each core: threads of the linear algebra, which is loaded below, would wait for cores
@@ -33,7 +34,7 @@ def undrawn() -> Iterator[None]:
         patched.setattr(_RUN, "draw_results", lambda *_, **__: ())
         patched.setattr(_RUN, "started_film", lambda *_, **__: None)
         # Nor do those of the command line called from here follow a second path in shorter steps.
-        patched.setattr("blockvis.cli.cores", lambda: 1)
+        patched.setattr("blockvis.cli._checking", lambda *_: nullcontext())
         yield
 
 

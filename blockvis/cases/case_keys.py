@@ -29,6 +29,7 @@ from .key import (
     TEXT,
     TEXTS,
     TRIPLE,
+    TRUE_OR_FALSE,
     VECTOR,
     Key,
     Section,
@@ -76,7 +77,6 @@ _PROFILE = ValueKind(
         "additionalProperties": False,
     },
 )  # fmt: skip
-_TRUE_OR_FALSE = ValueKind("true or false", {"type": "boolean"})
 _GROUPS = ValueKind(
     "list of names, or of lists of names",
     {"anyOf": [{"type": "string"}, {"type": "array", "items": TEXTS.schema}]},
@@ -365,7 +365,7 @@ EXPLAIN = Section(
             otherwise="each support of the drawing"),
         Key("directions", ValueKind("list of texts", {"type": "array", "items": {"enum": list(DIRECTIONS)}}),
             "Ways in which they may have moved", ["down", "rotation"], default=_EXPLAIN.directions),
-        Key("trough", _TRUE_OR_FALSE, "Whether troughs and slopes of the ground are candidates", True,
+        Key("trough", TRUE_OR_FALSE, "Whether troughs and slopes of the ground are candidates", True,
             otherwise="where the structure stands on three places or more"),
         Key("centres", NUMBERS, "Places x at which a trough may be deepest", [1.0, 2.0], "m",
             otherwise="five over the width of the structure"),

@@ -37,6 +37,7 @@ POSITIVE = ValueKind("number above 0", {"type": "number", "exclusiveMinimum": 0}
 FRACTION = ValueKind("number above 0 and below 1", {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1})
 SHARE = ValueKind("number from 0 to 1", {"type": "number", "minimum": 0, "maximum": 1})
 NOT_NEGATIVE = ValueKind("number of at least 0", {"type": "number", "minimum": 0})
+TRUE_OR_FALSE = ValueKind("true or false", {"type": "boolean"})
 TEXT = ValueKind("text", {"type": "string"})
 TEXTS = ValueKind(
     "text, or list of texts", {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}

@@ -102,6 +102,13 @@ class Table:
             raise self.error(key, f"is '{value}'{nearest(value, among)}; choose from {', '.join(among)}")
         return value
 
+    def boolean(self, key: str) -> bool:
+        """Read true or false; false if it is missing."""
+        value = self.take(key, False)
+        if not isinstance(value, bool):
+            raise self.error(key, f"is {shortened(value)}; give true or false")
+        return value
+
     def numbers(self, key: str) -> tuple[float, ...] | None:
         """Read a list of finite numbers."""
         value = self.take(key)

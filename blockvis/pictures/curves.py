@@ -17,6 +17,7 @@ from PIL import Image, ImageDraw
 import solver
 from blockvis.atomic_files import whole_file
 from blockvis.results.about import about, collapse_mechanism, counts_text
+from blockvis.results.reaction_range import ReactionRange
 
 from . import palette
 from .captions import (
@@ -61,7 +62,11 @@ class Event:
 
 
 def draw_curve(
-    response: solver.Response, path: str | os.PathLike[str], *, size: tuple[float, float] = (8.0, 5.0)
+    response: solver.Response,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[float, float] = (8.0, 5.0),
+    band: ReactionRange | None = None,
 ) -> Path:
     """Draw the reaction over the settlement, absolute and divided by the weight, and mark changes of the mechanism.
 
@@ -75,6 +80,8 @@ def draw_curve(
         Ending in .png, .svg or .pdf.
     size : (float, float) [inch]
         Width and height; a PNG has 200 pixels per inch.
+    band : ReactionRange, optional
+        Of the reaction, drawn behind it.
 
     Returns
     -------
@@ -88,7 +95,8 @@ def draw_curve(
         raise ValueError(f"'{path.name}' is no curve that blockvis draws; end its name in {', '.join(CURVE_SUFFIXES)}")
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.add_subplot()
-    _draw(axes, response, events=True)
+    _draw(axes, response, events=True, band=band)
+    name += "" if band is None else f"   ·   band: range of {band.runs.max(initial=0)} runs"
     axes.set_title(name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK))
     with whole_file(path) as partial:
         figure.savefig(partial, dpi=200)
@@ -167,7 +175,14 @@ class CurvePanel:
         return picture
 
 
-def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = TEXT) -> None:
+def _draw(
+    axes: Axes,
+    response: solver.Response,
+    *,
+    events: bool,
+    text: float = TEXT,
+    band: ReactionRange | None = None,
+) -> None:
     path = response.path
     factor, _ = force_unit(response)
     moment = response.measured.unit == "N·m"
@@ -189,6 +204,8 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
         axes.text(0.5, 0.5, "unbounded everywhere", transform=axes.transAxes, ha="center", fontsize=text)
     if len(known):
         low, high = shown_range(values, response)
+        if band is not None:
+            low, high = _draw_band(axes, response, band, factor, (low, high))
         axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
     if not response.parameter.is_path and len(path) == 1:
         _draw_single(axes, known, text)
@@ -216,6 +233,20 @@ def _draw(axes: Axes, response: solver.Response, *, events: bool, text: float = 
         _mark_collapse(axes, response, total, values, text, events)
     if response.stop is solver.Status.SOLVER_FAILED:
         _mark_failure(axes, response, total, values, text, events)
+
+
+def _draw_band(
+    axes: Axes, response: solver.Response, band: ReactionRange, factor: float, shown: tuple[float, float]
+) -> tuple[float, float]:
+    """Draw the range of the reaction; returns the range of the axis, in the unit ``factor``, in which it is whole."""
+    per_length, _ = parameter_unit(response)
+    total, least, most = band.along(response)
+    axes.fill_between(
+        total * per_length, least / factor, most / factor, color=palette.hexadecimal(palette.FORCE), alpha=0.18,
+        linewidth=0,
+    )  # fmt: skip
+    low, high = shown
+    return min(low, float(least.min(initial=0.0)) / factor), max(high, float(most.max(initial=0.0)) / factor)
 
 
 def _draw_line(

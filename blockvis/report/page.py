@@ -50,7 +50,9 @@ from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_
 from blockvis.results.about import about, counts_text, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
+from blockvis.results.reaction_range import ReactionRange
 from blockvis.runs.kinds import KINDS
+from blockvis.runs.path_range import WORDS
 
 from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, hexadecimals, rounded
 from .space import model_in_space
@@ -99,6 +101,7 @@ def write_report(
     title: str = "",
     fall: Fall | None = None,
     error: str = "",
+    band: ReactionRange | None = None,
 ) -> Path:
     """Write the report.
 
@@ -113,13 +116,15 @@ def write_report(
     fall : Fall, optional
         What comes after the last equilibrium, in time, instead of the frames without it.
     error : str
-        What of and how large, "error of the steps: reaction 0.2 %"; :func:`add_error` may say it later.
+        What of and how large, "error of the steps: reaction ± 0.2 %"; :func:`add_error` may say it later.
+    band : ReactionRange, optional
+        Of the reaction, drawn behind the curve.
 
     Returns
     -------
     pathlib.Path
     """
-    return write_whole(path, report_html(response, case_text, title=title, fall=fall, error=error))
+    return write_whole(path, report_html(response, case_text, title=title, fall=fall, error=error, band=band))
 
 
 def add_error(path: str | os.PathLike[str], error: str) -> None:
@@ -140,8 +145,19 @@ def _error(error: str) -> str:
     return html_rows([(name, value)]) if error else ERROR_UNKNOWN
 
 
+def _band(band: ReactionRange | None) -> str:
+    """Say what the band behind the curve is."""
+    return "" if band is None else html_rows([("band behind the curve", f"{band.runs.max(initial=0)} runs: {WORDS}")])
+
+
 def report_html(
-    response: solver.Response, case_text: str = "", *, title: str = "", fall: Fall | None = None, error: str = ""
+    response: solver.Response,
+    case_text: str = "",
+    *,
+    title: str = "",
+    fall: Fall | None = None,
+    error: str = "",
+    band: ReactionRange | None = None,
 ) -> str:
     """Make the report as HTML text; parameters as those of :func:`write_report`.
 
@@ -155,7 +171,7 @@ def report_html(
     page = files("blockvis") / "report"
     # No "<" may survive in the data: a name with "</script>" in it would end the script.
     origin = about(response)
-    model = _model(response, fall) | {"name": origin.name}
+    model = _model(response, fall, band) | {"name": origin.name}
     data = json.dumps(model, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
     failed = response.stop is solver.Status.SOLVER_FAILED
     return Template((page / "player.html").read_text(encoding="utf-8")).substitute(
@@ -170,7 +186,7 @@ def report_html(
         summary=html_rows(summary_rows(response, fall)),
         cracks=_cracks(response),
         certificate=html_rows(_certificate(response)),
-        error=_error(error),
+        error=_error(error) + _band(band),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
         case_open=" open" if case_text else "",
         model=data,
@@ -227,7 +243,7 @@ def _frames_of(response: solver.Response, swing: Swing, fall: Fall | None) -> li
     return [*map(framed_at, _thinned(path, most - n)), *falling]
 
 
-def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
+def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | None) -> dict[str, Any]:
     assembly = response.assembly
     swing = swing_of(response)
     frames = _frames_of(response, swing, fall)
@@ -264,7 +280,7 @@ def _model(response: solver.Response, fall: Fall | None) -> dict[str, Any]:
         "times": _times(frames),
         # In a fall in time blocks part and meet anew: what lay between two of them is no joint any more.
         "joints_of_fall": fall is None,
-        "curve": _curve(response),
+        "curve": _curve(response, band),
     }  # fmt: skip
 
 
@@ -473,18 +489,21 @@ def _times(shown: list[_Frame]) -> list[float]:
     return [round(t, 4) for t in times]
 
 
-def _curve(response: solver.Response) -> dict[str, Any]:
+def _curve(response: solver.Response, band: ReactionRange | None) -> dict[str, Any]:
     before, response = len(response.path), in_one_unit(response)
     per_length, _ = parameter_unit(response)
     factor, _ = force_unit(response)
     x = response.parameters * per_length
     y = response.values / factor
     low, high = shown_range(y, response)
+    total, least, most = (np.zeros(0),) * 3 if band is None else band.along(response)
+    total, least, most = total * per_length, least / factor, most / factor
+    low, high = min(low, float(least.min(initial=0.0))), max(high, float(most.max(initial=0.0)))
     high = high + 0.08 * (high - low) if high > low else 1.0
     bracket = collapse_places(response)
     collapse = None if bracket is None else float(bracket[1])
     first = min(0.0, float(x.min(initial=0.0))) * 1.02
-    widest = max([float(x.max(initial=0.0)), collapse or 0.0]) * 1.02 or 1.0
+    widest = max([float(x.max(initial=0.0)), collapse or 0.0, float(total.max(initial=0.0))]) * 1.02 or 1.0
 
     def ticks(low: float, high: float, n: int) -> list[float]:
         return [float(f"{t:.6g}") for t in MaxNLocator(n).tick_values(low, high) if low <= t <= high]
@@ -496,6 +515,7 @@ def _curve(response: solver.Response) -> dict[str, Any]:
         "reaction": [float(f"{v:.7g}") if np.isfinite(v) else None for v in y],
         # The reaction leaves that at rest at once: the way to the next one is dotted.
         "rest": leaves_rest(response),
+        "band": [[float(f"{v:.7g}") for v in row] for row in zip(total, least, most, strict=True)],
         "collapse": collapse,
         "x_min": first,
         "x_max": widest,

@@ -185,6 +185,12 @@
     pen.save(); pen.translate(13, (h - bottom + top) / 2); pen.rotate(-Math.PI / 2); pen.textBaseline = "middle"; pen.fillText(c.y_label, 0, 0); pen.restore();
     pen.strokeStyle = dark.matches && colours === DARK ? "#6aa9e0" : model.colours.force; pen.lineWidth = 2; pen.lineJoin = "round";
     pen.save(); pen.beginPath(); pen.rect(left - 3, top - 3, w - left - right + 6, h - top - bottom + 6); pen.clip(); pen.beginPath();
+    if (c.band.length) {
+      pen.save(); pen.globalAlpha = 0.2; pen.fillStyle = pen.strokeStyle;
+      c.band.forEach(([s, low], i) => i ? pen.lineTo(X(s), Y(low)) : pen.moveTo(X(s), Y(low)));
+      c.band.slice().reverse().forEach(([s, , high]) => pen.lineTo(X(s), Y(high)));
+      pen.fill(); pen.restore(); pen.beginPath();
+    }
     if (c.single && c.reaction[0] !== null) { pen.moveTo(X(0), Y(0)); pen.lineTo(X(0), Y(c.reaction[0])); pen.lineTo(X(1), Y(c.reaction[0])); }
     // An unbounded multiplier is null: the line stops before it and starts again after it.
     if (!c.single) c.settlement.forEach((s, i) => {

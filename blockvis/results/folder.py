@@ -34,9 +34,9 @@ CHECKPOINT = "checkpoint.npz"
 LOCK = ".lock"
 
 #: Files that list or sum up others; what a run starts with; pictures of the results.
-STEP_CHECK = "step_check.json"
+STEP_CHECK, RANGE = "step_check.json", "range.csv"
 _LISTS = (
-    *("summary.json", STEP_CHECK, "response.csv", "joints.csv", "blocks.pvd", "contacts.pvd", "joints.pvd"),
+    *("summary.json", STEP_CHECK, RANGE, "response.csv", "joints.csv", "blocks.pvd", "contacts.pvd", "joints.pvd"),
     *LIMIT_TABLES,
 )
 _STARTED = (RECORD, CHECKPOINT, "assembly.npz")
@@ -353,6 +353,20 @@ def stored_case(folder: str | Path) -> str:
         if file.is_file():
             return str(json.loads(file.read_text(encoding="utf-8")).get("case", ""))
     return ""
+
+
+def add_to_summary(folder: Path, **found: Any) -> None:
+    """Add to summary.json what becomes known after it is written.
+
+    Parameters
+    ----------
+    folder : Path
+    **found
+        By the names of the keys.
+    """
+    file = folder / "summary.json"
+    summary = json.loads(file.read_text(encoding="utf-8"))
+    write_whole(file, json.dumps({**summary, **found}, indent=2, ensure_ascii=False) + "\n")
 
 
 def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:

@@ -11,6 +11,8 @@ import numpy as np
 
 import solver
 from blockvis.cases.contents import Case
+from blockvis.cases.key import TRUE_OR_FALSE, Key
+from blockvis.cases.toml_table import Table
 from blockvis.numbers import force_text
 from blockvis.results.about import least_reaction, loss_of, mechanism_text
 
@@ -31,6 +33,22 @@ class SettlementKind(AnalysisKind):
     measured = solver.REACTION
     checkpoint = solver.PathState
     in_studies = True
+    keys = (
+        Key("range", TRUE_OR_FALSE, "Whether blockvis run follows a settlement again with friction, compliance of the "
+            "joints and imperfection varied, and gives the range of collapse and reaction", True, default=False),
+    )  # fmt: skip
+
+    def read(self, top: Table, analysis: Table) -> bool:
+        """Read the key ``range``."""
+        return analysis.boolean("range")
+
+    def refuse(self, settings: bool, case: Case) -> None:
+        """Refuse a range of what follows no settlement."""
+        if settings:
+            raise ValueError(
+                f'{case.source}: [analysis] range = true belongs to kind = "{self.name}"; a {case.analysis} has no '
+                "range: leave it out"
+            )
 
     def checked(self, case: Case) -> Case:
         """Check that the keys of a case fit together."""
@@ -45,6 +63,11 @@ class SettlementKind(AnalysisKind):
                 stacklevel=5,
             )
         needs_dry_joints(case)
+        if case.settings and case.controls.increments == LINEAR_PROGRAM:
+            raise ValueError(
+                f'{case.source}: [analysis] range = true belongs to increments = "{COULOMB}"; a linear program knows '
+                "no compliance and no imperfection"
+            )
         return case
 
     def course(self, case: Case) -> Course:

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-import pickle
 import queue
-import sys
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -18,31 +14,26 @@ import numpy as np
 
 import solver
 from blockvis.atomic_files import write_whole
-from blockvis.cases.build import case_assembly
 from blockvis.cases.case import parse_case
 from blockvis.cases.contents import Case
-from blockvis.processes import interpreter, unread
-from blockvis.results.folder import STEP_CHECK, stored_assembly
+from blockvis.results.folder import STEP_CHECK, add_to_summary
 from blockvis.results.record import read_record
 
-from .kinds import KINDS
-from .plan import planned
+from .once_more import LINEAR_PROGRAM, OnceMore, Traced, followed, takes_steps, traced
 from .reopen import open_results
 
-#: Increments at parameters no farther apart than this, as a fraction of the largest, are of the same place.
-SAME = 1e-9
+#: Error of a run over its difference from one with half the step tolerance: steps are of the first order. Walls
+#: whose bricks slide differ from an eighth of the tolerance mostly 1 to 2.1 times as much as from half of it.
+ERROR_OVER_DIFFERENCE = 2.0
 
-#: Difference that is worth a warning, and the smallest that is told.
-NOTABLE, SMALLEST = 0.01, 1e-4
+#: Reactions below this part of the first are compared with it: where one passes through zero nothing is a part of it.
+LEAST_REACTION = 0.05
 
-#: The way to find increments that has no steps of its own.
-LINEAR_PROGRAM = solver.INCREMENTS[1]
+#: Error that is worth a warning, and the smallest that is told, as a fraction and of positions [m].
+NOTABLE, SMALLEST, SMALLEST_PLACE = 0.01, 1e-4, 1e-5
 
 #: Seconds between looks for Ctrl-C while waiting, and after which waiting is worth a word.
 LOOK, WORTH_A_WORD = 0.2, 2.0
-
-#: How much less urgent the second path is, where the system knows such a thing: it is not to slow the first.
-LESS_URGENT = 5
 
 
 @dataclass(frozen=True)
@@ -54,13 +45,16 @@ class StepCheck:
     what : str
         What the analysis measures, in words.
     difference : float
-        Largest difference of what is measured at the same parameter, as a fraction of the largest that was measured.
+        Largest difference of what is measured at the same parameter, as a fraction of what is measured there, or of
+        ``LEAST_REACTION`` times the first where that is more.
     at : float [m or rad]
         Parameter where it is.
     unit : str
         Of the parameter.
     collapse : float
         Difference of the displacements at collapse, as a fraction; nan unless both collapse.
+    position : float [m]
+        Largest distance between the two places of a block at the same parameter.
     stop, stop_of_check : str
         How both ended.
     """
@@ -70,22 +64,35 @@ class StepCheck:
     at: float
     unit: str
     collapse: float
+    position: float
     stop: str
     stop_of_check: str
 
     @property
+    def step_error(self) -> dict[str, float | None]:
+        """The error that follows of each: ``reaction`` and ``collapse`` as fractions, ``position`` in m."""
+        return {
+            "reaction": ERROR_OVER_DIFFERENCE * self.difference,
+            "collapse": None if np.isnan(self.collapse) else ERROR_OVER_DIFFERENCE * self.collapse,
+            "position": ERROR_OVER_DIFFERENCE * self.position,
+        }
+
+    @property
     def error(self) -> float:
-        """The larger of the two differences."""
-        return float(np.nanmax([self.difference, self.collapse]))
+        """The larger of the errors of what is measured and of the collapse."""
+        return ERROR_OVER_DIFFERENCE * float(np.nanmax([self.difference, self.collapse]))
 
     def __str__(self) -> str:
         """Say it in a line."""
-        parts = [f"{self.what} {_percent(self.difference)} at {self.at:.4g} {self.unit}"]
-        if np.isfinite(self.collapse):
-            parts.append(f"collapse {_percent(self.collapse)}")
+        error = self.step_error
+        where = f" (at {self.at:.4g} {self.unit})" if self.difference > 0.0 else ""
+        parts = [f"{self.what} {_percent(error['reaction'])}{where}"]
+        if error["collapse"] is not None:
+            parts.append(f"collapse {_percent(error['collapse'])}")
+        parts.append(f"blocks {_millimetres(error['position'])}")
         if self.stop != self.stop_of_check:
-            parts.append(f"one ends as '{self.stop}', the other as '{self.stop_of_check}'")
-        return f"error of the steps: {', '.join(parts)} (apart from a run with half the step tolerance)"
+            parts.append(f"but with half the step tolerance it ends as '{self.stop_of_check}', not '{self.stop}'")
+        return f"error of the steps: {', '.join(parts)}"
 
     @property
     def warning(self) -> str:
@@ -94,30 +101,13 @@ class StepCheck:
             return ""
         return (
             f"the steps matter by more than {100.0 * NOTABLE:g} %: take a smaller step_tolerance; where that changes "
-            "nothing, as where stones slip off each other, a wall may have several paths: give results with that range"
+            "nothing, as where stones slip off each other, a wall may have several paths: give results with their "
+            "range (--range, of settlements)"
         )
 
 
-@dataclass(frozen=True)
-class Traced:
-    """What is compared of a path.
-
-    Attributes
-    ----------
-    measured : list of (int, float, float)
-        Phase, parameter and what is measured at each equilibrium.
-    collapse : float, optional
-        Displacement at collapse.
-    stop : str
-    """
-
-    measured: list[tuple[int, float, float]]
-    collapse: float | None
-    stop: str
-
-
 class StepChecking:
-    """The same path once more, followed by a process of its own while this one follows the case.
+    """The same path in shorter steps, followed by a process of its own while this one follows the case.
 
     Parameters
     ----------
@@ -128,13 +118,7 @@ class StepChecking:
     """
 
     def __init__(self, case: Case, folder: Path | None = None) -> None:
-        self._process = interpreter(__name__)
-        assert self._process.stdin is not None
-        with unread():
-            pickle.dump((case, folder), self._process.stdin)
-            self._process.stdin.flush()
-        self._found: queue.SimpleQueue[Traced | None] = queue.SimpleQueue()
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._other = OnceMore(_finer(case), folder)
 
     def compared(
         self,
@@ -143,7 +127,7 @@ class StepChecking:
         patience: float | None = None,
         waiting: Callable[[], None] = lambda: None,
     ) -> StepCheck | None:
-        """Wait for the other path, compare, and write ``step_check.json``; None where there is nothing to compare with.
+        """Wait for the other path and compare, as :func:`check_steps`; None where there is nothing to compare with.
 
         Parameters
         ----------
@@ -162,12 +146,11 @@ class StepChecking:
         began, told = time.monotonic(), False
         while True:
             with contextlib.suppress(queue.Empty):
-                # Windows sees Ctrl-C between two waits only.
-                other = self._found.get(timeout=LOOK)
+                other = self._other.found(LOOK)
                 break
             waited = time.monotonic() - began
             if patience is not None and waited > patience:
-                raise TimeoutError(f"the same path once more takes longer than {patience:.0f} s more")
+                raise TimeoutError(f"the same path in shorter steps takes longer than {patience:.0f} s more")
             if waited > WORTH_A_WORD and not told:
                 waiting()
                 told = True
@@ -175,43 +158,7 @@ class StepChecking:
 
     def close(self) -> None:
         """End the process."""
-        self._process.kill()
-        self._process.wait()
-        assert self._process.stdin is not None
-        with unread():
-            self._process.stdin.close()
-
-    def _listen(self) -> None:
-        assert self._process.stdout is not None
-        found = None
-        with self._process.stdout as out, contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):
-            found = pickle.load(out)
-        self._found.put(found)
-
-
-def main() -> None:
-    """Follow the path of a case that comes in, and say what came out."""
-    case, folder = pickle.load(sys.stdin.buffer)
-    # Where the first process ends, however that happens, nobody waits for this one.
-    threading.Thread(target=lambda: (sys.stdin.buffer.read(), os._exit(0)), daemon=True).start()
-    with open(os.dup(1), "wb") as out, open(os.devnull, "wb") as nowhere:
-        # What HiGHS and warnings say is said by the first process.
-        os.dup2(nowhere.fileno(), 1)
-        os.dup2(nowhere.fileno(), 2)
-        if hasattr(os, "nice"):
-            os.nice(LESS_URGENT)
-        found = None
-        with contextlib.suppress(Exception):
-            found = _followed_again(case, case_assembly(case) if folder is None else stored_assembly(folder))
-        with unread():
-            pickle.dump(found, out)
-            out.flush()
-    os._exit(0)
-
-
-def takes_steps(case: Case) -> bool:
-    """Whether a case follows a path in steps that choose themselves: a linear program per increment has none."""
-    return case.controls.increments != LINEAR_PROGRAM and KINDS[case.analysis].course(case).parameter.is_path
+        self._other.close()
 
 
 def stored_case(folder: Path) -> Case:
@@ -229,7 +176,9 @@ def stored_case(folder: Path) -> Case:
 
 
 def check_steps(folder: str | Path) -> StepCheck:
-    """Follow the run of a results folder again with half the step tolerance, compare, and write ``step_check.json``.
+    """Follow the run of a results folder again with half the step tolerance, compare, and write what comes out.
+
+    ``step_check.json`` has the differences, ``step_error`` in ``summary.json`` the errors that follow of them.
 
     Parameters
     ----------
@@ -249,7 +198,7 @@ def check_steps(folder: str | Path) -> StepCheck:
             f"'{folder}' has no path whose steps could be checked ({response.analysis}, {len(response.path)} "
             f"increments{by}); it takes a settlement or a pushover"
         )
-    return _written(folder, compared(response, _followed_again(case, response.assembly)))
+    return _written(folder, compared(response, followed(_finer(case), response.assembly)))
 
 
 def stored_check(folder: Path) -> StepCheck | None:
@@ -261,32 +210,27 @@ def stored_check(folder: Path) -> StepCheck | None:
     return StepCheck(**{**known, "collapse": np.nan if known["collapse"] is None else known["collapse"]})
 
 
-def traced(response: solver.Response) -> Traced:
-    """Take from a response what is compared."""
-    collapse = None if response.collapse is None else response.collapse.displacement
-    return Traced([(i.phase, i.parameter, i.measured) for i in response.path], collapse, str(response.stop))
+def _finer(case: Case) -> Case:
+    """Make the same case with half the error that its steps aim for."""
+    return replace(case, controls=replace(case.controls, step_tolerance=0.5 * case.controls.step_tolerance))
 
 
-def _followed_again(case: Case, assembly: solver.Assembly) -> Traced:
-    """Follow the path of a case in steps whose error is to be half of that which the case asks for."""
-    finer = replace(case.controls, step_tolerance=0.5 * case.controls.step_tolerance, falling_frames=1)
-    run = planned(replace(case, controls=finer), assembly)
-    found: list[solver.Increment] = []
-    while True:
-        try:
-            found.append(next(run.steps))
-        except StopIteration as stop:
-            ending: solver.Ending = stop.value
-            return traced(run.response(found, ending))
+def _percent(part: float | None) -> str:
+    return "below 0.01 %" if part is None or part < SMALLEST else f"± {_two_digits(100.0 * part)} %"
 
 
-def _percent(part: float) -> str:
-    return "below 0.01 %" if part < SMALLEST else f"{100.0 * part:.2g} %"
+def _millimetres(length: float | None) -> str:
+    return "below 0.01 mm" if length is None or length < SMALLEST_PLACE else f"± {_two_digits(1e3 * length)} mm"
+
+
+def _two_digits(value: float) -> str:
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def _written(folder: Path, check: StepCheck) -> StepCheck:
     numbers = {**vars(check), "collapse": None if np.isnan(check.collapse) else check.collapse}
     write_whole(folder / STEP_CHECK, json.dumps(numbers, indent=2) + "\n")
+    add_to_summary(folder, step_error=check.step_error)
     return check
 
 
@@ -300,25 +244,23 @@ def compared(response: solver.Response, other: Traced) -> StepCheck:
         Of the same case.
     """
     ours = traced(response)
-    largest = max((abs(measured) for _, _, measured in ours.measured), default=0.0)
-    near = SAME * max((abs(s) for _, s, _ in ours.measured), default=0.0)
-    apart = [
-        (abs(a - b), s)
-        for p, s, a in ours.measured
-        for q, t, b in other.measured
-        if p == q and abs(s - t) <= near and largest > 0.0
-    ]
-    difference, at = max(apart, default=(0.0, 0.0))
+    mine, others = ours.same_places(other)
+    a, b = ours.measured[mine], other.measured[others]
+    first = LEAST_REACTION * np.abs(ours.measured[:1]).max(initial=0.0)
+    apart = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), first), np.finfo(float).tiny)
+    worst = int(np.argmax(apart)) if len(apart) else None
+    moved = np.linalg.norm(ours.positions[mine] - other.positions[others], axis=2)
     collapse = np.nan
     if ours.collapse is not None and other.collapse is not None and ours.collapse > 0.0:
         collapse = abs(other.collapse - ours.collapse) / ours.collapse
     driver = response.settlements[-1] if response.control is None and response.settlements else None
     return StepCheck(
         what=response.measured.name,
-        difference=difference / largest if largest > 0.0 else 0.0,
-        at=at,
+        difference=0.0 if worst is None else float(apart[worst]),
+        at=0.0 if worst is None else float(ours.parameters[mine[worst]]),
         unit=response.parameter.unit if driver is None else driver.unit,
         collapse=collapse,
+        position=float(moved.max(initial=0.0)),
         stop=ours.stop,
         stop_of_check=other.stop,
     )

@@ -135,7 +135,7 @@ def _increments(
     start = Pose.initial(assembly) if pose is None else pose
     if resume is not None:
         start = resume.start
-    model = model_of(assembly, loads, interfaces, loads.live)
+    model = model_of(assembly, loads, interfaces, controls, loads.live)
     path = Path(model, ControlledLoad(assembly, control, start), 0, controls)
     at = 0.0
     try:

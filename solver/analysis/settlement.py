@@ -159,7 +159,8 @@ def _increments(
     for number, phase in enumerate(phases[first:], start=first):
         start = Pose.initial(assembly) if before is None else before.place.pose
         start = start if resume is None else resume.start
-        path = Path(model_of(assembly, loads, interfaces), SupportMotion(assembly, phase, start), number, controls)
+        model = model_of(assembly, loads, interfaces, controls)
+        path = Path(model, SupportMotion(assembly, phase, start), number, controls)
         at = 0.0
         try:
             state = path.begin(start, before) if resume is None else resume
@@ -173,13 +174,25 @@ def _increments(
     return ending
 
 
-def model_of(assembly: Assembly, loads: Loads, interfaces: Interfaces, live: np.ndarray | None = None) -> Model:
+def model_of(
+    assembly: Assembly, loads: Loads, interfaces: Interfaces, controls: Controls, live: np.ndarray | None = None
+) -> Model:
     """The units and loads of a path."""
     force = float(np.linalg.norm(loads.dead[assembly.free, : assembly.dimension], axis=1).mean())
     if force == 0.0:
         raise ValueError("no load acts on any free block; give them a weight")
     length = assembly.block_size
-    return Model(assembly, interfaces, loads.dead, length, force, length / 4.0, live=live)
+    return Model(
+        assembly,
+        interfaces,
+        loads.dead,
+        length,
+        force,
+        length / 4.0,
+        live=live,
+        compliance=controls.compliance_factor,
+        imperfection=controls.imperfection_factor,
+    )
 
 
 def timed(steps: Generator[Increment, None, Ending]) -> Generator[Increment, None, Ending]:

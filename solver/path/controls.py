@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from solver.results.increment import Status
@@ -33,11 +34,15 @@ class Controls:
         Relative error of the reaction that the steps of the path are chosen for.
     local_loss : float
         Share of the weight up to which blocks that leave for good are let go, and the path goes on without them.
+    compliance_factor : float
+        Times the compliance of the joints across and along, of the path of Coulomb friction.
+    imperfection_factor : float
+        Times the load along the movement of the supports by which symmetric structures leave their symmetric path.
 
     Raises
     ------
     ValueError
-        For an unknown way to find increments, a step_tolerance or a local_loss that is none.
+        For an unknown way to find increments, or a number out of its range.
     """
 
     increments: str | None = None
@@ -45,14 +50,22 @@ class Controls:
     falling_frames: int | None = None
     step_tolerance: float = 0.005
     local_loss: float = 0.05
+    compliance_factor: float = 1.0
+    imperfection_factor: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse an unknown way to find increments, and a tolerance that is none."""
+        """Refuse an unknown way to find increments, and a tolerance or a factor that is none."""
         if self.increments not in (None, *INCREMENTS):
             raise ValueError(f"increments is '{self.increments}'; it is 'coulomb' or 'linear program'")
         if not 0.0 < self.step_tolerance < 1.0:
             raise ValueError(
                 f"step_tolerance is {self.step_tolerance:g}; it is a number between 0 and 1, by default 0.005"
+            )
+        if not 0.0 < self.compliance_factor < math.inf:
+            raise ValueError(f"compliance_factor is {self.compliance_factor:g}; it is a number above 0, by default 1")
+        if not 0.0 <= self.imperfection_factor < math.inf:
+            raise ValueError(
+                f"imperfection_factor is {self.imperfection_factor:g}; it is a number of at least 0, by default 1"
             )
 
         if not 0.0 <= self.local_loss <= 1.0:

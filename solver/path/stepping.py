@@ -144,7 +144,8 @@ class Stepper:
         size = float(np.linalg.norm(sideways))
         self.imperfection = np.zeros_like(model.load)
         if size > 0.0:
-            self.imperfection[:, :d] = IMPERFECTION * self.weights[:, :1] * sideways / size
+            imperfection = model.imperfection * IMPERFECTION
+            self.imperfection[:, :d] = imperfection * self.weights[:, :1] * sideways / size
 
     def contacts(self, pose: Pose) -> Contacts:
         """Return the contact points at a pose; those at the last one asked for are remembered."""
@@ -166,7 +167,7 @@ class Stepper:
         pairs, joint = contacts.joints()
         whole = np.bincount(joint, contacts.areas, len(pairs))[joint]
         share = np.divide(contacts.areas, whole, out=np.full(n, 0.5), where=whole > 0.0)
-        of_joint = np.array([COMPLIANCE] + [SHEAR_COMPLIANCE] * (d - 1))
+        of_joint = self.model.compliance * np.array([COMPLIANCE] + [SHEAR_COMPLIANCE] * (d - 1))
         return of_joint / np.clip(share, LEAST_SHARE, 1.0)[:, None]
 
     def remembered(self, place: Place, contacts: Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -31,6 +31,8 @@ class Model:
         do its work.
     fallen : (n_blocks,) bool array, optional
         Blocks that are out of the structure: nothing loads or touches them.
+    compliance, imperfection : float
+        Times those of :mod:`solver.tolerances`.
     """
 
     assembly: Assembly
@@ -41,6 +43,8 @@ class Model:
     reach: float
     live: np.ndarray | None = None
     fallen: np.ndarray | None = None
+    compliance: float = 1.0
+    imperfection: float = 1.0
 
     def without(self, fallen: np.ndarray) -> Model:
         """Return the model once blocks, (n_blocks,) bool array, have left it."""

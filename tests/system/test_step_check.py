@@ -1,16 +1,24 @@
-"""``blockvis run --check-steps``: the same path with half the step tolerance, through the real entry point."""
+"""``blockvis run``: the same path with half the step tolerance, and the error that follows, told and written."""
 
 import json
+import queue
 import subprocess
 import sys
+from argparse import Namespace
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import blockvis
 import solver
-from blockvis.processes import cores
-from blockvis.runs.step_check import StepCheck, compared, stored_check, traced
+from blockvis.cases.case import parse_case
+from blockvis.cli import _say_error, _write_report, main
+from blockvis.report.page import add_error, write_report
+from blockvis.runs import step_check
+from blockvis.runs.once_more import takes_steps, traced
+from blockvis.runs.step_check import StepCheck, StepChecking, compared, stored_check
 
 CASE = """
 [geometry]
@@ -30,6 +38,9 @@ limit = 1.0
 tolerance = 1e-3
 """
 
+#: The first increments of it.
+SHORT = CASE.replace("limit = 1.0", "limit = 0.1")
+
 LIMIT_LOAD = """
 [geometry]
 layout = "arch"
@@ -46,6 +57,8 @@ blocks = "voussoir 3"
 force = [0.0, -1.0]
 """
 
+CHECK = StepCheck("reaction", 0.01, 0.1, "m", float("nan"), 0.002, "collapsed", "collapsed")
+
 
 def run(folder, text, *options, pictures=False):
     (folder / "case.toml").write_text(text, encoding="utf-8")
@@ -54,79 +67,74 @@ def run(folder, text, *options, pictures=False):
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.thorough
-def test_the_command_says_how_much_the_steps_matter(tmp_path):
-    done = run(tmp_path, CASE, "--check-steps")
+def run_here(folder, text, *options):
+    (folder / "case.toml").write_text(text, encoding="utf-8")
+    return main(["run", str(folder / "case.toml"), "-o", str(folder / "out"), "--no-pictures", *options])
+
+
+def test_a_run_tells_its_error_without_being_asked(tmp_path):
+    done = run(tmp_path, CASE)
     assert done.returncode == 0, done.stderr
-    (line,) = [line for line in done.stdout.splitlines() if line.startswith("error of the steps")]
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("error of the steps: reaction")]
+    assert line == str(stored_check(tmp_path / "out"))
     check = json.loads((tmp_path / "out" / "step_check.json").read_text(encoding="utf-8"))
     assert check["stop"] == check["stop_of_check"] == "collapsed"
     # The collapse is enclosed to a thousandth of a metre, in other steps at other places.
     displacement = blockvis.open_results(tmp_path / "out").collapse.displacement
     assert 0.0 < check["collapse"] < 2e-3 / displacement
-    assert check["difference"] < 1e-5
+    assert 0.0 < check["difference"] < 1e-5
     assert "collapse" in line
     assert "steps matter" not in done.stderr
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["step_error"] == {
+        "reaction": 2.0 * check["difference"],
+        "collapse": 2.0 * check["collapse"],
+        "position": 2.0 * check["position"],
+    }
 
 
-def test_a_run_says_so_without_being_asked_where_there_is_a_second_core(tmp_path):
-    done = run(tmp_path, CASE)
-    assert done.returncode == 0, done.stderr
-    said = "error of the steps" in done.stdout
-    assert (tmp_path / "out" / "step_check.json").is_file() == said
-    # Where other processes have the cores it may come too late, which is said, too.
-    assert (said or "error not known" in done.stderr) == (cores() > 1)
-
-
+@pytest.mark.slow
 @pytest.mark.pictures
-def test_the_report_says_so_too_also_when_it_is_drawn_again(tmp_path):
+def test_the_report_of_a_run_says_so_too(tmp_path):
     done = run(tmp_path, CASE, "--check-steps", pictures=True)
     assert done.returncode == 0, done.stderr
     (line,) = [line for line in done.stdout.splitlines() if line.startswith("error of the steps")]
-    row = "<tr><td>{}</td><td>{}</td></tr>".format(*line.split(": "))
-    report = tmp_path / "out" / "report.html"
-    assert report.read_text(encoding="utf-8").count(row) == 1
+    assert (tmp_path / "out" / "report.html").read_text(encoding="utf-8").count(row_of(line)) == 1
+
+
+def row_of(line):
+    return "<tr><td>{}</td><td>{}</td></tr>".format(*line.split(": "))
+
+
+def test_a_report_says_so_later_and_when_it_is_drawn_again(tmp_path, capsys):
+    assert run_here(tmp_path, SHORT, "--check-steps") == 0
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("error of the steps")]
+    response, report = blockvis.open_results(tmp_path / "out"), tmp_path / "out" / "report.html"
+    write_report(response, report)
+    assert row_of(line) not in report.read_text(encoding="utf-8")
+    add_error(report, line)
+    assert report.read_text(encoding="utf-8").count(row_of(line)) == 1
     report.unlink()
-    again = [sys.executable, "-m", "blockvis", "render", "out"]
-    subprocess.run(again, cwd=tmp_path, check=True, capture_output=True)
-    assert report.read_text(encoding="utf-8").count(row) == 1
+    _write_report(response, tmp_path / "out")
+    assert report.read_text(encoding="utf-8").count(row_of(line)) == 1
 
 
 def test_no_steps_are_checked_where_none_are_to_be(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "step_check.json").write_text("{}", encoding="utf-8")
-    done = run(tmp_path, CASE, "--no-check-steps", "--force")
+    done = run(tmp_path, SHORT, "--no-check-steps", "--force")
     assert done.returncode == 0, done.stderr
     assert "error of the steps" not in done.stdout
     # That of results before is none of these.
     assert not (tmp_path / "out" / "step_check.json").exists()
 
 
-def test_linear_programs_take_no_steps_that_could_be_compared(tmp_path):
-    text = CASE + '\n[analysis]\nincrements = "linear program"\n'
-    done = run(tmp_path, text)
-    assert done.returncode == 0, done.stderr
-    assert "error" not in done.stdout + done.stderr
-    assert not (tmp_path / "out" / "step_check.json").exists()
-    done = run(tmp_path, text, "--check-steps", "--force")
-    assert done.returncode == 2
-    assert "has no path whose steps could be checked (settlement, 4 increments, by linear program)" in done.stderr
-
-
-def test_what_matters_is_warned_of():
-    check = StepCheck("reaction", 0.02, 0.1, "m", float("nan"), "collapsed", "collapsed")
-    assert str(check) == "error of the steps: reaction 2 % at 0.1 m (apart from a run with half the step tolerance)"
-    assert "the steps matter by more than 1 %: take a smaller step_tolerance" in check.warning
-    assert "collapse 0.3 % (apart" in str(replace(check, collapse=0.003))
-    assert replace(check, difference=0.009).warning == ""
-    assert replace(check, difference=0.009, stop_of_check="limit reached").warning
-
-
-def test_a_check_is_read_as_it_was_written(tmp_path):
-    check = StepCheck("reaction", 0.02, 0.1, "m", float("nan"), "collapsed", "collapsed")
-    numbers = {**vars(check), "collapse": None, "way": "steps"}
-    (tmp_path / "step_check.json").write_text(json.dumps(numbers), encoding="utf-8")
-    assert str(stored_check(tmp_path)) == str(check)
+def test_linear_programs_take_no_steps_that_could_be_compared(tmp_path, capsys):
+    text = SHORT + '\n[analysis]\nincrements = "linear program"\n'
+    assert not takes_steps(parse_case(text, tmp_path / "case.toml"))
+    assert run_here(tmp_path, text, "--check-steps") == 2
+    error = capsys.readouterr().err
+    assert "has no path whose steps could be checked (settlement, 2 increments, by linear program)" in error
 
 
 @pytest.mark.thorough
@@ -137,13 +145,78 @@ def test_what_has_no_steps_is_refused(tmp_path):
     assert (tmp_path / "out" / "summary.json").is_file()
 
 
-def test_reactions_are_compared_at_the_same_places_only():
+def test_the_error_is_twice_the_difference_and_what_matters_is_warned_of():
+    assert str(CHECK) == "error of the steps: reaction ± 2 % (at 0.1 m), blocks ± 4 mm"
+    assert "the steps matter by more than 1 %: take a smaller step_tolerance" in CHECK.warning
+    assert str(replace(CHECK, position=0.117)).endswith(", blocks ± 230 mm")
+    assert ", collapse ± 0.6 %, blocks" in str(replace(CHECK, collapse=0.003))
+    small = replace(CHECK, difference=1e-7, position=1e-9, collapse=0.0)
+    words = "reaction below 0.01 % (at 0.1 m), collapse below 0.01 %, blocks below 0.01 mm"
+    assert str(small) == f"error of the steps: {words}"
+    assert small.warning == ""
+
+
+def test_where_one_run_collapses_and_the_other_does_not_it_is_said():
+    check = replace(CHECK, difference=0.001, stop_of_check="limit reached")
+    assert str(check).endswith(", but with half the step tolerance it ends as 'limit reached', not 'collapsed'")
+    assert check.warning
+    assert check.step_error == {"reaction": 0.002, "collapse": None, "position": 0.004}
+
+
+def test_a_check_is_read_as_it_was_written(tmp_path):
+    numbers = {**vars(CHECK), "collapse": None, "way": "steps"}
+    (tmp_path / "step_check.json").write_text(json.dumps(numbers), encoding="utf-8")
+    assert str(stored_check(tmp_path)) == str(CHECK)
+
+
+@pytest.fixture(scope="module")
+def settled():
     arch = blockvis.generators.arch(voussoirs=6, thickness_ratio=0.2)
     settlement = solver.Settlement(direction=(1, 0), increment=0.1, limit=0.2)
-    response = solver.settle(arch, settlement, friction_coefficient=2.0)
-    heavier = [replace(i, measured=1.02 * i.measured, reaction=1.02 * i.reaction) for i in response.increments]
-    elsewhere = [replace(i, parameter=i.parameter + 0.03) for i in response.increments[1:]]
-    check = compared(response, traced(replace(response, increments=(*heavier[:2], *elsewhere))))
-    assert check.at == pytest.approx(0.1)
-    assert check.difference == pytest.approx(0.02 * response.reaction[1] / response.reaction.max())
-    assert check.error == check.difference
+    return solver.settle(arch, settlement, friction_coefficient=2.0)
+
+
+def test_runs_are_compared_at_the_same_places_only(settled):
+    ours = traced(settled)
+    other = replace(
+        ours,
+        parameters=ours.parameters + np.array([0.0, 0.0, 0.03]),
+        measured=ours.measured * [1.0, 1.02, 1.5],
+        positions=ours.positions + np.array([0.0, 1.0, 9.0])[:, None, None] * [0.003, 0.004],
+    )
+    check = compared(settled, other)
+    assert (check.difference, check.at) == (pytest.approx(0.02), pytest.approx(0.1))
+    assert check.position == pytest.approx(0.005)
+    assert check.error == 2.0 * check.difference
+
+
+def test_where_the_reaction_is_next_to_nothing_it_is_compared_with_a_part_of_the_first(settled):
+    last = replace(settled.increments[2], measured=0.0)
+    other = traced(settled)
+    other.measured[2] = 0.001 * other.measured[0]
+    check = compared(replace(settled, increments=(*settled.increments[:2], last)), other)
+    assert (check.difference, check.at) == (pytest.approx(0.02), pytest.approx(0.2))
+
+
+class Late:
+    """Another path that does not come."""
+
+    def __init__(self, *_):
+        pass
+
+    def found(self, seconds):
+        raise queue.Empty
+
+    def close(self):
+        pass
+
+
+def test_a_path_that_does_not_come_is_left_in_one_line_with_the_remedy(tmp_path, monkeypatch, capsys, settled):
+    monkeypatch.setattr(step_check, "OnceMore", Late)
+    checking = StepChecking(parse_case(SHORT, tmp_path / "case.toml"))
+    left = SimpleNamespace(had_finished=False, folder=tmp_path, response=settled)
+    _say_error(Namespace(check_steps=None), left, checking, 0.0)
+    assert capsys.readouterr().err == (
+        "blockvis: error not known: the same path in shorter steps takes longer than 0 s more; --check-steps waits for "
+        "it, --no-check-steps does without\n"
+    )

@@ -75,6 +75,6 @@ def test_what_is_let_go_is_told_and_drawn_pale(tmp_path):
     assert blockvis.open_results(out).losses == response.losses, "the files keep what fell"
     blocks = block_dataset(response.assembly, response.path[-1])
     assert blocks.cell_data["fallen"].tolist() == [0, 1, 0, 0]
-    still = Image.open(blockvis.draw_still(response, tmp_path / "last.png", increment=-1)).convert("RGB")
-    standing = Image.open(blockvis.draw_still(response, tmp_path / "first.png", increment=0)).convert("RGB")
+    still = Image.open(blockvis.draw_still(response, -1, path=tmp_path / "last.png")).convert("RGB")
+    standing = Image.open(blockvis.draw_still(response, 0, path=tmp_path / "first.png")).convert("RGB")
     assert np.asarray(still).mean() > np.asarray(standing).mean()

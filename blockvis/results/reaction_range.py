@@ -1,0 +1,75 @@
+"""The range of the reaction over the settlement: a table in the results folder, a band in pictures."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import solver
+
+from .folder import RANGE
+
+#: Columns of range.csv.
+COLUMNS = ("phase", "settlement", "reaction_low", "reaction_high", "runs")
+
+
+@dataclass(frozen=True)
+class ReactionRange:
+    """The least and the largest reaction of several runs at n settlements.
+
+    Attributes
+    ----------
+    phases : (n,) array
+    settlements : (n,) array [m or rad]
+        Within the phase.
+    low, high : (n,) array [N or N·m]
+    runs : (n,) array
+        How many stand there.
+    """
+
+    phases: np.ndarray
+    settlements: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    runs: np.ndarray
+
+    def table(self) -> str:
+        """Text of range.csv."""
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(COLUMNS)
+        numbers = (self.phases, self.settlements, self.low, self.high, self.runs)
+        table.writerows(zip(*(values.tolist() for values in numbers), strict=True))
+        return text.getvalue()
+
+    def along(self, response: solver.Response) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(n,) arrays: parameter with the phases one after another, low and high, of the phases of a response.
+
+        Parameters
+        ----------
+        response : solver.Response
+        """
+        path = response.path
+        starts = {i.phase: float(t) - i.parameter for i, t in zip(path, response.parameters, strict=True)}
+        shown = np.isin(self.phases, list(starts))
+        start = np.array([starts[phase] for phase in self.phases[shown].tolist()])
+        return self.settlements[shown] + start, self.low[shown], self.high[shown]
+
+
+def stored_range(folder: Path) -> ReactionRange | None:
+    """Read the range of a results folder, if it has one.
+
+    Parameters
+    ----------
+    folder : Path
+    """
+    if not (folder / RANGE).is_file():
+        return None
+    with (folder / RANGE).open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    phases, settlements, low, high, runs = (np.array([float(row[name]) for row in rows]) for name in COLUMNS)
+    return ReactionRange(phases.astype(int), settlements, low, high, runs.astype(int))

@@ -1,0 +1,205 @@
+"""How far a path depends on what nobody knows well: friction, compliance of the joints, imperfection."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blockvis.atomic_files import write_whole
+from blockvis.cases.contents import Case
+from blockvis.numbers import force_text
+from blockvis.processes import cores
+from blockvis.results.folder import RANGE, add_to_summary
+from blockvis.results.reaction_range import ReactionRange
+
+from .once_more import OnceMore, Traced, takes_steps, traced
+from .reopen import open_results
+from .step_check import LOOK, stored_case
+
+#: Part by which friction is taken less and more, and what compliance is multiplied with and divided by.
+FRICTION, COMPLIANCE = 0.05, 3.0
+
+#: What is varied, in words.
+WORDS = (
+    f"friction ± {100.0 * FRICTION:g} %, compliance × {COMPLIANCE:g} and ÷ {COMPLIANCE:g}, both together, imperfection "
+    "× 0 and × 2"
+)
+
+
+@dataclass(frozen=True)
+class Variation:
+    """What a run has other than the case: factors of all friction coefficients, and those of solver.Controls."""
+
+    friction_factor: float = 1.0
+    compliance_factor: float = 1.0
+    imperfection_factor: float = 1.0
+
+    def of(self, case: Case) -> Case:
+        """Vary a case.
+
+        Parameters
+        ----------
+        case : Case
+        """
+        laws = {
+            pair: replace(law, friction_coefficient=self.friction_factor * law.friction_coefficient)
+            for pair, law in case.interfaces.items()
+        }
+        controls = replace(
+            case.controls,
+            compliance_factor=self.compliance_factor,
+            imperfection_factor=self.imperfection_factor,
+        )
+        friction = self.friction_factor * case.friction_coefficient
+        return replace(case, friction_coefficient=friction, interfaces=laws, controls=controls)
+
+
+#: One thing at a time, then less friction on softer joints and more on stiffer ones.
+VARIATIONS = (
+    Variation(friction_factor=1.0 - FRICTION),
+    Variation(friction_factor=1.0 + FRICTION),
+    Variation(compliance_factor=COMPLIANCE),
+    Variation(compliance_factor=1.0 / COMPLIANCE),
+    Variation(imperfection_factor=0.0),
+    Variation(imperfection_factor=2.0),
+    Variation(friction_factor=1.0 - FRICTION, compliance_factor=COMPLIANCE),
+    Variation(friction_factor=1.0 + FRICTION, compliance_factor=1.0 / COMPLIANCE),
+)
+
+
+@dataclass(frozen=True)
+class PathRange:
+    """Several runs of one case, the first as it is.
+
+    Attributes
+    ----------
+    runs : list of (Variation, Traced or None)
+        None for one that came to nothing.
+    unit : str
+        Of the settlement at collapse.
+    moment : bool
+        Whether the reaction is a moment.
+    """
+
+    runs: list[tuple[Variation, Traced | None]]
+    unit: str
+    moment: bool
+
+    @property
+    def followed(self) -> list[Traced]:
+        """Those that came to something."""
+        return [run for _, run in self.runs if run is not None]
+
+    @property
+    def collapse(self) -> tuple[float, float | None] | None:
+        """Least and largest displacement at collapse [m or rad]; without the largest where a run stands to its end."""
+        falls = sorted((int(run.phases[-1]), run.collapse) for run in self.followed if run.collapse is not None)
+        if not falls:
+            return None
+        return falls[0][1], falls[-1][1] if len(falls) == len(self.followed) else None
+
+    def reaction(self) -> ReactionRange:
+        """Range of the reaction at all settlements that one of the runs tells, over the runs that get there."""
+        rows = []
+        for phase in range(1 + max(int(run.phases.max(initial=0)) for run in self.followed)):
+            paths = [(run.parameters[run.phases == phase], run.measured[run.phases == phase]) for run in self.followed]
+            paths = [path for path in paths if len(path[0])]
+            for s in np.unique(np.concatenate([parameters for parameters, _ in paths])).tolist():
+                # Between two increments a reaction is on the line between them.
+                at = [float(np.interp(s, *path)) for path in paths if s <= path[0][-1]]
+                rows.append((phase, s, min(at), max(at), len(at)))
+        columns = [np.array(column) for column in zip(*rows, strict=True)]
+        return ReactionRange(*columns)
+
+    def numbers(self) -> dict[str, Any]:
+        """Give what summary.json says of it."""
+        runs = [
+            {**asdict(variation), "collapse": None if run is None else run.collapse}
+            | {"status": None if run is None else run.stop}
+            for variation, run in self.runs
+        ]
+        return {"collapse": None if self.collapse is None else list(self.collapse), "runs": runs}
+
+    def __str__(self) -> str:
+        """Say it in a line."""
+        followed, lost = self.followed, len(self.runs) - len(self.followed)
+        standing = sum(run.collapse is None for run in followed)
+        if self.collapse is None:
+            last = self.reaction()
+            forces = " to ".join(force_text(float(value), self.moment) for value in (last.low[-1], last.high[-1]))
+            where = f"{last.settlements[-1]:.4g} {self.unit}"
+            said = f"range of reaction {forces} at {where}, no collapse in {len(followed)} runs"
+        elif self.collapse[1] is None:
+            said = (
+                f"range of collapse from {self.collapse[0]:.4g} {self.unit} on, {standing} of {len(followed)} runs "
+                "without a collapse"
+            )
+        else:
+            said = f"range of collapse {self.collapse[0]:.4g} to {self.collapse[1]:.4g} {self.unit}"
+        return f"{said} ({WORDS}{f'; {lost} runs came to nothing' if lost else ''})"
+
+
+def wants_range(case: Case) -> bool:
+    """Whether a case asks for its range."""
+    return case.settings is True
+
+
+def find_range(folder: str | Path, waiting: Callable[[int, int], None] = lambda *_: None) -> PathRange:
+    """Follow the settlement of a results folder again, varied, on all cores, and write what comes out.
+
+    ``range.csv`` has the range of the reaction, ``range`` in ``summary.json`` that of the collapse.
+
+    Parameters
+    ----------
+    folder : str or Path
+        That a run of a case file has written.
+    waiting : callable, optional
+        Called before it begins with the number of runs and of those at a time.
+
+    Raises
+    ------
+    ValueError
+        For a run without a case file, or that follows no settlement in steps.
+    """
+    folder = Path(folder)
+    case, response = stored_case(folder), open_results(folder)
+    if not (takes_steps(case) and response.measured.is_force and response.path):
+        raise ValueError(
+            f"'{folder}' has no range ({response.analysis}, {len(response.path)} increments); it takes a settlement "
+            "whose increments are of Coulomb friction"
+        )
+    at_once = min(cores(), len(VARIATIONS))
+    waiting(len(VARIATIONS), at_once)
+    others = _all_followed([variation.of(case) for variation in VARIATIONS], folder, at_once)
+    runs = list(zip((Variation(), *VARIATIONS), (traced(response), *others), strict=True))
+    unit = response.settlements[response.path[-1].phase].unit
+    found = PathRange(runs, unit, moment=unit == "rad")
+    write_whole(folder / RANGE, found.reaction().table())
+    add_to_summary(folder, range=found.numbers())
+    return found
+
+
+def _all_followed(cases: Sequence[Case], folder: Path, at_once: int) -> list[Traced | None]:
+    """Follow cases of one assembly in processes of their own, so many at a time."""
+    found: dict[int, Traced | None] = {}
+    running: dict[int, OnceMore] = {}
+    begun = 0
+    try:
+        while len(found) < len(cases):
+            while begun < len(cases) and len(running) < at_once:
+                running[begun] = OnceMore(cases[begun], folder)
+                begun += 1
+            for number, process in list(running.items()):
+                with contextlib.suppress(queue.Empty):
+                    found[number] = process.found(LOOK / at_once)
+                    running.pop(number).close()
+    finally:
+        for process in running.values():
+            process.close()
+    return [found[number] for number in range(len(cases))]

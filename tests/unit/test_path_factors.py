@@ -1,0 +1,48 @@
+"""Factors of the model's constants that a path is given: compliance of the joints, imperfection."""
+
+import numpy as np
+import pytest
+
+import solver
+from blockvis.generators import build
+from solver.analysis.settlement import model_of
+from solver.kinematics import Pose
+from solver.path.drivers import SupportMotion
+from solver.path.stepping import Stepper
+
+
+def stepper(**factors):
+    arch = build("arch", {"voussoirs": 6})
+    model = model_of(arch, solver.self_weight(arch), solver.Interfaces(), solver.Controls(**factors))
+    start = Pose.initial(arch)
+    driver = SupportMotion(arch, solver.Settlement(direction=(1, 0), increment=0.1, limit=0.2), start)
+    return Stepper(model, driver), start
+
+
+def test_the_compliance_of_all_joints_is_multiplied():
+    (plain, start), (soft, _) = stepper(), stepper(compliance_factor=3.0)
+    contacts = plain.contacts(start)
+    assert np.array_equal(soft.compliance(contacts), 3.0 * plain.compliance(contacts))
+    assert np.array_equal(soft.imperfection, plain.imperfection)
+
+
+@pytest.mark.parametrize("factor", [0.0, 2.0])
+def test_the_imperfection_is_multiplied(factor):
+    (plain, _), (other, _) = stepper(), stepper(imperfection_factor=factor)
+    assert np.abs(plain.imperfection).max() > 0.0
+    assert np.array_equal(other.imperfection, factor * plain.imperfection)
+
+
+@pytest.mark.parametrize(
+    ("factors", "words"),
+    [
+        ({"compliance_factor": 0.0}, "compliance_factor is 0; it is a number above 0, by default 1"),
+        ({"compliance_factor": float("inf")}, "compliance_factor is inf; it is a number above 0"),
+        ({"imperfection_factor": -1.0}, "imperfection_factor is -1; it is a number of at least 0, by default 1"),
+        ({"imperfection_factor": float("nan")}, "imperfection_factor is nan; it is a number of at least 0"),
+    ],
+)
+def test_a_factor_that_is_none_is_refused(factors, words):
+    with pytest.raises(ValueError) as error:
+        solver.Controls(**factors)
+    assert str(error.value).startswith(words)
