@@ -92,7 +92,7 @@ def marks_of(
     """
     contacts, mechanism = increment.contacts, solver.mechanism_of(assembly, increment)
     points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
-    cracks, openings, faces = _cracks(assembly, joints, increment.pose, shown)
+    cracks, openings, faces = _cracks(assembly, joints, increment.pose, shown, increment.fallen)
     return Marks(
         cracks=cracks,
         openings=openings,
@@ -145,7 +145,7 @@ def length_per_force(sizes: np.ndarray, largest: float, usual_length: float, ext
 
 
 def _cracks(
-    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, shown: solver.Pose
+    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, shown: solver.Pose, fallen: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Quadrilaterals of the open joints, their openings [m], and the faces of those that gape too wide."""
     on_a, on_b, normal = faces_at(assembly, joints, pose)
@@ -154,6 +154,7 @@ def _cracks(
     apart = np.hypot(*np.moveaxis(on_a - on_b, 2, 0)).min(axis=1)
     turn = np.abs(pose.rotations[joints.block_a] - pose.rotations[joints.block_b])[:, 0]
     is_open = opening > SMALLEST_OPENING * assembly.block_size
+    is_open &= ~(fallen[joints.block_a] | fallen[joints.block_b])
     is_open &= apart < np.minimum(length, WIDEST * assembly.block_size)
     narrow, wide = is_open & (turn <= STEEPEST), is_open & (turn > STEEPEST)
     on_a, on_b, _ = faces_at(assembly, joints, shown)

@@ -250,7 +250,7 @@ class Drawer:
         head, detail = caption_of(self.response, increment, self.look.magnification)
         picture = self.scene.image()
         if widths and self.look.joints and not falling:
-            self._write_widths(picture, true, shown, hinges)
+            self._write_widths(picture, at, shown, hinges)
         return self.sheet.composed(
             picture,
             title=title or head,
@@ -396,9 +396,11 @@ class Drawer:
         scene.discs("hinge top", found.hinges, radius, palette.HINGE)
         return found.hinges
 
-    def _write_widths(self, picture: Image.Image, pose: solver.Pose, shown: solver.Pose, hinges: np.ndarray) -> None:
-        """Write the widths of the widest crack lines at a pose beside them, where there is room."""
-        cracks = cracks_of(self.assembly, pose, self.joints)[: 2 * MOST_WIDTHS]
+    def _write_widths(
+        self, picture: Image.Image, increment: solver.Increment, shown: solver.Pose, hinges: np.ndarray
+    ) -> None:
+        """Write the widths of the widest crack lines of an increment beside them, where there is room."""
+        cracks = cracks_of(self.assembly, increment.pose, self.joints, increment.fallen)[: 2 * MOST_WIDTHS]
         cracks = [crack for crack in cracks if crack.width >= LEAST_WIDTH * cracks[0].width]
         on_a, on_b, _ = faces_at(self.assembly, self.joints, shown)
         widest = [int(crack.joints[0]) for crack in cracks]

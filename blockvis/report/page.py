@@ -217,7 +217,8 @@ def _cracks(response: solver.Response) -> str:
     """List the crack lines of the last equilibrium."""
     if not response.path:
         return ""
-    rows = crack_rows(cracks_of(response.assembly, response.path[-1].pose), LISTED_CRACKS)
+    last = response.path[-1]
+    rows = crack_rows(cracks_of(response.assembly, last.pose, fallen=last.fallen), LISTED_CRACKS)
     return f'<h2>Cracks at the last equilibrium</h2><table id="crack-lines">{html_rows(rows)}</table>' if rows else ""
 
 

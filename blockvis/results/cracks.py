@@ -85,7 +85,12 @@ class Crack:
         }
 
 
-def cracks_of(assembly: solver.Assembly, pose: solver.Pose, joints: InitialJoints | None = None) -> list[Crack]:
+def cracks_of(
+    assembly: solver.Assembly,
+    pose: solver.Pose,
+    joints: InitialJoints | None = None,
+    fallen: np.ndarray | None = None,
+) -> list[Crack]:
     """Group the joints of the layout that have parted or slid at a pose into crack lines, the widest first.
 
     Parameters
@@ -94,9 +99,13 @@ def cracks_of(assembly: solver.Assembly, pose: solver.Pose, joints: InitialJoint
     pose : solver.Pose
     joints : InitialJoints, optional
         Of the assembly, where they are known already.
+    fallen : (n_blocks,) bool array, optional
+        Blocks that have left for good, whose joints are no cracks.
     """
     joints = initial_joints(assembly) if joints is None else joints
     moved = opening_and_slip(assembly, joints, pose)
+    if fallen is not None:
+        moved[fallen[joints.block_a] | fallen[joints.block_b]] = 0.0
     least = SMALLEST_OPENING * assembly.block_size
     # A stepped crack runs through bed joints that slide but stay shut.
     chosen = np.flatnonzero((moved[:, 0] > least) | (np.abs(moved[:, 1]) > least))

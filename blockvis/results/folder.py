@@ -222,7 +222,10 @@ class ResultsFolder:
         write_whole(self.path / "joints.csv", self._movements.table())
         for name, text in (tables or {}).items():
             write_whole(self.path / name, text)
-        cracks = cracks_of(self.assembly, response.path[-1].pose, self._movements.joints) if response.path else []
+        cracks = []
+        if response.path:
+            last = response.path[-1]
+            cracks = cracks_of(self.assembly, last.pose, self._movements.joints, last.fallen)
         listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
         write_whole(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")

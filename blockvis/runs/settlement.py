@@ -161,7 +161,7 @@ class SettlementKind(AnalysisKind):
 
 def losses_of(response: solver.Response) -> list[str]:
     """Say where blocks left for good while the structure stood, which, and what they weigh."""
-    unit = response.settlements[0].unit
+    unit = response.settlements[0].unit if response.settlements else "m"
     said = []
     for loss in response.losses:
         names, more = ", ".join(loss.blocks[:4]), len(loss.blocks) - 4

@@ -33,8 +33,9 @@ FIRST_TIME, LONGEST_TIME = 0.02, 1e4
 #: Acceleration, in units of g, and speed, in units of √(block size · g), under which what has moved may be at rest.
 STOPPED, SLOW = 1e-3, 1e-3
 
-#: At rest: movement of a block, in block sizes, in the longest step.
-AT_REST = 1e-7
+#: Movement of a block, in block sizes, below which a step in time has moved none, and such steps after which none will:
+#: as each is twice as long, a force out of balance would have moved it.
+AT_REST, IDLE = 1e-7, 12
 
 #: A frame of the fall is a movement of this, in block sizes, the first one of that: large against the compliance of the
 #: joints, small enough for rotations to be velocities.
@@ -70,7 +71,7 @@ class Falling:
         speed : float
             Of the fastest block, in units of √(block size · g).
         """
-        place, time = replace(place, velocity=None), FIRST_TIME
+        place, time, idle = replace(place, velocity=None), FIRST_TIME, 0
         for _ in range(STEPS_IN_TIME):
             try:
                 new, motion, error = self.stepper.step(place, time, in_time=True)
@@ -82,7 +83,8 @@ class Falling:
                 continue
             place = new
             yield place, motion, error.turn / time**2, moved / time
-            if time >= LONGEST_TIME and moved < AT_REST:
+            idle = idle + 1 if moved < AT_REST else 0
+            if idle == IDLE:
                 return
             time = min(time * (GROWTH if moved < longest / 3.0 else 1.0), LONGEST_TIME)
 
@@ -124,7 +126,9 @@ class Falling:
         driver, model = self.driver, self.model
         frames = list(self._dead_load_alone()._fall(beyond))
         if not frames:
-            frames = [self.reports.falling(beyond, np.zeros_like(model.load), beyond.s)]
+            # What is held by less than counts as a bearing goes on as it came.
+            velocity = np.zeros_like(model.load) if beyond.velocity is None else beyond.velocity
+            frames = [self.reports.falling(beyond, velocity, beyond.s)]
         # The first movement that is large against the compliance of the joints.
         sizes = [float(motion_size(frame.velocity, model.length).max()) for frame in frames]
         chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))

@@ -171,7 +171,8 @@ def test_lintel_slips_on_the_right_first_and_on_the_left_after(lintel):
 def test_lintel_loses_its_left_bearing(lintel):
     assert lintel.stop is solver.Status.COLLAPSED
     assert lintel.collapse.displacement == pytest.approx(END, rel=1e-3)
-    assert lintel.collapse.reaction / lintel.total_weight == pytest.approx(0.513778, abs=1e-3)
+    # On the last hundredth of a millimetre its corner stands on the pier, and bears upright.
+    assert lintel.path[-2].reaction / lintel.total_weight == pytest.approx(0.513778, abs=1e-3)
 
 
 @pytest.mark.parametrize(

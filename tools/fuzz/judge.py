@@ -169,6 +169,9 @@ def _judge_increment(
     if not _judge_forces(given, increment, k, near, weights, finding):
         finding.counted("later increment with a force across an open gap: not judged")
         return
+    if increment.fallen.any():
+        finding.counted("bounds without blocks that have left: not judged")
+        return
     start = _rings(assembly, solver.Pose.initial(assembly))
     velocity = support_velocities(
         start if settlement.unit == "m" else rings,
@@ -225,7 +228,7 @@ def _judge_forces(
     assembly, contacts = given.assembly, increment.contacts
     total, length = float(weights[assembly.free].sum()), assembly.block_size
     rest = np.zeros((assembly.n_blocks, 3))
-    rest[:, 1] -= weights
+    rest[:, 1] -= np.where(increment.fallen, 0.0, weights)
     for n, (normal, shear) in enumerate(increment.forces):
         force = normal * contacts.frames[n, 0] + shear * contacts.frames[n, 1]
         for block, sign in ((contacts.block_a[n], 1.0), (contacts.block_b[n], -1.0)):
@@ -268,6 +271,9 @@ def _judge_collapse(given: Trial, response: solver.Response, weights: np.ndarray
     """Where the structure is said to fall, it falls with every contact that could be there."""
     assembly = given.assembly
     fall = next(i for i in response.increments if i.status == solver.Status.FALLING)
+    if fall.fallen.any():
+        finding.counted("collapse without blocks that have left: not judged")
+        return
     rings = _rings(assembly, fall.pose)
     rounding = 8 * np.spacing(np.abs(assembly.vertices).max())
     near, apart = (part * assembly.block_size + rounding for part in (NEAR, APART_AT_COLLAPSE))
