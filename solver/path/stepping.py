@@ -239,10 +239,10 @@ class Stepper:
         closed = np.inf if still or viscosity == 1.0 else EXACT
         live, live_size = model.scaled_live
         multiplier = place.multiplier * live_size
-        motion_so_far, shear = np.zeros_like(load), forces[:, 1:]
+        motion_so_far, normal, shear = np.zeros_like(load), forces[:, 0], forces[:, 1:]
         pose = self._with_supports(place.pose, supports)
         contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
-        for _ in range(LINEARISATIONS):
+        for number in range(LINEARISATIONS):
             rows = ContactRows(wrench_matrix(contacts, pose, model.length), free)
             control = driver.control(pose) if model.live is not None else None
             problem = ContactProblem(
@@ -250,7 +250,7 @@ class Stepper:
                 gap=contacts.gaps / model.length,
                 slip=(contacts.slip - start.slip) / model.length,
                 # Gaps are absolute, so that the give across a joint is taken back; slip counts from the step's start.
-                forces=np.column_stack([forces[:, 0], shear]),
+                forces=np.column_stack([normal, shear]),
                 bound=bound,
                 compliance=compliance,
                 load=load + resisting * before,
@@ -264,6 +264,8 @@ class Stepper:
             self.programs += 1
             found = minimise(problem, trial, multiplier)
             forces, trial, multiplier = found.forces, found.trial, found.multiplier
+            # A turn by the first linearisation makes blocks grow: what that presses is not remembered.
+            normal = forces[:, 0] if number else normal
             motion_so_far = motion_so_far + found.motion
             full = np.zeros((assembly.n_blocks, n_dof))
             full[free] = motion_so_far.reshape(-1, n_dof) * scales
