@@ -50,6 +50,9 @@ ENCLOSED = 8.0
 #: Penetration, in block sizes, and normal force, in total loads, at which blocks may be wedged.
 PRESSED, LOCKED_FORCE = 1e-5, 1e2
 
+#: Part of the multiplier at the start under which one comes to zero within a bracket, and does not fall there at once.
+SPENT = 0.05
+
 #: Movement of the supports, in block sizes, in which the joints' compliance is used up.
 ONSET = 1e-3
 
@@ -157,8 +160,12 @@ class Path:
                 yield from self._unreported(state)
                 check, lost = self._checked(state.place), None
                 if self.model.live is not None:
-                    bounds = self.checks.bounds(beyond, CLOSING_GAP)
-                    lost = bounds.high if bounds.exists and bounds.high <= 0.0 else None
+                    first, bounds = (
+                        self.checks.bounds(Place.unloaded(state.start)),
+                        self.checks.bounds(beyond, CLOSING_GAP),
+                    )
+                    spent = state.place.multiplier <= SPENT * first.high
+                    lost = bounds.high if spent and bounds.exists and bounds.high <= 0.0 else None
                 return (yield from self.falling.collapse(check, beyond, state.upper_bound, lost))
             self.state = self._from(state, rest)
         return self.reports.reached()
