@@ -191,9 +191,11 @@ def badge_of(response: solver.Response) -> str:
 
 
 def lost_text(response: solver.Response) -> str:
-    """Name what a collapse is: of the structure, of a few blocks, or of its capacity for live loads."""
+    """Name what a collapse is: of the structure, of a few blocks, or of what a pushover loses."""
     if response.collapse is not None and response.collapse.lost == "capacity":
         return "capacity is lost"
+    if response.collapse is not None and response.control is not None:
+        return "equilibrium is lost along the control"
     loss = loss_of(response)
     return "a local loss" if loss is not None and loss.local else "collapse"
 

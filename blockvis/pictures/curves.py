@@ -330,7 +330,7 @@ def _mark_collapse(
     # A capacity that is lost ends at the foot of the diagram.
     above = collapse.lost == "capacity"
     lost = lost_text(response)
-    what = "no capacity" if above else lost.removeprefix("a ")
+    what = "no capacity" if above else lost.removeprefix("a ").replace(" is", "")
     places = collapse_places(response)
     assert places is not None
     low, middle, high = places.tolist()

@@ -427,4 +427,5 @@ def _collapse_of(
         mechanism=mechanism,
         unit=summary.get("settlement_unit", "m"),
         words=summary.get("mechanism") or "",
+        lost=summary.get("collapse_lost", "equilibrium"),
     )

@@ -68,6 +68,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         "settlement_unit": response.settlements[-1].unit if response.settlements else response.parameter.unit,
         "initial_reaction": _initial_reaction(response),
         "reaction_at_rest": path[0].reaction if path else None,
+        "collapse_lost": collapse.lost if collapse else None,
         "collapse_reaction": collapse.reaction if collapse else None,
         "mechanism": mechanism_text(response) if collapse else None,
         **_joint_counts(response),

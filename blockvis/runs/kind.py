@@ -117,8 +117,6 @@ class AnalysisKind(ABC):
     parameter, measured : solver.Quantity
     checkpoint : type
         Dataclass from which its increments go on; NoneType where they start again.
-    lost : str
-        What is lost at collapse: "equilibrium" or "capacity".
     in_studies : bool
         Whether studies repeat it.
     keys : tuple of Key
@@ -131,7 +129,6 @@ class AnalysisKind(ABC):
     parameter: solver.Quantity
     measured: solver.Quantity
     checkpoint: type[Any] = NoneType
-    lost: str = "equilibrium"
     in_studies: bool = False
     keys: tuple[Key, ...] = ()
     sections: tuple[Section, ...] = ()
@@ -193,8 +190,7 @@ class AnalysisKind(ABC):
 
     def restored(self, response: solver.Response, summary: Mapping[str, Any]) -> solver.Response:
         """Complete the response of a results folder by what this kind has put into the summary."""
-        collapse = None if response.collapse is None else replace(response.collapse, lost=self.lost)
-        return replace(response, parameter=self.parameter, measured=self.measured, collapse=collapse)
+        return replace(response, parameter=self.parameter, measured=self.measured)
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
         """Keys of summary.json beside those of every analysis."""

@@ -1,4 +1,4 @@
-"""Pushovers: live loads follow a growing control displacement from the limit load down to zero capacity."""
+"""Pushovers: live loads follow a growing control displacement from the limit load until none is carried."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CONTROL = Section(
         Key("point", VECTOR, "Point of the block, in the drawing", [1.0, 2.0], "m", otherwise="its centroid"),
         Key("increment", POSITIVE, "Largest step", 0.01, "m", 0.01),
         Key("limit", POSITIVE, "Displacement at which to stop if capacity is left", 0.5, "m", 1.0),
-        Key("tolerance", POSITIVE, "Width of the bracket of the displacement at zero capacity", 1e-4, "m",
+        Key("tolerance", POSITIVE, "Width of the bracket of the displacement at which it is lost", 1e-4, "m",
             otherwise="a hundredth of the increment"),
         Key("step_tolerance", FRACTION, "Relative error of the multiplier that steps aim for; a smaller one of "
             "[settlement] holds over it", 0.002, default=solver.Controls.step_tolerance),
@@ -44,7 +44,6 @@ class PushoverKind(AnalysisKind):
     parameter = solver.CONTROL_DISPLACEMENT
     measured = solver.LOAD_MULTIPLIER
     checkpoint = solver.PathState
-    lost = "capacity"
     sections = (CONTROL,)
 
     def read(self, top: Table, analysis: Table) -> solver.ControlDisplacement | None:
@@ -128,8 +127,9 @@ class PushoverKind(AnalysisKind):
                 lines.append(f"{name:<21}{i.load_multiplier:12.6g}     at {i.parameter:.6g} m, {load}")
         if response.collapse is not None:
             low, high = response.collapse.bracket
+            at = response.collapse.displacement
             lines += [
-                f"zero capacity at     {response.collapse.displacement:12.6g} m   between {low:.6g} and {high:.6g}",
+                f"{_lost(response):<21}{at:12.6g} m   between {low:.6g} and {high:.6g}",
                 f"mechanism: {mechanism_text(response)}",
             ]
         return lines
@@ -137,7 +137,8 @@ class PushoverKind(AnalysisKind):
     def title(self, response: solver.Response) -> str:
         """Say how it ended."""
         if response.collapse is not None:
-            return f"No capacity left at a control displacement of {response.collapse.displacement:.5g} m"
+            what = _lost(response)
+            return f"{what[0].upper()}{what[1:]} a control displacement of {response.collapse.displacement:.5g} m"
         return f"Pushover: {response.stop}"
 
     def rows(self, response: solver.Response) -> list[tuple[str, str]]:
@@ -145,12 +146,19 @@ class PushoverKind(AnalysisKind):
         rows, c = [], response.collapse
         if c is not None:
             place = f"{c.displacement:.6g} {c.unit}, between {c.bracket[0]:.6g} and {c.bracket[1]:.6g}"
-            rows.append(("zero capacity at", place))
+            rows.append((_lost(response), place))
         if response.path:
             values = response.values
             rows.append(("load multiplier α at the start", f"{values[0]:.6g}"))
             rows.append(("largest, last", f"{np.nanmax(values):.6g}, {values[-1]:.6g}"))
         return rows
+
+
+def _lost(response: solver.Response) -> str:
+    """Say what a pushover has lost where it ends."""
+    if response.collapse is not None and response.collapse.lost == "capacity":
+        return "zero capacity at"
+    return f"equilibrium lost along the control at α = {response.path[-1].load_multiplier:.6g}, at"
 
 
 def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDisplacement:

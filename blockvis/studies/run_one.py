@@ -16,6 +16,8 @@ import solver
 from blockvis.cases.build import case_assembly, case_interfaces, case_loads, case_settlements
 from blockvis.cases.case import Case, case_of
 from blockvis.pictures.annotations import settlement_arrows
+from blockvis.pictures.solid_marks import settlement_arrows_in_space
+from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import least_reaction, loss_in
 
 from .study_file import run_values
@@ -28,6 +30,9 @@ NAMED_JOINTS = 8
 
 #: Largest movement in the picture of a mechanism, as a fraction of the size of the structure.
 SWING = 0.05
+
+#: From where blocks in space are seen: the same in all runs, so that their mechanisms compare.
+VIEW = View(AROUND[0], ABOVE)
 
 
 class _OutOfTime(RuntimeError):
@@ -204,24 +209,52 @@ def _shape(
 ) -> bytes:
     """Pack the blocks as the mechanism displaces them, in single precision, for a small picture.
 
-    The arrows are where supports settle, and which way.
+    Of blocks in space these are the faces that are seen, as they are seen. The arrows are where supports settle, and
+    which way.
     """
     free = assembly.free[assembly.block_of_vertex]
     at_rest = solver.moved_vertices(assembly, falling.pose)
     size = float(np.ptp(at_rest[free], axis=0).max())
     step = solver.moved_vertices(assembly, solver.swung(falling.pose, falling.velocity * 1e-6)) - at_rest
-    fastest = float(np.hypot(*step[free].T).max()) / 1e-6
+    fastest = float(np.linalg.norm(step[free], axis=1).max()) / 1e-6
     moved = solver.swung(falling.pose, falling.velocity * (SWING * size / fastest if fastest > 0.0 else 0.0))
-    low, high = at_rest[free].min(axis=0), at_rest[free].max(axis=0)
-    _, places, directions = settlement_arrows(assembly, settlement, falling.pose, low - 0.15 * size, high + 0.15 * size)
+    vertices = solver.moved_vertices(assembly, moved)
+    if assembly.dimension == 2:
+        low, high = at_rest[free].min(axis=0) - 0.15 * size, at_rest[free].max(axis=0) + 0.15 * size
+        _, places, directions = settlement_arrows(assembly, settlement, falling.pose, low, high)
+        offsets, block = assembly.offsets, np.arange(assembly.n_blocks)
+    else:
+        _, *arrows = settlement_arrows_in_space(assembly, settlement, falling.pose)
+        places, directions = (VIEW.projected(ends) for ends in arrows)
+        corners, offsets, block = _seen_faces(assembly, vertices)
+        vertices, at_rest = (VIEW.projected(points[corners]) for points in (vertices, at_rest))
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
-        vertices=solver.moved_vertices(assembly, moved).astype(np.float32),
+        vertices=vertices.astype(np.float32),
         at_rest=at_rest.astype(np.float32),
-        offsets=assembly.offsets.astype(np.int32),
-        parts=mechanism.parts.astype(np.int16),
-        free=assembly.free,
+        offsets=offsets.astype(np.int32),
+        parts=mechanism.parts[block].astype(np.int16),
+        free=assembly.free[block],
         arrows=np.stack([places, directions], axis=1).astype(np.float32),
     )
     return buffer.getvalue()
+
+
+def _seen_faces(assembly: solver.Assembly, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find the faces that are turned to the eye: supports first, then those at the back.
+
+    Returns
+    -------
+    corners : (n_corners,) int array
+        Vertices around them, face after face.
+    offsets : (n_faces + 1,) int array
+        Where each begins.
+    block : (n_faces,) int array
+    """
+    solids = assembly.polyhedra
+    faces, rings = solids.faces(vertices), np.split(solids.corners, solids.face_offsets[1:-1])
+    order = np.lexsort((VIEW.depth(faces.middles), assembly.free[solids.block_of_face]))
+    order = order[VIEW.depth(faces.normals)[order] > 0.0]
+    offsets = np.cumsum([0, *(len(rings[face]) for face in order)])
+    return np.concatenate([rings[face] for face in order]), offsets, solids.block_of_face[order]

@@ -1,4 +1,4 @@
-"""Pushover: the load multiplier against a control displacement, with large displacements, to zero capacity."""
+"""Pushover: the load multiplier against a control displacement, with large displacements, to its end."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def pushover(
     pose: Pose | None = None,
     on_increment: Callable[[Increment], None] | None = None,
 ) -> Response:
-    """Follows a structure under growing displacement from its limit load down to zero capacity.
+    """Follows a structure under growing displacement from its limit load down to where it carries none.
 
     Parameters
     ----------
@@ -55,7 +55,8 @@ def pushover(
     Response
         ``settlement`` is the control displacement [m], ``load_multiplier`` is α and ``reaction`` the resultant of the
         live loads, α times its value at 1 [N]. The first increment has the limit load of the undeformed structure. The
-        collapse is where α reaches zero: beyond, the structure falls under its dead load alone.
+        collapse is where α reaches zero, ``lost`` "capacity": beyond, the structure falls under its dead load alone; or
+        where no equilibrium follows along the control at some α, ``lost`` "equilibrium".
 
     Raises
     ------

@@ -159,12 +159,15 @@ class Falling:
             words=str(mechanism_of(model.assembly, standing)),
             lost="equilibrium" if multiplier_beyond is None else "capacity",
         )
+        multiplier = standing.load_multiplier
         del standing, last, frames[self.falling_frames :]
         while frames:
             yield frames.pop(0)
         if model.live is None:
             return Ending(Status.COLLAPSED, str(collapse), collapse)
-        what = "equilibrium is lost" if multiplier_beyond is None else "no capacity is left"
+        what = "no capacity is left"
+        if multiplier_beyond is None:
+            what = f"equilibrium is lost along the control at α = {multiplier:.6g},"
         return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)
 
     def _dead_load_alone(self) -> Falling:

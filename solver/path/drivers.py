@@ -127,7 +127,7 @@ class ControlDisplacement:
     limit : float [m]
         Where to stop if capacity is left.
     tolerance : float, optional [m]
-        Width of the bracket of the displacement at zero capacity; a hundredth of the increment by default.
+        Width of the bracket of the displacement at the end; a hundredth of the increment by default.
     """
 
     block: str

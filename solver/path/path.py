@@ -54,6 +54,9 @@ PRESSED, LOCKED_FORCE = 1e-5, 1e2
 #: Movement, in block sizes, of what has left for good when the first block has gone as far as none comes back from.
 LEAVES = 0.1
 
+#: Part of the multiplier at the start under which one comes to zero within a bracket, and does not fall there at once.
+SPENT = 0.05
+
 #: Movement of the supports, in block sizes, in which the joints' compliance is used up.
 ONSET = 1e-3
 
@@ -171,8 +174,12 @@ class Path:
                 yield from self._unreported(state)
                 check, lost = self._checked(state.place), None
                 if self.model.live is not None:
-                    bounds = self.checks.bounds(beyond, CLOSING_GAP)
-                    lost = bounds.high if bounds.exists and bounds.high <= 0.0 else None
+                    first, bounds = (
+                        self.checks.bounds(Place.unloaded(state.start)),
+                        self.checks.bounds(beyond, CLOSING_GAP),
+                    )
+                    spent = state.place.multiplier <= SPENT * first.high
+                    lost = bounds.high if spent and bounds.exists and bounds.high <= 0.0 else None
                 return (yield from self.falling.collapse(check, beyond, state.upper_bound, lost))
             self.state = going_on
         return self.reports.reached()

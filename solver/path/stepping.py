@@ -259,10 +259,10 @@ class Stepper:
         closed = np.inf if in_time or viscosity == 1.0 else EXACT
         live, live_size = model.scaled_live
         multiplier = place.multiplier * live_size
-        motion_so_far, shear = np.zeros_like(load), forces[:, 1:]
+        motion_so_far, normal, shear = np.zeros_like(load), forces[:, 0], forces[:, 1:]
         pose = self._with_supports(place.pose, supports)
         contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
-        for _ in range(LINEARISATIONS):
+        for number in range(LINEARISATIONS):
             rows = ContactRows(wrench_matrix(contacts, pose, model.length), free)
             control = driver.control(pose) if model.live is not None else None
             problem = ContactProblem(
@@ -270,7 +270,7 @@ class Stepper:
                 gap=contacts.gaps / model.length,
                 slip=(contacts.slip - start.slip) / model.length,
                 # Gaps are absolute, so that the give across a joint is taken back; slip counts from the step's start.
-                forces=np.column_stack([forces[:, 0], shear]),
+                forces=np.column_stack([normal, shear]),
                 bound=bound,
                 compliance=compliance,
                 load=load + resisting * before,
@@ -284,6 +284,8 @@ class Stepper:
             self.programs += 1
             found = minimise(problem, trial, multiplier)
             forces, trial, multiplier = found.forces, found.trial, found.multiplier
+            # A turn by the first linearisation makes blocks grow: what that presses is not remembered.
+            normal = forces[:, 0] if number else normal
             motion_so_far = motion_so_far + found.motion
             full = np.zeros((assembly.n_blocks, n_dof))
             full[free] = motion_so_far.reshape(-1, n_dof) * scales
@@ -321,9 +323,8 @@ class Stepper:
             multiplier / (live_size or 1.0),
             motion / length if in_time else self._velocity(place, motion, length),
         )
-        turn = 0.0
-        if in_time or place.velocity is not None:
-            turn = float(np.abs(motion_so_far - before).max(initial=0.0))
+        # The first step of the supports has none before it to turn from.
+        turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
         return new, motion / scales, StepError(lag, turn, moved_by, float(-gap[carries].min(initial=0.0)))
 
     def _resistance(

@@ -35,7 +35,8 @@ class Collapse:
     words : str
         How it fails: macro-blocks, hinges and sliding joints.
     lost : str
-        What there is at the one end of the bracket and not at the other: "equilibrium", or "capacity" for live loads.
+        What there is at the one end of the bracket and not at the other: "equilibrium", or "capacity" where the
+        multiplier of the live loads comes to zero.
     """
 
     displacement: float

@@ -246,7 +246,7 @@ def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
     assert response.load_multiplier == pytest.approx(alpha)
     assert state_text(response.path[2], response).startswith("Control displacement 0.0600 m   ·   Load multiplier α =")
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert "No capacity left at a control displacement of 0.1961" in page
+    assert "Zero capacity at a control displacement of 0.1961" in page
     assert "control displacement [m]" in page
 
 
@@ -258,6 +258,7 @@ def test_pushover_written_from_python_comes_back(tmp_path):
     assert again.control == run.response.control
     assert again.analysis == "pushover"
     assert again.collapse.bracket == run.response.collapse.bracket
+    assert again.collapse.lost == run.response.collapse.lost == "capacity"
 
 
 @pytest.mark.thorough

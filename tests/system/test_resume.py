@@ -194,7 +194,10 @@ def test_run_killed_by_the_signal_goes_on(whole, tmp_path):
 
 @pytest.mark.parametrize(
     "moments",
-    [(30, 40), *(pytest.param((moment,), marks=pytest.mark.thorough) for moment in (2, 75, 100))],
+    [
+        ("state_00001.npz", 40),
+        *(pytest.param(moments, marks=pytest.mark.thorough) for moments in ((30, 40), (2,), (75,), (100,))),
+    ],
 )
 def test_killed_run_goes_on(whole, tmp_path, moments):
     out = tmp_path / "out"

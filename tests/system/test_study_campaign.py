@@ -8,16 +8,19 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 import pytest
+import shapely
 from structures import started_cluster
 
 import blockvis
 from blockvis.cli import main
 from blockvis.studies import campaign
 from blockvis.studies.fragility import fragility_of
+from blockvis.studies.pictures import draw_mechanisms
 from blockvis.studies.run_one import run_once
 from blockvis.studies.study_file import read_study
 from blockvis.studies.study_folder import StudyFolder, finished_runs
@@ -138,6 +141,28 @@ def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
     assert row["status"] == "failed"
     assert "took longer than 1e-09 s" in row["message"]
     assert shape == b""
+
+
+def test_blocks_in_space_are_studied_and_drawn(tmp_path):
+    """An arch with a depth whose springer moves out; its tile shows the faces that are turned to the eye."""
+    arch = {
+        "geometry": {"layout": "extruded arch", "parameters": {"voussoirs": 4, "thickness_ratio": 0.12}},
+        "settlement": {"direction": [1.0, 0.0, 0.0], "increment": 0.1, "limit": 1.0, "tolerance": 0.05},
+    }
+    friction = {"name": "friction", "values": [0.8, 1.0]}
+    given = {
+        "study": {"case": arch, "method": "grid"},
+        "parameters": {"material.friction_coefficient": friction},
+    }
+    records = _made_here(read_study(given), tmp_path / "out", [1])
+    table = records.table()
+    assert (table["status"] == "collapsed").all(), table["message"].tolist()
+    assert draw_mechanisms(records, table, tmp_path / "mechanisms.png").stat().st_size > 5_000
+    with np.load(records.shape_file(table["mechanism_class"][0])) as shape:
+        assert shape["vertices"].shape == shape["at_rest"].shape == (shape["offsets"][-1], 2)
+        around = [shape["vertices"][first:last] for first, last in pairwise(shape["offsets"])]
+        assert all(shapely.LinearRing(ring).is_ccw for ring in around)
+        assert len(shape["parts"]) == len(shape["free"]) == len(around)
 
 
 @pytest.mark.slow

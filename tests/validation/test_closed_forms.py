@@ -249,3 +249,29 @@ def test_keystone_locked_between_approaching_supports(degrees, friction_coeffici
     assert "block 0" in response.message
     assert response.collapse is None
     assert sunk == pytest.approx(0, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("friction_coefficient", "clearance", "limit"),
+    [(0.2, 1e-3, 2.0), (0.6, 0.0, 0.6), (0.6, 1e-6, 0.6), (1.2, 1e-2, 0.6)],
+)
+def test_brick_in_a_tray_that_turns(friction_coefficient, clearance, limit):
+    """Brick between the walls of its support: it turns with it, and slides out along a wall at 90° + atan μ."""
+    brick, tray = rectangle(0, 0, 1, 1), rectangle(-1, -1, 2, 2)
+    left, right = -clearance, 1 + clearance
+    tray[3:3] = [[right, 2], [right, 0], [left, 0], [left, 2]]
+    slides_out = np.pi / 2.0 + np.arctan(friction_coefficient)
+    turn = solver.Settlement(rotation_centre=(0.5, 0), rotation=1.0, increment=0.2, limit=limit)
+    response = settle([brick, tray], ["free", "moving"], turn, friction_coefficient)
+    if limit > slides_out:
+        low, high = response.collapse.bracket
+        assert low <= slides_out <= high
+        assert high - low <= 0.002 + 1e-9
+    else:
+        assert response.stop is solver.Status.LIMIT_REACHED
+        assert response.settlement == pytest.approx([0.0, 0.2, 0.4, 0.6])
+    turned = [increment.pose.rotations[0, 0] for increment in response.path]
+    assert turned == pytest.approx(response.settlement, abs=1.5 * clearance + 1e-5)
+    # Walls that only hold the brick do not squeeze it.
+    weight = solver.total_weight(response.assembly)
+    assert max(increment.forces[:, 0].max() for increment in response.path) < 2.0 * weight
