@@ -7,7 +7,7 @@ does not say in its own words is said in those of its quantities.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import NoneType
 from typing import Any
@@ -47,12 +47,18 @@ class Course:
 
 @dataclass(frozen=True)
 class RunInput:
-    """What an analysis starts from."""
+    """What an analysis starts from, and who listens to its steps."""
 
     case: Case
     assembly: solver.Assembly
     interfaces: solver.Interfaces
     loads: solver.Loads
+    listeners: list[Callable[[solver.PathState], None]] = field(default_factory=list)
+
+    def step(self, state: solver.PathState) -> None:
+        """Tell who listens where a step within an increment has led."""
+        for listener in self.listeners:
+            listener(state)
 
 
 @dataclass

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
 from typing import TextIO
+
+import numpy as np
 
 import solver
 from blockvis.fall import LONGEST
@@ -89,10 +92,28 @@ class Progress:
         What the increments run over.
     stream : text stream, optional
         stderr by default.
+    names : sequence of str
+        Of the blocks.
     """
 
-    def __init__(self, course: Course, stream: TextIO | None = None) -> None:
-        self.course, self.count, self._line = course, 0, _Line(stream)
+    def __init__(self, course: Course, stream: TextIO | None = None, names: Sequence[str] = ()) -> None:
+        self.course, self.count, self.names, self._line = course, 0, names, _Line(stream)
+
+    def step(self, state: solver.PathState) -> None:
+        """Show where an increment is that takes long: its settlement, the next step, and what moves most."""
+        if not self._line.due or not self.course.drivers:
+            return
+        driver = self.course.drivers[min(state.phase, len(self.course.drivers) - 1)]
+        s, velocity = state.place.s, state.place.velocity
+        moves = ""
+        if velocity is not None and self.names:
+            dimension = state.place.pose.positions.shape[1]
+            moves = f", '{self.names[int(np.linalg.norm(velocity[:, :dimension], axis=1).argmax())]}' moves most"
+        self._line.write(
+            f"{self.course.parameter.name} {s:.6g} of at most {driver.limit:g} {driver.unit}, increment "
+            f"{self.count + 1} in steps of {state.step:.2g}{moves}",
+            min(s / driver.limit, 1.0),
+        )
 
     def increment(self, increment: solver.Increment) -> None:
         """Show an increment."""

@@ -199,6 +199,7 @@ def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.
                 controls=case.controls,
                 pose=pose,
                 resume=resume,
+                on_step=given.step,
             )
         )
     except ValueError as error:

@@ -293,7 +293,8 @@ def _solved(
 ) -> Run:
     """Follow the increments to their end or to Ctrl-C, write each, and draw what came out."""
     folder = results.path
-    progress = Progress(run.course)
+    progress = Progress(run.course, names=results.assembly.names)
+    run.given.listeners.append(progress.step)
     ending = solver.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
     try:
         while True:

@@ -225,6 +225,7 @@ def settlement_steps(given: RunInput, resume: solver.PathState | None = None, *,
             loads=given.loads,
             controls=replace(case.controls, local_loss=0.0) if whole else case.controls,
             resume=resume,
+            on_step=given.step,
         )
     )
 

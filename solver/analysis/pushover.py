@@ -96,6 +96,7 @@ def pushover_increments(
     controls: Controls | None = None,
     pose: Pose | None = None,
     resume: PathState | None = None,
+    on_step: Callable[[PathState], None] | None = None,
 ) -> Generator[Increment, None, Ending]:
     """The increment loop of :func:`pushover` as a generator: yields each Increment, returns the Ending.
 
@@ -106,6 +107,8 @@ def pushover_increments(
     resume : PathState, optional
         Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
         for bit as if the loop had not been interrupted. ``pose`` is not looked at then.
+    on_step : callable, optional
+        Called with the :class:`PathState` after every step within an increment.
     """
     controls = controls or Controls()
     if controls.increments == LINEAR_PROGRAM:
@@ -121,7 +124,7 @@ def pushover_increments(
             f"the checkpoint has {len(resume.place.pose.rotations)} blocks, the assembly {assembly.n_blocks}: it "
             "belongs to another run"
         )
-    return (yield from timed(_increments(assembly, control, loads, interfaces, controls, pose, resume)))
+    return (yield from timed(_increments(assembly, control, loads, interfaces, controls, pose, resume, on_step)))
 
 
 def _increments(
@@ -132,12 +135,13 @@ def _increments(
     controls: Controls,
     pose: Pose | None,
     resume: PathState | None,
+    on_step: Callable[[PathState], None] | None,
 ) -> Generator[Increment, None, Ending]:
     start = Pose.initial(assembly) if pose is None else pose
     if resume is not None:
         start = resume.start
     model = model_of(assembly, loads, interfaces, controls, loads.live)
-    path = Path(model, ControlledLoad(assembly, control, start), 0, controls)
+    path = Path(model, ControlledLoad(assembly, control, start), 0, controls, on_step)
     at = 0.0
     try:
         state = path.begin(start) if resume is None else resume

@@ -114,6 +114,7 @@ def settlement_increments(
     loads: Loads,
     controls: Controls | None = None,
     resume: PathState | None = None,
+    on_step: Callable[[PathState], None] | None = None,
 ) -> Generator[Increment, None, Ending]:
     """The increment loop of :func:`settle` as a generator: yields each Increment, returns the Ending.
 
@@ -124,6 +125,8 @@ def settlement_increments(
     resume : PathState, optional
         Of an increment that such a loop has yielded, with the same other arguments: the increments after it follow, bit
         for bit as if the loop had not been interrupted.
+    on_step : callable, optional
+        Called with the :class:`PathState` after every step within an increment.
     """
     controls = controls or Controls()
     check_settlement(assembly, phases, controls)
@@ -140,8 +143,10 @@ def settlement_increments(
     near, local = (assembly, phases) if not origin.any() else without_origin(origin, assembly, phases)
     if resume is not None and resume.place.s > 0.0 and by_program != (resume.place.contacts is None):
         raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
-    found = linear_program_increments if by_program else _increments
-    steps = timed(found(near, local, interfaces, loads, controls, resume))
+    if by_program:
+        steps = timed(linear_program_increments(near, local, interfaces, loads, controls, resume))
+    else:
+        steps = timed(_increments(near, local, interfaces, loads, controls, resume, on_step))
     return (yield from (steps if not origin.any() else told_from(steps, origin)))
 
 
@@ -152,6 +157,7 @@ def _increments(
     loads: Loads,
     controls: Controls,
     resume: PathState | None,
+    on_step: Callable[[PathState], None] | None,
 ) -> Generator[Increment, None, Ending]:
     first = 0 if resume is None else resume.phase
     before: PathState | None = None
@@ -160,7 +166,7 @@ def _increments(
         start = Pose.initial(assembly) if before is None else before.place.pose
         start = start if resume is None else resume.start
         model = model_of(assembly, loads, interfaces, controls)
-        path = Path(model, SupportMotion(assembly, phase, start), number, controls)
+        path = Path(model, SupportMotion(assembly, phase, start), number, controls, on_step)
         at = 0.0
         try:
             state = path.begin(start, before) if resume is None else resume

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 from enum import Enum
 
@@ -81,9 +81,19 @@ class Path:
     number : int
         Of the phase.
     controls : Controls
+    on_step : callable, optional
+        Called with the :class:`PathState` after every step that was tried.
     """
 
-    def __init__(self, model: Model, driver: Driver, number: int, controls: Controls) -> None:
+    def __init__(
+        self,
+        model: Model,
+        driver: Driver,
+        number: int,
+        controls: Controls,
+        on_step: Callable[[PathState], None] | None = None,
+    ) -> None:
+        self.on_step = on_step
         self.whole, self.driver, self.number = model, driver, number
         self.frames, self.local_loss = controls.frames(model.dimension), controls.local_loss
         self._follow_without(np.zeros(0))
@@ -258,6 +268,8 @@ class Path:
             if state.refined and room <= self.driver.tolerance * (1.0 + 1e-9):
                 return state, Outcome.NO_EQUILIBRIUM
             state, outcome = self._step(state, target)
+            if self.on_step is not None:
+                self.on_step(state)
             if outcome is not None:
                 return state, outcome
         self.failure = f"at {state.place.s:.6g} {self.driver.unit}: {MOST_STEPS} were tried"

@@ -24,8 +24,12 @@ def stacked(shift=(0.0, 0.0), turn=0.0):
     return assembly, pose
 
 
+def all_cracks(assembly, pose):
+    return marks._cracks(assembly, initial_joints(assembly), pose, pose, np.zeros(assembly.n_blocks, dtype=bool))
+
+
 def cracks(assembly, pose):
-    return marks._cracks(assembly, initial_joints(assembly), pose, pose)[0]
+    return all_cracks(assembly, pose)[0]
 
 
 def area(polygon):
@@ -73,7 +77,9 @@ def test_of_a_wedge_that_gapes_only_the_faces_are_marked():
         c, s = np.cos(turn), np.sin(turn)
         # Rocked about the lower left corner.
         assembly, pose = stacked(shift=(0.5 * c - 0.5 * s - 0.5, 0.5 * s + 0.5 * c - 0.5), turn=turn)
-        filled, _, faces = marks._cracks(assembly, initial_joints(assembly), pose, pose)
+        filled, _, faces = marks._cracks(
+            assembly, initial_joints(assembly), pose, pose, np.zeros(assembly.n_blocks, dtype=bool)
+        )
         return len(filled), faces
 
     assert marked(0.3)[0] == 1
@@ -97,7 +103,9 @@ def four_blocks(apart):
 @given(st.floats(0.01, 0.2))
 def test_the_pocket_where_four_cracks_meet_is_air(apart):
     assembly, pose = four_blocks(apart)
-    found, openings, _ = marks._cracks(assembly, initial_joints(assembly), pose, pose)
+    found, openings, _ = marks._cracks(
+        assembly, initial_joints(assembly), pose, pose, np.zeros(assembly.n_blocks, dtype=bool)
+    )
     assert len(found) == 4
     np.testing.assert_allclose(openings, 2.0 * apart, rtol=1e-9)
     covered = shapely.union_all([shapely.Polygon(crack) for crack in found])

@@ -4,6 +4,7 @@ import ast
 import csv
 import io
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -182,3 +183,25 @@ def test_the_bar_shows_the_quantities_of_the_kind(analysis, extra, line, tmp_pat
     standing = solver.Increment(0.05, 7.0, 0, 7.0, 7.0, certificate, solver.Status.EQUILIBRIUM, 1, 0.1, state)
     Progress(course, stream).increment(standing)
     assert f"] {line}" in stream.getvalue()
+
+
+def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monkeypatch):
+    monkeypatch.setattr("blockvis.runs.progress.REDRAW", -1.0)
+    text = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
+    stream, seen = Terminal(), []
+    bar = Progress(KINDS["settlement"].course(parse_case(text, tmp_path / "case.toml")), stream, ["ground", "block"])
+    outlines = [[[-1, -1], [1, -1], [1, 0], [-1, 0]], [[-0.2, 0], [0.2, 0], [0.2, 1], [-0.2, 1]]]
+    assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
+    steps = solver.settlement_increments(
+        assembly,
+        [solver.Settlement(direction=(0, -1), increment=0.1, limit=0.1)],
+        interfaces=solver.Interfaces(solver.InterfaceLaw(0.6)),
+        loads=solver.self_weight(assembly),
+        on_step=lambda state: (seen.append(state.place.s), bar.step(state)),
+    )
+    assert len(list(steps)) == 2
+    assert seen == sorted(seen)
+    assert len(seen) > 2
+    assert re.search(
+        r"settlement 0\.0\d+ of at most 0.4 m, increment 1 in steps of 0\.\d+, '\w+' moves most", stream.getvalue()
+    )
