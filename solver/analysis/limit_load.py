@@ -9,11 +9,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from solver.assembly import Assembly, check_blocks, find_contacts
+from solver.contact_step.balance import nearest_equilibrium
+from solver.contact_step.problem import NotSolved
+from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose, dimension_of, moved_vertices, unit_lengths
 from solver.loads import Loads, checked_loads
+from solver.path.stepping import Stepper
 from solver.program.strength import Admissible, point_strength
 from solver.program.torsion import POINTS, TORSIONS, UNIFORM, Faces, face_wrench_matrix, point_forces
 from solver.program.without_dilatancy import solve_without_dilatancy
@@ -21,25 +25,19 @@ from solver.programs.problem import Unbounded
 from solver.programs.solve import solve_between
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
 from solver.results.limit import Envelope, LimitLoad, LimitStatus, limit_state
-from solver.tolerances import COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
+from solver.tolerances import CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
 REACH = 0.25
 
-#: Non-associative flow: part of the new normal forces in the next program, while wandering and while settling, and
-#: part of the dilatancy that is kept.
-RELAXATION, SETTLING_RELAXATION = 0.5, 0.9
-DILATANCY_KEPT = 0.5
+#: Non-associative flow: part of the new normal forces in the next program, and programs at most.
+RELAXATION, PROGRAMS = 0.9, 100
 
 #: Non-associative flow has converged when the multiplier changes by less than the first and shear forces exceed
 #: friction by less than the second, relative to the multiplier and to the largest normal force; the third in space,
 #: where the multiplier is off by as much.
 MULTIPLIER_CHANGE = 1e-7
-FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE = 1e-6, 1e-7
-
-#: Programs of the non-associative sequence: without preference among equal forces, which wanders to low multipliers,
-#: and then at most, near the forces of the lowest, to convergence.
-WANDERING, SETTLING = 40, 100
+FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE = 1e-6, 1e-8
 
 #: Cost of a change of a normal force in the non-associative programs, in multipliers: it only decides between equals.
 #: The second in space, where solutions are interior ones and a smaller cost is lost in their rounding; it is seen in
@@ -129,16 +127,16 @@ def limit_load(
     with the same resultants; single ones may be beyond friction.
 
     Non-associative flow is a sequence of such programs in the manner of Gilbert, Casapulla & Ahmed (2006),
-    https://doi.org/10.1016/j.compstruc.2006.02.005: the friction cone of each point is replaced by
-    |T| ≤ μ N⁰ + ψ (N - N⁰), with N⁰ out of the normal forces of the programs before and a dilatancy ψ that falls from
-    μ to zero. Ours first wanders among equal solutions, which leads to low multipliers, and then settles near the
-    lowest; solutions in space are interior ones, which wander less. Where it converges (N = N⁰) the forces obey Coulomb
-    friction and balance the loads, the mechanism does not lift where it slides, and the power of the loads is what
-    friction takes: a complete solution for friction without dilatancy, never above the associative value. It is not
-    proved to be the least: such a structure may have several limit loads, depending on how it was loaded, and may fall
-    below this one. Its two values agree where it has converged, but are no bounds. Convergence is not proved either;
-    "not converged" says so and gives the last program. Where the associative limit load is unbounded, so is what is
-    given here, although friction without dilatancy might slide.
+    https://doi.org/10.1016/j.compstruc.2006.02.005: the friction cone of each point is replaced by |T| ≤ μ N⁰ with N⁰
+    out of the normal forces of the programs before, and among equal multipliers the forces nearest to N⁰ are taken.
+    Ours has no dilatancy from the first program on and begins with the structure at rest, its forces of least elastic
+    energy under the dead load; what carries nothing there is asked last, so that a block that just fits between floor
+    and ceiling slides at μ, without the prestress that makes its associative limit load unbounded. Where it converges
+    (N = N⁰) the forces obey Coulomb friction and balance the loads, the mechanism does not lift where it slides, and
+    the power of the loads is what friction takes: a complete solution for friction without dilatancy, never above the
+    associative value. It is not proved to be the least: such a structure may have several limit loads, depending on how
+    it was loaded, and may fall below this one. Its two values agree where it has converged, but are no bounds.
+    Convergence is not proved either; "not converged" says so and gives the last program.
     """
     if flow not in ("associative", "non-associative"):
         raise ValueError(f"flow is '{flow}'; it is 'associative' or 'non-associative'")
@@ -162,12 +160,11 @@ def limit_load(
         if balanced.falls:
             return problem.result(falling, LimitStatus.NO_EQUILIBRIUM, flow, 2)
     try:
-        found = problem.associative(balanced)
+        if flow == "associative":
+            return problem.result(problem.associative(balanced), status, flow, 2)
+        return problem.non_associative(balanced, status)
     except Unbounded:
         return problem.result(balanced, LimitStatus.UNBOUNDED, flow, 2)
-    if flow == "associative":
-        return problem.result(found, status, flow, 2)
-    return problem.non_associative(found, status)
 
 
 @dataclass(frozen=True)
@@ -313,57 +310,53 @@ class _Problem:
         forces = (columns @ solution.x[:n]).reshape(-1, self.size)
         return _State(forces, float(solution.x[n]), -solution.row_dual[:rows], balanced.unbalanced, solution.gap)
 
-    def non_associative(self, start: _State, found: LimitStatus) -> LimitLoad:
-        """The sequence of programs with normal forces carried over and dilatancy taken away."""
-        normal, dilatancy, before = start.forces[:, 0], self.friction.copy(), start
-        state, converged = start, False
+    def at_rest(self, balanced: _State) -> np.ndarray:
+        """(n,) array: normal forces of the state of least elastic energy under the dead load, where there is one."""
+        free, d = self.assembly.free, self.contacts.points.shape[1]
+        rows = ContactRows(wrench_matrix(self.contacts, self.pose, self.length), free)
+        load, near = self.dead + balanced.multiplier * self.live, np.zeros((len(self.contacts), d))
+        try:
+            forces = nearest_equilibrium(rows, near, Stepper.compliance(self.contacts), self.friction, load)
+        except NotSolved:
+            forces = balanced.forces
+        return np.asarray(forces[:, 0])
+
+    def non_associative(self, balanced: _State, found: LimitStatus) -> LimitLoad:
+        """The sequence of programs in which friction is that of the normal forces carried over."""
+        normal, before, status = self.at_rest(balanced), balanced, LimitStatus.NOT_CONVERGED
         plane = self.size == 2
-        change_cost = CHANGE_COST if plane else CHANGE_COST_IN_SPACE
         most_excess = FRICTION_EXCESS if plane else FRICTION_EXCESS_IN_SPACE
-        lowest = (np.inf, normal)
-        for number in range(WANDERING + SETTLING):
-            wandering = number < WANDERING
-            dilatancy = np.where(dilatancy > 1e-3, DILATANCY_KEPT * dilatancy, 0.0)
-            if number == WANDERING:
-                normal = lowest[1]
-            state = self._without_dilatancy(normal, dilatancy, start.unbalanced, 0.0 if wandering else change_cost)
+        # Of equal ways to carry, those that press where nothing pressed come last.
+        idle = normal <= CARRYING_FRACTION * normal.max(initial=0.0)
+        change_cost = (CHANGE_COST if plane else CHANGE_COST_IN_SPACE) * (1.0 + idle)
+        programs = 1
+        for _ in range(PROGRAMS):
+            state, programs = self._sliding(normal, balanced.unbalanced, change_cost), programs + 1
             largest = float(state.forces[:, 0].max(initial=0.0)) or 1.0
             excess = _lengths(state.forces[:, 1:]) - self.friction * state.forces[:, 0] - self.cohesion
             change = abs(state.multiplier - before.multiplier) / max(abs(state.multiplier), 1e-12)
-            if (
-                not (wandering or state.falls)
-                and float(excess.max(initial=0.0)) <= most_excess * largest
-                and change <= MULTIPLIER_CHANGE
-            ):
-                converged = True
+            settled = float(excess.max(initial=0.0)) <= most_excess * largest and change <= MULTIPLIER_CHANGE
+            if settled and not state.falls:
+                status = found
                 break
-            kept = 1.0 - (RELAXATION if wandering else SETTLING_RELAXATION)
-            normal = kept * normal + (1.0 - kept) * state.forces[:, 0]
-            if wandering and not state.falls and not dilatancy.any() and state.multiplier < lowest[0]:
-                lowest = (state.multiplier, normal)
+            normal = (1.0 - RELAXATION) * normal + RELAXATION * state.forces[:, 0]
             before = state
-        programs = 3 + number
-        if converged and not plane:
-            last = self._without_dilatancy(normal, dilatancy, start.unbalanced, 0.0)
+        if status is found and not plane:
+            last = self._sliding(normal, balanced.unbalanced, 0.0 * change_cost)
             state, programs = replace(state, velocity=last.velocity, gap=last.gap), programs + 1
-        status = found if converged else LimitStatus.NOT_CONVERGED
         return self.result(state, status, "non-associative", programs)
 
-    def _without_dilatancy(
-        self, normal: np.ndarray, dilatancy: np.ndarray, unbalanced: np.ndarray, change_cost: float
-    ) -> _State:
+    def _sliding(self, normal: np.ndarray, unbalanced: np.ndarray, change_cost: np.ndarray) -> _State:
         """One program of the sequence."""
         found = solve_without_dilatancy(
             self.matrix,
             self.dead,
             self.live,
             unbalanced,
-            self.friction,
-            self.cohesion,
+            self.cohesion + self.friction * normal,
             self.crushing,
             self.price,
             normal,
-            dilatancy,
             change_cost,
         )
         return _State(
@@ -373,7 +366,7 @@ class _Problem:
             unbalanced,
             found.solution.gap,
             found.unbalanced > FALLING_FRACTION * float(np.abs(self.dead).sum()),
-            found.constant,
+            self.cohesion + self.friction * normal,
         )
 
     def result(self, state: _State, status: LimitStatus, flow: str, programs: int) -> LimitLoad:

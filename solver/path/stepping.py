@@ -161,7 +161,8 @@ class Stepper:
         """(n,) array: friction coefficients."""
         return self.model.interfaces.friction(self.model.assembly, contacts.block_a, contacts.block_b)
 
-    def compliance(self, contacts: Contacts) -> np.ndarray:
+    @staticmethod
+    def compliance(contacts: Contacts) -> np.ndarray:
         """(n, d) array: that of the joint, shared over its contact points by area, in units of the program."""
         n, d = contacts.points.shape
         pairs, joint = contacts.joints()

@@ -1,4 +1,4 @@
-"""The program of non-associative flow: the friction cones with normal forces of the programs before in them."""
+"""The program of non-associative flow: the friction cones with the normal forces of the program before in them."""
 
 from __future__ import annotations
 
@@ -22,8 +22,6 @@ class Found:
     ----------
     forces : (n, d) array
     multiplier : float
-    constant : (n,) array
-        The shear force that each point has whatever its normal force is.
     unbalanced : float
         Largest unbalanced force.
     solution : Solution
@@ -31,7 +29,6 @@ class Found:
 
     forces: np.ndarray
     multiplier: float
-    constant: np.ndarray
     unbalanced: float
     solution: Solution
 
@@ -41,15 +38,13 @@ def solve_without_dilatancy(
     dead: np.ndarray,
     live: np.ndarray,
     left: np.ndarray,
-    friction: np.ndarray,
-    cohesion: np.ndarray,
+    bound: np.ndarray,
     crushing: np.ndarray,
     price: np.ndarray,
     normal: np.ndarray,
-    dilatancy: np.ndarray,
-    change_cost: float,
+    change_cost: np.ndarray,
 ) -> Found:
-    """Maximise α with |T| ≤ c + μ N⁰ + ψ (N - N⁰); where changes cost, take of equal α the forces nearest to N⁰.
+    """Maximise α with |T| ≤ B; where changes cost, take of equal α the normal forces nearest to N⁰.
 
     Parameters
     ----------
@@ -57,60 +52,56 @@ def solve_without_dilatancy(
         Forces and moments on the free blocks from the d forces of each of n contact points.
     dead, live, left : (m,) arrays
         Loads, and what may stay out of balance, in the plane.
-    friction, cohesion, crushing, price : (n,) arrays
-        Of each contact point; the price is that of a unit of normal force, in multipliers.
+    bound, crushing, price : (n,) arrays
+        B and largest normal force of each contact point, and what a unit of normal force costs, in multipliers.
     normal : (n,) array
         N⁰.
-    dilatancy : (n,) array
-        ψ.
-    change_cost : float
-        Of a change of a normal force, in multipliers.
+    change_cost : (n,) array
+        Of a change of each normal force, in multipliers.
 
     Notes
     -----
-    In the plane columns N, u, v, then p, m, α and unbalanced forces: T = (u - v) / 2, u + v = 2 (k + ψ N) with the
-    constant k = c + (μ - ψ) N⁰, N - N⁰ = p - m, and a row N for each point that may crush. In space T is the sum of one
-    in the cone |T| ≤ ψ N and of one in the disc |T| ≤ k, which is the cone |T| ≤ k s with s = 1.
+    Columns: the shear forces, N, p, m, α and unbalanced forces, with N - N⁰ = p - m, and a row N for each point that
+    may crush. In the plane T = (u - v) / 2 of columns u + v = 2 B; in space the disc |T| ≤ B is the cone |T| ≤ B s with
+    s = 1.
     """
     n, rows = len(normal), len(dead)
     size = matrix.shape[1] // n
-    constant = cohesion + (friction - dilatancy) * normal
     brittle = np.flatnonzero(np.isfinite(crushing))
     identity, eye = sp.identity(rows, format="csr"), sp.identity(n, format="csr")
-    column = sp.csr_array(live[:, None])
-    by_point = sp.csr_array(eye)
     if size == 2:
-        a_normal, a_shear = matrix[:, 0::2], matrix[:, 1::2]
-        balance = [a_normal, a_shear / 2.0, -a_shear / 2.0, None, None, column, identity, -identity]
-        cone = [sp.diags_array(-2.0 * dilatancy), eye, eye, None, None, None, None, None]
-        change = [eye, None, None, -eye, eye, None, None, None]
-        crush = [by_point[brittle], None, None, None, None, None, None, None]
-        cost, right, slopes, off = [price, np.zeros(2 * n)], 2.0 * constant, np.zeros(0), left
+        half = sp.diags_array(np.full(n, 0.5))
+        shears = sp.hstack([half, -half])
+        to_shear = matrix[:, 1::2] @ shears
+        level, right, slopes, off = sp.hstack([eye, eye]), 2.0 * bound, np.zeros(0), left
     else:
-        first = sp.csr_array((np.ones(n), (np.arange(n), size * np.arange(n))), shape=(n, size * n))
-        shear = np.ones((n, size))
-        shear[:, 0] = 0.0
-        in_disc = sp.diags_array((shear * constant[:, None]).ravel())
-        balance = [matrix, matrix @ in_disc, None, None, column, identity, -identity]
-        cone = [None, first, None, None, None, None, None]
-        change = [first, None, -eye, eye, None, None, None]
-        crush = [first[brittle], None, None, None, None, None, None]
-        # The disc of a point is the cone of slope 1 whose first number is 1.
-        cost, right, slopes = [first.T @ price, np.zeros(size * n)], np.ones(n), np.concatenate([dilatancy, np.ones(n)])
-        off = np.zeros(rows)
-    costs = np.concatenate([*cost, np.full(2 * n, change_cost), [-1.0], np.full(2 * rows, UNBALANCED_COST)])
+        in_disc = np.ones((n, size)) * bound[:, None]
+        in_disc[:, 0] = 0.0
+        shears = sp.diags_array(in_disc.ravel())
+        to_shear = matrix @ shears
+        level = sp.csr_array((np.ones(n), (np.arange(n), size * np.arange(n))), shape=(n, size * n))
+        right, slopes, off = np.ones(n), np.ones(n), np.zeros(rows)
+    first = shears.shape[1]
+    blocks = [
+        [to_shear, matrix[:, 0::size], None, None, sp.csr_array(live[:, None]), identity, -identity],
+        [level, None, None, None, None, None, None],
+        [None, eye, -eye, eye, None, None, None],
+        [None, sp.csr_array(eye)[brittle], None, None, None, None, None],
+    ]
+    costs = np.concatenate(
+        [np.zeros(first), price, change_cost, change_cost, [-1.0], np.full(2 * rows, UNBALANCED_COST)]
+    )
     solution = solve_between(
         costs,
-        sp.csc_array(sp.block_array([balance, cone, change, crush], format="csc")),
+        sp.csc_array(sp.block_array(blocks, format="csc")),
         np.concatenate([-dead - off, right, normal, np.zeros(len(brittle))]),
         np.concatenate([-dead + off, right, normal, crushing[brittle]]),
         slopes,
         size,
     )
-    x = solution.x[: len(costs)]
-    if size == 2:
-        forces = np.stack([x[:n], (x[n : 2 * n] - x[2 * n : 3 * n]) / 2.0], axis=1)
-    else:
-        forces = (x[: size * n] + in_disc @ x[size * n : 2 * size * n]).reshape(n, size)
-    level = len(x) - 2 * rows - 1
-    return Found(forces, float(x[level]), constant, float(x[level + 1 :].max(initial=0.0)), solution)
+    x = solution.x
+    forces = (shears @ x[:first]).reshape(n, -1)
+    forces = np.column_stack([x[first : first + n], forces[:, int(size > 2) :]])
+    multiplier = first + 3 * n
+    unbalanced = x[multiplier + 1 : multiplier + 1 + 2 * rows]
+    return Found(forces, float(x[multiplier]), float(unbalanced.max(initial=0.0)), solution)

@@ -104,7 +104,7 @@ def test_the_other_direction_of_a_symmetric_wall(name):
     assert limit.mechanism[:, 0].min() == pytest.approx(-1.0, abs=0.5)
 
 
-@pytest.mark.parametrize("name", [pytest.param("W1", marks=pytest.mark.thorough), "W3"])
+@pytest.mark.parametrize("name", [pytest.param("W1", marks=pytest.mark.thorough), "W2", "W3"])
 def test_without_dilatancy_a_wall_carries_no_more(name):
     assembly = wall(WALLS[name][0])
     limit = limit_load(assembly, loads=sideways(assembly), friction_coefficient=0.65, flow="non-associative")
@@ -121,6 +121,22 @@ def test_without_dilatancy_a_wall_carries_no_more(name):
     if name == "W3":
         assert ((np.abs(slip) > 1e-3) & (opening < 1e-6)).any()
         assert limit.multiplier < 0.95 * WALLS[name][1]
+
+
+@pytest.mark.parametrize(
+    ("width", "friction", "multiplier"), [(1.0, 0.2, 0.2), (1.0, 0.4, 0.4), (1.0, 0.7, 0.7), (0.2, 0.4, 0.8)]
+)
+def test_a_block_that_just_fits_under_a_ceiling(width, friction, multiplier):
+    """It slides at μ, or, b < μ h, leans on the ceiling with N = (μ h/b - 1) W / 2 and slides at μ (1 + 2 N / W)."""
+    box = [[0, 0], [width, 0], [width, 1], [0, 1]]
+    floor, ceiling = ([[-1, low], [2, low], [2, low + 1], [-1, low + 1]] for low in (-1, 1))
+    assembly = solver.Assembly.from_outlines([box, floor, ceiling], roles=["free", "fixed", "fixed"])
+    loads = sideways(assembly)
+    sliding = limit_load(assembly, loads=loads, friction_coefficient=friction, flow="non-associative")
+    assert sliding.multiplier == pytest.approx(multiplier, rel=1e-6)
+    assert sliding.gap == pytest.approx(0.0, abs=1e-6)
+    # What lifts as it slides is stuck between the two.
+    assert limit_load(assembly, loads=loads, friction_coefficient=friction).status is LimitStatus.UNBOUNDED
 
 
 @pytest.mark.parametrize("n", [1, pytest.param(5, marks=pytest.mark.thorough)])
