@@ -86,7 +86,7 @@ class EquilibriumChecks:
         forces[closed] = nearest_equilibrium(
             ContactRows(matrix, free)[closed],
             near[closed],
-            self.stepper.compliance(contacts)[closed],
+            self.stepper.compliance(contacts, model.compliance)[closed],
             friction[closed],
             load,
             along,

@@ -162,13 +162,13 @@ class Stepper:
         return self.model.interfaces.friction(self.model.assembly, contacts.block_a, contacts.block_b)
 
     @staticmethod
-    def compliance(contacts: Contacts) -> np.ndarray:
-        """(n, d) array: that of the joint, shared over its contact points by area, in units of the program."""
+    def compliance(contacts: Contacts, factor: float = 1.0) -> np.ndarray:
+        """(n, d) array: factor times the joint's, shared over its contact points by area, in units of the program."""
         n, d = contacts.points.shape
         pairs, joint = contacts.joints()
         whole = np.bincount(joint, contacts.areas, len(pairs))[joint]
         share = np.divide(contacts.areas, whole, out=np.full(n, 0.5), where=whole > 0.0)
-        of_joint = self.model.compliance * np.array([COMPLIANCE] + [SHEAR_COMPLIANCE] * (d - 1))
+        of_joint = factor * np.array([COMPLIANCE] + [SHEAR_COMPLIANCE] * (d - 1))
         return of_joint / np.clip(share, LEAST_SHARE, 1.0)[:, None]
 
     def remembered(self, place: Place, contacts: Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -253,7 +253,7 @@ class Stepper:
         supports = driver.supports(s)
         start = self.contacts(place.pose) if among is None else among
         forces, trial, followed, fresh = self.remembered(place, start)
-        friction, compliance = self.friction(start), self.compliance(start)
+        friction, compliance = self.friction(start), self.compliance(start, model.compliance)
         bound = friction * followed
         resisting, before = self._resistance(place, length, in_time, viscosity)
         load = (model.scaled_load + (0.0 if in_time else viscosity) * self.imperfection)[free].ravel()
