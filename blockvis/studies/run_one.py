@@ -137,6 +137,9 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
         "increments": n_path,
         "programs": n_programs,
     }
+    if last is not None:
+        weights = assembly.masses * assembly.free
+        found["lost_share"] = float(weights[last.fallen].sum() / weights.sum())
     if ending.collapse is not None and last is not None:
         offset = before[last.phase]
         low, high = (float(offset + s) for s in ending.collapse.bracket)
