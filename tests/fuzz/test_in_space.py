@@ -36,7 +36,7 @@ def in_space_of(assembly):
         ("cuts", 1003),
         ("layout", 1004),
         ("stack", 1017),
-        ("stack", 1023),
+        pytest.param("stack", 1023, marks=pytest.mark.thorough),
         ("voronoi", 1002),
         pytest.param("voronoi", 1006, marks=pytest.mark.slow),
     ],

@@ -77,6 +77,7 @@ ENDS = {
 #: Three to twelve seconds each: walls that slide on settling supports, a study, and what others show too.
 THOROUGH = {
     "arch_friction",
+    "arch_moving_load",
     "arch_pushed_after_settlement",
     "panel_with_opening",
     "portal_frame",

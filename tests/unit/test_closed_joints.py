@@ -168,6 +168,7 @@ def test_proposed_thickness_is_the_widest_joint():
     assert proposed_thickness([box(0, 0, 1, 1), box(1, 0, 1, 1)])[0] == 0.0
 
 
+@pytest.mark.thorough
 @needs_facade
 def test_the_facade_closes_without_overlap_and_its_openings_stay():
     drawing = read_layout(FACADE, unit="m")

@@ -472,6 +472,7 @@ def test_solver_failure_is_not_collapse(monkeypatch):
     assert len(response.path) > 0
 
 
+@pytest.mark.thorough
 def test_no_brick_falls_into_another_where_little_drag_holds_it():
     """A wall over a flat arch whose ground moves aside: a brick fell by a third of its size in one careful step."""
     opening = {"x": 0.375, "y": 0.0, "width": 0.375, "height": 0.5, "head": "flat arch"}

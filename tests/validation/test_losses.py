@@ -31,8 +31,11 @@ def tilted(order=(0, 1, 2), mirrored=False, local_loss=0.05):
 
 @pytest.mark.parametrize(
     ("order", "mirrored"),
-    [((0, 1, 2), False), ((2, 0, 1), False), ((1, 2, 0), True)],
-    ids=["drawn", "shuffled", "mirror"],
+    [
+        pytest.param((0, 1, 2), False, id="drawn", marks=pytest.mark.thorough),
+        pytest.param((2, 0, 1), False, id="shuffled", marks=pytest.mark.thorough),
+        pytest.param((1, 2, 0), True, id="mirror and shuffled"),
+    ],
 )
 def test_the_path_goes_on_to_the_collapse_of_the_structure(order, mirrored):
     response = tilted(order, mirrored)
@@ -49,7 +52,7 @@ def test_the_path_goes_on_to_the_collapse_of_the_structure(order, mirrored):
     assert sum("brick' falls" in note for note in response.notes) == 1
 
 
-@pytest.mark.parametrize("local_loss", [0.0, 0.02])
+@pytest.mark.parametrize("local_loss", [0.0, pytest.param(0.02, marks=pytest.mark.thorough)])
 def test_the_first_loss_ends_it_where_that_is_asked_for(local_loss):
     response = tilted(local_loss=local_loss)
     assert response.stop is solver.Status.COLLAPSED
