@@ -251,6 +251,24 @@ def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
 
 
 @pytest.mark.thorough
+@pytest.mark.pictures
+@pytest.mark.path
+def test_pushover_that_snaps_says_at_which_multiplier(tmp_path, capsys):
+    text = '[geometry]\nlayout = "arch on piers"\n[material]\nfriction_coefficient = 0.75\n' + SIDEWAYS
+    control = '[analysis]\nkind = "pushover"\n[control]\nblock = "voussoir 4"\nincrement = 0.02\nlimit = 0.3\n'
+    folder, summary = ran(text + control + "[output]\nanimation = false\n", tmp_path)
+    assert summary["status"] == "collapsed"
+    assert summary["last_reaction"] > 0.1 * summary["total_weight"]
+    words = "equilibrium lost along the control at α = 0.1"
+    printed, page = capsys.readouterr().out, (folder / "report.html").read_text(encoding="utf-8")
+    assert words in printed
+    assert words[1:] in page
+    assert "zero capacity" not in (printed + page).lower()
+    assert "equilibrium is lost along the control at α = 0.1" in summary["message"]
+    assert summary["collapse_lost"] == blockvis.open_results(folder).collapse.lost == "equilibrium"
+
+
+@pytest.mark.thorough
 def test_pushover_written_from_python_comes_back(tmp_path):
     case = parse_case(PUSHED, tmp_path / "case.toml")
     run = blockvis.run_case(replace(case, animation=None), tmp_path / "out")
