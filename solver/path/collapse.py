@@ -25,10 +25,10 @@ REFINED = 1e-3
 
 #: Movement in a step in time, in block sizes, above which it is taken again, shorter by the second more than that asks
 #: for; steps, with those that are taken again; growth of the steps while blocks move by less than a third of it.
-HASTY, SHORTER, STEPS_IN_TIME, GROWTH = 0.03, 0.8, 400, 2.0
+HASTY, SHORTER, STEPS_IN_TIME, GROWTH = 0.03, 0.8, 200, 2.0
 
 #: First and longest step in time, in units of √(block size / g).
-FIRST_TIME, LONGEST_TIME = 0.02, 1e4
+FIRST_TIME, LONGEST_TIME = 0.02, 1e3
 
 #: Acceleration, in units of g, and speed, in units of √(block size · g), under which what has moved may be at rest.
 STOPPED, SLOW = 1e-3, 1e-3
