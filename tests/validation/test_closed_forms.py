@@ -48,12 +48,13 @@ def test_flat_arch(height, friction_coefficient):
     span = np.hypot(1.0, height)
     exact = 2 * (span - 1)
     assert response.stop is solver.Status.COLLAPSED
-    # Where friction only just suffices it lags the thrust, which grows without bound: 1.7e-3, a quarter of the step
-    # tolerance 1.0e-3.
-    assert response.collapse.displacement == pytest.approx(exact, rel=2e-3 if friction_coefficient < 2.0 else 1e-3)
+    # Where friction only just suffices it lags the thrust, which grows without bound: 1.7e-3 of the collapse, with a
+    # quarter of the step tolerance 1.0e-3.
+    lag = 2e-3 * exact if friction_coefficient < 2.0 else 1e-6
+    assert response.collapse.displacement == pytest.approx(exact, abs=max(1e-3 * exact, lag))
     low, high = response.collapse.bracket
     # Just before the snap blocks move a hundred times as fast as the support, and the viscosity holds them a little.
-    assert low - 2e-5 <= exact <= high + 1e-6
+    assert low - 2e-5 <= exact <= high + lag
     assert high - low <= 1e-4
     half = 1 + response.settlement / 2
     rise = np.sqrt(span**2 - half**2)
