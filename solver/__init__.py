@@ -44,7 +44,7 @@ from .results.quantities import (
     reaction_to,
     settlement_in,
 )
-from .results.response import Collapse, Control, Response, path_parameters, total_weight
+from .results.response import Collapse, Control, LocalLoss, Response, path_parameters, total_weight
 from .surface_loads import edge_pressure, load_on_top, surface_pressure
 
 __all__ = [
