@@ -41,9 +41,6 @@ LOOSER = dict.fromkeys(
     # Friction bounds that follow carry rounding on: 5e-9 between the kernels, 3e-8 between two versions.
     "arch_pushed_after_settlement": 1e-6,
     "arch_friction": 1e-6,
-    "portal_frame": 1e-3,
-    "dome_spreading": 5e-3,
-    "cross_vault_corner": 5e-3,
     # In space: 1e-3 between the kernels.
     "corner_of_walls": 5e-3,
     "cross_vault_corner": 2e-3,
