@@ -146,8 +146,7 @@ class SettlementKind(AnalysisKind):
             over = "" if moment or weight <= 0 else f" = {value / weight:.4f} W"
             return force_text(value, moment) + over
 
-        rows = []
-        rows += [("loss", note) for note in losses_of(response)]
+        rows = [("loss", note) for note in losses_of(response)]
         if c is not None:
             rows.append(("collapse displacement", f"{c.displacement:.6g} {c.unit}"))
             rows.append(("last equilibrium, first without", f"{c.bracket[0]:.6g}, {c.bracket[1]:.6g} {c.unit}"))

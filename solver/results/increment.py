@@ -233,8 +233,9 @@ class Increment:
     @property
     def fallen(self) -> np.ndarray:
         """(n_blocks,) bool array: blocks that have left for good, and are out of the structure."""
-        fell_at = self.state.fell_at
-        return ~np.isnan(fell_at) if len(fell_at) else np.zeros(len(self.pose.positions), dtype=bool)
+        # Read once: the arrays may be in a file.
+        state = self.state
+        return ~np.isnan(state.fell_at) if len(state.fell_at) else np.zeros(len(state.pose.positions), dtype=bool)
 
     @property
     def states(self) -> np.ndarray:
