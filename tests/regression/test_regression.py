@@ -36,6 +36,8 @@ LOOSER = dict.fromkeys(
     2e-3,
 ) | {
     "wall_with_arch": 5e-3,
+    # A brick slips a little earlier with one kernel: 4.7e-3 of the last reaction, within the step tolerance.
+    "wall_self_weight": 1e-2,
     "panel_settlement_friction": 2e-3,
     "facade": 5e-3,
     # Friction bounds that follow carry rounding on: 5e-9 between the kernels, 3e-8 between two versions.
