@@ -409,13 +409,13 @@ class Path:
         )
 
     def _let_go(self, state: PathState, end: Place) -> PathState | None:
-        """Go on without the blocks that have left for good; None where they are too many, or the others fall, too."""
+        """Go on without the blocks that left for good; None where none did, too many, or the others fall, too."""
         if self.model.live is not None:
             return None
         weights = self.model.assembly.masses * self.model.assembly.free * GRAVITY
         leaving = self.falling.ways(state.place, end) > LEAVES
         fell_at = np.where(leaving, state.place.s, state.fell_at if len(state.fell_at) else np.nan)
-        if weights[~np.isnan(fell_at)].sum() > self.local_loss * weights.sum():
+        if not leaving.any() or weights[~np.isnan(fell_at)].sum() > self.local_loss * weights.sum():
             return None
         before, notes, programs = state.fell_at, self.reports.notes, self.stepper.programs
         lost = float(weights[leaving].sum())
