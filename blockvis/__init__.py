@@ -2,25 +2,23 @@
 
     import blockvis, solver
     arch = blockvis.read("arch.msh", roles={"right springer": "moving", "left springer": "fixed"})
-    response = solver.settle(arch, solver.Settlement(direction=(1, 0)), friction_coefficient=0.6)
+    response = solver.Structure(arch, friction_coefficient=0.6).settle((1, 0))
     blockvis.write(response, "out/")
-    blockvis.animate(response, "out/collapse.mp4")
+    response.animate("out/collapse.mp4")
 
 Lengths are in m, forces in N, angles in rad; see ``solver`` for the signs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
-
-import solver
 
 if TYPE_CHECKING:
     from .cases.case import Case as Case
     from .cases.case import read_case as read_case
     from .explanation.explain import explain as explain
+    from .formats.read import from_compas as from_compas
     from .formats.read import inspect as inspect
     from .formats.read import read as read
     from .formats.read import read_layout as read_layout
@@ -45,6 +43,7 @@ _HOMES = {
     "draw_mechanism": "pictures.render",
     "draw_still": "pictures.render",
     "explain": "explanation.explain",
+    "from_compas": "formats.read",
     "inspect": "formats.read",
     "open_results": "runs.reopen",
     "read": "formats.read",
@@ -62,49 +61,6 @@ _HOMES = {
 __all__ = sorted(_HOMES)
 
 
-def _plot(response: solver.Response, **options: Any) -> Any:
-    """Show the response in a player for notebooks; see :func:`blockvis.show`."""
-    from .report.notebook import show
-
-    return show(response, **options)
-
-
-def _shown_by(name: str) -> Callable[[Any], str]:
-    """Make a method for notebooks of a function of :mod:`blockvis.report.notebook`, loaded when first used."""
-
-    def _repr_html_(value: Any) -> str:
-        written: str = getattr(import_module(".report.notebook", __name__), name)(value)
-        return written
-
-    return _repr_html_
-
-
-def _mesh(response: solver.Response, k: int = -1, *, shape: str = "moved") -> Any:
-    """Make a pyvista dataset of the blocks of increment k; see :func:`blockvis.results.datasets.block_dataset`."""
-    from .results.datasets import block_dataset
-
-    return block_dataset(response.assembly, response.increments[k], shape=shape)
-
-
-def _joints(response: solver.Response, k: int = -1, *, shape: str = "moved") -> Any:
-    """Make a pyvista dataset of the joints of increment k; see :func:`blockvis.results.datasets.joint_dataset`."""
-    from .results.datasets import joint_dataset
-
-    return joint_dataset(response.assembly, response.increments[k], shape=shape)
-
-
-# solver draws nothing and knows no pyvista; importing blockvis adds `Response.plot()`, `mesh(k)` and `joints(k)`, and
-# what notebooks show of its values.
-for _name, _method in (("plot", _plot), ("mesh", _mesh), ("joints", _joints)):
-    setattr(solver.Response, _name, _method)
-for _kind, _name in (
-    (solver.Response, "response_html"),
-    (solver.Collapse, "collapse_html"),
-    (solver.Assembly, "assembly_html"),
-):
-    setattr(_kind, "_repr_html_", _shown_by(_name))  # noqa: B010
-
-
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
         return getattr(import_module(f".{_HOMES[name]}", __name__), name)
@@ -112,4 +68,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+    return [*__all__, *(name for name in globals() if name.startswith("__"))]

@@ -12,9 +12,9 @@ Conventions, written once:
 This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 """
 
-from .analysis.limit_load import limit_load, limit_load_envelope
-from .analysis.pushover import pushover, pushover_increments
-from .analysis.settlement import check_settlement, settle, settlement_increments
+from .analysis.increments import Increments
+from .analysis.pushover import pushover_increments
+from .analysis.settlement import check_settlement, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, Assembly, find_contacts, measure_contacts
 from .equilibrium import block_forces
 from .geometry.contacts import Contacts
@@ -32,7 +32,6 @@ from .path.state import PathState
 from .programs.problem import SolveError
 from .results.certificate import Certificate, worst_of
 from .results.increment import ContactState, Increment, State, Status, StoredState
-from .results.limit import Envelope, LimitLoad, LimitStatus
 from .results.mechanism import Mechanism, mechanism_of, rigid_parts, with_motion
 from .results.quantities import (
     CONTROL_DISPLACEMENT,
@@ -44,7 +43,18 @@ from .results.quantities import (
     reaction_to,
     settlement_in,
 )
-from .results.response import Collapse, Control, LocalLoss, Response, path_parameters, total_weight
+from .results.response import (
+    Collapse,
+    Control,
+    Envelope,
+    LimitLoad,
+    LimitStatus,
+    LocalLoss,
+    Response,
+    path_parameters,
+    total_weight,
+)
+from .structure import Structure, limit_load, pushover, settle
 from .surface_loads import edge_pressure, load_on_top, surface_pressure
 
 __all__ = [
@@ -70,6 +80,7 @@ __all__ = [
     "Ending",
     "Envelope",
     "Increment",
+    "Increments",
     "InterfaceLaw",
     "Interfaces",
     "JointScatter",
@@ -90,6 +101,7 @@ __all__ = [
     "State",
     "Status",
     "StoredState",
+    "Structure",
     "block_forces",
     "carried",
     "carried_between",
@@ -99,7 +111,6 @@ __all__ = [
     "features_of",
     "find_contacts",
     "limit_load",
-    "limit_load_envelope",
     "load_on_top",
     "measure_contacts",
     "mechanism_of",

@@ -16,6 +16,7 @@ from .geometry.polyhedra import Polyhedra
 from .geometry.shapes import Shapes
 from .geometry.surfaces import polyhedra_of
 from .tolerances import DRAWN_GAP
+from .views import Shown
 
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 
@@ -25,7 +26,7 @@ SMALLEST_SHAPE_FACTOR = 1e-9
 
 
 @dataclass(frozen=True)
-class Assembly:
+class Assembly(Shown):
     """Rigid blocks of a masonry structure, supports included.
 
     Use :meth:`from_outlines` or :meth:`from_solids` unless the shapes are at hand: they check their input.

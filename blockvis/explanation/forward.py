@@ -205,24 +205,20 @@ def followed(order: Order) -> Run:
         controls=order.controls,
     )
     collapsed, message = False, ""
-    while True:
-        try:
-            increment = next(steps)
-        except StopIteration as stop:
-            ending: solver.Ending = stop.value
-            collapsed = ending.stop in (solver.Status.COLLAPSED, solver.Status.NO_INITIAL_EQUILIBRIUM)
-            message = ending.message
-            break
-        except solver.SolveError as error:
-            message = str(error)
-            break
-        if increment.status != solver.Status.EQUILIBRIUM:
-            continue
-        amounts.append(increment.parameter)
-        moved.append(increment.pose.displacements(assembly))
-        if opening_and_slip(assembly, joints, increment.pose)[:, 0].max(initial=0.0) > order.enough:
-            steps.close()
-            break
+    try:
+        for increment in steps:
+            if increment.status != solver.Status.EQUILIBRIUM:
+                continue
+            amounts.append(increment.parameter)
+            moved.append(increment.pose.displacements(assembly))
+            if opening_and_slip(assembly, joints, increment.pose)[:, 0].max(initial=0.0) > order.enough:
+                steps.close()
+                break
+        else:
+            collapsed = steps.ending.stop in (solver.Status.COLLAPSED, solver.Status.NO_INITIAL_EQUILIBRIUM)
+            message = steps.ending.message
+    except solver.SolveError as error:
+        message = str(error)
     return Run(np.array(amounts), np.array(moved).reshape(-1, assembly.n_blocks, 3), collapsed, message)
 
 

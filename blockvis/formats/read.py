@@ -6,6 +6,7 @@ import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -237,6 +238,37 @@ def read(
         closing=closing,
         outline_tolerance=outline_tolerance,
     )
+
+
+def from_compas(model: Any, **options: Any) -> solver.Assembly:
+    """Make an assembly of a model, an assembly or meshes of COMPAS in memory.
+
+    Parameters
+    ----------
+    model : object of COMPAS, or sequence of such
+        A block model, an assembly or a list of meshes; whatever has ``to_jsonstring``. Its supports stand still unless
+        ``roles`` says otherwise.
+    **options
+        As of :func:`read`.
+
+    Returns
+    -------
+    solver.Assembly
+
+    Raises
+    ------
+    TypeError
+        For what COMPAS does not write.
+    """
+    parts = model if isinstance(model, Sequence) else [model]
+    strange = next((part for part in parts if not hasattr(part, "to_jsonstring")), None)
+    if strange is not None:
+        raise TypeError(f"{type(strange).__name__} is no object of COMPAS; give a model, an assembly or meshes")
+    texts = [part.to_jsonstring() for part in parts]
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "model.json"
+        path.write_text(f"[{','.join(texts)}]" if isinstance(model, Sequence) else texts[0], encoding="utf-8")
+        return read(path, **options)
 
 
 def save_layout(assembly: solver.Assembly, path: str | Path, *, pose: solver.Pose | None = None) -> None:

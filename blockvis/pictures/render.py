@@ -73,7 +73,7 @@ def draw_still(
 
 
 def draw_mechanism(
-    response: solver.Response, path: str | os.PathLike[str], *, size: tuple[int, int] = STILL_SIZE
+    response: solver.Response | solver.LimitLoad, path: str | os.PathLike[str], *, size: tuple[int, int] = STILL_SIZE
 ) -> Path:
     """Draw the last equilibrium, its hinges and sliding joints, and the motion that follows.
 
@@ -82,7 +82,7 @@ def draw_mechanism(
 
     Parameters
     ----------
-    response : solver.Response
+    response : solver.Response or solver.LimitLoad
     path : path
     size : (int, int)
         Width and height in pixels.
@@ -91,6 +91,7 @@ def draw_mechanism(
     -------
     pathlib.Path
     """
+    response = response.response if isinstance(response, solver.LimitLoad) else response
     _check_response(response)
     swing = swing_of(response)
     drawer = _drawer(response, Look(forces="none"), size, (swing.increment,), extra=(swing.displaced,), finer=1)

@@ -81,6 +81,13 @@ def response_html(response: solver.Response) -> str:
     return f"<div>{''.join(images)}{_table(summary_rows(response))}</div>"
 
 
+def limit_load_html(limit: solver.LimitLoad) -> str:
+    """Show a limit load by its mechanism, where it knows its structure, and its numbers."""
+    if limit.analysed is None:
+        return f"<p>{html.escape(str(limit))}</p>"
+    return response_html(limit.response)
+
+
 def collapse_html(collapse: solver.Collapse) -> str:
     """Show a collapse by its numbers and its mechanism in words."""
     low, high = collapse.bracket

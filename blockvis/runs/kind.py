@@ -18,6 +18,7 @@ from blockvis.cases.key import Key, Section
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import loss_of, mechanism_text
 
+#: How a kind works its increments out, for :class:`solver.Increments`.
 Steps = Generator[solver.Increment, None, solver.Ending]
 
 
@@ -71,8 +72,8 @@ class AnalysisRun:
         Name of the kind.
     given : RunInput
     course : Course
-    steps : generator of solver.Increment
-        Returns a solver.Ending. None by default, for steps that fill in the other fields as they go.
+    steps : solver.Increments
+        None by default, for those that fill in the other fields as they go.
     limits : list of solver.LimitLoad
         Filled as the steps go, one per limit state.
     """
@@ -80,7 +81,7 @@ class AnalysisRun:
     analysis: str
     given: RunInput
     course: Course
-    steps: Steps = field(default_factory=lambda: _ended(solver.Ending(solver.Status.LIMIT_REACHED)))
+    steps: solver.Increments = field(default_factory=lambda: without_increments())
     limits: list[solver.LimitLoad] = field(default_factory=list)
 
     def recorded(self, increments: Sequence[solver.Increment]) -> None:
@@ -255,23 +256,14 @@ def _with_unit(value: float, quantity: solver.Quantity) -> str:
     return f"{value:12.6g} {quantity.unit}".rstrip()
 
 
-def begun(steps: Steps) -> Steps:
-    """Take the first of the steps at once: what it refuses is refused before anything is written."""
-    try:
-        first = next(steps)
-    except StopIteration as stop:
-        return _ended(stop.value)
-    return _following(first, steps)
+def without_increments() -> solver.Increments:
+    """Make the increments of an analysis that has none: it is at its limit where it begins."""
 
+    def steps() -> Steps:
+        return solver.Ending(solver.Status.LIMIT_REACHED)
+        yield
 
-def _ended(ending: solver.Ending) -> Steps:
-    return ending
-    yield
-
-
-def _following(first: solver.Increment, steps: Steps) -> Steps:
-    yield first
-    return (yield from steps)
+    return solver.Increments(steps())
 
 
 def needs_live_load(case: Case) -> None:

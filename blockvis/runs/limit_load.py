@@ -19,7 +19,16 @@ from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
 from blockvis.numbers import force_text
 
-from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, begun, needs_dry_joints, needs_live_load
+from .kind import (
+    AnalysisKind,
+    AnalysisRun,
+    Course,
+    RunInput,
+    Steps,
+    needs_dry_joints,
+    needs_live_load,
+    without_increments,
+)
 from .settlement import not_reached, settlement_course, settlement_steps, stored_settlements
 
 #: Flow rules of the sliding joints of a limit load.
@@ -155,7 +164,7 @@ class LimitLoadKind(AnalysisKind):
             pairs = zip(resume.limits, found, strict=True)
             run.limits = [replace(limit, held=increment.held) for limit, increment in pairs]
         steps = _over_places(run, places, live, resume, found) if len(places) else _along_settlement(run, resume, found)
-        run.steps = begun(steps)
+        run.steps = solver.Increments(steps).begin()
         return run
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
@@ -347,12 +356,7 @@ def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, foun
     before = None if resume is None else resume.settlement
     steps = settlement_steps(run.given, before, whole=True)
     programs = 0
-    while True:
-        try:
-            increment = next(steps)
-        except StopIteration as stop:
-            ending: solver.Ending = stop.value
-            break
+    for increment in steps:
         programs += increment.programs
         if increment.status == solver.Status.FALLING:
             yield _read_for_multipliers(increment)
@@ -362,6 +366,7 @@ def _along_settlement(run: AnalysisRun, resume: LimitLoadCheckpoint | None, foun
             shown, programs = replace(state, status=solver.Status.EQUILIBRIUM), 0
             reached = increment.checkpoint
             yield replace(shown, checkpoint=None if reached is None else _checkpoint(run, settlement=reached))
+    ending = steps.ending
     if ending.stop is not solver.Status.LIMIT_REACHED:
         if ending.stop is solver.Status.COLLAPSED and shown is not None:
             return replace(ending, message=f"the settlement alone brings it down: {ending.message}")
@@ -381,18 +386,14 @@ def _over_places(
     """Limit states for each place of a moving load at the end of the settlements; then the mechanism of the lowest."""
     standing, programs = run.given.loads, 0
     pose = None if resume is None else resume.pose
-    steps = settlement_steps(run.given, whole=True)
-    while resume is None:
-        try:
-            increment = next(steps)
-        except StopIteration as stop:
-            if stop.value.stop is not solver.Status.LIMIT_REACHED:
-                return not_reached(stop.value, "it carries no live load")
-            break
+    steps = settlement_steps(run.given, whole=True) if resume is None else without_increments()
+    for increment in steps:
         programs += increment.programs
         pose = increment.pose
         if increment.status == solver.Status.FALLING:
             yield _read_for_multipliers(increment)
+    if steps.ending.stop is not solver.Status.LIMIT_REACHED:
+        return not_reached(steps.ending, "it carries no live load")
     chosen, shown, least = 0, None, np.inf
     for number, x in enumerate(places):
         if number < len(found):
@@ -424,7 +425,7 @@ def _read_for_multipliers(increment: solver.Increment) -> solver.Increment:
 def _checkpoint(
     run: AnalysisRun, *, settlement: solver.PathState | None = None, pose: solver.Pose | None = None
 ) -> LimitLoadCheckpoint:
-    return LimitLoadCheckpoint(tuple(replace(limit, held=None) for limit in run.limits), settlement, pose)
+    return LimitLoadCheckpoint(tuple(replace(limit, held=None, analysed=None) for limit in run.limits), settlement, pose)
 
 
 def _wanted(case: Case, increment: solver.Increment) -> bool:

@@ -157,10 +157,4 @@ def followed(case: Case, assembly: solver.Assembly) -> Traced:
     assembly : solver.Assembly
     """
     run = planned(replace(case, controls=replace(case.controls, falling_frames=1)), assembly)
-    found: list[solver.Increment] = []
-    while True:
-        try:
-            found.append(next(run.steps))
-        except StopIteration as stop:
-            ending: solver.Ending = stop.value
-            return traced(run.response(found, ending))
+    return traced(run.response(run.steps.all(), run.steps.ending))

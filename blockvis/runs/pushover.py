@@ -16,7 +16,16 @@ from blockvis.cases.toml_table import Table
 from blockvis.results.about import mechanism_text
 from blockvis.suggestions import nearest
 
-from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, begun, needs_dry_joints, needs_live_load
+from .kind import (
+    AnalysisKind,
+    AnalysisRun,
+    Course,
+    RunInput,
+    Steps,
+    needs_dry_joints,
+    needs_live_load,
+    without_increments,
+)
 from .settlement import not_reached, settlement_steps
 
 CONTROL = Section(
@@ -97,7 +106,9 @@ class PushoverKind(AnalysisKind):
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
         """Prepare the settlements of a case, of which only a fall is reported, and the pushover."""
         control = _checked_control(given.case, given.assembly)
-        return AnalysisRun(self.name, given, self.course(given.case), begun(_steps(given, control, resume)))
+        return AnalysisRun(
+            self.name, given, self.course(given.case), solver.Increments(_steps(given, control, resume)).begin()
+        )
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
         """Give the control displacement, and the multiplier at the start and where it is largest."""
@@ -175,32 +186,27 @@ def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDis
 
 def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.PathState | None) -> Steps:
     case = given.case
-    pose, steps = None, settlement_steps(given, whole=True)
+    pose = None
     # A pushover that has begun has its settlement behind it.
-    before = solver.Ending(solver.Status.LIMIT_REACHED)
-    while resume is None:
-        try:
-            increment = next(steps)
-        except StopIteration as stop:
-            before = stop.value
-            break
+    steps = settlement_steps(given, whole=True) if resume is None else without_increments()
+    for increment in steps:
         if increment.status == solver.Status.FALLING:
             yield replace(increment, parameter=0.0, measured=increment.load_multiplier, phase=0)
         pose = increment.pose
-    if before.stop is not solver.Status.LIMIT_REACHED:
-        return not_reached(before, "nothing is left to push over")
+    if steps.ending.stop is not solver.Status.LIMIT_REACHED:
+        return not_reached(steps.ending, "nothing is left to push over")
     try:
-        return (
-            yield from solver.pushover_increments(
-                given.assembly,
-                control,
-                loads=given.loads,
-                interfaces=given.interfaces,
-                controls=case.controls,
-                pose=pose,
-                resume=resume,
-                on_step=given.step,
-            )
+        pushed = solver.pushover_increments(
+            given.assembly,
+            control,
+            loads=given.loads,
+            interfaces=given.interfaces,
+            controls=case.controls,
+            pose=pose,
+            resume=resume,
+            on_step=given.step,
         )
+        yield from pushed
     except ValueError as error:
         raise ValueError(f"{case.source}: {error}") from None
+    return pushed.ending

@@ -106,6 +106,15 @@ class Clock:
         finally:
             self.seconds[part] = self.seconds.get(part, 0.0) + time.perf_counter() - started
 
+    def each(self, part: str, increments: solver.Increments) -> Iterator[solver.Increment]:
+        """Give each of the increments, and count the seconds it takes to find it to a part."""
+        while True:
+            with self.counting(part):
+                increment = next(increments, None)
+            if increment is None:
+                return
+            yield increment
+
 
 def run_case(
     case: Case | str | Path,
@@ -297,13 +306,7 @@ def _solved(
     run.given.listeners.append(progress.step)
     ending = solver.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
     try:
-        while True:
-            try:
-                with clock.counting("solve"):
-                    increment = next(run.steps)
-            except StopIteration as stop:
-                ending = stop.value
-                break
+        for increment in clock.each("solve", run.steps):
             with clock.counting("write"):
                 results.add(increment)
             run.recorded(results.increments)
@@ -314,6 +317,7 @@ def _solved(
             for note in increment.notes:
                 warnings.warn(note, stacklevel=2)
             progress.increment(increment)
+        ending = run.steps.ending
     except KeyboardInterrupt:
         run.steps.close()
     finally:

@@ -16,7 +16,7 @@ from blockvis.cases.toml_table import Table
 from blockvis.numbers import force_text
 from blockvis.results.about import least_reaction, loss_of, mechanism_text
 
-from .kind import AnalysisKind, AnalysisRun, Course, RunInput, Steps, needs_dry_joints
+from .kind import AnalysisKind, AnalysisRun, Course, RunInput, needs_dry_joints, without_increments
 
 #: The methods in words, as ``[analysis] increments`` has them.
 COULOMB, LINEAR_PROGRAM = solver.INCREMENTS
@@ -203,7 +203,9 @@ def _method(response: solver.Response) -> str | None:
     return LINEAR_PROGRAM if np.isnan(response.path[0].largest) else COULOMB
 
 
-def settlement_steps(given: RunInput, resume: solver.PathState | None = None, *, whole: bool = False) -> Steps:
+def settlement_steps(
+    given: RunInput, resume: solver.PathState | None = None, *, whole: bool = False
+) -> solver.Increments:
     """Follow the settlements of a case under the dead load alone; without settlements there are no increments.
 
     Parameters
@@ -215,17 +217,15 @@ def settlement_steps(given: RunInput, resume: solver.PathState | None = None, *,
     """
     case = given.case
     if not case.settlements:
-        return solver.Ending(solver.Status.LIMIT_REACHED)
-    return (
-        yield from solver.settlement_increments(
-            given.assembly,
-            case.settlements,
-            interfaces=given.interfaces,
-            loads=given.loads,
-            controls=replace(case.controls, local_loss=0.0) if whole else case.controls,
-            resume=resume,
-            on_step=given.step,
-        )
+        return without_increments()
+    return solver.settlement_increments(
+        given.assembly,
+        case.settlements,
+        interfaces=given.interfaces,
+        loads=given.loads,
+        controls=replace(case.controls, local_loss=0.0) if whole else case.controls,
+        resume=resume,
+        on_step=given.step,
     )
 
 

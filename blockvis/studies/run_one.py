@@ -112,12 +112,7 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
     # Only the ends of the path are kept.
     first = last = falling = None
     n_path = n_programs = 0
-    while True:
-        try:
-            increment = next(steps)
-        except StopIteration as stop:
-            ending: solver.Ending = stop.value
-            break
+    for increment in steps:
         if increment.status is solver.Status.FALLING:
             falling = increment
         else:
@@ -125,6 +120,7 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
             n_path, n_programs = n_path + 1, n_programs + increment.programs
         if seconds is not None and time.perf_counter() - started > seconds:
             raise _OutOfTime(f"took longer than {seconds:g} s, at a settlement of {increment.settlement:.6g}")
+    ending = steps.ending
     before = [0.0, *np.cumsum([s.limit for s in case.settlements])]
     found: dict[str, Any] = {
         "status": str(ending.stop),

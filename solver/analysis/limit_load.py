@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +13,7 @@ from solver.contact_step.problem import NotSolved
 from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import Contacts
-from solver.interfaces import InterfaceLaw, Interfaces
+from solver.interfaces import Interfaces
 from solver.kinematics import Pose, dimension_of, moved_vertices, unit_lengths
 from solver.loads import Loads, checked_loads
 from solver.path.stepping import Stepper
@@ -24,7 +23,7 @@ from solver.program.without_dilatancy import solve_without_dilatancy
 from solver.programs.problem import Unbounded
 from solver.programs.solve import solve_between
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
-from solver.results.limit import Envelope, LimitLoad, LimitStatus, limit_state
+from solver.results.response import LimitLoad, LimitStatus, limit_state
 from solver.tolerances import CARRYING_FRACTION, COMPUTED_GAP, DRAWN_GAP, FALLING_FRACTION
 
 #: Largest gap, in block sizes, of a contact point that may close within a displacement.
@@ -45,12 +44,11 @@ FRICTION_EXCESS, FRICTION_EXCESS_IN_SPACE = 1e-6, 1e-8
 CHANGE_COST, CHANGE_COST_IN_SPACE = 1e-8, 1e-5
 
 
-def limit_load(
+def find_limit_load(
     assembly: Assembly,
-    *,
+    interfaces: Interfaces,
     loads: Loads,
-    friction_coefficient: float = 0.6,
-    interfaces: Interfaces | None = None,
+    *,
     pose: Pose | None = None,
     flow: str = "associative",
     closed_gap: float | None = None,
@@ -58,45 +56,7 @@ def limit_load(
     overlap_tolerance: float | None = None,
     torsion: str = POINTS,
 ) -> LimitLoad:
-    """The largest multiplier of the live loads at which the structure can be in equilibrium.
-
-    Parameters
-    ----------
-    assembly : Assembly
-        Fixed and moving supports both stand still.
-    loads : Loads
-        Dead loads, and the live loads that the multiplier scales. For the other direction give minus the live loads.
-    friction_coefficient : float
-        Of every interface, where ``interfaces`` is not given.
-    interfaces : Interfaces, optional
-    pose : Pose, optional
-        The geometry: that of an increment gives the capacity left after a settlement. The drawing by default.
-    flow : {"associative", "non-associative"}
-        Whether sliding joints lift by friction coefficient times slip, or do not lift.
-    closed_gap : float, optional [m]
-        Contact points with a larger gap are open and carry nothing. By default a thousandth of the width of the
-        thinnest block in the drawing, a millionth of the block size at a given pose.
-    displacement : float [m]
-        How far the live loads may move along themselves, on average, while joints close. 0: what is open carries
-        nothing. A wall of many bricks whose joints slide has openings of hundredths of a millimetre after a settlement,
-        and its strict limit load is that of the one loosest brick.
-    overlap_tolerance : float, optional [m]
-        Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
-    torsion : {"points", "uniform"}
-        What a face of blocks in space resists when it turns in its own plane: what friction at its contact points
-        does, or what it does under a uniform pressure, which is up to 1.85 times less.
-
-    Returns
-    -------
-    LimitLoad
-
-    Raises
-    ------
-    ValueError
-        For no free block, overlapping blocks, loads of the wrong shape, no live load on a free block, a law of torsion
-        that is not known or that blocks in the plane do not have.
-    SolveError
-        If HiGHS gives no solution that passes its check.
+    """The limit load of a structure; parameters as those of :meth:`solver.Structure.limit_load`.
 
     Notes
     -----
@@ -146,7 +106,6 @@ def limit_load(
         raise ValueError("torsion is 'uniform', but faces of blocks in the plane have none; leave it out")
     check_blocks(assembly, overlap_tolerance)
     loads = checked_live(assembly, loads)
-    interfaces = interfaces or Interfaces(InterfaceLaw(friction_coefficient))
     if closed_gap is None:
         closed_gap = DRAWN_GAP * float(assembly.widths.min()) if pose is None else COMPUTED_GAP * assembly.block_size
     pose = Pose.initial(assembly) if pose is None else pose
@@ -416,48 +375,6 @@ class _Problem:
             torsion=POINTS if self.faces is None else UNIFORM,
             held=limit_state(self.pose, self.contacts, forces * self.force, self.friction, mechanism),
         )
-
-
-def limit_load_envelope(
-    assembly: Assembly,
-    positions: Sequence[float] | np.ndarray,
-    live: Callable[[float], np.ndarray],
-    *,
-    dead: np.ndarray,
-    friction_coefficient: float = 0.6,
-    interfaces: Interfaces | None = None,
-    pose: Pose | None = None,
-    flow: str = "associative",
-    torsion: str = POINTS,
-) -> Envelope:
-    """Limit loads of a live load that moves over the structure.
-
-    Parameters
-    ----------
-    assembly : Assembly
-    positions : (n,) sequence
-    live : callable
-        From a position to the live loads there, an (n_blocks, n_dof) array [N, N·m].
-    dead : (n_blocks, n_dof) array [N, N·m]
-    friction_coefficient, interfaces, pose, flow, torsion
-        As in :func:`limit_load`.
-    """
-    positions = np.asarray(positions, dtype=float)
-    if positions.ndim != 1 or len(positions) == 0:
-        raise ValueError(f"positions have shape {positions.shape}; give at least one number")
-    limits = tuple(
-        limit_load(
-            assembly,
-            loads=Loads(dead, live(float(x))),
-            friction_coefficient=friction_coefficient,
-            interfaces=interfaces,
-            pose=pose,
-            flow=flow,
-            torsion=torsion,
-        )
-        for x in positions
-    )
-    return Envelope(positions, limits)
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:

@@ -1,109 +1,27 @@
-"""Settlement analysis: settle(), and its increments one by one."""
+"""The increments of a settlement, checked before anything is solved."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Generator, Sequence
-from contextlib import ExitStack, suppress
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from solver.assembly import Assembly, check_blocks
-from solver.interfaces import InterfaceLaw, Interfaces
+from solver.interfaces import Interfaces
 from solver.kinematics import Pose
-from solver.loads import Loads, Settlement, checked_loads
+from solver.loads import Loads, Settlement
 from solver.paper_method import linear_program_increments
 from solver.path.controls import LINEAR_PROGRAM, Controls, Ending
 from solver.path.drivers import SupportMotion
-from solver.path.local_origin import at_origin, told_from, without_origin
+from solver.path.local_origin import at_origin, in_global_coordinates, without_origin
 from solver.path.path import Path
 from solver.path.state import PathState
 from solver.program.model import Model
 from solver.programs.problem import SolveError
-from solver.programs.threads import NotLimited, one_thread
 from solver.results.increment import Increment, Status
-from solver.results.quantities import reaction_to, settlement_in
-from solver.results.response import Response
 
-
-def settle(
-    assembly: Assembly,
-    settlement: Settlement | Sequence[Settlement],
-    *,
-    friction_coefficient: float = 0.6,
-    interfaces: Interfaces | None = None,
-    loads: Loads | None = None,
-    controls: Controls | None = None,
-    on_increment: Callable[[Increment], None] | None = None,
-) -> Response:
-    """Follows a structure from its drawing through the settlement of its supports to collapse.
-
-    Parameters
-    ----------
-    assembly : Assembly
-        With at least one moving support.
-    settlement : Settlement or sequence of Settlement
-        One phase, or several one after another.
-    friction_coefficient : float
-        Of every interface, where ``interfaces`` is not given.
-    interfaces : Interfaces, optional
-        Laws per pair of materials.
-    loads : Loads, optional
-        Self-weight by default.
-    controls : Controls, optional
-    on_increment : callable, optional
-        Called with every :class:`Increment` as it is found.
-
-    Returns
-    -------
-    Response
-
-    Raises
-    ------
-    ValueError
-        For input that cannot be analysed: no moving support, overlapping blocks, loads of the wrong shape.
-
-    Notes
-    -----
-    Portioli & Cascini, Engineering Structures 148 (2017) 485-496, https://doi.org/10.1016/j.engstruct.2017.06.073:
-    rigid blocks, no-tension frictional contact points, gap functions, a linear program per increment, the geometry
-    updated after each, until no equilibrium exists.
-    """
-    phases = (settlement,) if isinstance(settlement, Settlement) else tuple(settlement)
-    interfaces = interfaces or Interfaces(InterfaceLaw(friction_coefficient))
-    loads = checked_loads(assembly, loads)
-    steps = settlement_increments(assembly, phases, interfaces=interfaces, loads=loads, controls=controls)
-    increments, ending = drained(steps, on_increment)
-    return Response(
-        assembly=assembly,
-        settlements=phases,
-        interfaces=interfaces,
-        loads=loads,
-        increments=increments,
-        stop=ending.stop,
-        message=ending.message,
-        collapse=ending.collapse,
-        parameter=settlement_in(phases[0].unit),
-        measured=reaction_to(phases[0].unit),
-    )
-
-
-def drained(
-    steps: Generator[Increment, None, Ending], on_increment: Callable[[Increment], None] | None = None
-) -> tuple[tuple[Increment, ...], Ending]:
-    """All increments of a loop and how it ended; ``on_increment`` is called with each as it is found."""
-    increments: list[Increment] = []
-    while True:
-        try:
-            increment = next(steps)
-        except StopIteration as stop:
-            ending: Ending = stop.value
-            return tuple(increments), ending
-        increment = replace(increment, checkpoint=None)
-        increments.append(increment)
-        if on_increment is not None:
-            on_increment(increment)
+from .increments import Increments, TimedIncrements
 
 
 def settlement_increments(
@@ -115,10 +33,10 @@ def settlement_increments(
     controls: Controls | None = None,
     resume: PathState | None = None,
     on_step: Callable[[PathState], None] | None = None,
-) -> Generator[Increment, None, Ending]:
-    """The increment loop of :func:`settle` as a generator: yields each Increment, returns the Ending.
+) -> Increments:
+    """The increments of :meth:`solver.Structure.settle`, one by one as they are asked for, and then its ending.
 
-    Parameters are those of :func:`settle`. Everything found so far has been yielded whenever it is interrupted.
+    Everything found so far has been given whenever it is interrupted.
 
     Parameters
     ----------
@@ -143,11 +61,9 @@ def settlement_increments(
     near, local = (assembly, phases) if not origin.any() else without_origin(origin, assembly, phases)
     if resume is not None and resume.place.s > 0.0 and by_program != (resume.place.contacts is None):
         raise ValueError("the checkpoint is of increments found in another way: it belongs to another run")
-    if by_program:
-        steps = timed(linear_program_increments(near, local, interfaces, loads, controls, resume))
-    else:
-        steps = timed(_increments(near, local, interfaces, loads, controls, resume, on_step))
-    return (yield from (steps if not origin.any() else told_from(steps, origin)))
+    follow = linear_program_increments if by_program else partial(_increments, on_step=on_step)
+    steps = follow(near, local, interfaces, loads, controls, resume)
+    return TimedIncrements(steps, partial(in_global_coordinates, origin=origin) if origin.any() else None)
 
 
 def _increments(
@@ -199,25 +115,6 @@ def model_of(
         compliance=controls.compliance_factor,
         imperfection=controls.imperfection_factor,
     )
-
-
-def timed(steps: Generator[Increment, None, Ending]) -> Generator[Increment, None, Ending]:
-    """The same increments with the seconds each took, not counting what whoever listens takes in between.
-
-    The linear algebra keeps to one thread while they are worked out, where it can be limited: of several, all but one
-    wait by counting, on a core that another process could have.
-    """
-    while True:
-        started = time.perf_counter()
-        try:
-            with ExitStack() as limits:
-                with suppress(NotLimited):
-                    limits.enter_context(one_thread())
-                increment = next(steps)
-        except StopIteration as stop:
-            ending: Ending = stop.value
-            return ending
-        yield replace(increment, seconds=time.perf_counter() - started)
 
 
 def check_settlement(assembly: Assembly, phases: Sequence[Settlement], controls: Controls | None = None) -> None:

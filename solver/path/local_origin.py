@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -12,8 +11,6 @@ from solver.assembly import Assembly
 from solver.kinematics import Pose
 from solver.loads import Settlement
 from solver.results.increment import Increment
-
-Ended = TypeVar("Ended")
 
 #: Distance from the origin in block sizes beyond which rounding of the coordinates, half a nanometre at five thousand
 #: kilometres, would come near what the geometry is corrected to.
@@ -50,16 +47,9 @@ def _nearer(phase: Settlement, origin: np.ndarray) -> Settlement:
     return replace(phase, rotation_centre=centre, radial_from=axis)
 
 
-def told_from(steps: Generator[Increment, None, Ended], origin: np.ndarray) -> Generator[Increment, None, Ended]:
-    """The increments with their places where the drawing has them; checkpoints stay in local coordinates."""
-    while True:
-        try:
-            increment = next(steps)
-        except StopIteration as stop:
-            ended: Ended = stop.value
-            return ended
-        pose, contacts = increment.pose, increment.contacts
-        yield increment.with_arrays(
-            pose=Pose(pose.positions + origin, pose.rotations),
-            contacts=replace(contacts, points=contacts.points + origin),
-        )
+def in_global_coordinates(increment: Increment, origin: np.ndarray) -> Increment:
+    """The increment with its places where the drawing has them; its checkpoint stays in local coordinates."""
+    pose, contacts = increment.pose, increment.contacts
+    return increment.with_arrays(
+        pose=Pose(pose.positions + origin, pose.rotations), contacts=replace(contacts, points=contacts.points + origin)
+    )

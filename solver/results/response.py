@@ -1,24 +1,29 @@
-"""Response: a whole analysis, and how it ended."""
+"""Response: a whole analysis, and how it ended; and limit loads, of which one is an analysis of its own."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from enum import StrEnum
+from typing import Any, Protocol
 
 import numpy as np
 
 from solver.assembly import Assembly
+from solver.geometry.contacts import Contacts
 from solver.interfaces import Interfaces
+from solver.kinematics import Pose, relative_velocities
 from solver.loads import GRAVITY, Loads, Settlement
+from solver.views import Shown, views
 
-from .increment import Increment, Status
-from .limit import LimitLoad
-from .quantities import REACTION, SETTLEMENT, Quantity
+from .certificate import Certificate
+from .increment import Increment, State, Status, StoredState
+from .quantities import LOAD_MULTIPLIER, LOAD_POSITION, REACTION, SETTLEMENT, Quantity
 
 
 @dataclass(frozen=True)
-class Collapse:
+class Collapse(Shown):
     """Where the structure loses equilibrium.
 
     Attributes
@@ -90,7 +95,7 @@ class Control(Protocol):
 
 
 @dataclass(frozen=True)
-class Response:
+class Response(Shown):
     """A whole analysis.
 
     Attributes
@@ -221,6 +226,40 @@ class Response:
         """Weight of the free blocks [N]."""
         return total_weight(self.assembly)
 
+    def mesh(self, k: int = -1, *, shape: str = "moved") -> Any:
+        """Make a PyVista dataset of the blocks of an increment.
+
+        Parameters
+        ----------
+        k : int
+            Number of the increment; -1 is the last.
+        shape : {"moved", "undeformed"}
+            Where the blocks stand at the increment, or where they were drawn, their displacements in arrays.
+
+        Returns
+        -------
+        pyvista.DataSet
+            One cell per block, in space per face; its arrays are those of ``increments/*.vtu``.
+
+        Raises
+        ------
+        ImportError
+            Where no package that draws is installed.
+        """
+        return views().blocks(self, k, shape)
+
+    def joints(self, k: int = -1, *, shape: str = "moved") -> Any:
+        """Make a PyVista dataset of the joints of an increment: opening, slip, force; as :meth:`mesh`."""
+        return views().joints(self, k, shape)
+
+    def contacts(self, k: int = -1, *, shape: str = "moved") -> Any:
+        """Make a PyVista dataset of the contact points of an increment and their forces; as :meth:`mesh`."""
+        return views().contacts(self, k, shape)
+
+    def animate(self, path: str | os.PathLike[str], **options: Any) -> Any:
+        """Write the film of the collapse, its format chosen by the suffix; options of :func:`blockvis.animate`."""
+        return views().animate(self, path, **options)
+
 
 def path_parameters(path: Sequence[Increment]) -> np.ndarray:
     """(n,) array: parameter of each increment, phases one after another."""
@@ -235,3 +274,212 @@ def path_parameters(path: Sequence[Increment]) -> np.ndarray:
 def total_weight(assembly: Assembly) -> float:
     """Weight of the free blocks [N]."""
     return float(assembly.masses[assembly.free].sum() * GRAVITY)
+
+
+#: What is said with a limit load in space whose joints lift where they slide.
+CAVEAT = (
+    "associative friction lifts what slides: in grooves and wedges of blocks in space the multiplier may be too high; "
+    'flow = "non-associative" slides without lift'
+)
+
+
+class LimitStatus(StrEnum):
+    """What a limit load is.
+
+    ``HELD``: a limit load, but without any live load the blocks would move: back onto joints that are open at this
+    pose, or down. ``NO_EQUILIBRIUM``: the dead load is not carried, nor with any live load of this pattern.
+    """
+
+    FOUND = "limit load"
+    HELD = "held by the live load"
+    UNBOUNDED = "unbounded"
+    NO_EQUILIBRIUM = "no equilibrium"
+    NOT_CONVERGED = "not converged"
+
+
+@dataclass(frozen=True)
+class LimitLoad(Shown):
+    """The capacity of a structure under live loads at one geometry.
+
+    Attributes
+    ----------
+    multiplier : float
+        α of the live loads at the limit; ``inf`` where no live load of this pattern causes collapse, ``nan`` where
+        there is no equilibrium.
+    bounds : (float, float)
+        Static value, from forces in equilibrium within friction, and kinematic value, from the power balance of the
+        mechanism, - dead · velocity / live · velocity (plus friction where it is not associative). For associative
+        flow they enclose the limit load.
+    certificate : Certificate
+    status : LimitStatus
+    flow : str
+        "associative" or "non-associative".
+    live_force : float [N]
+        Resultant of the live loads on the free blocks at a multiplier of 1.
+    programs : int
+        Linear programs solved.
+    torsion : str
+        Of the faces of blocks in space: that of their contact "points", or under a "uniform" pressure.
+    held : State or StoredState, optional
+        The limit state: pose, closed contact points, their forces at the limit, and the mechanism as its velocity. In
+        memory, or in a file; None where it is kept with the increment that reports the limit load.
+    analysed : (Assembly, Interfaces, Loads), optional
+        Whose limit load it is.
+    """
+
+    multiplier: float
+    bounds: tuple[float, float]
+    certificate: Certificate
+    status: LimitStatus
+    flow: str
+    live_force: float
+    programs: int
+    held: State | StoredState | None = field(default=None, repr=False, compare=False)
+    torsion: str = "points"
+    analysed: tuple[Assembly, Interfaces, Loads] | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def state(self) -> State:
+        """The limit state, read from its file where it is kept in one."""
+        if self.held is None:
+            raise ValueError("this limit load has only its numbers; its arrays are with the increment that reports it")
+        return self.held if isinstance(self.held, State) else self.held.read()
+
+    @property
+    def pose(self) -> Pose:
+        """The geometry."""
+        return self.state.pose
+
+    @property
+    def contacts(self) -> Contacts:
+        """The closed contact points."""
+        return self.state.contacts
+
+    @property
+    def forces(self) -> np.ndarray:
+        """(n_contacts, d) array [N]: normal (compression positive) and shear force on ``block_a`` at the limit."""
+        return self.state.forces
+
+    @property
+    def friction(self) -> np.ndarray:
+        """(n_contacts,) array: friction coefficients."""
+        return self.state.friction
+
+    @property
+    def mechanism(self) -> np.ndarray:
+        """(n_blocks, n_dof) array: how the blocks begin to move, largest movement 1 (rotations times block size).
+
+        Where there is no equilibrium, how they fall; where the multiplier is unbounded, zero.
+        """
+        return self.state.velocity
+
+    @property
+    def caveat(self) -> str:
+        """What is to be kept in mind with this limit load; empty where there is nothing.
+
+        Friction without dilatancy may carry less than associative friction, in space more often than in the plane: what
+        is pushed along a groove of half-angle 45° with μ = 0.5 slides at 0.707 of its weight, associative at 0.816.
+        """
+        return CAVEAT if self.flow == "associative" and self.mechanism.shape[1] == 6 else ""
+
+    @property
+    def gap(self) -> float:
+        """Kinematic minus static value; what rounding leaves of it."""
+        return self.bounds[1] - self.bounds[0]
+
+    @property
+    def increment(self) -> Increment:
+        """The state at the limit as an increment, for pictures and tables; its velocity is the mechanism."""
+        if self.held is None:
+            raise ValueError("this limit load has only its numbers; its arrays are with the increment that reports it")
+        finite = self.multiplier if np.isfinite(self.multiplier) else 0.0
+        return Increment(
+            parameter=0.0,
+            measured=self.multiplier,
+            phase=0,
+            load_multiplier=self.multiplier,
+            reaction=finite * self.live_force,
+            certificate=self.certificate,
+            status=Status.FALLING if self.status is LimitStatus.NO_EQUILIBRIUM else Status.EQUILIBRIUM,
+            programs=self.programs,
+            seconds=0.0,
+            held=self.held,
+        )
+
+    @property
+    def response(self) -> Response:
+        """The limit load as an analysis of its own, of one increment, for pictures, tables and files.
+
+        Raises
+        ------
+        ValueError
+            Where it was read from a file and not found by :meth:`solver.Structure.limit_load`.
+        """
+        if self.analysed is None:
+            raise ValueError("this limit load does not know its structure; the response that reports it does")
+        assembly, interfaces, loads = self.analysed
+        return Response(
+            assembly,
+            settlements=(),
+            interfaces=interfaces,
+            loads=loads,
+            increments=(self.increment,),
+            stop=Status.LIMIT_REACHED,
+            message=str(self),
+            analysis="limit load",
+            limits=(self,),
+            parameter=LOAD_POSITION,
+            measured=LOAD_MULTIPLIER,
+        )
+
+    def __str__(self) -> str:
+        """Say how large it is, or why there is none."""
+        moving = int((np.abs(self.mechanism).max(axis=1) > 0.01).sum())
+        if self.status is LimitStatus.NO_EQUILIBRIUM:
+            return f"no equilibrium under the dead load: {moving} blocks fall"
+        if self.status is LimitStatus.UNBOUNDED:
+            return "unbounded: no live load of this pattern brings the structure down"
+        law = "" if self.torsion == "points" else f", {self.torsion} torsion"
+        text = f"load multiplier {self.multiplier:.6g} ({self.flow} friction{law}, bounds differ by {self.gap:.1e})"
+        text += f", {moving} blocks moving" + ("" if self.status is LimitStatus.FOUND else f", {self.status}")
+        return f"{text}; {self.caveat}" if self.caveat else text
+
+
+def limit_state(
+    pose: Pose, contacts: Contacts, forces: np.ndarray, friction: np.ndarray, mechanism: np.ndarray
+) -> State:
+    """Make the state of a limit load; parameters as the attributes of :class:`LimitLoad`."""
+    return State(
+        pose=pose,
+        contacts=contacts,
+        forces=forces,
+        displacements=relative_velocities(contacts, pose, mechanism),
+        friction=friction,
+        velocity=mechanism,
+        support_forces=np.zeros_like(mechanism),
+    )
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Limit loads for several positions of a live load.
+
+    Attributes
+    ----------
+    positions : (n,) array
+        As given, usually x [m].
+    limits : tuple of LimitLoad
+    """
+
+    positions: np.ndarray
+    limits: tuple[LimitLoad, ...]
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """(n,) array: load multiplier at each position."""
+        return np.array([limit.multiplier for limit in self.limits])
+
+    @property
+    def worst(self) -> int:
+        """Number of the position with the smallest multiplier; no equilibrium counts as smaller than any."""
+        return int(np.argmin(np.nan_to_num(self.multipliers, nan=-np.inf, posinf=np.inf)))

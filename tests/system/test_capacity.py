@@ -16,7 +16,6 @@ from blockvis.pictures.captions import parameter_label, state_text, value_label
 from blockvis.pictures.render import draw_still
 from blockvis.runs.kinds import KINDS
 from blockvis.runs.plan import planned
-from solver.analysis.settlement import drained
 
 COLUMN = """
 [geometry]
@@ -63,7 +62,7 @@ def solved(text, tmp_path):
     """The response of a case and what its summary says of its capacity, nothing written or drawn."""
     case = parse_case(text, tmp_path / "case.toml")
     plan = planned(case, case_assembly(case))
-    response = plan.response(*drained(plan.steps))
+    response = plan.response(plan.steps.all(), plan.steps.ending)
     return response, KINDS[case.analysis].summary(response)
 
 

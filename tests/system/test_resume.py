@@ -433,10 +433,9 @@ def test_checkpoint_behind_the_last_increment_has_nothing_left_to_do():
     assert [(told[k].phase, told[k].checkpoint.phase) for k in ends] == [(0, 0), (1, 1)]
     assert ends[-1] == len(told) - 1
     steps = solver.settlement_increments(arch, phases, resume=told[-1].checkpoint, **setting)
-    with pytest.raises(StopIteration) as end:
-        next(steps)
-    assert end.value.value.stop is solver.Status.LIMIT_REACHED
-    assert end.value.value.message == "the settlement reached its limit of 0.01 m"
+    assert steps.all() == ()
+    assert steps.ending.stop is solver.Status.LIMIT_REACHED
+    assert steps.ending.message == "the settlement reached its limit of 0.01 m"
     first = next(solver.settlement_increments(arch, phases, resume=told[ends[0]].checkpoint, **setting))
     assert _equal(first.pose, told[ends[0] + 1].pose)
     assert first.programs == told[ends[0] + 1].programs
@@ -449,11 +448,8 @@ def test_checkpoint_of_another_run_is_refused():
     checkpoint = next(
         solver.settlement_increments(arch, (spread,), loads=solver.self_weight(arch), **setting)
     ).checkpoint
-    steps = solver.settlement_increments(
-        other, (spread,), loads=solver.self_weight(other), resume=checkpoint, **setting
-    )
     with pytest.raises(ValueError, match="belongs to another run"):
-        next(steps)
+        solver.settlement_increments(other, (spread,), loads=solver.self_weight(other), resume=checkpoint, **setting)
 
 
 def test_a_response_keeps_no_checkpoints():

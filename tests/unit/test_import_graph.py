@@ -23,6 +23,7 @@ ORDER = (
     "blockvis.explanation",
     "blockvis.studies",
     "blockvis.runs.run",
+    "blockvis.views",
     "blockvis.report",
     "blockvis.pyvista_plugin",
     "blockvis.pictures",
@@ -51,6 +52,7 @@ ORDER = (
     "blockvis.broken_pipes",
     "blockvis.atomic_files",
     "solver",
+    "solver.structure",
     "solver.analysis",
     "solver.paper_method",
     "solver.path",
@@ -65,6 +67,7 @@ ORDER = (
     "solver.interfaces",
     "solver.assembly",
     "solver.geometry",
+    "solver.views",
     "solver.tolerances",
 )
 

@@ -74,7 +74,9 @@ class TiltKind(AnalysisKind):
         return analysis.number("tilt_step", 0.02, positive=True)
 
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
-        return AnalysisRun(self.name, given, self.course(given.case), _tilted(given, given.case.settings))
+        return AnalysisRun(
+            self.name, given, self.course(given.case), solver.Increments(_tilted(given, given.case.settings))
+        )
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
         return {"tilt_step": float(np.diff(response.parameters)[0])}

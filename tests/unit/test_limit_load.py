@@ -5,8 +5,8 @@ import pytest
 
 import solver
 from blockvis import generators
-from solver.analysis.limit_load import limit_load, limit_load_envelope
-from solver.results.limit import LimitStatus
+from solver import Structure, limit_load
+from solver.results.response import LimitStatus
 from solver.surface_loads import edge_pressure, load_on_top, surface_pressure
 
 GROUND = [[-2, -1], [3, -1], [3, 0], [-2, 0]]
@@ -142,16 +142,14 @@ def test_input_is_refused_with_a_remedy():
 
 def test_envelope_of_a_load_that_moves_over_an_arch():
     arch = generators.arch()
-    dead = solver.self_weight(arch).dead
+    structure = Structure(arch, friction_coefficient=2.0)
     x = np.linspace(-0.9, 0.9, 13)
-    envelope = limit_load_envelope(
-        arch, x, lambda at: load_on_top(arch, at, (0.0, -1000.0)), dead=dead, friction_coefficient=2.0
-    )
+    envelope = structure.envelope(x, lambda at: load_on_top(arch, at, (0.0, -1000.0)))
     assert envelope.multipliers == pytest.approx(envelope.multipliers[::-1], rel=1e-6)
     assert envelope.multipliers[envelope.worst] == envelope.multipliers.min()
     assert abs(x[envelope.worst]) < 0.7
     with pytest.raises(ValueError, match="at least one number"):
-        limit_load_envelope(arch, [], lambda at: dead, dead=dead)
+        structure.envelope([], lambda at: structure.loads.dead)
 
 
 def test_pressure_acts_on_what_it_meets_first():

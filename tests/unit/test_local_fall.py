@@ -7,8 +7,7 @@ import pytest
 
 import solver
 from blockvis import generators
-from solver import tolerances
-from solver.analysis.settlement import settlement_increments
+from solver import settlement_increments, tolerances
 
 pytestmark = pytest.mark.path
 

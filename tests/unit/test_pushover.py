@@ -6,8 +6,8 @@ import pytest
 
 import solver
 from blockvis import generators
-from solver.analysis.limit_load import limit_load
-from solver.analysis.pushover import ControlDisplacement, pushover
+from solver import limit_load, pushover
+from solver.analysis.pushover import ControlDisplacement
 from solver.tolerances import SHEAR_COMPLIANCE
 
 pytestmark = pytest.mark.path

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import solver
-from solver.analysis.limit_load import limit_load
-from solver.analysis.pushover import ControlDisplacement, pushover
-from solver.results.limit import LimitStatus
+from solver import limit_load, pushover
+from solver.analysis.pushover import ControlDisplacement
+from solver.results.response import LimitStatus
 
 pytestmark = pytest.mark.path
 

@@ -9,7 +9,7 @@ from test_panels import panel
 
 import solver
 from blockvis import generators
-from solver.analysis.settlement import settlement_increments
+from solver import settlement_increments
 
 pytestmark = pytest.mark.path
 

@@ -1,0 +1,78 @@
+"""What ``solver`` offers of pictures, datasets and films with its results, made here: its ``solver.views.Views``."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import solver
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a notebook shows as HTML.
+
+    Attributes
+    ----------
+    written : str
+    """
+
+    written: str
+
+    def _repr_html_(self) -> str:
+        return self.written
+
+
+def shown(value: Any, **options: Any) -> Any:
+    """Show a response in a player, of a limit load, a structure or its blocks a picture."""
+    if isinstance(value, solver.Response):
+        from .report.notebook import show
+
+        return show(value, **options)
+    return Picture(html(value, **options))
+
+
+def html(value: Any) -> str:
+    """Write a response, a limit load, a collapse, a structure or its blocks as HTML."""
+    from .report import notebook
+
+    if isinstance(value, solver.LimitLoad):
+        return notebook.limit_load_html(value)
+    if isinstance(value, solver.Response):
+        return notebook.response_html(value)
+    if isinstance(value, solver.Collapse):
+        return notebook.collapse_html(value)
+    return notebook.assembly_html(value.assembly if isinstance(value, solver.Structure) else value)
+
+
+def blocks(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid:
+    """Make a dataset of the blocks of increment k."""
+    from .results.datasets import block_dataset
+
+    return block_dataset(response.assembly, response.increments[k], shape=shape)
+
+
+def joints(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid:
+    """Make a dataset of the joints of increment k."""
+    from .results.datasets import joint_dataset
+
+    return joint_dataset(response.assembly, response.increments[k], shape=shape)
+
+
+def contacts(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid:
+    """Make a dataset of the contact points of increment k."""
+    from .results.datasets import contact_dataset
+
+    return contact_dataset(response.assembly, response.increments[k], shape=shape)
+
+
+def animate(response: solver.Response, path: str | os.PathLike[str], **options: Any) -> Path:
+    """Write the film of a collapse."""
+    from .pictures.render import animate as write
+
+    return write(response, path, **options)

@@ -1,0 +1,102 @@
+"""The increments of an analysis, one by one, and then how it ended."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, suppress
+from dataclasses import replace
+
+from solver.path.controls import Ending
+from solver.programs.threads import NotLimited, one_thread
+from solver.results.increment import Increment
+
+
+class Increments(Iterator[Increment]):
+    """The increments of an analysis, found one by one as they are asked for, and then how it ended.
+
+    Parameters
+    ----------
+    steps : generator
+        Yields each :class:`Increment`, returns the :class:`Ending`.
+    changed : callable, optional
+        From an increment as it is found to the one that is given.
+    """
+
+    def __init__(
+        self,
+        steps: Generator[Increment, None, Ending],
+        changed: Callable[[Increment], Increment] | None = None,
+    ) -> None:
+        self._steps, self._changed = steps, changed
+        self._first: Increment | None = None
+        self._ending: Ending | None = None
+
+    def __next__(self) -> Increment:
+        """Find the next increment."""
+        if self._first is not None:
+            first, self._first = self._first, None
+            return first
+        try:
+            increment = self._found()
+        except StopIteration as stop:
+            # What it stops with again after its end is nothing.
+            self._ending = self._ending or stop.value
+            raise StopIteration(self._ending) from None
+        return increment if self._changed is None else self._changed(increment)
+
+    def _found(self) -> Increment:
+        return next(self._steps)
+
+    @property
+    def ending(self) -> Ending:
+        """How it ended.
+
+        Raises
+        ------
+        RuntimeError
+            Before the last increment has been asked for.
+        """
+        if self._ending is None:
+            raise RuntimeError("the analysis has not ended; ask for all of its increments first")
+        return self._ending
+
+    def begin(self) -> Increments:
+        """Find the first increment at once, so that what it refuses is refused now."""
+        self._first = next(self, None)
+        return self
+
+    def close(self) -> None:
+        """End the analysis where it is."""
+        self._steps.close()
+
+    def all(self, on_increment: Callable[[Increment], None] | None = None) -> tuple[Increment, ...]:
+        """Find all increments, without the states that a path goes on from.
+
+        Parameters
+        ----------
+        on_increment : callable, optional
+            Called with each as it is found.
+        """
+        increments = []
+        for found in self:
+            increments.append(replace(found, checkpoint=None))
+            if on_increment is not None:
+                on_increment(increments[-1])
+        return tuple(increments)
+
+
+class TimedIncrements(Increments):
+    """The same with the seconds each took, not counting what whoever listens takes in between.
+
+    The linear algebra keeps to one thread while they are worked out, where it can be limited: of several, all but one
+    wait by counting, on a core that another process could have.
+    """
+
+    def _found(self) -> Increment:
+        started = time.perf_counter()
+        with ExitStack() as limits:
+            with suppress(NotLimited):
+                limits.enter_context(one_thread())
+            increment = next(self._steps)
+        return replace(increment, seconds=time.perf_counter() - started)

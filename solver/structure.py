@@ -1,0 +1,376 @@
+"""A structure: blocks with their joints and loads, and what is asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .analysis.increments import Increments
+from .analysis.limit_load import find_limit_load
+from .analysis.pushover import pushover_increments
+from .analysis.settlement import settlement_increments
+from .assembly import Assembly
+from .interfaces import InterfaceLaw, Interfaces
+from .kinematics import Pose
+from .loads import Loads, Settlement, checked_loads, weight_fraction
+from .path.controls import Controls
+from .path.drivers import ControlDisplacement
+from .results.increment import Increment
+from .results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, Quantity, reaction_to, settlement_in
+from .results.response import Control, Envelope, LimitLoad, Response
+from .views import Shown
+
+#: Coefficient of friction that the functions of this module take where none is said; a structure takes none in silence.
+FRICTION_COEFFICIENT = 0.6
+
+
+@dataclass(frozen=True, init=False)
+class Structure(Shown):
+    """Blocks with their joints and loads.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    interfaces : Interfaces, optional
+        Laws per pair of materials; give these or a friction coefficient.
+    loads : Loads, optional
+        Self-weight by default.
+    friction_coefficient : float, optional
+        Of every interface.
+
+    Raises
+    ------
+    TypeError
+        Where neither interfaces nor a friction coefficient is given, or both are.
+    ValueError
+        For a friction coefficient or loads that are not finite, or loads of the wrong shape.
+    """
+
+    assembly: Assembly
+    interfaces: Interfaces
+    loads: Loads
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        interfaces: Interfaces | None = None,
+        loads: Loads | None = None,
+        *,
+        friction_coefficient: float | None = None,
+    ) -> None:
+        if (interfaces is None) == (friction_coefficient is None):
+            raise TypeError("a structure needs either a friction_coefficient or interfaces; give one of them")
+        if interfaces is None:
+            interfaces = Interfaces(InterfaceLaw(float(friction_coefficient or 0.0)))
+        object.__setattr__(self, "assembly", assembly)
+        object.__setattr__(self, "interfaces", interfaces)
+        object.__setattr__(self, "loads", checked_loads(assembly, loads))
+
+    def __repr__(self) -> str:
+        """Say how many blocks it has."""
+        return f"<Structure of {self.assembly.n_blocks} blocks>"
+
+    def with_live(self, live: np.ndarray | None = None, *, acceleration: Sequence[float] | None = None) -> Structure:
+        """Put the structure under other live loads.
+
+        Parameters
+        ----------
+        live : (n_blocks, n_dof) array [N, N·m], optional
+        acceleration : (d,) sequence, optional
+            Instead: in units of gravity, of every block; (1, 0) pushes to the right with its weight.
+        """
+        if (live is None) == (acceleration is None):
+            raise TypeError("with_live needs either the live loads or an acceleration; give one of them")
+        if acceleration is not None:
+            live = weight_fraction(self.assembly, acceleration)
+        return replace(self, loads=Loads(self.loads.dead, np.asarray(live, dtype=float)))
+
+    def settle(
+        self,
+        settlement: Settlement | Sequence[Settlement] | Sequence[float],
+        *,
+        controls: Controls | None = None,
+        on_increment: Callable[[Increment], None] | None = None,
+    ) -> Response:
+        """Follow the structure from its drawing through the settlement of its supports to collapse.
+
+        Parameters
+        ----------
+        settlement : Settlement, sequence of Settlement or (d,) sequence of float
+            One phase, or several one after another; or only the direction in which the moving supports go.
+        controls : Controls, optional
+        on_increment : callable, optional
+            Called with every :class:`Increment` as it is found.
+
+        Returns
+        -------
+        Response
+
+        Raises
+        ------
+        ValueError
+            For input that cannot be analysed: no moving support, overlapping blocks.
+
+        Notes
+        -----
+        Portioli & Cascini, Engineering Structures 148 (2017) 485-496, https://doi.org/10.1016/j.engstruct.2017.06.073:
+        rigid blocks, no-tension frictional contact points, gap functions, a convex program per increment, the geometry
+        updated after each, until no equilibrium exists.
+        """
+        phases = _phases(settlement)
+        increments = settlement_increments(
+            self.assembly, phases, interfaces=self.interfaces, loads=self.loads, controls=controls
+        )
+        found = increments.all(on_increment)
+        unit = phases[0].unit
+        return self._response(increments, found, "settlement", settlement_in(unit), reaction_to(unit), phases)
+
+    def pushover(
+        self,
+        control: ControlDisplacement,
+        *,
+        controls: Controls | None = None,
+        pose: Pose | None = None,
+        on_increment: Callable[[Increment], None] | None = None,
+    ) -> Response:
+        """Follow the structure under growing displacement from its limit load down to where it carries none.
+
+        Fixed and moving supports both stand still.
+
+        Parameters
+        ----------
+        control : ControlDisplacement
+        controls : Controls, optional
+        pose : Pose, optional
+            Where to start, for instance after a settlement; the drawing by default. Displacements count from there.
+        on_increment : callable, optional
+            Called with every :class:`Increment` as it is found.
+
+        Returns
+        -------
+        Response
+            ``settlement`` is the control displacement [m], ``load_multiplier`` is α and ``reaction`` the resultant of
+            the live loads, α times its value at 1 [N]. The first increment has the limit load of the undeformed
+            structure. The collapse is where α reaches zero, ``lost`` "capacity": beyond, the structure falls under its
+            dead load alone; or where no equilibrium follows along the control at some α, ``lost`` "equilibrium".
+
+        Raises
+        ------
+        ValueError
+            For input that cannot be analysed: no live load, a control block that is a support, overlapping blocks.
+
+        Notes
+        -----
+        The path is that of a settlement, see :mod:`solver.path.path`, with the multiplier as one more unknown and the
+        control displacement as one more equation.
+        """
+        increments = pushover_increments(
+            self.assembly, control, loads=self.loads, interfaces=self.interfaces, controls=controls, pose=pose
+        )
+        found = increments.all(on_increment)
+        return self._response(increments, found, "pushover", CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, control=control)
+
+    def limit_load(
+        self,
+        *,
+        acceleration: Sequence[float] | None = None,
+        pose: Pose | None = None,
+        flow: str = "associative",
+        closed_gap: float | None = None,
+        displacement: float = 0.0,
+        overlap_tolerance: float | None = None,
+        torsion: str = "points",
+    ) -> LimitLoad:
+        """Find the largest multiplier of the live loads at which the structure can be in equilibrium.
+
+        Fixed and moving supports both stand still.
+
+        Parameters
+        ----------
+        acceleration : (d,) sequence, optional
+            Instead of the live loads of the structure: of every block, in units of gravity; the multiplier is then
+            the acceleration. For the other direction give minus this one.
+        pose : Pose, optional
+            The geometry: that of an increment gives the capacity left after a settlement. The drawing by default.
+        flow : {"associative", "non-associative"}
+            Whether sliding joints lift by friction coefficient times slip, or do not lift.
+        closed_gap : float, optional [m]
+            Contact points with a larger gap are open and carry nothing. By default a thousandth of the width of the
+            thinnest block in the drawing, a millionth of the block size at a given pose.
+        displacement : float [m]
+            How far the live loads may move along themselves, on average, while joints close. 0: what is open carries
+            nothing. A wall of many bricks whose joints slide has openings of hundredths of a millimetre after a
+            settlement, and its strict limit load is that of the one loosest brick.
+        overlap_tolerance : float, optional [m]
+            Overlap of two blocks in the drawing that is accepted; a thousandth of the width of the thinnest block.
+        torsion : {"points", "uniform"}
+            What a face of blocks in space resists when it turns in its own plane: what friction at its contact
+            points does, or what it does under a uniform pressure, which is up to 1.85 times less.
+
+        Returns
+        -------
+        LimitLoad
+
+        Raises
+        ------
+        ValueError
+            For no free block, overlapping blocks, no live load on a free block, a law of torsion that is not known or
+            that blocks in the plane do not have.
+        SolveError
+            If HiGHS gives no solution that passes its check.
+
+        Notes
+        -----
+        The program, its dual, strength, gaps, torsion and friction without dilatancy are described with
+        :func:`solver.analysis.limit_load.find_limit_load`. For associative flow the multiplier is the exact limit load
+        of the model, and an upper bound for every other flow rule with the same friction.
+        """
+        if acceleration is not None:
+            return self.with_live(acceleration=acceleration).limit_load(
+                pose=pose,
+                flow=flow,
+                closed_gap=closed_gap,
+                displacement=displacement,
+                overlap_tolerance=overlap_tolerance,
+                torsion=torsion,
+            )
+        found = find_limit_load(
+            self.assembly,
+            self.interfaces,
+            self.loads,
+            pose=pose,
+            flow=flow,
+            closed_gap=closed_gap,
+            displacement=displacement,
+            overlap_tolerance=overlap_tolerance,
+            torsion=torsion,
+        )
+        return replace(found, analysed=(self.assembly, self.interfaces, self.loads))
+
+    def envelope(
+        self,
+        positions: Sequence[float] | np.ndarray,
+        live: Callable[[float], np.ndarray],
+        *,
+        pose: Pose | None = None,
+        flow: str = "associative",
+        torsion: str = "points",
+    ) -> Envelope:
+        """Limit loads of a live load that moves over the structure.
+
+        Parameters
+        ----------
+        positions : (n,) sequence
+        live : callable
+            From a position to the live loads there, an (n_blocks, n_dof) array [N, N·m].
+        pose, flow, torsion
+            As in :meth:`limit_load`.
+        """
+        positions = np.asarray(positions, dtype=float)
+        if positions.ndim != 1 or len(positions) == 0:
+            raise ValueError(f"positions have shape {positions.shape}; give at least one number")
+        limits = (self.with_live(live(float(x))).limit_load(pose=pose, flow=flow, torsion=torsion) for x in positions)
+        return Envelope(positions, tuple(limits))
+
+    def _response(
+        self,
+        increments: Increments,
+        found: tuple[Increment, ...],
+        analysis: str,
+        parameter: Quantity,
+        measured: Quantity,
+        settlements: tuple[Settlement, ...] = (),
+        control: Control | None = None,
+    ) -> Response:
+        ending = increments.ending
+        return Response(
+            assembly=self.assembly,
+            settlements=settlements,
+            interfaces=self.interfaces,
+            loads=self.loads,
+            increments=found,
+            stop=ending.stop,
+            message=ending.message,
+            collapse=ending.collapse,
+            analysis=analysis,
+            parameter=parameter,
+            measured=measured,
+            control=control,
+        )
+
+
+def _phases(settlement: Settlement | Sequence[Settlement] | Sequence[float]) -> tuple[Settlement, ...]:
+    if isinstance(settlement, Settlement):
+        return (settlement,)
+    phases = tuple(part for part in settlement if isinstance(part, Settlement))
+    if len(phases) == len(settlement):
+        return phases
+    return (Settlement(direction=[part for part in settlement if not isinstance(part, Settlement)]),)
+
+
+def settle(
+    assembly: Assembly,
+    settlement: Settlement | Sequence[Settlement],
+    *,
+    friction_coefficient: float = FRICTION_COEFFICIENT,
+    interfaces: Interfaces | None = None,
+    loads: Loads | None = None,
+    controls: Controls | None = None,
+    on_increment: Callable[[Increment], None] | None = None,
+) -> Response:
+    """Follow blocks through the settlement of their supports to collapse: :meth:`Structure.settle` in one call.
+
+    The friction coefficient is of every interface, where ``interfaces`` are not given.
+    """
+    structure = _structure(assembly, interfaces, loads, friction_coefficient)
+    return structure.settle(settlement, controls=controls, on_increment=on_increment)
+
+
+def pushover(
+    assembly: Assembly,
+    control: ControlDisplacement,
+    *,
+    loads: Loads,
+    friction_coefficient: float = FRICTION_COEFFICIENT,
+    interfaces: Interfaces | None = None,
+    controls: Controls | None = None,
+    pose: Pose | None = None,
+    on_increment: Callable[[Increment], None] | None = None,
+) -> Response:
+    """Follow blocks under growing displacement: :meth:`Structure.pushover` in one call."""
+    structure = _structure(assembly, interfaces, loads, friction_coefficient)
+    return structure.pushover(control, controls=controls, pose=pose, on_increment=on_increment)
+
+
+def limit_load(
+    assembly: Assembly,
+    *,
+    loads: Loads,
+    friction_coefficient: float = FRICTION_COEFFICIENT,
+    interfaces: Interfaces | None = None,
+    pose: Pose | None = None,
+    flow: str = "associative",
+    closed_gap: float | None = None,
+    displacement: float = 0.0,
+    overlap_tolerance: float | None = None,
+    torsion: str = "points",
+) -> LimitLoad:
+    """Find the largest multiplier of live loads: :meth:`Structure.limit_load` in one call."""
+    return _structure(assembly, interfaces, loads, friction_coefficient).limit_load(
+        pose=pose,
+        flow=flow,
+        closed_gap=closed_gap,
+        displacement=displacement,
+        overlap_tolerance=overlap_tolerance,
+        torsion=torsion,
+    )
+
+
+def _structure(
+    assembly: Assembly, interfaces: Interfaces | None, loads: Loads | None, friction_coefficient: float
+) -> Structure:
+    if interfaces is not None:
+        return Structure(assembly, interfaces, loads)
+    return Structure(assembly, loads=loads, friction_coefficient=friction_coefficient)

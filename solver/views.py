@@ -1,0 +1,73 @@
+"""Pictures, datasets and films of structures and results, which are made by a package that draws: this one does not."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Any, Protocol
+
+#: Entry points under which a package that draws offers its :class:`Views`.
+GROUP = "solver.views"
+
+
+class Views(Protocol):
+    """What a package that draws offers."""
+
+    def shown(self, value: Any, **options: Any) -> Any:
+        """Give what a notebook shows of a value as the last line of a cell."""
+
+    def html(self, value: Any) -> str:
+        """Give the value as HTML."""
+
+    def blocks(self, response: Any, k: int, shape: str) -> Any:
+        """Give the blocks of increment k as a dataset."""
+
+    def joints(self, response: Any, k: int, shape: str) -> Any:
+        """Give the joints of increment k as a dataset."""
+
+    def contacts(self, response: Any, k: int, shape: str) -> Any:
+        """Give the contact points of increment k as a dataset."""
+
+    def animate(self, response: Any, path: str | os.PathLike[str], **options: Any) -> Any:
+        """Write a film."""
+
+
+@cache
+def _views() -> Views | None:
+    for entry in entry_points(group=GROUP):
+        views: Views = entry.load()
+        return views
+    return None
+
+
+def views() -> Views:
+    """Find the views of the package that draws.
+
+    Raises
+    ------
+    ImportError
+        Where none is installed.
+    """
+    found = _views()
+    if found is None:
+        raise ImportError("solver draws nothing; pictures and datasets are made by blockvis: pip install blockvis")
+    return found
+
+
+class Shown:
+    """A value that notebooks show where a package that draws is installed."""
+
+    def _repr_html_(self) -> str | None:
+        found = _views()
+        return None if found is None else found.html(self)
+
+    def plot(self, **options: Any) -> Any:
+        """Show it in a notebook, for the last line of a cell: a player of a response, a picture of all else.
+
+        Parameters
+        ----------
+        **options
+            Of a response ``height`` [pixels].
+        """
+        return views().shown(self, **options)

@@ -1,0 +1,131 @@
+"""A structure: blocks with their joints and loads, and what is asked of it."""
+
+import json
+
+import numpy as np
+import pytest
+
+import blockvis
+import solver
+from blockvis import generators
+
+#: A block twice as high as wide overturns at a horizontal acceleration of its slenderness, 0.5 g, unless it slides.
+GROUND = [[-1, -0.2], [3, -0.2], [3, 0], [-1, 0]]
+BLOCK = [[0, 0], [1, 0], [1, 2], [0, 2]]
+
+
+@pytest.fixture
+def block() -> solver.Assembly:
+    return solver.Assembly.from_outlines([GROUND, BLOCK], roles=["fixed", "free"])
+
+
+@pytest.mark.parametrize(("friction", "multiplier"), [(0.7, 0.5), (0.3, 0.3)])
+def test_acceleration_at_which_a_block_overturns_or_slides(block, friction, multiplier):
+    structure = solver.Structure(block, friction_coefficient=friction)
+    for acceleration in ((1, 0), (-1, 0)):
+        limit = structure.limit_load(acceleration=acceleration)
+        assert limit.multiplier == pytest.approx(multiplier, rel=1e-6)
+        assert structure.with_live(acceleration=acceleration).limit_load().multiplier == limit.multiplier
+
+
+def test_friction_is_never_assumed(block):
+    with pytest.raises(TypeError, match="either a friction_coefficient or interfaces"):
+        solver.Structure(block)
+    with pytest.raises(TypeError, match="either a friction_coefficient or interfaces"):
+        solver.Structure(block, solver.Interfaces(), friction_coefficient=0.5)
+    with pytest.raises(ValueError, match="friction_coefficient is -1"):
+        solver.Structure(block, friction_coefficient=-1.0)
+    with pytest.raises(TypeError, match="either the live loads or an acceleration"):
+        solver.Structure(block, friction_coefficient=0.5).with_live()
+    assert solver.Structure(block, friction_coefficient=0.0).interfaces.default.friction_coefficient == 0.0
+
+
+def test_structure_and_functions_give_the_same():
+    arch = generators.arch()
+    spread = solver.Settlement(direction=(1, 0))
+    by_name = solver.Structure(arch, friction_coefficient=2.0).settle((1, 0))
+    by_function = solver.settle(arch, spread, friction_coefficient=2.0)
+    assert by_name.collapse.bracket == by_function.collapse.bracket
+    assert by_name.settlements == (spread,)
+
+
+def test_limit_load_is_a_response_of_its_own(block, tmp_path):
+    limit = solver.Structure(block, friction_coefficient=0.7).limit_load(acceleration=(1, 0))
+    response = limit.response
+    assert response.limits == (limit,)
+    assert response.values == pytest.approx([0.5])
+    assert response.loads.live[1, 0] == pytest.approx(solver.total_weight(block))
+    assert "0.5" in limit.plot()._repr_html_()
+    picture = blockvis.draw_mechanism(limit, tmp_path / "mechanism.png")
+    assert picture.stat().st_size > 10_000
+    blockvis.write(response, tmp_path / "out")
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["limit_load_multiplier"] == pytest.approx(0.5)
+
+
+def test_datasets_of_an_increment():
+    response = solver.Structure(generators.arch(), friction_coefficient=2.0).settle((1, 0))
+    last = response.path[-1]
+    k = len(response.path) - 1
+    contacts = response.contacts(k)
+    assert contacts.n_cells == len(last.contacts)
+    assert np.asarray(contacts["normal_force"]) == pytest.approx(last.forces[:, 0])
+    assert response.mesh(k).n_cells == response.assembly.n_blocks
+    assert response.joints(k)["opening"].max() > 0.0
+
+
+def test_what_is_analysed_shows_itself_in_a_notebook():
+    structure = solver.Structure(generators.arch(), friction_coefficient=2.0)
+    assert "<svg" in structure._repr_html_()
+    assert "<svg" in structure.plot()._repr_html_()
+    assert repr(structure) == f"<Structure of {structure.assembly.n_blocks} blocks>"
+
+
+def test_increments_are_asked_for_and_then_how_it_ended():
+    arch = generators.arch()
+    increments = solver.settlement_increments(
+        arch,
+        [solver.Settlement(direction=(1, 0), increment=0.01, limit=0.02)],
+        interfaces=solver.Interfaces(),
+        loads=solver.self_weight(arch),
+    ).begin()
+    with pytest.raises(RuntimeError, match="has not ended"):
+        _ = increments.ending
+    assert [increment.parameter for increment in increments] == pytest.approx([0.0, 0.01, 0.02])
+    assert increments.ending.stop is solver.Status.LIMIT_REACHED
+    assert next(increments, None) is None
+    assert increments.ending.stop is solver.Status.LIMIT_REACHED
+
+
+def test_public_names_are_all_that_is_seen():
+    assert {name for name in dir(blockvis) if not name.startswith("__")} == set(blockvis.__all__)
+
+
+class _Mesh:
+    """What COMPAS writes of a mesh, in memory."""
+
+    def __init__(self, name: str, low: float) -> None:
+        corners = [[x, y, low + z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+        faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+        self.data = {
+            "dtype": "compas.datastructures/Mesh",
+            "name": name,
+            "data": {
+                "vertex": {str(k): dict(zip("xyz", p, strict=True)) for k, p in enumerate(corners)},
+                "face": {str(k): f for k, f in enumerate(faces)},
+            },
+        }
+
+    def to_jsonstring(self) -> str:
+        return json.dumps(self.data)
+
+
+def test_meshes_of_compas_in_memory_become_blocks():
+    meshes = [_Mesh("ground", 0), _Mesh("block", 1)]
+    assembly = blockvis.from_compas(meshes, roles={"ground": "fixed"}, dimension=3)
+    assert assembly.names == ("ground", "block")
+    assert list(assembly.roles) == ["fixed", "free"]
+    assert solver.Structure(assembly, friction_coefficient=0.4).limit_load(
+        acceleration=(1, 0, 0)
+    ).multiplier == pytest.approx(0.4, rel=1e-4)
+    with pytest.raises(TypeError, match="str is no object of COMPAS"):
+        blockvis.from_compas([*meshes, "wall"])
