@@ -12,7 +12,7 @@ from blockvis import generators
 
 arch = generators.arch(thickness_ratio=0.10, embrace=140.0, voussoirs=12)
 sink = solver.Settlement(direction=(0, -1), increment=0.01, limit=1.0, tolerance=1e-4)
-response = solver.settle(arch, sink, friction_coefficient=2.0)
+response = solver.Structure(arch, friction_coefficient=2.0).settle(sink)
 print(response.collapse)
 assert abs(response.collapse.displacement - 0.35254631) < 1e-3
 

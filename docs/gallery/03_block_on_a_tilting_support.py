@@ -17,7 +17,7 @@ assembly = solver.Assembly.from_outlines(
     names=["plate", "block"],
 )
 tilt = solver.Settlement(rotation_centre=(0, 0), rotation=1.0, increment=0.02, limit=1.0, tolerance=1e-5)
-response = solver.settle(assembly, tilt, friction_coefficient=0.7)
+response = solver.Structure(assembly, friction_coefficient=0.7).settle(tilt)
 print(response.collapse)
 assert abs(response.collapse.displacement - math.atan(0.5)) < 1e-4
 

@@ -12,7 +12,7 @@ from blockvis import generators
 
 portal = generators.portal(span=2.0, height=2.4, column_width=0.5, column_blocks=4, lintel_height=0.5)
 sink = solver.Settlement(direction=(0, -1), increment=0.05, limit=0.6)
-response = solver.settle(portal, sink, friction_coefficient=0.6)
+response = solver.Structure(portal, friction_coefficient=0.6).settle(sink)
 print(response)
 print(f"reaction at first {response.initial_reaction:.0f} N of {response.total_weight:.0f} N")
 assert response.stop is solver.Status.LIMIT_REACHED

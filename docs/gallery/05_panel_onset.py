@@ -12,7 +12,7 @@ from blockvis import generators
 
 panel = generators.panel(nb=3, nc=4, x_s=3.0)
 sink = solver.Settlement(direction=(0, -1), increment=0.02, limit=0.1)
-response = solver.settle(panel, sink, friction_coefficient=0.3)
+response = solver.Structure(panel, friction_coefficient=0.3).settle(sink)
 share = response.initial_reaction / response.total_weight
 print(f"{share:.6f}, exactly {25 / 218:.6f}")
 assert abs(share - 25 / 218) < 1e-6

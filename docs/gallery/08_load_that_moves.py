@@ -12,11 +12,9 @@ import solver
 from blockvis import generators
 
 arch = generators.segmental_arch(span=4.0, rise=1.0, thickness=0.25, voussoirs=15)
-dead = solver.self_weight(arch).dead
+structure = solver.Structure(arch, friction_coefficient=0.6)
 places = [-1.85 + 0.1 * k for k in range(38)]
-envelope = solver.limit_load_envelope(
-    arch, places, lambda x: solver.load_on_top(arch, x, (0.0, -1000.0)), dead=dead, friction_coefficient=0.6
-)
+envelope = structure.envelope(places, lambda x: solver.load_on_top(arch, x, (0.0, -1000.0)))
 worst = envelope.worst
 print(f"weakest at x = {places[worst]:.2f} m: {envelope.multipliers[worst]:.3f} kN")
 assert abs(envelope.multipliers[worst] - 17.164) < 0.01

@@ -7,7 +7,6 @@ rocks, α = tan(arctan 0.2 − arcsin d), and ends at d = 0.19612, all by geomet
 """
 
 import math
-from dataclasses import replace
 
 import blockvis
 import solver
@@ -16,9 +15,9 @@ outlines = [[[0, 0.2 * k], [0.2, 0.2 * k], [0.2, 0.2 * k + 0.2], [0, 0.2 * k + 0
 ground = [[-0.5, -0.1], [0.7, -0.1], [0.7, 0], [-0.5, 0]]
 names = [*(f"block {k + 1}" for k in range(5)), "ground"]
 stack = solver.Assembly.from_outlines([*outlines, ground], roles=["free"] * 5 + ["fixed"], names=names)
-loads = replace(solver.self_weight(stack), live=solver.weight_fraction(stack, (1.0, 0.0)))
+structure = solver.Structure(stack, friction_coefficient=0.7).with_live(acceleration=(1, 0))
 control = solver.ControlDisplacement("block 5", (1, 0), point=(0.2, 1.0), increment=0.02, limit=0.5)
-response = solver.pushover(stack, control, loads=loads, friction_coefficient=0.7)
+response = structure.pushover(control)
 print(f"α falls from {response.load_multiplier[0]:.4f} to 0 at d = {response.collapse.displacement:.5f} m")
 assert abs(response.load_multiplier[0] - 0.2) < 1e-6
 assert abs(response.collapse.displacement - math.sin(math.atan(0.2))) < 1e-4

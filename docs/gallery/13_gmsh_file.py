@@ -18,7 +18,7 @@ print(found)
 arch = blockvis.read(mesh, roles={"left springer": "fixed", "right springer": "moving"})
 print(arch)
 sink = solver.Settlement(direction=(0, -1), increment=0.02, limit=0.6, tolerance=1e-4)
-response = solver.settle(arch, sink, friction_coefficient=2.0)
+response = solver.Structure(arch, friction_coefficient=2.0).settle(sink)
 print(response.collapse)
 assert abs(response.collapse.displacement - 0.33003942) < 1e-3
 blockvis.draw_mechanism(response, "arch.png")

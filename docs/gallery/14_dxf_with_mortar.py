@@ -47,7 +47,7 @@ wall = blockvis.read(folder / "wall.dxf", joint_thickness="auto")
 print(wall)
 assert wall.n_blocks == 29
 sink = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.05)
-response = solver.settle(wall, sink, friction_coefficient=0.6)
+response = solver.Structure(wall, friction_coefficient=0.6).settle(sink)
 print(response)
 assert response.stop is solver.Status.LIMIT_REACHED
 assert 0.05 < response.initial_reaction / response.total_weight < 0.5

@@ -32,7 +32,7 @@ assert portal.n_blocks == 5
 # %%
 # By symmetry the right support carries half of everything before it sinks; less once it does.
 sink = solver.Settlement(direction=(0, -1), increment=0.02, limit=0.2)
-response = solver.settle(portal, sink, friction_coefficient=0.6)
+response = solver.Structure(portal, friction_coefficient=0.6).settle(sink)
 print(response.reaction / response.total_weight)
 assert 0.3 < response.initial_reaction / response.total_weight < 0.5 + 1e-6
 blockvis.draw_still(response, len(response.path) - 1, "lintel.png")

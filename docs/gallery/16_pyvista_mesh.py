@@ -35,7 +35,7 @@ mesh.save(folder / "stack.vtp")
 stack = blockvis.read(folder / "stack.vtp")
 print(stack)
 tilt = solver.Settlement(rotation_centre=(0, 0), rotation=1.0, increment=0.02, limit=1.0, tolerance=1e-5)
-response = solver.settle(stack, tilt, friction_coefficient=0.9)
+response = solver.Structure(stack, friction_coefficient=0.9).settle(tilt)
 print(response.collapse)
 assert abs(response.collapse.displacement - np.arctan(0.6 / 1.6)) < 1e-3
 blockvis.draw_mechanism(response, "stack.png")

@@ -12,7 +12,7 @@ from blockvis import generators
 
 arch = generators.arch_on_piers(span=2.0, rise=1.0, thickness=0.25, voussoirs=13)
 spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=1.0)
-response = solver.settle(arch, spread, friction_coefficient=0.6)
+response = solver.Structure(arch, friction_coefficient=0.6).settle(spread)
 print(response.collapse)
 assert response.stop is solver.Status.COLLAPSED
 assert 0.3 < response.collapse.displacement < 0.42

@@ -19,7 +19,7 @@ from blockvis.fall import fall_of
 
 arch = generators.arch(thickness_ratio=0.15, voussoirs=12)
 spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
-response = solver.settle(arch, spread, friction_coefficient=0.6)
+response = solver.Structure(arch, friction_coefficient=0.6).settle(spread)
 fall = fall_of(response)
 print(f"{fall.times[-1]:.2f} s until all rest")
 assert 0.5 < fall.times[-1] <= 4.0

@@ -13,7 +13,7 @@ from blockvis import generators
 
 dome = generators.dome(lunes=8, courses=6, thickness_ratio=0.12, cap=15.0)
 spread = solver.Settlement(radial_from=(0, 0), increment=0.04, limit=0.5, tolerance=1e-4)
-response = solver.settle(dome, spread, friction_coefficient=0.7)
+response = solver.Structure(dome, friction_coefficient=0.7).settle(spread)
 print(response.collapse)
 assert abs(response.initial_reaction / response.total_weight - 0.1661226) < 1e-6
 assert abs(response.collapse.displacement - 0.1721334) < 1e-4

@@ -12,7 +12,7 @@ from blockvis import generators
 
 vault = generators.cross_vault(span=4.0, rise=1.5, thickness=0.3, voussoirs=7, stone=1.4)
 sink = solver.Settlement(direction=(0, 0, -1), increment=0.03, limit=0.09)
-response = solver.settle(vault, sink, friction_coefficient=0.7)
+response = solver.Structure(vault, friction_coefficient=0.7).settle(sink)
 print(response)
 assert response.stop is solver.Status.LIMIT_REACHED
 assert response.path[-1].certificate.equilibrium_residual < 1e-8

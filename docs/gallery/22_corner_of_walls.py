@@ -12,7 +12,7 @@ from blockvis import generators
 
 corner = generators.l_corner(bricks=2, across=2, courses=4)
 sink = solver.Settlement(direction=(0, 0, -1), increment=0.02, limit=0.06)
-response = solver.settle(corner, sink, friction_coefficient=0.6)
+response = solver.Structure(corner, friction_coefficient=0.6).settle(sink)
 print(response)
 assert response.stop is solver.Status.LIMIT_REACHED
 for increment in response.path:
