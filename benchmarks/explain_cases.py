@@ -30,7 +30,7 @@ from blockvis.cases.explain_settings import DIRECTIONS
 from blockvis.cases.profiles import Profile, cut_ground
 from blockvis.explanation.candidates import VECTORS, Candidate, differential, rotation_of, scaled_motions
 from blockvis.results.joints import end_openings, initial_joints
-from blockvis.toml_text import as_toml
+from blockvis.text import as_toml
 
 #: Relative standard deviation of the observed widths.
 NOISE = 0.2

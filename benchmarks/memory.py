@@ -20,7 +20,7 @@ from typing import Any
 from growth import BRICK, INCREMENT, wall_of
 
 import blockvis
-from blockvis.cases.case import parse_case
+from blockvis.case_files.read import parse_case
 from blockvis.results.folder import ResultsFolder
 
 CASE = """

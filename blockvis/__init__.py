@@ -15,8 +15,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .cases.case import Case as Case
-    from .cases.case import read_case as read_case
+    from .case_files.read import read_case as read_case
+    from .cases.contents import Case as Case
     from .explanation.explain import explain as explain
     from .formats.read import from_compas as from_compas
     from .formats.read import inspect as inspect
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 #: Public names and where they live; loaded when first used, because VTK takes seconds to import.
 _HOMES = {
-    "Case": "cases.case",
+    "Case": "cases.contents",
     "animate": "pictures.render",
     "draw_curve": "pictures.curves",
     "draw_mechanism": "pictures.render",
@@ -47,7 +47,7 @@ _HOMES = {
     "inspect": "formats.read",
     "open_results": "runs.reopen",
     "read": "formats.read",
-    "read_case": "cases.case",
+    "read_case": "case_files.read",
     "read_layout": "formats.read",
     "run_case": "runs.run",
     "save_layout": "formats.read",

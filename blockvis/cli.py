@@ -22,14 +22,14 @@ import numpy as np
 
 import solver
 
-from .broken_pipes import is_broken_pipe
-from .extras import MissingExtra
 from .generators import LAYOUTS, help_text
 from .layout.views import VIEWS
+from .system.extras import MissingExtra
+from .system.processes import is_broken_pipe
 
 if TYPE_CHECKING:
     from .cases.contents import Case
-    from .fall import Fall
+    from .dynamics.fall import Fall
     from .runs.run import Run
     from .runs.step_check import StepChecking
 
@@ -381,11 +381,11 @@ def _sweep(options: argparse.Namespace) -> int:
 
 
 def _new(options: argparse.Namespace) -> int:
-    from .atomic_files import write_whole
+    from .case_files.new_case import case_text, relative_to
+    from .case_files.read import parse_case
     from .cases.build import case_assembly
-    from .cases.case import parse_case
-    from .cases.new_case import case_text, relative_to
     from .formats.read import inspect
+    from .system.atomic_files import write_whole
 
     drawing = Path(options.drawing)
     stem = drawing.parent.name if glob.has_magic(drawing.name) else drawing.resolve().stem
@@ -403,10 +403,12 @@ def _new(options: argparse.Namespace) -> int:
 
 
 def _schema(options: argparse.Namespace) -> int:
-    from .reference.schema import SCHEMAS
+    from .case_files.schema import case_schema
+    from .studies.study_schema import study_schema
 
     # ASCII, so that it is valid JSON in whatever encoding a shell writes it to a file.
-    print(json.dumps(SCHEMAS[options.file](), indent=2))
+    schema = study_schema() if options.file == "study" else case_schema()
+    print(json.dumps(schema, indent=2))
     return 0
 
 
@@ -419,7 +421,7 @@ def _run_numbers(text: str) -> tuple[int, ...]:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from .cases.case import read_case
+    from .case_files.read import read_case
     from .runs.run import resume_run, run_case
 
     drawn = {"film": not options.no_film, "pictures": not options.no_pictures}
@@ -562,7 +564,7 @@ def _draw_curve(response: solver.Response, folder: Path, names: Sequence[str]) -
 
 def _write_report(response: solver.Response, folder: Path) -> Fall | None:
     """Write the report of a results folder, with what is known of its error and range; returns its fall."""
-    from .fall import fall_of
+    from .dynamics.fall import fall_of
     from .report.page import write_report
     from .results.fall_files import stored_fall
     from .results.folder import stored_case
@@ -691,7 +693,7 @@ def _parameter(given: str) -> tuple[str, Any]:
 
 def _in_words(response: solver.Response, folder: Path) -> str:
     """Sum up a run in words."""
-    from .runs.kinds import KINDS
+    from .kinds.kinds import KINDS
 
     kind = KINDS[response.analysis]
     assembly, weight = response.assembly, response.total_weight

@@ -1,1 +1,1 @@
-"""Case files: read, checked, and built into assembly, interfaces and loads."""
+"""What a case holds, and the assembly, interfaces and loads that are built of it."""

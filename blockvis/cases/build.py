@@ -15,7 +15,7 @@ from blockvis.formats.read import read_layout
 from blockvis.layout import layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.units import doubt
-from blockvis.suggestions import nearest
+from blockvis.text import nearest
 
 from .contents import Case
 from .coordinates import check_coordinates

@@ -29,7 +29,7 @@ class Case:
     analysis : str
         Name of the kind of analysis.
     settings : optional
-        What that kind has read from its own keys; see :meth:`blockvis.runs.kind.AnalysisKind.read`.
+        What that kind has read from its own keys; see :meth:`blockvis.kinds.kind.AnalysisKind.read`.
     profiles : tuple of Profile or None
         Of the settlements along x; :func:`blockvis.cases.build.case_settlements` makes motions of supports of them.
     explain : ExplainSettings

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from blockvis.suggestions import nearest, refuse_unknown
+from blockvis.text import nearest, refuse_unknown
 
 from .toml_table import is_number
 

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
 import solver
-from blockvis.suggestions import nearest
+from blockvis.text import nearest
 
 from .distributions import Distribution, read_distribution
 

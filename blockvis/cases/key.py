@@ -1,7 +1,7 @@
 """What a key of a TOML file is: its kind of value, unit, default, meaning and an example.
 
-The tables of keys are made of these: :data:`blockvis.cases.case_keys.SECTIONS`, the keys of a kind of analysis in
-:attr:`blockvis.runs.kind.AnalysisKind.keys`, and :data:`blockvis.studies.study_keys.SECTIONS`. The JSON schema, the
+The tables of keys are made of these: :data:`blockvis.case_files.case_keys.SECTIONS`, the keys of a kind of analysis in
+:attr:`blockvis.kinds.kind.AnalysisKind.keys`, and :data:`blockvis.studies.study_keys.SECTIONS`. The JSON schema, the
 reference pages and the comments of new case files are written from them.
 """
 

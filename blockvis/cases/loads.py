@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import solver
-from blockvis.suggestions import nearest
+from blockvis.text import nearest
 
 
 @dataclass(frozen=True)

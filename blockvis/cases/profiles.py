@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 import solver
-from blockvis.suggestions import nearest
+from blockvis.text import nearest
 
 from .toml_table import Table, is_number, shortened
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from blockvis.suggestions import nearest
+from blockvis.text import nearest
 
 
 class Table:

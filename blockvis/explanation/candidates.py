@@ -12,7 +12,7 @@ import numpy as np
 import solver
 from blockvis.cases.explain_settings import ExplainSettings
 from blockvis.cases.profiles import Profile, cut_ground
-from blockvis.suggestions import nearest
+from blockvis.text import nearest
 
 #: Unit vectors of directions of the case file.
 VECTORS = {"down": (0.0, -1.0), "up": (0.0, 1.0), "left": (-1.0, 0.0), "right": (1.0, 0.0)}

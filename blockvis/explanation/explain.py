@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 import solver
+from blockvis.case_files.read import case_file_text, case_of, parsed_toml
 from blockvis.cases.build import case_assembly
-from blockvis.cases.case import Case, case_file_text, case_of, parsed_toml
-from blockvis.runs.kind import needs_dry_joints
-from blockvis.runs.kinds import KINDS
+from blockvis.cases.contents import Case
+from blockvis.kinds.kind import needs_dry_joints
+from blockvis.kinds.kinds import KINDS
 from blockvis.runs.progress import StudyProgress
 
 from .candidates import (

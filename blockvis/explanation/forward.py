@@ -15,10 +15,10 @@ import numpy as np
 import solver
 from blockvis.cases.build import case_interfaces, case_loads
 from blockvis.cases.contents import Case
-from blockvis.extras import require
-from blockvis.processes import cores
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.runs.progress import StudyProgress
+from blockvis.system.extras import require
+from blockvis.system.processes import cores
 
 from .observations import Observations
 

@@ -22,7 +22,7 @@ from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
 from blockvis.layout.layout import Layout
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
-from blockvis.suggestions import files_like, nearest
+from blockvis.text import files_like, nearest
 
 #: Uncertainty of a width, as a fraction of it, and the least [m], where the observations give none.
 WIDTH_UNCERTAINTY, LEAST_UNCERTAINTY = 0.2, 2e-4

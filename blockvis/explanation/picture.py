@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import solver
-from blockvis.atomic_files import whole_file
-from blockvis.numbers import rounded_length
 from blockvis.pictures import palette
 from blockvis.pictures.frame import framed
 from blockvis.results.cracks import SMALLEST_OPENING
 from blockvis.results.joints import faces_at
+from blockvis.system.atomic_files import whole_file
+from blockvis.text import rounded_length
 
 from .words import amount_text, percent, width_text
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
-from blockvis.atomic_files import make_folder, write_whole
 from blockvis.results.folder import ResultsExist
+from blockvis.system.atomic_files import make_folder, write_whole
 
 from .forward import LEANING
 from .likelihood import ELSEWHERE, INDEPENDENT

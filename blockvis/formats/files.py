@@ -7,7 +7,7 @@ import hashlib
 import re
 from pathlib import Path
 
-from blockvis.suggestions import files_like
+from blockvis.text import files_like
 
 from . import FORMATS
 

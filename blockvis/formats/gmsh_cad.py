@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from blockvis.extras import install_command
 from blockvis.layout.layout import Layout
 from blockvis.layout.units import metres_per
+from blockvis.system.extras import install_command
 
 from . import gmsh_mesh
 from .bodies import Bodies, Body

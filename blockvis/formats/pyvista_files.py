@@ -475,7 +475,7 @@ def write(layout: AnyLayout, path: Path) -> None:
         surface.save(str(path))
     else:
         if path.suffix.lower() == ".vtu":
-            from blockvis.vtk_files import write_vtu
+            from blockvis.system.vtk_files import write_vtu
 
             write_vtu(grid, path)
             return

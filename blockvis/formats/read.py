@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.atomic_files import whole_file
 from blockvis.formats import FORMATS, Format
 from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
@@ -24,6 +23,7 @@ from blockvis.layout.selection import sorted_out
 from blockvis.layout.solid_layout import SolidLayout
 from blockvis.layout.units import chosen_unit, doubt, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
+from blockvis.system.atomic_files import whole_file
 
 from .bodies import Bodies, in_dimension
 from .cells import of_files

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import solver
-from blockvis.suggestions import nearest, refuse_unknown
+from blockvis.text import nearest, refuse_unknown
 
 from .arches import arch, basket_handle_arch, pointed_arch, segmental_arch
 from .corners import l_corner, t_corner, two_leaf_wall

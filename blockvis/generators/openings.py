@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.outlines import rectangle
-from blockvis.suggestions import refuse_unknown
+from blockvis.text import refuse_unknown
 
 from .arches import segmental_joints, voussoir_outlines
 from .dimensions import above_zero, at_least_zero, choice, finite, whole

@@ -6,7 +6,7 @@ import fnmatch
 from collections.abc import Mapping, Sequence
 
 import solver
-from blockvis.suggestions import by_similarity
+from blockvis.text import by_similarity
 
 from .layout import AnyLayout
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.suggestions import by_similarity
+from blockvis.text import by_similarity
 
 from .layout import Layout
 from .left_out import LeftOut, in_words, matches

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 import solver
-from blockvis.numbers import force_text
 from blockvis.results.about import loss_of
+from blockvis.text import force_text
 
 #: Warning on frames of a fall in real time.
 FALL_BADGE = "FALLING · real time"

@@ -15,9 +15,9 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image, ImageDraw
 
 import solver
-from blockvis.atomic_files import whole_file
 from blockvis.results.about import about, collapse_mechanism, counts_text
 from blockvis.results.reaction_range import ReactionRange
+from blockvis.system.atomic_files import whole_file
 
 from . import palette
 from .captions import (

@@ -11,10 +11,10 @@ import numpy as np
 from PIL import Image
 
 import solver
-from blockvis.fall import CAPTION, Fall, falling_increment
-from blockvis.numbers import force_text, rounded_length
+from blockvis.dynamics.fall import CAPTION, Fall, falling_increment
 from blockvis.results.cracks import cracks_of
 from blockvis.results.joints import faces_at, initial_joints
+from blockvis.text import force_text, rounded_length
 
 from . import palette
 from .annotations import (

@@ -16,12 +16,11 @@ from pathlib import Path
 from typing import Any
 
 import solver
-from blockvis.atomic_files import partial_of, remove
-from blockvis.broken_pipes import is_broken_pipe
-from blockvis.fall import Fall, fall_of
-from blockvis.processes import interpreter, unread
+from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.results.increments import StoredIncrements
 from blockvis.results.viewer_files import ViewerFiles
+from blockvis.system.atomic_files import partial_of, remove
+from blockvis.system.processes import interpreter, is_broken_pipe, unread
 
 from .video import find_encoder
 

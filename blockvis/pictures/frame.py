@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 import solver
-from blockvis.numbers import length_text, rounded_length
+from blockvis.text import length_text, rounded_length
 
 from . import palette
 

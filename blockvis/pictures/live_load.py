@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import solver
-from blockvis.numbers import force_text
+from blockvis.text import force_text
 
 #: Loads below this fraction of the largest are rounding.
 ROUNDING = 1e-5

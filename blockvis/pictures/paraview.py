@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from string import Template
 
-from blockvis.atomic_files import write_whole
+from blockvis.system.atomic_files import write_whole
 
 from . import palette
 from .solid_view import ABOVE, AROUND, View

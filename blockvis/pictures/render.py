@@ -11,9 +11,9 @@ import numpy as np
 from PIL import Image
 
 import solver
-from blockvis.atomic_files import whole_file
-from blockvis.fall import Fall, fall_of
+from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.results.about import loss_of
+from blockvis.system.atomic_files import whole_file
 
 from .drawer import Drawer, Look
 from .film import film_of

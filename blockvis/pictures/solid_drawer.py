@@ -14,9 +14,9 @@ from matplotlib.transforms import Affine2D
 from PIL import Image
 
 import solver
-from blockvis.fall import Fall
-from blockvis.numbers import force_text
+from blockvis.dynamics.fall import Fall
 from blockvis.results.joint_faces import initial_joints
+from blockvis.text import force_text
 
 from . import palette
 from .annotations import SMALLEST_RESULTANT, length_per_force

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 import solver
-from blockvis.atomic_files import whole_file
+from blockvis.system.atomic_files import whole_file
 
 from . import palette
 from .frame import Key, Sheet, framed, write_names

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from blockvis.atomic_files import whole_file
-from blockvis.video_suffixes import VIDEO_SUFFIXES
+from blockvis.results.folder import VIDEO_SUFFIXES
+from blockvis.system.atomic_files import whole_file
 
 #: What imageio's writer is given for each format. Quality of x264 is 0 lossless, 51 worst: line drawings show ringing
 #: from about 22 on. A gif has a palette per frame: one of the first frame lacks the colours of cracks that open later.

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 import solver
-from blockvis.fall import fall_of
-from blockvis.numbers import force_text
+from blockvis.dynamics.fall import fall_of
 from blockvis.pictures import palette
 from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.render import draw_mechanism
+from blockvis.text import force_text
 
 from .page import html_rows, report_html, summary_rows
 

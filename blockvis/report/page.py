@@ -17,9 +17,8 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 import solver
-from blockvis.atomic_files import write_whole
-from blockvis.fall import CAPTION, Fall, falling_increment
-from blockvis.numbers import force_text, rounded_length
+from blockvis.dynamics.fall import CAPTION, Fall, falling_increment
+from blockvis.kinds.kinds import KINDS
 from blockvis.pictures import palette
 from blockvis.pictures.annotations import (
     SMALLEST_RESULTANT,
@@ -50,9 +49,9 @@ from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_
 from blockvis.results.about import about, counts_text, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
-from blockvis.results.reaction_range import ReactionRange
-from blockvis.runs.kinds import KINDS
-from blockvis.runs.path_range import WORDS
+from blockvis.results.reaction_range import WORDS, ReactionRange
+from blockvis.system.atomic_files import write_whole
+from blockvis.text import force_text, rounded_length
 
 from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, hexadecimals, rounded
 from .space import model_in_space

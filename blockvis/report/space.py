@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 import solver
-from blockvis.numbers import force_text, rounded_length
 from blockvis.pictures import palette
 from blockvis.pictures.annotations import SMALLEST_RESULTANT, length_per_force, resultants
 from blockvis.pictures.frame import Frame, framed
@@ -18,6 +17,7 @@ from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import Swing
 from blockvis.results.joint_faces import InitialJoints, initial_joints
 from blockvis.results.joints import carried_faces
+from blockvis.text import force_text, rounded_length
 
 from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, hexadecimals, rounded
 

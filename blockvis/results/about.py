@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import solver
-from blockvis.numbers import force_text
+from blockvis.text import force_text
 
 from .increments import folder_of
 from .record import Record, read_record, versions

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import solver
-from blockvis.atomic_files import make_folder, write_whole
-from blockvis.fall import Fall, falling_increment
+from blockvis.dynamics.fall import Fall, falling_increment
+from blockvis.system.atomic_files import make_folder, write_whole
 
 from .npz import checked_arrays, compressed, flat, from_flat
 
@@ -27,7 +27,7 @@ def write_fall(fall: Fall, response: solver.Response, folder: Path) -> None:
     folder : Path
         Of the results.
     """
-    from blockvis.vtk_files import write_pvd, write_vtu
+    from blockvis.system.vtk_files import write_pvd, write_vtu
 
     from .datasets import add_arrays, block_grid
 

@@ -16,8 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 import solver
-from blockvis.atomic_files import PARTIAL, WINDOWS, flush, make_folder, remove, write_whole
-from blockvis.video_suffixes import VIDEO_SUFFIXES
+from blockvis.system.atomic_files import PARTIAL, WINDOWS, flush, make_folder, remove, write_whole
 
 from .cracks import MOST_LISTED, cracks_of
 from .increments import StoredIncrements, packed_increment
@@ -32,6 +31,9 @@ CHECKPOINT = "checkpoint.npz"
 
 #: What a run holds locked on Windows.
 LOCK = ".lock"
+
+#: Endings of the films that blockvis writes.
+VIDEO_SUFFIXES = (".mp4", ".gif", ".webp")
 
 #: Files that list or sum up others; what a run starts with; pictures of the results.
 STEP_CHECK, RANGE = "step_check.json", "range.csv"

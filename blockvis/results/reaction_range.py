@@ -16,6 +16,15 @@ from .folder import RANGE
 #: Columns of range.csv.
 COLUMNS = ("phase", "settlement", "reaction_low", "reaction_high", "runs")
 
+#: Part by which friction is taken less and more, and what compliance is multiplied with and divided by.
+FRICTION, COMPLIANCE = 0.05, 3.0
+
+#: What is varied, in words.
+WORDS = (
+    f"friction ± {100.0 * FRICTION:g} %, compliance × {COMPLIANCE:g} and ÷ {COMPLIANCE:g}, both together, imperfection "
+    "× 0 and × 2"
+)
+
 
 @dataclass(frozen=True)
 class ReactionRange:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 import solver
-from blockvis.vtk_files import is_whole, write_pvd, write_vtu
+from blockvis.system.vtk_files import is_whole, write_pvd, write_vtu
 
 from .joint_faces import InitialJoints, initial_joints
 
@@ -77,7 +77,7 @@ def write_lists(folder: Path, increments: Sequence[solver.Increment], *, durable
     folder : Path
     increments : sequence of solver.Increment
     durable : bool
-        As of :func:`blockvis.atomic_files.whole_file`.
+        As of :func:`blockvis.system.atomic_files.whole_file`.
     """
     times = output_times(increments)
     for kind in GRIDS:

@@ -16,10 +16,10 @@ import numpy as np
 import solver
 from blockvis.cases.build import case_assembly
 from blockvis.cases.contents import Case
-from blockvis.processes import interpreter, unread
+from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import stored_assembly
+from blockvis.system.processes import interpreter, unread
 
-from .kinds import KINDS
 from .plan import planned
 
 #: Increments at parameters no farther apart than this, as a fraction of the largest, are of the same place.

@@ -11,25 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from blockvis.atomic_files import write_whole
 from blockvis.cases.contents import Case
-from blockvis.numbers import force_text
-from blockvis.processes import cores
 from blockvis.results.folder import RANGE, add_to_summary
-from blockvis.results.reaction_range import ReactionRange
+from blockvis.results.reaction_range import COMPLIANCE, FRICTION, WORDS, ReactionRange
+from blockvis.system.atomic_files import write_whole
+from blockvis.system.processes import cores
+from blockvis.text import force_text
 
 from .once_more import OnceMore, Traced, takes_steps, traced
 from .reopen import open_results
 from .step_check import LOOK, stored_case
-
-#: Part by which friction is taken less and more, and what compliance is multiplied with and divided by.
-FRICTION, COMPLIANCE = 0.05, 3.0
-
-#: What is varied, in words.
-WORDS = (
-    f"friction ± {100.0 * FRICTION:g} %, compliance × {COMPLIANCE:g} and ÷ {COMPLIANCE:g}, both together, imperfection "
-    "× 0 and × 2"
-)
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,8 @@ from typing import Any
 import solver
 from blockvis.cases.build import case_interfaces, case_loads, case_settlements
 from blockvis.cases.contents import Case
-
-from .kind import AnalysisRun, RunInput
-from .kinds import KINDS
+from blockvis.kinds.kind import AnalysisRun, RunInput
+from blockvis.kinds.kinds import KINDS
 
 
 def planned(

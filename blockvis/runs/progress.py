@@ -10,9 +10,8 @@ from typing import TextIO
 import numpy as np
 
 import solver
-from blockvis.fall import LONGEST
-
-from .kind import Course
+from blockvis.dynamics.fall import LONGEST
+from blockvis.kinds.kind import Course
 
 #: Seconds between two redrawings of the bar.
 REDRAW = 0.1

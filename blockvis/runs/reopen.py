@@ -6,12 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import solver
+from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_interfaces, case_loads
-from blockvis.cases.case import parse_case
 from blockvis.cases.loads import with_moving_load
+from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import stored_case, stored_response
-
-from .kinds import KINDS
 
 
 def open_results(folder: str | Path) -> solver.Response:

@@ -15,18 +15,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import solver
-from blockvis.atomic_files import PARTIAL
+from blockvis.case_files.read import Case, parse_case, read_case
 from blockvis.cases.build import case_assembly
-from blockvis.cases.case import Case, parse_case, read_case
-from blockvis.fall import Fall, fall_of
+from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.formats.files import checksum_of_files
+from blockvis.kinds.kind import AnalysisRun
+from blockvis.kinds.kinds import KINDS
 from blockvis.results.fall_files import remove_fall, stored_fall, write_fall
 from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
 from blockvis.results.viewer_files import restore_grids
+from blockvis.system.atomic_files import PARTIAL
 
-from .kind import AnalysisRun
-from .kinds import KINDS
 from .plan import planned
 from .progress import DrawingProgress, Progress
 from .reopen import open_results

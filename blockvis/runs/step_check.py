@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 import solver
-from blockvis.atomic_files import write_whole
-from blockvis.cases.case import parse_case
+from blockvis.case_files.read import parse_case
 from blockvis.cases.contents import Case
 from blockvis.results.folder import STEP_CHECK, add_to_summary
 from blockvis.results.record import read_record
+from blockvis.system.atomic_files import write_whole
 
 from .once_more import LINEAR_PROGRAM, OnceMore, Traced, followed, takes_steps, traced
 from .reopen import open_results

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import solver
+from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import ResultsFolder
 from blockvis.results.increments import folder_of
-
-from .kinds import KINDS
 
 
 def write(response: solver.Response, folder: str | Path, *, overwrite: bool = False) -> Path:

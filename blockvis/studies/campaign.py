@@ -16,9 +16,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from blockvis.extras import require
-from blockvis.processes import cores
 from blockvis.runs.progress import StudyProgress
+from blockvis.system.extras import require
+from blockvis.system.processes import cores
 
 from .run_one import failed_row, run_once
 from .study_file import Study, read_study
@@ -139,7 +139,7 @@ def run_study(
             with local_cluster(min(workers or cores(), len(todo))) as client:
                 carry_out(records, todo, client, progress)
     else:
-        from blockvis.cases.case import case_of
+        from blockvis.case_files.read import case_of
 
         # The folder is not changed unless the scheduler answers.
         file = case_of(plan.values, plan.case_source).file
@@ -165,7 +165,7 @@ def _keep(records: StudyFolder, run: int) -> None:
     """Write the results folder of a run, repeated on this machine from a case file with the values of the run."""
     import tomli_w
 
-    from blockvis.cases.case import parse_case
+    from blockvis.case_files.read import parse_case
     from blockvis.runs.run import run_case
 
     folder = records.folder / "results" / f"run_{run:06d}"

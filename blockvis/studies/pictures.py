@@ -14,9 +14,9 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 import solver
-from blockvis.atomic_files import whole_file
 from blockvis.pictures import palette
 from blockvis.results.about import LOCAL
+from blockvis.system.atomic_files import whole_file
 
 from .fragility import Fragility, fragility_of
 from .sensitivity import first_order, outcome, swings

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 import solver
+from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly, case_interfaces, case_loads, case_settlements
-from blockvis.cases.case import Case, case_of
+from blockvis.cases.contents import Case
 from blockvis.pictures.annotations import settlement_arrows
 from blockvis.pictures.solid_marks import settlement_arrows_in_space
 from blockvis.pictures.solid_view import ABOVE, AROUND, View

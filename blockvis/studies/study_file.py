@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from blockvis.case_files.read import case_of, read_case
 from blockvis.cases.build import case_assembly
-from blockvis.cases.case import case_of, read_case
 from blockvis.cases.distributions import Distribution, read_distribution
 from blockvis.cases.imperfections import read_imperfection
 from blockvis.cases.toml_table import is_number
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats.files import checksum_of_files
-from blockvis.runs.kinds import KINDS
-from blockvis.suggestions import nearest, refuse_unknown
+from blockvis.kinds.kinds import KINDS
+from blockvis.text import nearest, refuse_unknown
 
 from .sampling import METHODS, Design, designed
 from .study_keys import COMMON_KEYS, LIST_KEYS, SECTIONS, STUDY

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import solver
-from blockvis.atomic_files import flush, make_folder, whole_file, write_whole
 from blockvis.results.npz import compressed
+from blockvis.system.atomic_files import flush, make_folder, whole_file, write_whole
 
 from .run_one import FAILED
 from .study_file import RESERVED, Study

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from blockvis.cases.case_keys import DISTRIBUTION_KEYS, IMPERFECTION_KEYS
+from blockvis.case_files.case_keys import DISTRIBUTION_KEYS, IMPERFECTION_KEYS
 from blockvis.cases.key import NUMBERS, POSITIVE, TEXT, TEXTS, Key, Section, ValueKind, one_of, whole
 
 from .sampling import METHODS

@@ -15,7 +15,7 @@ from PIL import Image
 import blockvis
 import solver
 from blockvis import generators
-from blockvis.fall import fall_of
+from blockvis.dynamics.fall import fall_of
 
 arch = generators.arch(thickness_ratio=0.15, voussoirs=12)
 spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)

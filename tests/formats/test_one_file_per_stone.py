@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 import blockvis
+from blockvis.case_files.read import read_case
 from blockvis.cases.build import case_assembly
-from blockvis.cases.case import read_case
 from blockvis.cli import main
 from blockvis.formats.files import checksum_of_files, files_of
 from blockvis.formats.read import read, read_layout

@@ -63,7 +63,7 @@ def test_pvd_gives_its_first_time(tmp_path):
 def test_results_are_layouts_too(tmp_path):
     import solver
     from blockvis.results.datasets import block_dataset
-    from blockvis.vtk_files import write_vtu
+    from blockvis.system.vtk_files import write_vtu
 
     wall = solver.Assembly.from_outlines(
         [[[0, 0], [1, 0], [1, 1], [0, 1]], [[1, 0], [2, 0], [2, 1], [1, 1]]],

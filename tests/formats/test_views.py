@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from blockvis.case_files.read import read_case
 from blockvis.cases.build import case_assembly
-from blockvis.cases.case import read_case
 from blockvis.cli import main
 from blockvis.formats.read import read, read_layout
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly, case_interfaces, case_loads
-from blockvis.cases.case import parse_case
 from blockvis.cli import main
 
 ROOT = Path(__file__).parents[2]

@@ -7,8 +7,8 @@ import pytest
 
 import solver
 from blockvis import generators
+from blockvis.case_files.read import read_case
 from blockvis.cases.build import case_assembly, case_interfaces
-from blockvis.cases.case import read_case
 
 FACADE = Path(__file__).parents[2] / "examples" / "facade.toml"
 

@@ -12,7 +12,7 @@ from structures import equal_certificates
 import blockvis
 import solver
 from blockvis import generators
-from blockvis.cases.case import parse_case
+from blockvis.case_files.read import parse_case
 from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of

@@ -12,7 +12,7 @@ from structures import arch_response
 from blockvis.pictures.paraview import write_paraview_macro
 from blockvis.results.datasets import block_dataset, contact_dataset, joint_dataset
 from blockvis.results.viewer_files import output_times
-from blockvis.vtk_files import write_pvd, write_vtu
+from blockvis.system.vtk_files import write_pvd, write_vtu
 
 PVPYTHON, XVFB = shutil.which("pvpython"), shutil.which("xvfb-run")
 

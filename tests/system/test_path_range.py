@@ -14,7 +14,7 @@ from test_step_check import CASE, LIMIT_LOAD, SHORT, run_here
 
 import blockvis
 import solver
-from blockvis.cases.case import parse_case
+from blockvis.case_files.read import parse_case
 from blockvis.cli import _say_range, main
 from blockvis.pictures.curves import _draw
 from blockvis.report.page import report_html

@@ -17,7 +17,7 @@ from test_report import browser, visited
 
 import blockvis
 import solver
-from blockvis.fall import fall_of
+from blockvis.dynamics.fall import fall_of
 from blockvis.pictures import palette
 from blockvis.pictures.swing import swing_of
 from blockvis.report.page import report_html, write_report

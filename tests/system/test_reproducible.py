@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blockvis.cases.case import parse_case
+from blockvis.case_files.read import parse_case
 from blockvis.cli import main
 
 CASE = """

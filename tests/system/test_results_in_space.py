@@ -32,7 +32,7 @@ from blockvis.pictures.swing import swing_of
 from blockvis.report.page import write_report
 from blockvis.results.datasets import block_dataset, contact_dataset, joint_dataset
 from blockvis.results.joints import initial_joints, joint_states
-from blockvis.vtk_files import write_vtu
+from blockvis.system.vtk_files import write_vtu
 
 SMALL = (640, 360)
 

@@ -13,7 +13,7 @@ import pytest
 
 import blockvis
 import solver
-from blockvis.cases.case import parse_case
+from blockvis.case_files.read import parse_case
 from blockvis.cli import _say_error, _write_report, main
 from blockvis.report.page import add_error, write_report
 from blockvis.runs import step_check

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from structures import BENT, arch_response, dropped_brick, parted, wall
 
 import solver
-from blockvis.numbers import rounded_length
 from blockvis.pictures import annotations as marks
 from blockvis.pictures.annotations import part_outlines
 from blockvis.pictures.hatching import hatch_lines
 from blockvis.results.joints import initial_joints
+from blockvis.text import rounded_length
 
 
 def stacked(shift=(0.0, 0.0), turn=0.0):

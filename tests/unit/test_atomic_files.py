@@ -13,10 +13,10 @@ from structures import arch_response
 import blockvis
 import solver
 from blockvis import generators
-from blockvis.atomic_files import PARTIAL, whole_file, write_whole
 from blockvis.results.folder import ResultsFolder
 from blockvis.results.record import Record
-from blockvis.vtk_files import write_pvd
+from blockvis.system.atomic_files import PARTIAL, whole_file, write_whole
+from blockvis.system.vtk_files import write_pvd
 
 ROOT = Path(__file__).parents[2]
 
@@ -168,14 +168,14 @@ def test_there_is_one_way_to_write_a_file():
         *(f"blockvis/formats/{name}.py" for name in ("compas_json", "gmsh_mesh", "layout_json", "solids", "svg")),
         # The case of one run of a study, which is made anew each time.
         "blockvis/studies/campaign.py",
-        "blockvis/atomic_files.py",
+        "blockvis/system/atomic_files.py",
     }
     assert {name for name, calls in found.items() if calls} == allowed
 
 
 def test_a_list_of_files_is_flushed_with_what_follows(tmp_path, monkeypatch):
     flushed = []
-    monkeypatch.setattr("blockvis.atomic_files.flush", flushed.append)
+    monkeypatch.setattr("blockvis.system.atomic_files.flush", flushed.append)
     write_pvd(tmp_path / "a.pvd", [(0.0, "a.vtu")], last=False)
     write_pvd(tmp_path / "b.pvd", [(0.0, "b.vtu")])
     assert flushed == [tmp_path / ".a.part.pvd", tmp_path / ".b.part.pvd", tmp_path]

@@ -7,10 +7,11 @@ from typing import Any
 import pytest
 
 import solver
-from blockvis.cases import case_keys, imperfections
-from blockvis.cases.case import case_of
+from blockvis.case_files import case_keys
+from blockvis.case_files.read import case_of
+from blockvis.cases import imperfections
 from blockvis.cases.toml_table import Table
-from blockvis.runs.kinds import KINDS
+from blockvis.kinds.kinds import KINDS
 from blockvis.studies import study_keys
 from blockvis.studies.study_file import read_study
 

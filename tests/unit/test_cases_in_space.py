@@ -7,8 +7,8 @@ import pytest
 
 import solver
 from blockvis import generators
+from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly, case_loads
-from blockvis.cases.case import parse_case
 from blockvis.cli import main
 from blockvis.formats.read import save_layout, write_layout
 from blockvis.layout.assemble import assemble

@@ -10,7 +10,7 @@ from structures import BENT, arch_response, parted, wall
 import solver
 from blockvis.results.datasets import block_dataset, contact_dataset
 from blockvis.results.viewer_files import output_times
-from blockvis.vtk_files import write_pvd, write_vtu
+from blockvis.system.vtk_files import write_pvd, write_vtu
 
 
 def test_every_block_is_one_polygon_bent_ones_too():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import solver
+from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly
-from blockvis.cases.case import parse_case
 from blockvis.formats.read import read_layout, write_layout
 from blockvis.layout.layout import Layout
 from blockvis.layout.units import doubt

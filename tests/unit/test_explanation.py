@@ -10,7 +10,7 @@ import structures
 
 import solver
 from blockvis import generators
-from blockvis.cases.case import parse_case
+from blockvis.case_files.read import parse_case
 from blockvis.cases.explain_settings import ExplainSettings
 from blockvis.explanation.candidates import (
     candidates_of,

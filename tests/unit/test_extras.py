@@ -11,7 +11,7 @@ import pytest
 
 import blockvis
 from blockvis.cli import main
-from blockvis.extras import EXTRAS, MissingExtra, require
+from blockvis.system.extras import EXTRAS, MissingExtra, require
 
 ROOT = Path(__file__).parents[2]
 

@@ -14,9 +14,9 @@ from structures import parted, wall
 
 import blockvis
 import solver
-from blockvis import fall as fall_module
 from blockvis.cli import main
-from blockvis.fall import CAPTION, Fall, fall_of
+from blockvis.dynamics import fall as fall_module
+from blockvis.dynamics.fall import CAPTION, Fall, fall_of
 from blockvis.report.page import report_html
 from blockvis.results.fall_files import stored_fall, write_fall
 

@@ -6,8 +6,8 @@ import shapely
 
 import solver
 from blockvis import generators
+from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly, case_interfaces
-from blockvis.cases.case import parse_case
 from blockvis.cases.imperfections import Imperfection, imperfect, moved_corners, read_imperfection
 
 WINDOW = {"x": 1.0, "y": 0.6, "width": 1.0, "height": 0.6, "head": "segmental arch", "voussoirs": 9}

@@ -12,45 +12,29 @@ from blockvis.formats import FORMATS
 
 ROOT = Path(__file__).parents[2]
 
-#: The rooms of both packages, highest first: a room imports itself and rooms below it. A module belongs to the longest
-#: name that it starts with. The kinds of analysis read their own keys of a case file and lie below its reader.
-#: Shapes and how they touch lie below the assembly; what plans and
-#: solves a case lies below the pictures, the run that draws what came out above them.
+#: The rooms of both packages, highest first, each named once: a room imports itself and rooms below it. The kinds of
+#: analysis read their own keys of a case file and lie below its reader; a run draws what came out and lies above the
+#: pictures and the report.
 ORDER = (
     "blockvis.__main__",
     "blockvis.cli",
-    "blockvis.reference",
     "blockvis.explanation",
     "blockvis.studies",
-    "blockvis.runs.run",
+    "blockvis.runs",
     "blockvis.views",
     "blockvis.report",
     "blockvis.pyvista_plugin",
     "blockvis.pictures",
-    "blockvis.runs",
-    "blockvis.cases.case",
-    "blockvis.cases.new_case",
-    "blockvis.cases.case_keys",
-    "blockvis.runs.kinds",
-    "blockvis.runs.pushover",
-    "blockvis.runs.limit_load",
-    "blockvis.runs.settlement",
-    "blockvis.runs.kind",
+    "blockvis.case_files",
+    "blockvis.kinds",
     "blockvis.results",
-    "blockvis.fall",
+    "blockvis.dynamics",
     "blockvis.cases",
     "blockvis.generators",
     "blockvis.formats",
     "blockvis.layout",
-    "blockvis.suggestions",
-    "blockvis.video_suffixes",
-    "blockvis.extras",
-    "blockvis.numbers",
-    "blockvis.toml_text",
-    "blockvis.vtk_files",
-    "blockvis.processes",
-    "blockvis.broken_pipes",
-    "blockvis.atomic_files",
+    "blockvis.text",
+    "blockvis.system",
     "solver",
     "solver.structure",
     "solver.analysis",
@@ -77,6 +61,8 @@ APART = (
     ("blockvis.results", "blockvis.formats"),
     ("blockvis.results", "blockvis.generators"),
     ("blockvis.pictures", "blockvis.cases"),
+    ("blockvis.pictures", "blockvis.case_files"),
+    ("blockvis.pictures", "blockvis.kinds"),
     ("blockvis.pictures", "blockvis.formats"),
     ("blockvis.pictures", "blockvis.runs"),
     ("blockvis.report", "blockvis.cases"),

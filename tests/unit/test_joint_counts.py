@@ -15,12 +15,12 @@ from structures import arch_response
 import blockvis
 import solver
 from blockvis import generators
+from blockvis.kinds.kinds import KINDS
 from blockvis.pictures import annotations
 from blockvis.pictures.curves import events_of
 from blockvis.pictures.swing import swing_of
 from blockvis.report.page import report_html, summary_rows
 from blockvis.results.joints import initial_joints
-from blockvis.runs.kinds import KINDS
 
 SINKS = (0.0, -1.0)
 

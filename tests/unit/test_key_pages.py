@@ -6,12 +6,12 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from key_reference import case_page, study_page
 
-from blockvis.cases import case_keys
+from blockvis.case_files import case_keys
 from blockvis.cases.toml_table import is_number
 from blockvis.generators import LAYOUTS, parameters_of
 from blockvis.generators.catalogue import described
-from blockvis.reference.pages import case_page, study_page
 from blockvis.studies import study_keys
 
 ROOT = Path(__file__).parents[2]

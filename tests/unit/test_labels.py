@@ -11,7 +11,7 @@ from structures import arch_response, parted, wall
 
 import solver
 from blockvis import generators
-from blockvis.fall import fall_of
+from blockvis.dynamics.fall import fall_of
 from blockvis.pictures import palette
 from blockvis.pictures.captions import FAILED_BADGE, FALL_BADGE
 from blockvis.pictures.drawer import Drawer, Look

@@ -11,12 +11,12 @@ from structures import arch_response, dropped_brick
 
 import blockvis
 import solver
+from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.captions import lost_text
 from blockvis.pictures.curves import draw_curve
 from blockvis.report.page import report_html
 from blockvis.results.about import LOCAL, loss_of
 from blockvis.results.datasets import block_dataset
-from blockvis.runs.kinds import KINDS
 
 
 def test_a_brick_that_drops_is_a_local_loss():

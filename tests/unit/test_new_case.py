@@ -11,8 +11,8 @@ import ezdxf
 import pytest
 
 from blockvis import generators, read, save_layout
-from blockvis.cases.case import read_case
-from blockvis.cases.new_case import relative_to
+from blockvis.case_files.new_case import relative_to
+from blockvis.case_files.read import read_case
 from blockvis.cli import main
 
 ROOT = Path(__file__).parents[2]

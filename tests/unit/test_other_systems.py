@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from blockvis import atomic_files, broken_pipes, generators, read_case, save_layout
+from blockvis import generators, read_case, save_layout
 from blockvis.cli import main
 from blockvis.results import folder as results_folder
 from blockvis.results.folder import ResultsExist, ResultsFolder
+from blockvis.system import atomic_files, processes
 
 CASE = '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\n'
 
@@ -20,7 +21,7 @@ CASE = '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\n'
 @pytest.fixture
 def windows(monkeypatch):
     """The branches for Windows, with its refusal to flush what is open for reading only."""
-    for module in (atomic_files, results_folder, broken_pipes):
+    for module in (atomic_files, results_folder, processes):
         monkeypatch.setattr(module, "WINDOWS", True)
     opened, fsync = os.open, os.fsync
     modes = {}
@@ -124,9 +125,9 @@ def test_macos_flushes_the_memory_of_the_disk_too(tmp_path, monkeypatch):
 
 
 def test_a_pipe_that_nobody_reads_is_no_error_of_the_input(windows):
-    assert broken_pipes.is_broken_pipe(OSError(errno.EINVAL, "Invalid argument"))
-    assert not broken_pipes.is_broken_pipe(OSError(errno.EINVAL, "Invalid argument", "a file"))
-    assert not broken_pipes.is_broken_pipe(OSError(errno.ENOSPC, "No space left"))
+    assert processes.is_broken_pipe(OSError(errno.EINVAL, "Invalid argument"))
+    assert not processes.is_broken_pipe(OSError(errno.EINVAL, "Invalid argument", "a file"))
+    assert not processes.is_broken_pipe(OSError(errno.ENOSPC, "No space left"))
 
 
 @pytest.mark.parametrize("ending", ["\n", "\r\n"])

@@ -9,8 +9,8 @@ import structures
 import blockvis
 import solver
 from blockvis import cli
+from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly, case_settlements
-from blockvis.cases.case import parse_case
 from blockvis.cases.profiles import Profile
 
 NO_FALL = solver.Controls(falling_frames=0)

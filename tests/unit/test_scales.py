@@ -8,8 +8,8 @@ import pytest
 
 import solver
 from blockvis import generators
+from blockvis.case_files.read import read_case
 from blockvis.cases.build import case_assembly
-from blockvis.cases.case import read_case
 
 #: A national grid: coordinates of five thousand kilometres are rounded to a nanometre.
 GRID = np.array([5e5, 5e6])

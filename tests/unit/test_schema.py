@@ -7,15 +7,16 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from blockvis.case_files.schema import case_schema
 from blockvis.cli import main
-from blockvis.reference.schema import SCHEMAS
+from blockvis.studies.study_schema import study_schema
 
 ROOT = Path(__file__).parents[2]
 CASES = [*sorted((ROOT / "examples").glob("*.toml")), *sorted((ROOT / "tests" / "regression").glob("*.toml"))]
 STUDIES = sorted((ROOT / "examples" / "studies").glob("*.toml"))
 
-CASE = jsonschema.Draft7Validator(SCHEMAS["case"]())
-STUDY = jsonschema.Draft7Validator(SCHEMAS["study"]())
+CASE = jsonschema.Draft7Validator(case_schema())
+STUDY = jsonschema.Draft7Validator(study_schema())
 
 
 def _with(**changes):
@@ -98,6 +99,6 @@ def test_the_command_prints_the_schema(file, capsys):
 
 
 def test_descriptions_have_meaning_and_unit():
-    density = SCHEMAS["case"]()["properties"]["material"]["properties"]["density"]
+    density = case_schema()["properties"]["material"]["properties"]["density"]
     assert density["default"] == 2000.0
     assert "[kg/m³]" in density["description"]

@@ -4,8 +4,8 @@ import ezdxf
 import numpy as np
 import pytest
 
+from blockvis.case_files.read import parse_case, read_case
 from blockvis.cases.build import case_assembly
-from blockvis.cases.case import parse_case, read_case
 from blockvis.cli import main
 from blockvis.formats.read import inspect, read, read_layout
 from blockvis.layout.layout import Layout

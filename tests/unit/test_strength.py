@@ -7,7 +7,7 @@ import pytest
 
 import solver
 from blockvis import generators
-from blockvis.cases.case import parse_case
+from blockvis.case_files.read import parse_case
 from blockvis.cli import main
 
 WIDTH, HEIGHT, THICKNESS = 0.8, 0.5, 0.3

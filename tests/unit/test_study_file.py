@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import blockvis
-from blockvis.cases.case import case_of
+from blockvis.case_files.read import case_of
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.cli import main
 from blockvis.studies import campaign

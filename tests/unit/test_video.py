@@ -12,7 +12,7 @@ from PIL import Image
 
 from blockvis.pictures import video
 from blockvis.pictures.video import write_film
-from blockvis.video_suffixes import VIDEO_SUFFIXES
+from blockvis.results.folder import VIDEO_SUFFIXES
 
 SIZE = (128, 72)
 

@@ -9,8 +9,8 @@ from scipy.spatial import ConvexHull, Voronoi, cKDTree
 
 import solver
 from blockvis import generators
+from blockvis.case_files.read import read_case
 from blockvis.cases.build import case_assembly
-from blockvis.cases.case import read_case
 from blockvis.layout.solids import extruded
 from solver.kinematics import Pose, moved, moved_vertices, rotation_matrices
 

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import solver
-
-from .extras import is_installed
-from .layout.triangulation import cells_of_ring
+from blockvis.layout.triangulation import cells_of_ring
+from blockvis.system.extras import is_installed
 
 if TYPE_CHECKING:
     import pymunk

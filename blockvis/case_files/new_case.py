@@ -12,14 +12,12 @@ from typing import Any
 import numpy as np
 
 import solver
+from blockvis.case_files import case_keys
+from blockvis.cases.build import DENSITY
+from blockvis.cases.key import Key, Section
 from blockvis.layout.inspect import Inspection
 from blockvis.layout.inspect_solids import SolidInspection
-from blockvis.numbers import rounded_length
-from blockvis.toml_text import as_key, as_toml
-
-from . import case_keys
-from .build import DENSITY
-from .key import Key, Section
+from blockvis.text import as_key, as_toml, rounded_length
 
 #: The first increment, and the limit, as fractions of the median block: steps pass over nothing that a block's movement
 #: changes, and most structures have fallen, or shown that they do not, when a support has moved by a block.

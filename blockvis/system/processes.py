@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import signal
 import subprocess
@@ -10,7 +11,7 @@ import sys
 import threading
 from collections.abc import Iterator
 
-from .broken_pipes import is_broken_pipe
+from .atomic_files import WINDOWS
 
 
 def interpreter(module: str) -> subprocess.Popen[bytes]:
@@ -36,6 +37,13 @@ def _deaf() -> Iterator[None]:
     finally:
         # None where a program around Python has set what happens.
         signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+
+
+def is_broken_pipe(error: OSError) -> bool:
+    """Whether an error says that nobody reads what is written; Windows calls it an invalid argument of no file."""
+    if isinstance(error, BrokenPipeError):
+        return True
+    return WINDOWS and error.errno == errno.EINVAL and error.filename is None
 
 
 @contextlib.contextmanager

@@ -35,7 +35,7 @@ def write_vtu(
     path : path
         Its folder is made if it does not exist.
     last, durable : bool
-        As of :func:`blockvis.atomic_files.whole_file`.
+        As of :func:`blockvis.system.atomic_files.whole_file`.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def write_pvd(
     entries : iterable of (time, file)
         Files as given, relative to the folder of ``path``.
     last, durable : bool
-        As of :func:`blockvis.atomic_files.whole_file`.
+        As of :func:`blockvis.system.atomic_files.whole_file`.
 
     Returns
     -------

@@ -6,18 +6,11 @@ import re
 from dataclasses import replace
 
 import solver
-from blockvis.generators import LAYOUTS
-from blockvis.layout.joints.close import WAYS
-from blockvis.layout.units import UNITS
-from blockvis.layout.views import VIEWS
-from blockvis.runs.kinds import KINDS
-from blockvis.video_suffixes import VIDEO_SUFFIXES
-
-from .build import DENSITY, THICKNESS
-from .distributions import KINDS as DISTRIBUTIONS
-from .explain_settings import DIRECTIONS, ExplainSettings
-from .imperfections import IMPERFECTIONS
-from .key import (
+from blockvis.cases.build import DENSITY, THICKNESS
+from blockvis.cases.distributions import KINDS as DISTRIBUTIONS
+from blockvis.cases.explain_settings import DIRECTIONS, ExplainSettings
+from blockvis.cases.imperfections import IMPERFECTIONS
+from blockvis.cases.key import (
     FRACTION,
     NOT_NEGATIVE,
     NUMBER,
@@ -37,6 +30,12 @@ from .key import (
     one_of,
     whole,
 )
+from blockvis.generators import LAYOUTS
+from blockvis.kinds.kinds import KINDS
+from blockvis.layout.joints.close import WAYS
+from blockvis.layout.units import UNITS
+from blockvis.layout.views import VIEWS
+from blockvis.results.folder import VIDEO_SUFFIXES
 
 _FRICTION = solver.InterfaceLaw.friction_coefficient
 _CONTROLS = solver.Controls()

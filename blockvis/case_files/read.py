@@ -12,21 +12,21 @@ import numpy as np
 
 import solver
 from blockvis import generators
+from blockvis.cases.contents import Case
+from blockvis.cases.explain_settings import read_explain
+from blockvis.cases.imperfections import Imperfection, read_imperfection
+from blockvis.cases.loads import LoadCase
+from blockvis.cases.profiles import Profile, read_profile
+from blockvis.cases.toml_table import Table, is_number, shortened, toml_value
+from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats import FORMATS
+from blockvis.kinds.kinds import KINDS
 from blockvis.layout.joints.close import WAYS
 from blockvis.layout.views import VIEWS
-from blockvis.runs.kinds import KINDS
-from blockvis.suggestions import files_like
-from blockvis.video_suffixes import VIDEO_SUFFIXES
+from blockvis.results.folder import VIDEO_SUFFIXES
+from blockvis.text import files_like
 
 from .case_keys import MOST_STEPS
-from .contents import Case
-from .explain_settings import read_explain
-from .imperfections import Imperfection, read_imperfection
-from .loads import LoadCase
-from .profiles import Profile, read_profile
-from .toml_table import Table, is_number, shortened, toml_value
-from .value_paths import parse_path, put
 
 
 def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:

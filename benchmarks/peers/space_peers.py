@@ -1,6 +1,6 @@
 """Blocks in space beside other tools, in one run: the same stones, the same machine, one table.
 
-    python benchmarks/space_peers.py [--quick] [--questions 1 2 3] [--seconds 300] [--speeds 0.02]
+    python benchmarks/peers/space_peers.py [--quick] [--questions 1 2 3] [--seconds 300] [--speeds 0.02]
 
 Peers are whatever is installed of compas_cra, compas_lmgc90 and mujoco, as for ``peers.py``; seconds are processor
 time.

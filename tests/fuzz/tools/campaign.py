@@ -1,4 +1,4 @@
-"""Thousands of random structures before the oracle: ``python tools/fuzz/campaign.py --count 1000 --seed 0``.
+"""Thousands of random structures before the oracle: ``python tests/fuzz/tools/campaign.py --count 1000 --seed 0``.
 
 Prints a line per trial that went wrong, and a table at the end; exits with 1 if anything went wrong. A single trial
 again: ``--kind voronoi --seed 17 --count 1``.

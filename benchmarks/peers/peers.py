@@ -1,11 +1,11 @@
 """blockvis beside other tools, in one run: the same blocks, the same machine, one table.
 
-    python benchmarks/peers.py [--quick] [--questions 1 2 3] [--seconds 300]
+    python benchmarks/peers/peers.py [--quick] [--questions 1 2 3] [--seconds 300]
 
 Peers are whatever is installed of compas_cra, compas_lmgc90, mujoco and pymunk; the rest is printed as "not installed":
 
     python -m venv peers && peers/bin/pip install . compas_cra compas_lmgc90 "mujoco!=4.0.0" pymunk
-    peers/bin/python benchmarks/peers.py
+    peers/bin/python benchmarks/peers/peers.py
 
 (The notes of mujoco 4.0.1 name an error in the sparse solver of 4.0.0.) Seconds are processor time, imports left out;
 compare them within one run only. ``--quick`` runs blockvis alone; ``--seconds`` is the processor time after which a run

@@ -1,17 +1,16 @@
-"""JSON schemas of case and study files, with which editors complete and check TOML."""
+"""JSON schemas of case files and their tables, with which editors complete and check TOML."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from blockvis.cases import case_keys
+from blockvis.case_files import case_keys
 from blockvis.cases.distributions import CUT_OFF, KINDS
 from blockvis.cases.key import Key, Section
 from blockvis.generators import LAYOUTS
 from blockvis.generators.catalogue import described
-from blockvis.studies import study_keys
 
 #: The draft of JSON schema that editors of TOML read.
 DRAFT = "http://json-schema.org/draft-07/schema#"
@@ -28,44 +27,11 @@ def case_schema() -> dict[str, Any]:
     dict
         What the file's keys and the kinds of their values are; whether they fit together, the run says.
     """
-    return {"$schema": DRAFT, "title": "blockvis case file"} | _case()
+    return {"$schema": DRAFT, "title": "blockvis case file"} | case_values()
 
 
-def study_schema() -> dict[str, Any]:
-    """Make the JSON schema of the study file."""
-    study, parameter, imperfections = study_keys.SECTIONS
-    head = _table(study)
-    head["properties"]["case"] = {
-        "anyOf": [{"type": "string"}, _case()],
-        "description": head["properties"]["case"]["description"],
-    }
-    varied = _table(parameter)
-    varied["allOf"] = [
-        {"anyOf": [{"required": ["values"]}, {"required": ["distribution"]}]},
-        *_distributions(also=_without_distribution(parameter)),
-    ]
-    return {
-        "$schema": DRAFT,
-        "title": "blockvis study file",
-        "type": "object",
-        "properties": {
-            "study": head,
-            "parameters": {
-                "type": "object",
-                "description": parameter.meaning,
-                "additionalProperties": {"anyOf": [{"type": "array", "minItems": 1}, varied]},
-            },
-            "imperfections": _one_or_several(imperfections, _scattered(imperfections)),
-        },
-        "required": ["study"],
-        "additionalProperties": False,
-    }
-
-
-SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {"case": case_schema, "study": study_schema}
-
-
-def _case() -> dict[str, Any]:
+def case_values() -> dict[str, Any]:
+    """Make the schema of the tables of a case, as a case file has them, or a study within it."""
     tables: dict[str, Any] = {}
     for section in case_keys.SECTIONS:
         name, _, rest = section.name.partition(".")
@@ -73,14 +39,14 @@ def _case() -> dict[str, Any]:
             tables[name] = {
                 "type": "object",
                 "description": section.meaning,
-                "additionalProperties": _table(section),
+                "additionalProperties": table_schema(section),
             }
         elif rest:
-            tables[name]["properties"][rest] = _table(section)
+            tables[name]["properties"][rest] = table_schema(section)
         elif section is case_keys.IMPERFECTIONS_SECTION:
-            tables[name] = _one_or_several(section, _scattered(section))
+            tables[name] = one_or_several(section, scattered(section))
         else:
-            tables[name] = _one_or_several(section, _table(section))
+            tables[name] = one_or_several(section, table_schema(section))
     tables["geometry"] |= {
         "oneOf": [{"required": ["file"], "not": {"required": ["parameters"]}}, {"required": ["layout"]}],
         "allOf": [_parameters(layout) for layout in LAYOUTS],
@@ -93,7 +59,8 @@ def _case() -> dict[str, Any]:
     }
 
 
-def _table(section: Section) -> dict[str, Any]:
+def table_schema(section: Section) -> dict[str, Any]:
+    """Make the schema of one table."""
     table: dict[str, Any] = {"type": "object", "description": section.meaning}
     if section.names is not None:
         return table | {"additionalProperties": dict(section.names.schema)}
@@ -112,23 +79,25 @@ def _value(key: Key) -> dict[str, Any]:
     return value
 
 
-def _one_or_several(section: Section, table: Mapping[str, Any]) -> dict[str, Any]:
+def one_or_several(section: Section, table: Mapping[str, Any]) -> dict[str, Any]:
+    """Let a table be there several times where its section may."""
     if not section.several:
         return dict(table)
     return {"description": section.meaning, "anyOf": [dict(table), {"type": "array", "items": dict(table)}]}
 
 
-def _scattered(section: Section) -> dict[str, Any]:
-    return _table(section) | {"allOf": _distributions(also=_without_distribution(section))}
+def scattered(section: Section) -> dict[str, Any]:
+    """Make the schema of a table whose values are drawn from a distribution."""
+    return table_schema(section) | {"allOf": distributions(also=without_distribution(section))}
 
 
-def _without_distribution(section: Section) -> list[str]:
+def without_distribution(section: Section) -> list[str]:
     """Names of the keys that do not belong to a distribution."""
     numbers = {key.name for key in case_keys.DISTRIBUTION_KEYS}
     return [key.name for key in section.keys if key.name not in numbers]
 
 
-def _distributions(also: Sequence[str]) -> list[dict[str, Any]]:
+def distributions(also: Sequence[str]) -> list[dict[str, Any]]:
     """Say which numbers each distribution takes."""
     found = []
     for kind, numbers in KINDS.items():

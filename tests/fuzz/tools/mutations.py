@@ -1,4 +1,4 @@
-"""Files of every format that is read, with bytes changed at random: ``python tools/fuzz/mutations.py --count 100``.
+"""Files of every format that is read, with bytes changed at random: ``python tests/fuzz/tools/mutations.py --count 100``.
 
 Each must be read as a drawing or refused with a reason: a traceback, a process that dies, more than 20 s or 2 GiB of
 memory fails. Prints a table per suffix; exits with 1 if anything failed.

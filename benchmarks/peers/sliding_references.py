@@ -1,6 +1,6 @@
 """Reactions and capacities where joints slide, beside closed forms and physics engines.
 
-    python benchmarks/sliding_references.py [--only column door window panel pushover] [--parts 1 2] \
+    python benchmarks/peers/sliding_references.py [--only column door window panel pushover] [--parts 1 2] \
         [--engines pymunk compas_lmgc90 [--speed 0.01] [--time-step 0.0005 0.0001]]
 
 Values of the engines are those of LMGC90 0.1.11 and pymunk 7.3.1 with supports at 5 to 20 mm/s, settings as in
@@ -13,16 +13,21 @@ and increments stand beside each other.
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections.abc import Sequence
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 from physics_engines import ENGINES, SAMPLING
-from sliding_walls import DESCRIPTIONS, WALLS, Wall, door, sinking, spread
 
 import solver
 from blockvis.generators import catalogue
+
+# The walls are those of the benchmarks beside this folder.
+sys.path.append(str(Path(__file__).parents[1]))
+from sliding_walls import DESCRIPTIONS, WALLS, Wall, door, sinking, spread
 
 #: Settlement [m], then R / W: of the column elementary statics, LMGC90, pymunk; of the window, the smallest and largest
 #: of LMGC90 between 10 and 30 mm, pymunk; of the others LMGC90, pymunk.

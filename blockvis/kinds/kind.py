@@ -1,7 +1,7 @@
 """A kind of analysis: what it runs over, what it measures, its keys, its increments, and its words.
 
-A new kind is an object of :class:`AnalysisKind` in a file of its own, with a row in :mod:`blockvis.runs.kinds`. What it
-does not say in its own words is said in those of its quantities.
+A new kind is an object of :class:`AnalysisKind` in a file of its own, with a row in :mod:`blockvis.kinds.kinds`. What
+it does not say in its own words is said in those of its quantities.
 """
 
 from __future__ import annotations

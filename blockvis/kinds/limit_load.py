@@ -17,7 +17,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
-from blockvis.numbers import force_text
+from blockvis.text import force_text
 
 from .kind import (
     AnalysisKind,
@@ -425,7 +425,9 @@ def _read_for_multipliers(increment: solver.Increment) -> solver.Increment:
 def _checkpoint(
     run: AnalysisRun, *, settlement: solver.PathState | None = None, pose: solver.Pose | None = None
 ) -> LimitLoadCheckpoint:
-    return LimitLoadCheckpoint(tuple(replace(limit, held=None, analysed=None) for limit in run.limits), settlement, pose)
+    return LimitLoadCheckpoint(
+        tuple(replace(limit, held=None, analysed=None) for limit in run.limits), settlement, pose
+    )
 
 
 def _wanted(case: Case, increment: solver.Increment) -> bool:

@@ -13,8 +13,8 @@ import solver
 from blockvis.cases.contents import Case
 from blockvis.cases.key import TRUE_OR_FALSE, Key
 from blockvis.cases.toml_table import Table
-from blockvis.numbers import force_text
 from blockvis.results.about import least_reaction, loss_of, mechanism_text
+from blockvis.text import force_text
 
 from .kind import AnalysisKind, AnalysisRun, Course, RunInput, needs_dry_joints, without_increments
 

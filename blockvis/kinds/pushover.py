@@ -14,7 +14,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import FRACTION, POSITIVE, TEXT, VECTOR, Key, Section
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import mechanism_text
-from blockvis.suggestions import nearest
+from blockvis.text import nearest
 
 from .kind import (
     AnalysisKind,

@@ -1,0 +1,1 @@
+"""Case files: their keys, read and checked into a case; new ones, and their schema."""

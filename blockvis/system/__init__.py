@@ -1,0 +1,1 @@
+"""Files, processes and extras of the machine; nothing here knows masonry."""

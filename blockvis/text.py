@@ -1,0 +1,137 @@
+"""Text that people read: numbers with their units, values as TOML writes them, and names similar to a given one."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def length_text(length: float) -> str:
+    """Write a round length [m] with its unit.
+
+    Examples
+    --------
+    >>> length_text(0.2), length_text(5.0), length_text(0.002)
+    ('0.2 m', '5 m', '0.002 m')
+    """
+    return f"{length:g} m"
+
+
+def force_text(force: float, moment: bool = False) -> str:
+    """Write a force [N], or a moment [N·m], with four digits and the unit that suits it.
+
+    Examples
+    --------
+    >>> force_text(2211.97), force_text(152.3), force_text(3.21e6, moment=True)
+    ('2.212 kN', '152.3 N', '3.21 MN·m')
+    """
+    size = abs(force)
+    factor, unit = next((f, u) for f, u in ((1e6, "MN"), (1e3, "kN"), (1.0, "N")) if size >= f or f == 1.0)
+    return f"{force / factor:.4g} {unit}" + ("·m" if moment else "")
+
+
+def rounded_length(largest: float) -> float:
+    """Round down to 1, 2 or 5 times a power of ten; 1 unless the length is positive and finite.
+
+    Examples
+    --------
+    >>> rounded_length(0.34)
+    0.2
+    """
+    if not (np.isfinite(largest) and largest > 0.0):
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(largest))
+    return float(f"{max(m for m in (1.0, 2.0, 5.0) if m * power <= largest * (1 + 1e-9)) * power:.6g}")
+
+
+def as_toml(value: Any) -> str:
+    r"""Write a value as TOML has it; numbers with twelve digits, which leaves out the rounding of converted lengths.
+
+    Examples
+    --------
+    >>> print(as_toml({"x": 0.1 + 0.2, "names": ["a", 'b "c"'], "film": False}))
+    {x = 0.3, names = ["a", "b \"c\""], film = false}
+    """
+    import tomlkit
+
+    return tomlkit.item(_inline(value)).as_string()
+
+
+def as_key(key: str) -> str:
+    """Write a key as TOML has it, in quotes where it needs them.
+
+    Examples
+    --------
+    >>> as_key("limit"), as_key("left springer")
+    ('limit', '"left springer"')
+    """
+    import tomlkit
+
+    return tomlkit.key(key).as_string()
+
+
+def _inline(value: Any) -> Any:
+    import tomlkit
+
+    if isinstance(value, Mapping):
+        table = tomlkit.inline_table()
+        table.update({key: _inline(one) for key, one in value.items()})
+        return table
+    if isinstance(value, list | tuple):
+        return [_inline(one) for one in value]
+    return float(f"{value:.12g}") if isinstance(value, float) else value
+
+
+def nearest(word: str, known: Sequence[str]) -> str:
+    """Write a hint at the known word most similar to the given one.
+
+    Returns
+    -------
+    str
+        Empty if no known word is similar.
+
+    Examples
+    --------
+    >>> nearest("thikness", ["density", "thickness"])
+    " (did you mean 'thickness'?)"
+    >>> nearest("frction", ["cohesion", "friction_coefficient"])
+    " (did you mean 'friction_coefficient'?)"
+    """
+    # A word of a longer name counts as much as the name: who writes "frction" means friction_coefficient.
+    whole = {part: name for name in reversed(known) for part in name.split("_")} | {name: name for name in known}
+    near = difflib.get_close_matches(word, list(whole), n=1, cutoff=0.5)
+    return f" (did you mean '{whole[near[0]]}'?)" if near else ""
+
+
+def by_similarity(word: str, known: Iterable[str]) -> list[str]:
+    """Order known words by similarity to the given one, upper and lower case alike, the most similar first."""
+    likeness = {name: difflib.SequenceMatcher(None, word.lower(), name.lower()).ratio() for name in known}
+    return sorted(likeness, key=lambda name: -likeness[name])
+
+
+def files_like(path: Path, pattern: str = "*", *, or_any: bool = False) -> list[str]:
+    """Find up to three names similar to that of a missing file, among the files of its folder that fit a pattern.
+
+    Parameters
+    ----------
+    path : Path
+        Of the missing file.
+    pattern : str
+        As of ``Path.glob``.
+    or_any : bool
+        Whether less similar names, or any, are returned if none is similar.
+    """
+    beside = sorted(entry.name for entry in path.parent.glob(pattern)) if path.parent.is_dir() else []
+    near = difflib.get_close_matches(path.name, beside, n=3, cutoff=0.4 if or_any else 0.6)
+    return near or (beside[:3] if or_any else [])
+
+
+def refuse_unknown(given: Iterable[str], known: Sequence[str], where: str) -> None:
+    """Raise ``ValueError`` for the first given key that is not known."""
+    for key in given:
+        if key not in known:
+            raise ValueError(f"{where} has no '{key}'{nearest(str(key), known)}; it has {', '.join(known)}")
