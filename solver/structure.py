@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -227,19 +228,11 @@ class Structure(Shown):
         :func:`solver.analysis.limit_load.find_limit_load`. For associative flow the multiplier is the exact limit load
         of the model, and an upper bound for every other flow rule with the same friction.
         """
-        if acceleration is not None:
-            return self.with_live(acceleration=acceleration).limit_load(
-                pose=pose,
-                flow=flow,
-                closed_gap=closed_gap,
-                displacement=displacement,
-                overlap_tolerance=overlap_tolerance,
-                torsion=torsion,
-            )
+        under = self if acceleration is None else self.with_live(acceleration=acceleration)
         found = find_limit_load(
             self.assembly,
             self.interfaces,
-            self.loads,
+            under.loads,
             pose=pose,
             flow=flow,
             closed_gap=closed_gap,
@@ -247,7 +240,7 @@ class Structure(Shown):
             overlap_tolerance=overlap_tolerance,
             torsion=torsion,
         )
-        return replace(found, analysed=(self.assembly, self.interfaces, self.loads))
+        return replace(found, analysed=(self.assembly, self.interfaces, under.loads))
 
     def envelope(
         self,
@@ -335,13 +328,10 @@ def pushover(
     loads: Loads,
     friction_coefficient: float = FRICTION_COEFFICIENT,
     interfaces: Interfaces | None = None,
-    controls: Controls | None = None,
-    pose: Pose | None = None,
-    on_increment: Callable[[Increment], None] | None = None,
+    **options: Any,
 ) -> Response:
-    """Follow blocks under growing displacement: :meth:`Structure.pushover` in one call."""
-    structure = _structure(assembly, interfaces, loads, friction_coefficient)
-    return structure.pushover(control, controls=controls, pose=pose, on_increment=on_increment)
+    """Follow blocks under growing displacement: :meth:`Structure.pushover`, with its options, in one call."""
+    return _structure(assembly, interfaces, loads, friction_coefficient).pushover(control, **options)
 
 
 def limit_load(
@@ -350,22 +340,10 @@ def limit_load(
     loads: Loads,
     friction_coefficient: float = FRICTION_COEFFICIENT,
     interfaces: Interfaces | None = None,
-    pose: Pose | None = None,
-    flow: str = "associative",
-    closed_gap: float | None = None,
-    displacement: float = 0.0,
-    overlap_tolerance: float | None = None,
-    torsion: str = "points",
+    **options: Any,
 ) -> LimitLoad:
-    """Find the largest multiplier of live loads: :meth:`Structure.limit_load` in one call."""
-    return _structure(assembly, interfaces, loads, friction_coefficient).limit_load(
-        pose=pose,
-        flow=flow,
-        closed_gap=closed_gap,
-        displacement=displacement,
-        overlap_tolerance=overlap_tolerance,
-        torsion=torsion,
-    )
+    """Find the largest multiplier of live loads: :meth:`Structure.limit_load`, with its options, in one call."""
+    return _structure(assembly, interfaces, loads, friction_coefficient).limit_load(**options)
 
 
 def _structure(
