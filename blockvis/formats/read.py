@@ -23,7 +23,7 @@ from blockvis.layout.selection import sorted_out
 from blockvis.layout.solid_layout import SolidLayout
 from blockvis.layout.units import chosen_unit, doubt, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
-from blockvis.system.atomic_files import whole_file
+from blockvis.system.atomic_files import whole_file, write_whole
 
 from .bodies import Bodies, in_dimension
 from .cells import of_files
@@ -266,9 +266,8 @@ def from_compas(model: Any, **options: Any) -> solver.Assembly:
         raise TypeError(f"{type(strange).__name__} is no object of COMPAS; give a model, an assembly or meshes")
     texts = [part.to_jsonstring() for part in parts]
     with TemporaryDirectory() as folder:
-        path = Path(folder) / "model.json"
-        path.write_text(f"[{','.join(texts)}]" if isinstance(model, Sequence) else texts[0], encoding="utf-8")
-        return read(path, **options)
+        text = f"[{','.join(texts)}]" if isinstance(model, Sequence) else texts[0]
+        return read(write_whole(Path(folder) / "model.json", text, durable=False), **options)
 
 
 def save_layout(assembly: solver.Assembly, path: str | Path, *, pose: solver.Pose | None = None) -> None:
