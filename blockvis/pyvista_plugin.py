@@ -97,7 +97,7 @@ class BlockvisAccessor:
 
     def __repr__(self) -> str:
         """One line: how many blocks there are, and what can be done with them."""
-        return f"<{self.layout().n_blocks} blocks: plot(), assembly(), settle(), limit_load(), save()>"
+        return f"<{self.layout().n_blocks} blocks: plot(), assembly(), structure(), settle(), limit_load(), save()>"
 
     def layout(self, dimension: int | None = None) -> AnyLayout:
         """Read the blocks as a layout, lengths in m, in 2 or 3 dimensions; as they are drawn by default."""
@@ -140,6 +140,36 @@ class BlockvisAccessor:
             overlap_tolerance=overlap_tolerance,
         )
 
+    def structure(
+        self,
+        roles: Mapping[str, str] | None = None,
+        *,
+        friction_coefficient: float | None = None,
+        interfaces: solver.Interfaces | None = None,
+        loads: solver.Loads | None = None,
+        **options: Any,
+    ) -> solver.Structure:
+        """Give the blocks joints and loads.
+
+        Parameters
+        ----------
+        roles : mapping of str to {"free", "fixed", "moving"}, optional
+        friction_coefficient : float, optional
+            Of every interface, 0.6 where neither it nor ``interfaces`` is given.
+        interfaces, loads : optional
+            As of :class:`solver.Structure`.
+        **options
+            As of :meth:`assembly`.
+        """
+        if interfaces is None and friction_coefficient is None:
+            friction_coefficient = solver.InterfaceLaw.friction_coefficient
+        return solver.Structure(
+            self.assembly(roles, **options),
+            interfaces,
+            loads,
+            friction_coefficient=None if interfaces is not None else friction_coefficient,
+        )
+
     def settle(
         self,
         roles: Mapping[str, str] | None = None,
@@ -149,16 +179,9 @@ class BlockvisAccessor:
         limit: float = 0.5,
         tolerance: float | None = None,
         phases: Sequence[solver.Settlement] = (),
-        friction_coefficient: float = solver.InterfaceLaw.friction_coefficient,
-        interfaces: solver.Interfaces | None = None,
-        loads: solver.Loads | None = None,
         controls: solver.Controls | None = None,
-        supports: Sequence[Mapping[str, Any]] = (),
-        density: float = 2000.0,
-        thickness: float = 1.0,
-        joint_thickness: float | str = 0.0,
-        overlap_tolerance: float | None = None,
         dimension: int | None = None,
+        **options: Any,
     ) -> solver.Response:
         """Move the moving supports until the structure collapses.
 
@@ -173,39 +196,23 @@ class BlockvisAccessor:
             Width of the collapse bracket; a hundredth of the increment by default.
         phases : sequence of solver.Settlement
             Settlements one after another, in place of ``direction``, ``increment``, ``limit`` and ``tolerance``.
-        friction_coefficient : float
-        interfaces, loads, controls : optional
-            As of :func:`solver.settle`.
-        supports, density, thickness, joint_thickness, overlap_tolerance
-            As of :func:`blockvis.layout.assemble.assemble`.
+        controls : solver.Controls, optional
         dimension : {2, 3}, optional
             As of :meth:`layout`.
+        **options
+            As of :meth:`structure`.
 
         Returns
         -------
         solver.Response
         """
-        assembly = self.assembly(
-            roles,
-            supports=supports,
-            density=density,
-            thickness=thickness,
-            joint_thickness=joint_thickness,
-            overlap_tolerance=overlap_tolerance,
-            dimension=3 if direction is not None and len(direction) == 3 else dimension,
-        )
-        down = [*[0.0] * (assembly.dimension - 1), -1.0]
+        dimension = 3 if direction is not None and len(direction) == 3 else dimension
+        structure = self.structure(roles, dimension=dimension, **options)
+        down = [*[0.0] * (structure.assembly.dimension - 1), -1.0]
         one = solver.Settlement(
             direction=down if direction is None else direction, increment=increment, limit=limit, tolerance=tolerance
         )
-        return solver.settle(
-            assembly,
-            tuple(phases) or one,
-            friction_coefficient=friction_coefficient,
-            interfaces=interfaces,
-            loads=loads,
-            controls=controls,
-        )
+        return structure.settle(tuple(phases) or one, controls=controls)
 
     def limit_load(
         self,
@@ -213,15 +220,9 @@ class BlockvisAccessor:
         *,
         weight_fraction: Sequence[float] | None = None,
         loads: solver.Loads | None = None,
-        friction_coefficient: float = solver.InterfaceLaw.friction_coefficient,
-        interfaces: solver.Interfaces | None = None,
         flow: str = "associative",
-        supports: Sequence[Mapping[str, Any]] = (),
-        density: float = 2000.0,
-        thickness: float = 1.0,
-        joint_thickness: float | str = 0.0,
-        overlap_tolerance: float | None = None,
         dimension: int | None = None,
+        **options: Any,
     ) -> solver.LimitLoad:
         """Find the largest multiplier of live loads that the blocks carry as drawn; all supports stand still.
 
@@ -233,34 +234,23 @@ class BlockvisAccessor:
             by default.
         loads : solver.Loads, optional
             Dead and live loads, in place of the self-weight and ``weight_fraction``.
-        friction_coefficient : float
-        interfaces, flow : optional
-            As of :func:`solver.limit_load`.
-        supports, density, thickness, joint_thickness, overlap_tolerance
-            As of :func:`blockvis.layout.assemble.assemble`.
+        flow : {"associative", "non-associative"}
+            As of :meth:`solver.Structure.limit_load`.
         dimension : {2, 3}, optional
             As of :meth:`layout`.
+        **options
+            As of :meth:`structure`.
 
         Returns
         -------
         solver.LimitLoad
         """
-        assembly = self.assembly(
-            roles,
-            supports=supports,
-            density=density,
-            thickness=thickness,
-            joint_thickness=joint_thickness,
-            overlap_tolerance=overlap_tolerance,
-            dimension=3 if weight_fraction is not None and len(weight_fraction) == 3 else dimension,
-        )
-        if loads is None:
-            along = [1.0, *[0.0] * (assembly.dimension - 1)] if weight_fraction is None else weight_fraction
-            live = solver.weight_fraction(assembly, along, assembly.free)
-            loads = replace(solver.self_weight(assembly), live=live)
-        return solver.limit_load(
-            assembly, loads=loads, friction_coefficient=friction_coefficient, interfaces=interfaces, flow=flow
-        )
+        dimension = 3 if weight_fraction is not None and len(weight_fraction) == 3 else dimension
+        structure = self.structure(roles, loads=loads, dimension=dimension, **options)
+        if loads is not None:
+            return structure.limit_load(flow=flow)
+        along = [1.0, *[0.0] * (structure.assembly.dimension - 1)] if weight_fraction is None else weight_fraction
+        return structure.limit_load(acceleration=along, flow=flow)
 
     def plot(
         self,
