@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .solids import Solid, area_vectors, cross, off_planes, outward, planes_of, triangles_of, volume
+from .solids import Solid, cross, off_planes, outward, planes_of, triangles_of, volume, width_of
 
 #: Triangles that lie within this fraction of the width of a block of one plane are one face: modellers warp the faces
 #: of stones by a tenth of it.
@@ -42,12 +42,6 @@ class PlaneSolid:
     solid: Solid
     warp: float
     place: np.ndarray
-
-
-def width_of(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> float:
-    """Six volumes over the surface: the edge of a cube, three times the thickness of a slab."""
-    surface = float(np.linalg.norm(area_vectors(points, faces), axis=1).sum())
-    return 6.0 * abs(volume(points, faces)) / surface if surface else 0.0
 
 
 def with_plane_faces(points: np.ndarray, triangles: np.ndarray, tolerance: float = WARPED) -> PlaneSolid:
