@@ -19,6 +19,7 @@ import numpy as np
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.solids import Solid
+from blockvis.layout.surfaces import cleaned
 
 from . import compas_json
 from .bodies import Bodies
@@ -95,7 +96,7 @@ def _read_solids(content: dict[str, Any], path: Path) -> Layout:
             raise ValueError(f"'{path}': block '{name}' is no closed block: {what}; repair it")
         if not np.isfinite(points).all():
             raise ValueError(f"'{path}': block '{name}' has a point that is not finite; repair it")
-        solids.append((points, faces))
+        solids.append(cleaned(points, faces))
         names.append(name)
     layout = Layout(blocks=tuple(solids), names=tuple(names), unit=str(content.get("unit", "")))
     return with_rows(layout, content["blocks"])

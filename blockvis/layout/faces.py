@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .solids import Solid, cross, off_planes, outward, planes_of, triangles_of, volume, width_of
+from .solids import Solid, cross, off_planes, planes_of, triangles_of, volume, width_of
+from .surfaces import cleaned
 
 #: Triangles that lie within this fraction of the width of a block of one plane are one face: modellers warp the faces
 #: of stones by a tenth of it.
@@ -85,8 +86,8 @@ def fitted(points: np.ndarray, faces: list[list[int]], near: float) -> PlaneSoli
     corners = points[rings[worst]]
     place = corners[int(np.abs(corners @ planes[worst, :3] - planes[worst, 3]).argmax())]
     if warp[worst] <= ROUNDING * width_of(points, rings):
-        return PlaneSolid(outward(points, rings), 0.0, place)
-    return PlaneSolid(outward(*flattened(points, rings, planes)), float(warp[worst]), place)
+        return PlaneSolid(cleaned(points, rings), 0.0, place)
+    return PlaneSolid(cleaned(*flattened(points, rings, planes)), float(warp[worst]), place)
 
 
 def flattened(points: np.ndarray, faces: list[list[int]], planes: np.ndarray, first: np.ndarray | None = None) -> Solid:

@@ -9,6 +9,7 @@ import numpy as np
 
 from .faces import ROUNDING, flattened
 from .solids import Solid, area_vectors, planes_of, volume, width_of
+from .surfaces import cleaned
 
 #: Gaps and overlaps of joints up to this fraction of the width of a typical block are faced unless the caller says
 #: otherwise: drawings of real vaults overlap by up to 8e-4 of a block, and their corners are as far off.
@@ -304,5 +305,5 @@ def _moved(
         mine = slice(start[i], start[i + 1])
         found = flattened(points, rings, planes[mine], joint[mine])
         if volume(*found) > 0.0:
-            moved[i] = found
+            moved[i] = cleaned(*found)
     return tuple(moved)

@@ -40,7 +40,7 @@ def duplicates(blocks: Sequence[np.ndarray]) -> list[tuple[int, int]]:
     """
     centres = np.array([(corners.min(axis=0) + corners.max(axis=0)) / 2.0 for corners in blocks])
     sizes = np.array([float(np.ptp(corners, axis=0).max()) for corners in blocks])
-    cell = 4.0 * SAME * float(np.median(sizes))
+    cell = 4.0 * SAME * float(np.median(sizes)) or 1.0
     found: dict[int, int] = {}
     # Grids shifted by half a cell along each axis: no grid line separates a pair in all of them.
     for shift in itertools.product((0.0, 0.5), repeat=centres.shape[1]):
