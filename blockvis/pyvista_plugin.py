@@ -26,9 +26,8 @@ from .formats.gmsh_mesh import holds_flat_blocks
 from .formats.pyvista_files import dataset_of, layout_of_dataset
 from .formats.read import read_layout, write_layout
 from .layout.assemble import assemble
-from .layout.layout import AnyLayout
+from .layout.layout import Layout
 from .layout.selection import sorted_out
-from .layout.solid_layout import SolidLayout
 from .pictures import palette
 from .pictures.solid_scene import drawn_forward
 from .pictures.solid_view import ABOVE, AROUND, View, showing_faces
@@ -99,11 +98,11 @@ class BlockvisAccessor:
         """One line: how many blocks there are, and what can be done with them."""
         return f"<{self.layout().n_blocks} blocks: plot(), assembly(), structure(), settle(), limit_load(), save()>"
 
-    def layout(self, dimension: int | None = None) -> AnyLayout:
+    def layout(self, dimension: int | None = None) -> Layout:
         """Read the blocks as a layout, lengths in m, in 2 or 3 dimensions; as they are drawn by default."""
         layout = layout_of_dataset(self._mesh, dimension=dimension)
         layout = replace(layout, unit=layout.unit or "m")
-        return layout if isinstance(layout, SolidLayout) else sorted_out(layout)
+        return layout if layout.dimension == 3 else sorted_out(layout)
 
     def save(self, path: str | Path) -> Path:
         """Write the blocks to a layout file of any format that blockvis writes."""

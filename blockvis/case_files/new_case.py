@@ -16,7 +16,6 @@ from blockvis.case_files import case_keys
 from blockvis.cases.build import DENSITY
 from blockvis.cases.key import Key, Section
 from blockvis.layout.inspect import Inspection
-from blockvis.layout.inspect_solids import SolidInspection
 from blockvis.text import as_key, as_toml, rounded_length
 
 #: The first increment, and the limit, as fractions of the median block: steps pass over nothing that a block's movement
@@ -31,9 +30,6 @@ SUPPORT_WORDS = ("springer", "support", "ground", "foundation", "footing", "abut
 
 #: Keys of a drawing in the plane, which one in space does not have.
 _IN_THE_PLANE = ("thickness", "closing", "outline_tolerance")
-
-#: A drawing in the plane or in space.
-Found = Inspection | SolidInspection
 
 #: Characters of a line of comment.
 WIDTH = 100
@@ -62,7 +58,7 @@ class Ground:
 
 
 def case_text(
-    found: Found,
+    found: Inspection,
     file: str,
     *,
     view: str | None = None,
@@ -73,7 +69,7 @@ def case_text(
 
     Parameters
     ----------
-    found : Inspection or SolidInspection
+    found : Inspection
         Of the drawing.
     file : str
         The drawing, relative to the case file.
@@ -147,18 +143,18 @@ def relative_to(folder: Path, drawing: str | Path) -> str:
     return Path(path).as_posix()
 
 
-def block_size(found: Found) -> float:
+def block_size(found: Inspection) -> float:
     """Find the distance across the median free block [m]."""
     across = [float(np.linalg.norm(np.ptp(found.layout.corners(i), axis=0))) for i in _with_role(found, solver.FREE)]
     return float(np.median(across)) if across else 1.0
 
 
-def ground_of(found: Found) -> Ground:
+def ground_of(found: Inspection) -> Ground:
     """Say what stands and what settles, of what a drawing says.
 
     Parameters
     ----------
-    found : Inspection or SolidInspection
+    found : Inspection
     """
     fixed, moving = _with_role(found, solver.FIXED), _with_role(found, solver.MOVING)
     if moving:
@@ -185,7 +181,7 @@ def ground_of(found: Found) -> Ground:
     return Ground("The drawing has supports that stand, and none that moves.", settles=False)
 
 
-def _named_supports(found: Found) -> dict[str, float]:
+def _named_supports(found: Inspection) -> dict[str, float]:
     """Where blocks stand in the mean [m] whose layer, or else name, is that of a support; by that layer or name."""
     layout = found.layout
     places: dict[str, list[float]] = {}
@@ -200,7 +196,7 @@ def _named_supports(found: Found) -> dict[str, float]:
     return {label: sum(x) / len(x) for label, x in places.items()}
 
 
-def _two_halves(found: Found) -> tuple[Mapping[str, Any], ...]:
+def _two_halves(found: Inspection) -> tuple[Mapping[str, Any], ...]:
     """Lay a ground under the lowest blocks, split where they leave a gap nearest to the middle, or in the middle."""
     corners = [found.layout.corners(i) for i in found.kept]
     up = found.layout.dimension - 1
@@ -236,11 +232,11 @@ def _two_halves(found: Found) -> tuple[Mapping[str, Any], ...]:
     )
 
 
-def _with_role(found: Found, role: str) -> list[int]:
+def _with_role(found: Inspection, role: str) -> list[int]:
     return [int(i) for i in found.kept if found.roles[i] == role]
 
 
-def _counted(found: Found) -> str:
+def _counted(found: Inspection) -> str:
     size = (found.high - found.low).tolist()
     roles = [f"{len(_with_role(found, role))} {role}" for role in solver.ROLES if _with_role(found, role)]
     deep = f"{size[1]:.4g} m deep, " if len(size) == 3 else ""
@@ -248,7 +244,7 @@ def _counted(found: Found) -> str:
     return f"{len(found.kept)} blocks{where}, {', '.join(roles)}; {size[0]:.4g} m wide, {deep}{size[-1]:.4g} m high."
 
 
-def _roles(found: Found, ground: Ground) -> str:
+def _roles(found: Inspection, ground: Ground) -> str:
     section = case_keys.ROLES
     lines = [_comment(f"{section.meaning}. {ground.says}")]
     as_drawn = [i for i in found.kept if found.roles[i] != solver.FREE and found.layout.names[i] not in ground.roles]

@@ -108,7 +108,7 @@ def _note_numbers(assembly: solver.Assembly, source: Path) -> None:
         )
 
 
-def _note_density(case: Case, sketch: layout.AnyLayout) -> None:
+def _note_density(case: Case, sketch: layout.Layout) -> None:
     """Warn where the density of the case loses against the file's."""
     if case.density is None or case.file is None or sketch.density is None:
         return
@@ -165,7 +165,7 @@ def across_blocks(assembly: solver.Assembly) -> np.ndarray:
     return np.asarray(np.linalg.norm(high - low, axis=1))
 
 
-def _case_layout(case: Case) -> layout.AnyLayout:
+def _case_layout(case: Case) -> layout.Layout:
     thickness = case.thickness or THICKNESS
     if case.file is not None:
         return read_layout(
@@ -184,7 +184,7 @@ def _case_layout(case: Case) -> layout.AnyLayout:
         raise ValueError(f"{case.source}: [geometry] layout: {error}") from None
     # A parametric layout has its own density and thickness; those of the case replace them.
     sketch = replace(sketch, density=sketch.density if case.density is None else None)
-    if isinstance(sketch, layout.Layout):
+    if sketch.dimension == 2:
         sketch = replace(sketch, thickness=sketch.thickness if case.thickness is None else None)
         return layout.standing(sketch, thickness) if case.dimension == 3 else sketch
     if case.dimension == 2:
@@ -192,7 +192,7 @@ def _case_layout(case: Case) -> layout.AnyLayout:
     return sketch
 
 
-def _with_densities(case: Case, sketch: layout.AnyLayout) -> layout.AnyLayout:
+def _with_densities(case: Case, sketch: layout.Layout) -> layout.Layout:
     unknown = set(case.densities) - set(sketch.materials)
     if unknown:
         name = sorted(unknown)[0]

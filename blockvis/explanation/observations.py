@@ -20,7 +20,6 @@ import solver
 from blockvis.cases.toml_table import shortened
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
-from blockvis.layout.layout import Layout
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
 from blockvis.text import files_like, nearest
 
@@ -419,7 +418,7 @@ def block_at(assembly: solver.Assembly, point: np.ndarray) -> int:
 def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
     """Compare a drawing of the damaged state with the undamaged one, block by block."""
     layout = read_layout(path)
-    if not isinstance(layout, Layout):
+    if layout.dimension == 3:
         raise ValueError(f"{path}: draws blocks in space; give a drawing in the plane, as the case is")
     partner = _partners(layout.names, layout.outlines, assembly)
     if not partner:

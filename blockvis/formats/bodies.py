@@ -15,8 +15,8 @@ from blockvis.layout.block_table import with_rows
 from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches
+from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import outlines_of_cells, rectangle
-from blockvis.layout.solid_layout import SolidLayout
 from blockvis.layout.solids import volume
 from blockvis.layout.views import VIEWS, axis_across, view_along
 
@@ -160,19 +160,20 @@ def layout_of_bodies(
         if one.scatter < best.scatter - 1e-4 * size:
             best = one
     name, along = view_along(best.axis), "xyz"[best.axis]
-    notes = [
+    notes: list[str] = [
         f"{len(bodies)} bodies were read as outlines in {name}; their depth along {along} is the thickness "
         "(dimension = 3 takes them into space)"
     ]
     middle = (best.low + best.high) / 2.0
     if np.ptp(middle) > ECCENTRIC * size:
         first, last = bodies[int(middle.argmin())].name, bodies[int(middle.argmax())].name
-        notes.append(
+        differ = (
             f"the middle planes of the bodies along {along} differ by up to {np.ptp(middle):.3g} in the file's unit "
             f"('{first}' and '{last}'): an analysis in the plane knows nothing of that eccentricity"
         )
+        notes.append(Note(CHANGED, differ))
     layout = Layout(
-        outlines=best.outlines,
+        blocks=best.outlines,
         names=tuple(body.name for body in bodies),
         unit=found.unit,
         notes=(*notes, *found.notes),
@@ -187,7 +188,7 @@ def solids_of_bodies(
     view: str | None = None,
     ignore: Sequence[str] = (),
     only: Sequence[str] = (),
-) -> SolidLayout:
+) -> Layout:
     """Make a layout in space of bodies of any shape.
 
     Parameters
@@ -223,27 +224,27 @@ def solids_of_bodies(
         drawn = abs(volume(body.points, body.faces))
         changed.append((volume(points, faces) / drawn - 1.0, body.name))
         solids.append((points[:, [0, 2, 1]] * [1.0, -1.0, 1.0] if lying else points, faces))
-    notes = []
+    said = []
     if warped:
         most, name, place = max(warped, key=lambda one: one[0])
-        notes.append(
+        said.append(
             f"planes were fitted to warped faces of {len(warped)} of {len(solids)} blocks: up to {most:.3g} in the "
             f"file's unit, of '{name}' at ({', '.join(f'{x:.6g}' for x in place)})"
         )
     coarser = [one for one in changed if abs(one[0]) > NOTED_VOLUME]
     if coarser:
         most, name = max(coarser, key=lambda one: abs(one[0]))
-        notes.append(
+        said.append(
             f"faces were joined to fewer plane ones: the volume of {len(coarser)} of {len(solids)} blocks is off by up "
             f"to {100.0 * most:+.2g} %, of '{name}'; draw round stones with fewer sides"
         )
     if lying and view is None:
-        notes.append(f'{found.up_says}: its (x, y, z) were read as (x, -z, y); give view = "xz" if z is up')
-    layout = SolidLayout(
-        solids=tuple(solids),
+        said.append(f'{found.up_says}: its (x, y, z) were read as (x, -z, y); give view = "xz" if z is up')
+    layout = Layout(
+        blocks=tuple(solids),
         names=tuple(body.name for body in asked.bodies),
         unit=found.unit,
-        notes=(*notes, *found.notes),
+        notes=(*(Note(CHANGED, text) for text in said), *found.notes),
     )
     return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", ignore))
 
@@ -255,7 +256,7 @@ def in_dimension(
     view: str | None = None,
     ignore: Sequence[str] = (),
     only: Sequence[str] = (),
-) -> Layout | SolidLayout:
+) -> Layout:
     """Make a layout in the plane, 2, or in space, 3; by default in space where bodies are not prisms side by side."""
     if dimension == 3:
         return solids_of_bodies(found, path, view, ignore, only)
@@ -265,7 +266,7 @@ def in_dimension(
         if dimension == 2 or view is not None:
             raise
         layout = solids_of_bodies(found, path, None, ignore, only)
-        return replace(layout, notes=(f"blocks in space: {error.reason}", *layout.notes))
+        return replace(layout, notes=(Note(CHANGED, f"blocks in space: {error.reason}"), *layout.notes))
 
 
 @dataclass(frozen=True)

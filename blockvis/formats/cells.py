@@ -13,7 +13,8 @@ import solver
 from blockvis.layout.block_table import with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
-from blockvis.layout.outlines import UPRIGHT, flattened, is_flat, outlines_of_cells
+from blockvis.layout.notes import UPRIGHT, kind_of
+from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
 
 from .bodies import Bodies, Body
 from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
@@ -82,7 +83,7 @@ def layout_of_cells(
     outlines = outlines_of_cells(flat, rings, owner, names, unusable)
     first = np.unique(owner, return_index=True)[1]
     notes = tuple(text for text in (how, note) if text)
-    layout = Layout(outlines=tuple(outlines), names=tuple(names), unit="", notes=notes)
+    layout = Layout(blocks=tuple(outlines), names=tuple(names), unit="", notes=notes)
     layout = with_rows(layout, [row_of(data, int(cell), names[k]) for k, cell in enumerate(first)])
     return layout.leaving_out(unusable)
 
@@ -194,8 +195,8 @@ def _merged_bodies(parts: Sequence[tuple[Bodies, str]]) -> Bodies:
 
 
 def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> Layout:
-    upright = {note for part, _ in parts for note in part.notes if note.startswith(UPRIGHT)}
-    lying = any(not any(note.startswith(UPRIGHT) for note in part.notes) for part, _ in parts)
+    upright = {note for part, _ in parts for note in part.notes if kind_of(note) == UPRIGHT}
+    lying = any(not any(kind_of(note) == UPRIGHT for note in part.notes) for part, _ in parts)
     if len(upright) + lying > 1:
         raise ValueError(f"'{path}' has flat parts that lie in different planes; draw them in one")
     named = [replace(part, names=_own_names(part.names, label)) for part, label in parts]
@@ -210,7 +211,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
         return np.concatenate(list(parts))
 
     return Layout(
-        outlines=joined("outlines"),
+        blocks=joined("blocks"),
         names=joined("names"),
         groups=tuple(group or label for d, (_, label) in zip(named, parts, strict=True) for group in d.groups),
         roles=joined("roles"),

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from blockvis.layout.surfaces import same_points, turned_faces
+
 from .bodies import Body, fans
 
 #: Points closer than this fraction of the size of the drawing are one: single precision is accurate to 6e-8.
@@ -34,19 +36,14 @@ def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
 
 
 def _with_points_merged(points: np.ndarray, faces: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Merge points that coincide, and drop the faces that have no area then."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
-    # Exact copies first: a million of them would make a million squared pairs.
-    unique, inverse = np.unique(points, axis=0, return_inverse=True)
-    pairs = cKDTree(unique).query_pairs(SAME_POINT * size, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(unique), len(unique)))
-    _, label = connected_components(graph, directed=False)
-    first = np.unique(label, return_index=True)[1]
-    faces = label[inverse.ravel()][faces]
-    return unique[first], faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    """Merge points that coincide, in the order of their coordinates, and drop the faces that have no area then."""
+    same = same_points(points, SAME_POINT * size)
+    kept = np.unique(same)
+    kept = kept[np.lexsort(points[kept].T[::-1])]
+    number = np.empty(len(points), dtype=np.int64)
+    number[kept] = np.arange(len(kept))
+    faces = number[same][faces]
+    return points[kept], faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
 
 
 def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float, path: Path | str) -> list[Body]:
@@ -105,22 +102,10 @@ def _pieces(name: str, points: np.ndarray, faces: np.ndarray, piece: np.ndarray)
 
 
 def _seen_from_outside(points: np.ndarray, faces: np.ndarray, edge: np.ndarray, piece: np.ndarray) -> np.ndarray:
-    """(m, 3) int array: the faces of closed pieces, all seen counter-clockwise from outside whatever the file has.
-
-    Two faces see their edge in opposite senses. Each face is there twice, as it is and turned round, and goes with the
-    one of each neighbour that fits: of a piece that encloses something there are two sets, and one is taken.
-    """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    m = len(faces)
-    first, second = edge.ravel().argsort(kind="stable").reshape(-1, 2).T
-    forward = (faces < np.roll(faces, -1, axis=1)).ravel()
-    fits = forward[first] != forward[second]
-    one, other = first // 3, second // 3
-    rows, columns = np.append(one, one + m), np.append(other + m * ~fits, other + m * fits)
-    label = connected_components(coo_matrix((np.ones(2 * len(one)), (rows, columns)), shape=(2 * m, 2 * m)))[1]
-    faces = np.where((label[:m] > label[m:])[:, None], faces[:, ::-1], faces)
+    """(m, 3) int array: the faces of closed pieces, all seen counter-clockwise from outside whatever the file has."""
+    edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    turned = turned_faces(edges, edge.ravel(), np.repeat(np.arange(len(faces)), 3))
+    faces = np.where(turned[:, None], faces[:, ::-1], faces)
     inside_out = np.bincount(piece, _volumes(points, faces)) < 0.0
     return np.where(inside_out[piece][:, None], faces[:, ::-1], faces)
 

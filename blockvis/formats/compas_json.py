@@ -18,8 +18,8 @@ import numpy as np
 import solver
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
+from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import FLAT
-from blockvis.layout.solid_layout import SolidLayout
 
 from .bodies import Bodies, fans
 from .cells import layout_of_cells
@@ -103,10 +103,11 @@ def read_content(content: Any, path: Path, view: str | None) -> Layout | Bodies 
     return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} blocks of COMPAS", *notes))
 
 
-def _left_out(planes: Sequence[_Mesh]) -> str:
+def _left_out(planes: Sequence[_Mesh]) -> Note:
     listed = ", ".join(f"'{mesh.row['name']}'" + " (a support)" * ("role" in mesh.row) for mesh in planes[:6])
     more = f" and {len(planes) - 6} more" if len(planes) > 6 else ""
-    return f"left out: {listed}{more}, a single face without volume; draw a support that it stands for by [[supports]]"
+    remedy = "draw a support that it stands for by [[supports]]"
+    return Note(LEFT_OUT, f"left out: {listed}{more}, a single face without volume; {remedy}")
 
 
 def _flat(meshes: Sequence[_Mesh], path: Path, view: str | None) -> Layout | Bodies:
@@ -307,7 +308,7 @@ def _mesh(points: np.ndarray, faces: list[list[int]], data: dict[str, Any], name
     return _Mesh(points @ matrix[:3, :3].T + matrix[:3, 3], faces, row)
 
 
-def write(layout: SolidLayout, path: Path) -> None:
+def write(layout: Layout, path: Path) -> None:
     """Write the blocks of a layout in space as meshes of COMPAS 2: its ``json_load`` gives blocks and supports."""
     lists: dict[str, list[dict[str, Any]]] = {"blocks": [], "supports": []}
     for (points, faces), row in zip(layout.solids, rows_of(layout), strict=True):

@@ -16,11 +16,12 @@ import numpy as np
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches
-from blockvis.layout.outlines import FLAT, UPRIGHT, arc_points
+from blockvis.layout.notes import CHANGED, LEFT_OUT, UPRIGHT, Note, kind_of
+from blockvis.layout.outlines import FLAT, arc_points
 from blockvis.layout.units import metres_per
-from blockvis.layout.views import VIEWS, axis_across
+from blockvis.layout.views import VIEWS, axis_across, upright_note
 
-from .loose_lines import Faces, Line, faces_of_lines, joined_ends, joined_note, nothing_closed
+from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
 #: Units by the header variable $INSUNITS.
@@ -127,11 +128,12 @@ def _layout(found: _Found, faces: Faces, stated: str) -> Layout:
     """Make a layout of what was found; ``stated`` is the unit that the file states."""
     notes = found.notes + faces.notes + joined_note(found.misses, _size(found))
     if found.skipped:
-        notes.append("skipped: " + ", ".join(f"{n} {kind}" for kind, n in found.skipped.items()))
+        listed = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
+        notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
     if found.hidden:
-        notes.append("skipped on layers that are off or frozen: " + _listed(found.hidden))
+        notes.append(Note(LEFT_OUT, f"skipped on layers that are off or frozen: {_listed(found.hidden)}"))
     layout = Layout(
-        outlines=tuple(ring[:, :2] for ring in found.rings),
+        blocks=tuple(ring[:, :2] for ring in found.rings),
         names=tuple(found.names),
         unit=stated,
         notes=tuple(notes),
@@ -147,16 +149,16 @@ def _layout(found: _Found, faces: Faces, stated: str) -> Layout:
 def _faults(audit: Any) -> list[str]:
     """Count the faults that ezdxf found in a note."""
     faults = len(audit.fixes) + len(audit.errors)
-    return [f"{faults} faults of the file were repaired or passed over"] if faults else []
+    return [Note(CHANGED, f"{faults} faults of the file were repaired or passed over")] if faults else []
 
 
 def _elevations(found: _Found, view: str | None) -> list[str]:
     """Say in a note that a drawing in space was read as a plane one."""
-    upright = any(note.startswith(UPRIGHT) for note in found.notes)
+    upright = any(kind_of(note) == UPRIGHT for note in found.notes)
     if not any(abs(ring[:, 2] - (ring[0, 2] if upright else 0.0)).max() > 0 for ring in found.rings):
         return []
     seen = "from above" if view in (None, "xy") else f"along {'xyz'[axis_across(view)]}"
-    return [f"elevations were ignored: the drawing was read as seen {seen}"]
+    return [Note(CHANGED, f"elevations were ignored: the drawing was read as seen {seen}")]
 
 
 def _turned(found: _Found, view: str | None, path: Path) -> list[str]:
@@ -180,7 +182,7 @@ def _turned(found: _Found, view: str | None, path: Path) -> list[str]:
     found.rings = [ring[:, order] for ring in found.rings]
     found.loose = [replace(line, points=line.points[:, order]) for line in found.loose]
     found.left_out = [item.seen(order) for item in found.left_out]
-    return [f"{UPRIGHT}: its ({chosen[0]}, {chosen[1]}) were read as (x, y)"]
+    return [upright_note(chosen)]
 
 
 def _flat(
@@ -395,10 +397,7 @@ def _with_loose(found: _Found, reading: Reading) -> Faces:
         found.names.append(f"face {number}")
         found.rows.append({})
     if faces.rings:
-        faces.notes.append(
-            f"{len(faces.rings)} blocks are faces between {len(wanted)} loose lines; an opening enclosed by lines "
-            "counts as a block too: erase it or draw closed outlines"
-        )
+        faces.notes.append(faces_note(faces, wanted))
     return faces
 
 

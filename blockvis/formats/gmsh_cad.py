@@ -83,7 +83,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
             return _bodies_of_volumes(content, path, unit, per_mm)
         surfaces = gmsh_mesh.layout_of_mesh(target.with_suffix(".msh").read_bytes(), path, reading)
     assert isinstance(surfaces, Layout)
-    return replace(surfaces, outlines=tuple(ring * per_mm for ring in surfaces.outlines), unit=unit)
+    return replace(surfaces, blocks=tuple(ring * per_mm for ring in surfaces.outlines), unit=unit)
 
 
 def _failed(path: Path, done: subprocess.CompletedProcess[str], target: str) -> ValueError:

@@ -132,7 +132,7 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
         notes.append(f"{groups.count('')} of {len(tags)} surfaces are in no physical group")
     notes += [note] if note else []
     layout = Layout(
-        outlines=tuple(outlines),
+        blocks=tuple(outlines),
         names=tuple(names),
         groups=tuple(groups),
         materials=tuple(groups),

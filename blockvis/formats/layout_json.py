@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
-from blockvis.layout.layout import AnyLayout, Layout
-from blockvis.layout.solid_layout import SolidLayout
+from blockvis.layout.layout import Layout
 from blockvis.layout.solids import Solid
+from blockvis.layout.surfaces import cleaned
 
 from . import compas_json
 from .bodies import Bodies
@@ -31,7 +31,7 @@ FORMAT = "blockvis layout"
 COMPAS = ".compas."
 
 
-def read(path: Path, reading: Reading) -> AnyLayout | Bodies:
+def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a .json layout, or the blocks of a file of COMPAS."""
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
@@ -63,7 +63,7 @@ def read(path: Path, reading: Reading) -> AnyLayout | Bodies:
             raise ValueError(f"'{path}': block '{name}' needs at least three corners [x, y]; its shape is {ring.shape}")
         outlines.append(ring)
         names.append(name)
-    layout = Layout(outlines=tuple(outlines), names=tuple(names), unit=str(content.get("unit", "")))
+    layout = Layout(blocks=tuple(outlines), names=tuple(names), unit=str(content.get("unit", "")))
     return with_rows(layout, content["blocks"])
 
 
@@ -77,7 +77,7 @@ def _is_own(content: Any) -> bool:
     )
 
 
-def _read_solids(content: dict[str, Any], path: Path) -> SolidLayout:
+def _read_solids(content: dict[str, Any], path: Path) -> Layout:
     """Read blocks in space."""
     solids: list[Solid] = []
     names = []
@@ -96,21 +96,21 @@ def _read_solids(content: dict[str, Any], path: Path) -> SolidLayout:
             raise ValueError(f"'{path}': block '{name}' is no closed block: {what}; repair it")
         if not np.isfinite(points).all():
             raise ValueError(f"'{path}': block '{name}' has a point that is not finite; repair it")
-        solids.append((points, faces))
+        solids.append(cleaned(points, faces))
         names.append(name)
-    layout = SolidLayout(solids=tuple(solids), names=tuple(names), unit=str(content.get("unit", "")))
+    layout = Layout(blocks=tuple(solids), names=tuple(names), unit=str(content.get("unit", "")))
     return with_rows(layout, content["blocks"])
 
 
-def write(layout: AnyLayout, path: Path) -> None:
+def write(layout: Layout, path: Path) -> None:
     """Write a .json layout; of blocks in space to a name that ends in .compas.json meshes of COMPAS."""
     if COMPAS in path.name.lower():
-        if not isinstance(layout, SolidLayout):
+        if layout.dimension == 2:
             raise ValueError(f"'{path}': COMPAS knows blocks in space only; give dimension 3, or write to .json")
         compas_json.write(layout, path)
         return
     shapes: list[dict[str, Any]]
-    if isinstance(layout, SolidLayout):
+    if layout.dimension == 3:
         shapes = [{"points": points.tolist(), "faces": faces} for points, faces in layout.solids]
     else:
         shapes = [{"outline": ring.tolist()} for ring in layout.outlines]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.left_out import LeftOut
+from blockvis.layout.notes import CHANGED, Note
 
 #: Lines are intersected on a grid of this fraction of the size of the drawing.
 GRID = 1e-6
@@ -110,8 +111,11 @@ def faces_of_lines(lines: Sequence[Line], outlines: Sequence[np.ndarray] = ()) -
         n, cutting = sum(map(len, found.pieces.values())), len(lines) - len(rest)
         around = "an outline cut it" if len(found.pieces) == 1 else f"{len(found.pieces)} outlines cut them"
         found.notes.append(
-            f"cut: {cutting} lines within {around} into {n} blocks; leave their layer out "
-            "(ignore) if they are no joints"
+            Note(
+                CHANGED,
+                f"cut: {cutting} lines within {around} into {n} blocks; leave their layer out "
+                "(ignore) if they are no joints",
+            )
         )
     _add_faces([lines[k] for k in sorted(rest)], [segments[k] for k in sorted(rest)], outlines, every, size, found)
     return found
@@ -138,7 +142,16 @@ def joined_note(misses: Sequence[float], size: float) -> list[str]:
     """Say how many outlines did not quite close, where that was more than rounding; ``size`` is that of the drawing."""
     far = [miss for miss in misses if miss > GRID * size]
     words = f"joined: the ends of {len(far)} outlines, which missed each other by up to {max(far, default=0):.3g} units"
-    return [words] if far else []
+    return [Note(CHANGED, words)] if far else []
+
+
+def faces_note(faces: Faces, lines: Sequence[Line]) -> Note:
+    """Say that blocks are what loose lines enclose."""
+    return Note(
+        CHANGED,
+        f"{len(faces.rings)} blocks are faces between {len(lines)} loose lines; an opening enclosed by lines "
+        "counts as a block too: erase it or draw closed outlines",
+    )
 
 
 def nothing_closed(faces: Faces) -> str:
@@ -200,7 +213,8 @@ def _joined(flat: list[np.ndarray], borders: list[Any], size: float, found: Face
             flat[k][e] = best
             moved.append(distance)
     if moved:
-        found.notes.append(f"joined: {len(moved)} ends of lines that missed another by up to {max(moved):.3g} units")
+        said = f"joined: {len(moved)} ends of lines that missed another by up to {max(moved):.3g} units"
+        found.notes.append(Note(CHANGED, said))
     return flat
 
 

@@ -15,8 +15,8 @@ from xml.sax.saxutils import unescape
 import numpy as np
 
 from blockvis.layout.block_table import rows_of
-from blockvis.layout.layout import AnyLayout, Layout
-from blockvis.layout.solid_layout import SolidLayout
+from blockvis.layout.layout import Layout
+from blockvis.layout.notes import LEFT_OUT, Note
 
 from .bodies import Bodies, Body, body_of_polygons, in_dimension
 from .cells import block_array, layout_of_cells, merged, row_of
@@ -254,7 +254,7 @@ def _check_parts(path: Path, seen: tuple[Path, ...] = ()) -> None:
 
 def layout_of_dataset(
     data: Any, path: Path | str = "dataset", view: str | None = None, dimension: int | None = None
-) -> AnyLayout:
+) -> Layout:
     """Make a layout of a pyvista dataset: a mesh, or a multiblock of meshes.
 
     Parameters
@@ -313,7 +313,7 @@ def _found_in_parts(data: Any, path: Path | str, view: str | None) -> Layout | B
         left_out += [f"'{name or 'a flat part'}'" for _, name in flat]
     chosen = solid or flat
     joined = merged([found for found, _ in chosen], [name for _, name in chosen], path)
-    note = (f"left out: {', '.join(left_out)}, which draw no blocks",) if left_out else ()
+    note = (Note(LEFT_OUT, f"left out: {', '.join(left_out)}, which draw no blocks"),) if left_out else ()
     return replace(joined, notes=joined.notes + note)
 
 
@@ -414,9 +414,9 @@ def _within(numbers: np.ndarray, end: int) -> bool:
     return len(numbers) == 0 or bool(numbers.min() >= 0 and numbers.max() < end)
 
 
-def dataset_of(layout: AnyLayout) -> pyvista.UnstructuredGrid:
+def dataset_of(layout: Layout) -> pyvista.UnstructuredGrid:
     """Make a dataset of a cell per block, polygon or polyhedron, with the cell arrays that the reader understands."""
-    grid = _polyhedra(layout) if isinstance(layout, SolidLayout) else _polygons(layout)
+    grid = _polyhedra(layout) if layout.dimension == 3 else _polygons(layout)
     grid.cell_data["block_id"] = np.arange(layout.n_blocks, dtype=np.int32)
     rows = rows_of(layout)
     for key in ("name", "group", "role", "material"):
@@ -440,7 +440,7 @@ def _polygons(layout: Layout) -> pyvista.UnstructuredGrid:
     return pyvista.UnstructuredGrid(cells, np.full(len(counts), 7, dtype=np.uint8), points)
 
 
-def _polyhedra(layout: SolidLayout) -> pyvista.UnstructuredGrid:
+def _polyhedra(layout: Layout) -> pyvista.UnstructuredGrid:
     import pyvista
 
     cells: list[int] = []
@@ -467,7 +467,7 @@ def _add_words(attributes: Any, name: str, words: list[str]) -> None:
     attributes.AddArray(array)
 
 
-def write(layout: AnyLayout, path: Path) -> None:
+def write(layout: Layout, path: Path) -> None:
     """Write .vtu, .vtp or .vtk: a cell per block, polygon or polyhedron, double precision, lengths in m."""
     grid = dataset_of(layout)
     if path.suffix.lower() == ".vtp":

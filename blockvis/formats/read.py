@@ -15,13 +15,10 @@ import solver
 from blockvis.formats import FORMATS, Format
 from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
-from blockvis.layout.inspect_solids import SolidInspection, inspected_solids
-from blockvis.layout.layout import AnyLayout, Layout, layout_of, standing
-from blockvis.layout.left_out import in_words
+from blockvis.layout.layout import Layout, layout_of, standing
 from blockvis.layout.outlines import ring_area, without_collinear
-from blockvis.layout.selection import sorted_out
-from blockvis.layout.solid_layout import SolidLayout
-from blockvis.layout.units import chosen_unit, doubt, metres_per
+from blockvis.layout.selection import noted, sorted_out
+from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
 from blockvis.system.atomic_files import whole_file, write_whole
 
@@ -48,7 +45,7 @@ def read_layout(
     only: str | Sequence[str] = (),
     dimension: int | str = "auto",
     thickness: float = 1.0,
-) -> AnyLayout:
+) -> Layout:
     """Read the blocks of a layout file.
 
     Parameters
@@ -73,7 +70,7 @@ def read_layout(
 
     Returns
     -------
-    Layout, or SolidLayout of blocks in space
+    Layout
         Lengths in m, outlines without collinear points, plane faces. What the drawing holds beside its blocks is in
         ``left_out``, and in a note per kind and layer.
 
@@ -92,7 +89,7 @@ def read_layout(
     content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)
     layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
     layout = replace(layout, source=str(path))
-    if isinstance(layout, SolidLayout):
+    if layout.dimension == 3:
         return _in_metres(layout, unit)
     if layout.n_blocks == 0 and not layout.left_out:
         raise ValueError(f"'{path}' draws no block; draw each block as one closed outline or meshed surface")
@@ -109,7 +106,7 @@ def read_layout(
     outlines = tuple(without_collinear(ring * factor) for ring in layout.outlines)
     layout = replace(
         layout,
-        outlines=outlines,
+        blocks=outlines,
         thickness=None if layout.thickness is None else layout.thickness * factor,
         unit=chosen,
         notes=layout.notes + ((note,) if note else ()),
@@ -126,45 +123,41 @@ def read_layout(
 
 
 def _in_dimension(
-    content: Layout | Bodies | SolidLayout,
+    content: Layout | Bodies,
     path: Path,
     dimension: int | None,
     view: str | None,
     ignore: Sequence[str],
     only: Sequence[str],
-) -> AnyLayout:
+) -> Layout:
     """Make a layout of what a file holds, in the plane or in space."""
     if isinstance(content, Layout):
-        return content
-    if isinstance(content, SolidLayout):
-        if dimension == 2:
+        if content.dimension == 3 and dimension == 2:
             raise ValueError(f"'{path}' draws its blocks in space; leave out dimension = 2")
         return content
     return in_dimension(content, path, dimension, view, ignore, only)
 
 
-def _apart(content: AnyLayout | Bodies, path: Path) -> Layout | Bodies:
+def _apart(content: Layout | Bodies, path: Path) -> Layout | Bodies:
     """Refuse layouts in space as files of one stone each: they hold all blocks."""
-    if isinstance(content, SolidLayout):
+    if isinstance(content, Layout) and content.dimension == 3:
         raise ValueError(f"'{path}' stands for layouts of blocks in space; give one of them")
     return content
 
 
-def _in_metres(layout: SolidLayout, unit: str | None) -> SolidLayout:
+def _in_metres(layout: Layout, unit: str | None) -> Layout:
     """Choose the unit of a layout in space, and check its coordinates."""
     chosen, note = chosen_unit(unit, layout.unit, np.cbrt(layout.volumes))
     factor = metres_per(chosen)
     layout = replace(
         layout,
-        solids=tuple((points * factor, faces) for points, faces in layout.solids),
+        blocks=tuple((points * factor, faces) for points, faces in layout.solids),
         unit=chosen,
         notes=layout.notes + ((note,) if note else ()),
         left_out=tuple(item.mapped(factor) for item in layout.left_out),
     )
     _check_coordinates(layout.source, float(np.abs(layout.points).max()))
-    doubted = doubt(chosen, float(np.median(np.cbrt(layout.volumes))))
-    notes = (*layout.notes, *in_words(layout.left_out), *((doubted,) if doubted else ()))
-    return replace(layout, notes=notes)
+    return noted(layout, np.cbrt(layout.volumes))
 
 
 def _check_coordinates(source: str, largest: float) -> None:
@@ -175,7 +168,7 @@ def _check_coordinates(source: str, largest: float) -> None:
         )
 
 
-def write_layout(layout: AnyLayout, path: str | Path) -> None:
+def write_layout(layout: Layout, path: str | Path) -> None:
     """Write a layout to a file; the suffix chooses the format, lengths in m."""
     if layout.n_blocks == 0:
         raise ValueError(f"there is no block to write to '{path}'")
@@ -283,7 +276,7 @@ def inspect(
     ignore: str | Sequence[str] = (),
     only: str | Sequence[str] = (),
     dimension: int | str = "auto",
-) -> Inspection | SolidInspection:
+) -> Inspection:
     """Read a layout file and measure it.
 
     Parameters
@@ -297,18 +290,18 @@ def inspect(
         As of :func:`read_layout`.
     """
     layout = read_layout(path, unit=unit, view=view, ignore=ignore, only=only, dimension=dimension)
-    return inspected_solids(layout) if isinstance(layout, SolidLayout) else inspected(layout)
+    return inspected(layout)
 
 
-def _read_by_suffix(path: Path, reading: Reading) -> AnyLayout | Bodies:
+def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a file with the module of its suffix."""
     if path.stat().st_size == 0:
         raise ValueError(f"'{path}' is empty (0 bytes); export it again")
-    found: AnyLayout | Bodies = _module_of(path, "read").read(path, reading)
+    found: Layout | Bodies = _module_of(path, "read").read(path, reading)
     return found
 
 
-def _write_by_suffix(layout: AnyLayout, path: Path) -> None:
+def _write_by_suffix(layout: Layout, path: Path) -> None:
     """Write a file, whole or not at all, with the module of its suffix."""
     module = _module_of(path, "write")
     if layout.dimension == 3 and not _format(path, "write").writes_space:

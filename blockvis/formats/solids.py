@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
-from blockvis.layout.layout import AnyLayout, Layout
+from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import FLAT
-from blockvis.layout.solid_layout import SolidLayout
 from blockvis.layout.solids import Solid, area_vectors, prism, triangles_of
 
 from .bodies import Bodies
@@ -165,9 +164,9 @@ def _own_rows(path: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def write(layout: AnyLayout, path: Path) -> None:
+def write(layout: Layout, path: Path) -> None:
     """Write .stl, .obj or .ply as text, or .glb: blocks in space, or outlines extruded by their thickness, else 1 m."""
-    if isinstance(layout, SolidLayout):
+    if layout.dimension == 3:
         solids, what = list(layout.solids), "blocks in space, z is up, lengths in m"
     else:
         depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
@@ -175,7 +174,7 @@ def write(layout: AnyLayout, path: Path) -> None:
         what = "blocks extruded by their thickness, lengths in m"
     if path.suffix.lower() == ".glb":
         # y is up there, as it is in the plane.
-        in_space = isinstance(layout, SolidLayout)
+        in_space = layout.dimension == 3
         turned = [(points[:, [0, 2, 1]] * [1, 1, -1] if in_space else points, faces) for points, faces in solids]
         path.write_bytes(_glb(turned, rows_of(layout)))
         return

@@ -22,10 +22,11 @@ import solver
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches
+from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import LARGEST_CHORD
 from blockvis.layout.units import UNITS, metres_per
 
-from .loose_lines import Faces, Line, faces_of_lines, joined_ends, joined_note, nothing_closed
+from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -110,7 +111,7 @@ def read(path: Path, reading: Reading) -> Layout:
     names = tuple(row.get("name", f"block {k}") for k, row in enumerate(found.rows))
     left_out = tuple(item.mapped((1.0, -1.0)) for item in found.left_out)
     notes = tuple(dict.fromkeys(found.notes))
-    layout = Layout(outlines=turned, names=names, unit=stated, notes=notes, left_out=left_out)
+    layout = Layout(blocks=turned, names=names, unit=stated, notes=notes, left_out=left_out)
     return with_rows(layout, found.rows)
 
 
@@ -141,10 +142,7 @@ def _with_loose(found: _Found, reading: Reading) -> Faces:
         found.rings.append(ring)
         found.rows.append(_row(layer, f"face {number}"))
     if faces.rings:
-        faces.notes.append(
-            f"{len(faces.rings)} blocks are faces between {len(wanted)} loose lines; an opening enclosed by lines "
-            "counts as a block too: erase it or draw closed outlines"
-        )
+        faces.notes.append(faces_note(faces, wanted))
     return faces
 
 
@@ -171,10 +169,10 @@ def _walk(element: ElementTree.Element, where: _Where, found: _Found) -> None:
     if tag in ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata"):
         return
     if "display:none" in element.get("style", "").replace(" ", "") or element.get("display") == "none":
-        found.notes.append(f"a hidden <{tag}> was skipped")
+        found.notes.append(Note(LEFT_OUT, f"a hidden <{tag}> was skipped"))
         return
     if tag == "use":
-        found.notes.append("a <use> (clone) was skipped; unlink clones to have them read")
+        found.notes.append(Note(LEFT_OUT, "a <use> (clone) was skipped; unlink clones to have them read"))
         return
     where = replace(
         where, matrix=where.matrix @ _matrix(element.get("transform", ""), where.path), depth=where.depth + 1

@@ -5,19 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 import solver
 
-from .layout import AnyLayout, Layout
-from .solid_layout import SolidLayout
-
-Drawn = TypeVar("Drawn", Layout, SolidLayout)
+from .layout import Layout
 
 
-def rows_of(layout: AnyLayout) -> list[dict[str, Any]]:
+def rows_of(layout: Layout) -> list[dict[str, Any]]:
     """Write the block table of a layout.
 
     Returns
@@ -39,7 +36,7 @@ def rows_of(layout: AnyLayout) -> list[dict[str, Any]]:
     return rows
 
 
-def with_rows(layout: Drawn, rows: Sequence[Any]) -> Drawn:
+def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
     """Put the values of a block table, one row per block, into a layout.
 
     Raises
@@ -65,11 +62,9 @@ def with_rows(layout: Drawn, rows: Sequence[Any]) -> Drawn:
     for name, role in zip(words("name", layout.names), roles, strict=True):
         if role and role not in solver.ROLES:
             raise ValueError(f"block '{name}' has role '{role}' in the file; roles are {', '.join(solver.ROLES)}")
-    # Blocks in space have no thickness out of a plane.
-    own = {"thickness": numbers("thickness")} if isinstance(layout, Layout) else {}
     return replace(
         layout,
-        **own,  # type: ignore[arg-type]
+        thickness=numbers("thickness") if layout.dimension == 2 else None,
         names=words("name", layout.names),
         groups=words("group", [""] * layout.n_blocks),
         roles=roles,
@@ -78,7 +73,7 @@ def with_rows(layout: Drawn, rows: Sequence[Any]) -> Drawn:
     )
 
 
-def layers_of(layout: AnyLayout, default: str) -> list[str]:
+def layers_of(layout: Layout, default: str) -> list[str]:
     """Name the layer of each block: its group, else its role as a support, else its material, else the default."""
     return [
         group or (role if role in (solver.FIXED, solver.MOVING) else "") or material or default

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .solids import Solid, area_vectors, cross, off_planes, outward, planes_of, triangles_of, volume
+from .solids import Solid, cross, off_planes, planes_of, triangles_of, volume, width_of
+from .surfaces import cleaned
 
 #: Triangles that lie within this fraction of the width of a block of one plane are one face: modellers warp the faces
 #: of stones by a tenth of it.
@@ -42,12 +43,6 @@ class PlaneSolid:
     solid: Solid
     warp: float
     place: np.ndarray
-
-
-def width_of(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> float:
-    """Six volumes over the surface: the edge of a cube, three times the thickness of a slab."""
-    surface = float(np.linalg.norm(area_vectors(points, faces), axis=1).sum())
-    return 6.0 * abs(volume(points, faces)) / surface if surface else 0.0
 
 
 def with_plane_faces(points: np.ndarray, triangles: np.ndarray, tolerance: float = WARPED) -> PlaneSolid:
@@ -91,8 +86,8 @@ def fitted(points: np.ndarray, faces: list[list[int]], near: float) -> PlaneSoli
     corners = points[rings[worst]]
     place = corners[int(np.abs(corners @ planes[worst, :3] - planes[worst, 3]).argmax())]
     if warp[worst] <= ROUNDING * width_of(points, rings):
-        return PlaneSolid(outward(points, rings), 0.0, place)
-    return PlaneSolid(outward(*flattened(points, rings, planes)), float(warp[worst]), place)
+        return PlaneSolid(cleaned(points, rings), 0.0, place)
+    return PlaneSolid(cleaned(*flattened(points, rings, planes)), float(warp[worst]), place)
 
 
 def flattened(points: np.ndarray, faces: list[list[int]], planes: np.ndarray, first: np.ndarray | None = None) -> Solid:

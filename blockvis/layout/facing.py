@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .faces import ROUNDING, flattened, width_of
-from .solids import Solid, area_vectors, planes_of, volume
+from .faces import ROUNDING, flattened
+from .solids import Solid, area_vectors, planes_of, volume, width_of
+from .surfaces import cleaned
 
 #: Gaps and overlaps of joints up to this fraction of the width of a typical block are faced unless the caller says
 #: otherwise: drawings of real vaults overlap by up to 8e-4 of a block, and their corners are as far off.
@@ -55,6 +56,15 @@ class _Faces:
     areas: np.ndarray
 
 
+def facing_tolerance(
+    solids: Sequence[Solid], joint_thickness: float = 0.0, overlap_tolerance: float | None = None
+) -> float:
+    """Find the gap and overlap [m] up to which joints are faced: by default 0.01 of the width of a typical block."""
+    if overlap_tolerance is None:
+        overlap_tolerance = DEFAULT_FACING * float(np.median([width_of(*solid) for solid in solids]))
+    return max(joint_thickness, overlap_tolerance)
+
+
 def faced(
     solids: Sequence[Solid], names: Sequence[str], tolerance: float | None = None, anchored: np.ndarray | None = None
 ) -> Facing:
@@ -77,7 +87,7 @@ def faced(
     """
     widths = np.array([width_of(*solid) for solid in solids])
     width = float(np.median(widths))
-    near = DEFAULT_FACING * width if tolerance is None else tolerance
+    near = facing_tolerance(solids) if tolerance is None else tolerance
     anchored = np.zeros(len(solids), dtype=bool) if anchored is None else anchored
     faces = _faces_of(solids)
     one, other, apart = _joints(faces, near, ROUNDING * width)
@@ -295,5 +305,5 @@ def _moved(
         mine = slice(start[i], start[i + 1])
         found = flattened(points, rings, planes[mine], joint[mine])
         if volume(*found) > 0.0:
-            moved[i] = found
+            moved[i] = cleaned(*found)
     return tuple(moved)

@@ -1,23 +1,39 @@
-"""Inspection of a layout before any analysis: sizes, joints, overlaps, duplicates."""
+"""Inspection of a layout before any analysis: sizes, weights, joints, overlaps, duplicates."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 import solver
 
+from .facing import Facing as FacedJoints
+from .facing import faced, facing_tolerance
 from .joints.close import Proposal, proposed
 from .joints.facing_edges import Facing
 from .layout import Layout
+from .notes import UNIT_CLASH, kind_of
 from .repair import DEFAULT_OVERLAP, ROUNDING, duplicates, overlaps
 from .roles import dropped_twins, roles_of
 from .simplify import default_tolerance, simplified
+from .solids import size_of, width_of
 
 #: Classes of joint thickness in the report.
 CLASSES = 8
+
+#: Gaps between faces that cover each other are joints drawn open between these parts of the width of a typical block.
+SMALLEST_JOINT, WIDEST_JOINT = 1e-3, 0.2
+
+#: Density of blocks for which the layout has none [kg/m³], as of a run.
+DENSITY = 2000.0
+
+#: Title and text of a line of the report.
+Row = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -29,116 +45,105 @@ class Inspection:
     layout : Layout
         As read, duplicates included.
     kept : (n_kept,) int array
-        Numbers of the outlines that are no duplicates.
+        Numbers of the blocks that are no duplicates.
     twins : tuple of (int, int)
-        Outlines drawn twice: the first and the later copy.
+        Blocks drawn twice: the first and the later copy.
+    roles : tuple of str
+        Role of each block, as a run takes it from roles, groups and names.
+    sizes : (n_kept,) array [m²], in space [m³]
+        Areas, in space volumes.
+    low, high : (d,) arrays [m]
+        Corners of the box around all blocks.
     overlapping : tuple of (int, int, float)
-        Pairs of outlines that overlap and the depth [m], deepest first.
+        Pairs of blocks that overlap and the depth [m], deepest first; in space those that a run does not face.
     overlap_tolerance : float [m]
         Deepest overlap that is resolved by default.
-    areas : (n_kept,) array [m²]
-    low, high : (2,) arrays [m]
-        Corners of the box around all blocks.
-    joints : Facing
-        Stretches where edges face each other across a gap; block numbers count the kept outlines.
-    proposal : Proposal
-        Joint thickness, and how joints are closed.
-    roles : tuple of str
-        Role of each outline, as a run takes it from roles, groups and names.
-    finer : str
-        The note on outlines that are finer than needed, or "".
+    joint_thickness : float [m]
+        Joint thickness that closes the joints; 0 if there are none.
+    rows : tuple of (str, str)
+        Titles and texts of the report on weights and corners.
+    joint_rows : tuple of (str, str)
+        Titles and texts of the report on joints.
+    joints : joints.facing_edges.Facing
+        In the plane, stretches where edges face each other across a gap; block numbers count the kept blocks.
+    facing : facing.Facing
+        In space, joints whose faces do not lie in one plane, as a run closes them; block numbers count the kept blocks.
+    open_joints : tuple of (int, int, float)
+        In space, pairs of blocks of which faces cover each other across a gap, and the gap [m], widest first.
+    refused : str
+        Why a run would refuse the blocks, or "".
     """
 
     layout: Layout
     kept: np.ndarray
     twins: tuple[tuple[int, int], ...]
-    overlapping: tuple[tuple[int, int, float], ...]
-    overlap_tolerance: float
-    areas: np.ndarray
+    roles: tuple[str, ...]
+    sizes: np.ndarray
     low: np.ndarray
     high: np.ndarray
-    joints: Facing
-    proposal: Proposal
-    roles: tuple[str, ...]
-    finer: str = ""
-
-    @property
-    def joint_thickness(self) -> float:
-        """Joint thickness that closes the joints [m]; 0 if there are none."""
-        return self.proposal.thickness
+    overlapping: tuple[tuple[int, int, float], ...]
+    overlap_tolerance: float
+    joint_thickness: float
+    rows: tuple[Row, ...]
+    joint_rows: tuple[Row, ...]
+    joints: Facing = field(default_factory=Facing.none)
+    facing: FacedJoints = field(default_factory=lambda: FacedJoints(()))
+    open_joints: tuple[tuple[int, int, float], ...] = ()
+    refused: str = ""
 
     @property
     def unit_clash(self) -> str:
         """The note on a unit that cannot be right, or ""."""
-        return next((note for note in self.layout.notes if note.startswith("unit clash")), "")
+        return next((note for note in self.layout.notes if kind_of(note) == UNIT_CLASH), "")
 
     def __str__(self) -> str:
         """Write the measurements as lines of a table."""
-        width, height = self.high - self.low
-        lines = [
-            f"{self.layout.source}",
-            f"outlines        {self.layout.n_blocks}"
-            + (f", {len(self.twins)} of them duplicates: {len(self.kept)} blocks" if self.twins else ""),
-            f"size            {width:.4g} m × {height:.4g} m, from ({self.low[0]:.6g}, {self.low[1]:.6g}) m",
-            f"unit            {self.layout.unit}",
-            f"areas           {self.areas.min():.4g} to {self.areas.max():.4g} m², median "
-            f"{np.median(self.areas):.4g}, sum {self.areas.sum():.6g} m²",
-            f"corners         {sum(len(self.layout.outlines[i]) for i in self.kept)}"
-            + (f"; in a run {self.finer}" if self.finer else ""),
+        layout, in_space = self.layout, self.layout.dimension == 3
+        size = " × ".join(f"{length:.4g} m" for length in self.high - self.low)
+        corner = ", ".join(f"{x:.6g}" for x in self.low)
+        unit = "m³" if in_space else "m²"
+        copies = f", {len(self.twins)} of them duplicates: {len(self.kept)} blocks" if self.twins else ""
+        names = [layout.names[i] for i in self.kept]
+        rows = [
+            ("blocks in space" if in_space else "outlines", f"{layout.n_blocks}{copies}"),
+            ("size", f"{size}, from ({corner}) m" + ("; z is up" if in_space else "")),
+            ("unit", layout.unit),
+            (
+                "volumes" if in_space else "areas",
+                f"{self.sizes.min():.4g} to {self.sizes.max():.4g} {unit}, median {np.median(self.sizes):.4g}, sum "
+                f"{self.sizes.sum():.6g} {unit}",
+            ),
+            *self.rows,
+            *((what, self._counted(of)) for what, of in (("groups", layout.groups), ("materials", layout.materials))),
+            ("roles", self._counted(self.roles)),
+            ("names", f"{', '.join(names[:4])}{' ...' if len(names) > 4 else ''}"),
+            *self.joint_rows,
+            *self._overlap_rows(),
         ]
-        for title, words in (
-            ("groups", self.layout.groups),
-            ("materials", self.layout.materials),
-            ("roles", self.roles),
-        ):
-            counted = Counter(words[i] for i in self.kept)
-            listed = [f"'{word}' {n}" if word else f"none {n}" for word, n in counted.most_common(12)]
-            more = f", {len(counted) - 12} more" if len(counted) > 12 else ""
-            lines.append(f"{title:15} {', '.join(listed)}{more}")
-        names = [self.layout.names[i] for i in self.kept]
-        lines.append(f"{'names':15} {', '.join(names[:4])}{' ...' if len(names) > 4 else ''}")
-        lines += [*self._joint_lines(), *self._overlap_lines()]
+        if self.refused:
+            rows.append(("refused", self.refused))
         if self.twins:
-            shown = ", ".join(f"{self.layout.names[b]} = {self.layout.names[a]}" for a, b in self.twins[:8])
-            lines.append(f"duplicates      {shown}{' ...' if len(self.twins) > 8 else ''}")
-        lines += [f"note            {note}" for note in self.layout.notes]
-        return "\n".join(lines)
+            shown = ", ".join(f"{layout.names[b]} = {layout.names[a]}" for a, b in self.twins[:8])
+            rows.append(("duplicates", f"{shown}{' ...' if len(self.twins) > 8 else ''}"))
+        rows += [("note", note) for note in layout.notes]
+        return "\n".join([layout.source, *(f"{title:15} {text}" for title, text in rows)])
 
-    def _joint_lines(self) -> list[str]:
-        if not len(self.joints):
-            return ["mortar joints   none: no gaps between facing edges"]
-        widest = self.joints.gaps.max(axis=1) * 1e3
-        lengths = self.joints.lengths
-        edges = np.linspace(0.0, max(self.joint_thickness * 1e3, widest.max()), CLASSES + 1)
-        edges[-1] *= 1.0 + 1e-6
-        metres = np.histogram(widest, edges, weights=lengths)[0]
-        counts = np.histogram(widest, edges)[0]
-        lines = [
-            f"mortar joints   {len(widest)} stretches, {lengths.sum():.4g} m, gaps of {widest.min():.3g} to "
-            f"{widest.max():.3g} mm, median {np.median(widest):.3g} mm"
-        ]
-        for k in np.flatnonzero(counts):
-            lines.append(f"  {edges[k]:6.1f} to {edges[k + 1]:6.1f} mm  {counts[k]:6d} stretches  {metres[k]:9.3f} m")
-        lines.append(f'proposed        joint_thickness = {self.joint_thickness:g}   (m, or "auto")')
-        if self.proposal.way == "voronoi":
-            lines.append(
-                '                closing = "voronoi": faces are not straight, mortar goes to the nearest stone'
-            )
-        lines += [f"                {self.proposal.note}"] if self.proposal.note else []
-        return lines
+    def _counted(self, words: Sequence[str]) -> str:
+        counted = Counter(words[i] for i in self.kept)
+        listed = [f"'{word}' {n}" if word else f"none {n}" for word, n in counted.most_common(12)]
+        return ", ".join(listed) + (f", {len(counted) - 12} more" if len(counted) > 12 else "")
 
-    def _overlap_lines(self) -> list[str]:
+    def _overlap_rows(self) -> list[Row]:
         if not self.overlapping:
-            return ["overlaps        none"]
-        lines = [f"overlaps        {len(self.overlapping)} pairs, up to {self.overlapping[0][2]:.3g} m deep"]
+            return [] if self.refused else [("overlaps", "none")]
+        rows = [("overlaps", f"{len(self.overlapping)} pairs, up to {self.overlapping[0][2]:.3g} m deep")]
         for i, j, depth in self.overlapping[:8]:
+            resolved = depth <= self.overlap_tolerance
             verdict = (
-                "resolved to the midline"
-                if depth <= self.overlap_tolerance
-                else "refused: redraw, or raise the tolerance"
+                "resolved to the midline" if resolved else "refused: move the blocks apart or raise overlap_tolerance"
             )
-            lines.append(f"  {self.layout.names[i]} and {self.layout.names[j]}: {depth:.3g} m, {verdict}")
-        return lines
+            rows.append(("", f"{self.layout.names[i]} and {self.layout.names[j]}: {depth:.3g} m, {verdict}"))
+        return rows
 
 
 def inspected(layout: Layout) -> Inspection:
@@ -153,25 +158,141 @@ def inspected(layout: Layout) -> Inspection:
     -------
     Inspection
     """
-    twins = duplicates(layout.outlines)
+    twins = duplicates(layout.every_corner)
     dropped = dropped_twins(layout, twins, {})
     kept = np.array([i for i in range(layout.n_blocks) if i not in dropped])
-    assembly = solver.Assembly.from_outlines([layout.outlines[i] for i in kept], names=[layout.names[i] for i in kept])
-    width = float(np.median(assembly.widths))
-    found = overlaps(assembly, ROUNDING * width)
-    outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
-    proposal = proposed(outlines)
+    drawn = layout.chosen(kept)
+    roles = tuple(roles_of(layout, {}))
+    free = np.array([roles[i] == solver.FREE for i in kept])
+    found = _in_space(drawn, free) if layout.dimension == 3 else _in_the_plane(drawn)
+    for key in ("overlapping", "open_joints"):
+        found[key] = tuple((int(kept[i]), int(kept[j]), by) for i, j, by in found.get(key, ()))
     return Inspection(
         layout=layout,
         kept=kept,
         twins=tuple(twins),
-        overlapping=tuple((int(kept[i]), int(kept[j]), depth) for i, j, depth in found),
-        overlap_tolerance=DEFAULT_OVERLAP * width,
-        areas=assembly.areas,
-        low=assembly.vertices.min(axis=0),
-        high=assembly.vertices.max(axis=0),
-        joints=proposal.stretches,
-        proposal=proposal,
-        roles=tuple(roles_of(layout, {})),
-        finer=simplified(outlines, default_tolerance(outlines))[1],
+        roles=roles,
+        low=drawn.points.min(axis=0),
+        high=drawn.points.max(axis=0),
+        **found,
     )
+
+
+def _in_the_plane(layout: Layout) -> dict[str, Any]:
+    """Measure what is told of outlines only, and areas, overlaps and joints; blocks by their place in the layout."""
+    assembly = solver.Assembly.from_outlines(layout.outlines, names=layout.names)
+    width = float(np.median(assembly.widths))
+    outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
+    finer = simplified(outlines, default_tolerance(outlines))[1]
+    proposal = proposed(outlines)
+    return {
+        "sizes": assembly.areas,
+        "overlapping": overlaps(assembly, ROUNDING * width),
+        "overlap_tolerance": DEFAULT_OVERLAP * width,
+        "joint_thickness": proposal.thickness,
+        "joints": proposal.stretches,
+        "rows": (("corners", f"{sum(map(len, layout.outlines))}" + (f"; in a run {finer}" if finer else "")),),
+        "joint_rows": _mortar_rows(proposal),
+    }
+
+
+def _mortar_rows(proposal: Proposal) -> tuple[Row, ...]:
+    """Report mortar joints by their thickness, and how they can be closed."""
+    joints = proposal.stretches
+    if not len(joints):
+        return (("mortar joints", "none: no gaps between facing edges"),)
+    widest = joints.gaps.max(axis=1) * 1e3
+    edges = np.linspace(0.0, max(proposal.thickness * 1e3, widest.max()), CLASSES + 1)
+    edges[-1] *= 1.0 + 1e-6
+    metres = np.histogram(widest, edges, weights=joints.lengths)[0]
+    counts = np.histogram(widest, edges)[0]
+    rows = [
+        (
+            "mortar joints",
+            f"{len(widest)} stretches, {joints.lengths.sum():.4g} m, gaps of {widest.min():.3g} to "
+            f"{widest.max():.3g} mm, median {np.median(widest):.3g} mm",
+        )
+    ]
+    for k in np.flatnonzero(counts):
+        rows.append(("", f"{edges[k]:6.1f} to {edges[k + 1]:6.1f} mm  {counts[k]:6d} stretches  {metres[k]:9.3f} m"))
+    rows.append(("proposed", f'joint_thickness = {proposal.thickness:g}   (m, or "auto")'))
+    if proposal.way == "voronoi":
+        rows.append(("", 'closing = "voronoi": faces are not straight, mortar goes to the nearest stone'))
+    return (*rows, ("", proposal.note)) if proposal.note else tuple(rows)
+
+
+def _in_space(layout: Layout, free: np.ndarray) -> dict[str, Any]:
+    """Measure what is told of blocks in space only, and volumes, overlaps and joints."""
+    facing = faced(layout.solids, layout.names)
+    overlapping: list[tuple[int, int, float]] = []
+    gaps: list[tuple[int, int, float]] = []
+    refused = ""
+    tolerance = facing_tolerance(layout.solids)
+    try:
+        assembly = solver.Assembly.from_solids(facing.solids, names=layout.names)
+        overlapping = overlaps(assembly, tolerance)
+        gaps = _open_joints(assembly, float(np.median([width_of(*solid) for solid in layout.solids])))
+    except ValueError as error:
+        refused = str(error)
+    thickness = _closing_thickness(gaps)
+    joint_rows = [("joints", facing.note or "faces in contact lie in one plane")]
+    if gaps:
+        worst = ", ".join(f"{layout.names[i]} | {layout.names[j]} {by:.3g} m" for i, j, by in gaps[:4])
+        more = f" and {len(gaps) - 4} more" if len(gaps) > 4 else ""
+        joint_rows.append(("open joints", f"{len(gaps)}: {worst}{more}; joint_thickness = {thickness:g} closes them"))
+    return {
+        "sizes": layout.volumes,
+        "overlapping": overlapping,
+        "overlap_tolerance": tolerance,
+        "joint_thickness": thickness,
+        "facing": facing,
+        "open_joints": gaps,
+        "refused": refused,
+        "rows": _solid_rows(layout, free),
+        "joint_rows": tuple(joint_rows),
+    }
+
+
+def _solid_rows(layout: Layout, free: np.ndarray) -> tuple[Row, ...]:
+    """Report weights, the largest block, and the number of corners and faces."""
+    density = np.full(layout.n_blocks, np.nan) if layout.density is None else layout.density
+    known = bool(np.isfinite(density).all())
+    weights = layout.volumes * np.where(np.isnan(density), DENSITY, density) * solver.GRAVITY
+    supports = f", supports {weights[~free].sum():.6g} N" if (~free).any() else ""
+    largest = int(layout.volumes.argmax())
+    return (
+        (
+            "weight",
+            f"{weights[free].sum():.6g} N{supports}"
+            + ("" if known else f", at {DENSITY:g} kg/m³ where the file has no density"),
+        ),
+        ("largest block", f"'{layout.names[largest]}', {size_of(layout.corners(largest)):.4g} m across"),
+        (
+            "corners, faces",
+            f"{sum(len(points) for points, _ in layout.solids)}, {sum(len(faces) for _, faces in layout.solids)}",
+        ),
+    )
+
+
+def _closing_thickness(open_joints: Sequence[tuple[int, int, float]]) -> float:
+    """Joint thickness that closes open joints [m], widest first, rounded up to two digits; 0 without any."""
+    if not open_joints:
+        return 0.0
+    widest = 1.01 * open_joints[0][2]
+    unit = 10.0 ** (math.floor(math.log10(widest)) - 1)
+    return float(f"{math.ceil(widest / unit) * unit:.2g}")
+
+
+def _open_joints(assembly: solver.Assembly, width: float) -> list[tuple[int, int, float]]:
+    """Pairs of blocks of which faces cover each other across a gap, and its width [m], widest first."""
+    contacts = solver.find_contacts(assembly, assembly.vertices, WIDEST_JOINT * width)
+    pairs, joint = contacts.joints()
+    n = len(pairs)
+    low, high = np.full(n, np.inf), np.full(n, -np.inf)
+    np.minimum.at(low, joint, contacts.gaps)
+    np.maximum.at(high, joint, contacts.gaps)
+    area = np.bincount(joint, contacts.areas, minlength=n)
+    # What touches somewhere, or opens like a wedge, is no joint that was drawn open.
+    found = (low > SMALLEST_JOINT * width) & (high < 2.0 * low) & (area > (0.3 * width) ** 2)
+    gaps = [(int(i), int(j), float(gap)) for (i, j), gap in zip(pairs[found], high[found], strict=True)]
+    return sorted(gaps, key=lambda pair: -pair[2])

@@ -2,43 +2,147 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 
 import solver
 
-from .labels import LabelledBlocks
 from .left_out import LeftOut
-from .solid_layout import SolidLayout
-from .solids import extruded
+from .notes import CHANGED, Note
+from .solids import Solid, extruded, volume
+
+#: A block in the plane: (n, 2) corners in order [m], the first not repeated.
+Outline = np.ndarray
+
+#: Surrogate halves of characters, which escaped JSON and bytes that are no text leave behind.
+_HALVES = re.compile("[\ud800-\udfff]")
+
+#: What a drawing may say of every block in a word.
+_WORDS = ("names", "groups", "roles", "materials")
 
 
 @dataclass(frozen=True)
-class Layout(LabelledBlocks):
-    """Outlines of blocks, with what else a drawing says of them.
+class Layout:
+    """Blocks of a drawing in the plane or in space, with what else the drawing says of them.
 
     Attributes
     ----------
-    outlines : tuple of (n, 2) arrays [m]
-        Corners of each block in order, the first corner not repeated.
+    blocks : tuple of (n, 2) arrays, or of (points, faces) [m]
+        In the plane the corners of each block in order, the first corner not repeated; gravity acts along -y. In space
+        the (n, 3) corners of each block, and the corners around each of its faces, counter-clockwise seen from outside;
+        gravity acts along -z.
     names : tuple of str
         One per block; may repeat.
+    groups : tuple of str
+        Physical group, layer, object group or part of each block, "" for none.
+    roles : tuple of str
+        "free", "fixed", "moving", or "" where the file says nothing.
+    materials : tuple of str
+    density : (n_blocks,) array [kg/m³] or None
+        NaN for a block of which the file says nothing.
     thickness : (n_blocks,) array [m] or None
-        Out of plane; NaN for a block of which the file says nothing.
+        Out of plane; NaN for a block of which the file says nothing. Blocks in space have none.
+    unit : str
+        Unit of length in which the file was read; inside a format's reader the unit that the file states, "" for none.
+    notes : tuple of str
+        What the reader assumed or dropped; see :class:`blockvis.layout.notes.Note`.
+    source : str
+        The file, "" for a layout that was not read from a file.
+    left_out : tuple of LeftOut
+        What the file draws beside its blocks.
     """
 
-    outlines: tuple[np.ndarray, ...]
+    blocks: tuple[Outline | Solid, ...]
     names: tuple[str, ...]
-    thickness: np.ndarray | None = field(default=None, kw_only=True)
+    groups: tuple[str, ...] = ()
+    roles: tuple[str, ...] = ()
+    materials: tuple[str, ...] = ()
+    density: np.ndarray | None = None
+    thickness: np.ndarray | None = None
+    unit: str = "m"
+    notes: tuple[str, ...] = ()
+    source: str = ""
+    left_out: tuple[LeftOut, ...] = ()
 
-    shapes_in = "outlines"
-    dimension = 2
+    def __post_init__(self) -> None:
+        """Check that there is one word of each kind per block, and replace broken characters."""
+        for kind in _WORDS:
+            if kind != "names" and not getattr(self, kind):
+                object.__setattr__(self, kind, ("",) * self.n_blocks)
+            if len(getattr(self, kind)) != self.n_blocks:
+                raise ValueError(f"{self.n_blocks} blocks but {len(getattr(self, kind))} {kind}; give one per block")
+        # A file in another encoding than it states leaves halves of characters, which cannot be written to a file.
+        note = "characters that the file's encoding does not have are shown as \ufffd"
+        for kind in _WORDS:
+            words = getattr(self, kind)
+            whole = tuple(_HALVES.sub("\ufffd", word) for word in words)
+            if whole != tuple(words) and note not in self.notes:
+                object.__setattr__(self, "notes", (*self.notes, note))
+            object.__setattr__(self, kind, whole)
+
+    @property
+    def n_blocks(self) -> int:
+        """Number of blocks."""
+        return len(self.blocks)
+
+    @property
+    def dimension(self) -> int:
+        """2 of blocks in the plane, and where there is none; 3 of blocks in space."""
+        return 3 if self.blocks and isinstance(self.blocks[0], tuple) else 2
+
+    @property
+    def outlines(self) -> tuple[Outline, ...]:
+        """The blocks of a layout in the plane."""
+        return cast(tuple[Outline, ...], self.blocks)
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """The blocks of a layout in space."""
+        return cast(tuple[Solid, ...], self.blocks)
+
+    @property
+    def volumes(self) -> np.ndarray:
+        """(n_blocks,) array [m³]: of blocks in space."""
+        return np.array([volume(*solid) for solid in self.solids])
 
     def corners(self, block: int) -> np.ndarray:
-        """(n, 2) array [m]: the corners of a block."""
-        return self.outlines[block]
+        """(n, d) array [m]: the corners of a block."""
+        shape = self.blocks[block]
+        return shape[0] if isinstance(shape, tuple) else shape
+
+    @property
+    def every_corner(self) -> list[np.ndarray]:
+        """(n, d) arrays [m]: the corners of all blocks."""
+        return [self.corners(i) for i in range(self.n_blocks)]
+
+    @property
+    def points(self) -> np.ndarray:
+        """(n_points, d) array [m]: the corners of all blocks, one block after another."""
+        return np.concatenate(self.every_corner) if self.blocks else np.zeros((0, 2))
+
+    def chosen(self, blocks: Sequence[int] | np.ndarray) -> Layout:
+        """Take only these blocks, in this order."""
+        keep = [int(i) for i in blocks]
+        taken: dict[str, Any] = {}
+        for kind in ("blocks", *_WORDS, "thickness", "density"):
+            of = getattr(self, kind)
+            taken[kind] = tuple(of[i] for i in keep) if isinstance(of, tuple) else of if of is None else of[keep]
+        return replace(self, **taken)
+
+    def with_more(self, blocks: Sequence[Outline | Solid], **of_blocks: Sequence[Any]) -> Layout:
+        """Add blocks, with what is known of them: names, roles, materials, density, thickness."""
+        taken: dict[str, Any] = {"blocks": self.blocks + tuple(blocks)}
+        for kind in _WORDS:
+            taken[kind] = getattr(self, kind) + tuple(of_blocks.get(kind, ("",) * len(blocks)))
+        for kind in ("density",) if self.dimension == 3 else ("density", "thickness"):
+            known = getattr(self, kind)
+            own = np.full(self.n_blocks, np.nan) if known is None else known
+            taken[kind] = np.append(own, of_blocks.get(kind, np.full(len(blocks), np.nan)))
+        return replace(self, **taken)
 
     def leaving_out(self, reasons: Mapping[int, LeftOut]) -> Layout:
         """Leave out these blocks, each for its reason."""
@@ -51,38 +155,31 @@ class Layout(LabelledBlocks):
         return replace(others, left_out=(*self.left_out, *named))
 
 
-#: A layout in the plane, or in space.
-AnyLayout = Layout | SolidLayout
-
-
-def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> AnyLayout:
+def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> Layout:
     """Make a layout of an assembly, with its blocks as drawn or as displaced in a pose."""
     vertices = assembly.vertices if pose is None else solver.moved_vertices(assembly, pose)
-    roles = tuple(map(str, assembly.roles))
-    if isinstance(assembly.shapes, solver.Polyhedra):
-        shapes = assembly.shapes
-        faces: list[list[list[int]]] = [[] for _ in assembly.names]
-        rings = np.split(shapes.corners, shapes.face_offsets[1:-1])
-        for block, ring in zip(shapes.block_of_face.tolist(), rings, strict=True):
-            faces[block].append((ring - shapes.offsets[block]).tolist())
-        return SolidLayout(
-            solids=tuple(zip(np.split(vertices, shapes.offsets[1:-1]), faces, strict=True)),
-            names=assembly.names,
-            roles=roles,
-            materials=assembly.materials,
-            density=assembly.density,
-        )
+    in_space = isinstance(assembly.shapes, solver.Polyhedra)
     return Layout(
-        outlines=tuple(np.split(vertices, assembly.offsets[1:-1])),
+        blocks=_solids_of(assembly.polyhedra, vertices)
+        if in_space
+        else tuple(np.split(vertices, assembly.offsets[1:-1])),
         names=assembly.names,
-        roles=roles,
+        roles=tuple(map(str, assembly.roles)),
         materials=assembly.materials,
-        thickness=assembly.thickness,
+        thickness=None if in_space else assembly.thickness,
         density=assembly.density,
     )
 
 
-def standing(layout: Layout, thickness: float) -> SolidLayout:
+def _solids_of(shapes: solver.Polyhedra, vertices: np.ndarray) -> tuple[Solid, ...]:
+    faces: list[list[list[int]]] = [[] for _ in range(len(shapes))]
+    rings = np.split(shapes.corners, shapes.face_offsets[1:-1])
+    for block, ring in zip(shapes.block_of_face.tolist(), rings, strict=True):
+        faces[block].append((ring - shapes.offsets[block]).tolist())
+    return tuple(zip(np.split(vertices, shapes.offsets[1:-1]), faces, strict=True))
+
+
+def standing(layout: Layout, thickness: float) -> Layout:
     """Put a layout of the plane into space: upright, extruded along y by half of its thickness to each side.
 
     Parameters
@@ -93,17 +190,11 @@ def standing(layout: Layout, thickness: float) -> SolidLayout:
     """
     depth = np.full(layout.n_blocks, np.nan) if layout.thickness is None else layout.thickness
     depth = np.where(np.isnan(depth), thickness, depth)
-    return SolidLayout(
-        solids=tuple(
+    return replace(
+        layout,
+        blocks=tuple(
             extruded(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)
         ),
-        names=layout.names,
-        groups=layout.groups,
-        roles=layout.roles,
-        materials=layout.materials,
-        density=layout.density,
-        unit=layout.unit,
-        notes=(*layout.notes, "the drawing in the plane was extruded along y by its thickness"),
-        source=layout.source,
-        left_out=layout.left_out,
+        thickness=None,
+        notes=(*layout.notes, Note(CHANGED, "the drawing in the plane was extruded along y by its thickness")),
     )

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .notes import LEFT_OUT, Note
+
 #: Kinds of what is left out, for one and for many.
 KINDS = {
     "open": ("line that closes no outline", "lines that close no outline"),
@@ -80,7 +82,7 @@ class LeftOut:
         return 0.0 if self.closed or len(self.points) < 3 else float(np.hypot(*(self.points[0] - self.points[-1])))
 
 
-def in_words(left_out: Sequence[LeftOut]) -> list[str]:
+def in_words(left_out: Sequence[LeftOut]) -> list[Note]:
     """Say what is left out: one line per kind and layer, with the number and the place of the first.
 
     Parameters
@@ -89,7 +91,7 @@ def in_words(left_out: Sequence[LeftOut]) -> list[str]:
 
     Returns
     -------
-    list of str
+    list of Note
 
     Examples
     --------
@@ -108,10 +110,11 @@ def in_words(left_out: Sequence[LeftOut]) -> list[str]:
         misses = [item.miss for item in members if item.miss]
         apart = f"{min(misses):.3g} to {max(misses):.3g}" if len(misses) > 1 else "".join(f"{m:.3g}" for m in misses)
         ends = f", {'their' if len(members) > 1 else 'its'} ends {apart} apart" if misses else ""
-        lines.append(
+        text = (
             f"left out: {len(members)} {words}{where}, {'the first ' if len(members) > 1 else ''}{called}"
             f"at ({x:.6g}, {y:.6g}){ends}"
         )
+        lines.append(Note(LEFT_OUT, text))
     return lines
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .left_out import LeftOut
-from .views import VIEWS, axis_across
+from .views import VIEWS, axis_across, upright_note
 
 #: A point this close to the line between its neighbours, as a fraction of the size of the block, lies on it: in files
 #: of single precision (VTK, STL) a coordinate is accurate to 6e-8 of its size.
@@ -16,9 +16,6 @@ COLLINEAR = 1e-6
 
 #: Spread of the third coordinate, as a fraction of the size of the drawing, that still counts as flat.
 FLAT = 1e-6
-
-#: Beginning of the note on a flat drawing that does not lie in the plane of x and y.
-UPRIGHT = "the drawing stands upright"
 
 #: Largest angle of a chord, whatever the tolerance: twelve chords make a circle.
 LARGEST_CHORD = math.pi / 6.0
@@ -88,7 +85,7 @@ def flattened(points: np.ndarray, where: str, view: str | None = None) -> tuple[
     if view is not None and view not in flat:
         raise ValueError(f'{where} lies in {flat[0]}: seen as {view} it has no area; give view = "{flat[0]}", or none')
     chosen = view or flat[0]
-    note = "" if chosen == "xy" else f"{UPRIGHT}: its ({chosen[0]}, {chosen[1]}) were read as (x, y)"
+    note = "" if chosen == "xy" else upright_note(chosen)
     return points[:, VIEWS[chosen]], note
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -24,30 +25,31 @@ ROUNDING = 2e-6
 THICKEST_JOINT = 2.0
 
 
-def duplicates(outlines: Sequence[np.ndarray]) -> list[tuple[int, int]]:
+def duplicates(blocks: Sequence[np.ndarray]) -> list[tuple[int, int]]:
     """Find blocks that are drawn twice.
 
     Parameters
     ----------
-    outlines : sequence of (n, 2) arrays [m]
+    blocks : sequence of (n, d) arrays [m]
+        Corners of each block.
 
     Returns
     -------
     list of (int, int)
-        The first outline and its later copy.
+        The first block and its later copy.
     """
-    centres = np.array([(ring.min(axis=0) + ring.max(axis=0)) / 2.0 for ring in outlines])
-    sizes = np.array([float(np.ptp(ring, axis=0).max()) for ring in outlines])
-    cell = 4.0 * SAME * float(np.median(sizes))
+    centres = np.array([(corners.min(axis=0) + corners.max(axis=0)) / 2.0 for corners in blocks])
+    sizes = np.array([float(np.ptp(corners, axis=0).max()) for corners in blocks])
+    cell = 4.0 * SAME * float(np.median(sizes)) or 1.0
     found: dict[int, int] = {}
-    # Four grids, shifted by half a cell: no grid line separates a pair in all of them.
-    for shift in ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)):
-        places: dict[tuple[float, float], list[int]] = {}
-        for i, (x, y) in enumerate(np.floor(centres / cell + shift)):
+    # Grids shifted by half a cell along each axis: no grid line separates a pair in all of them.
+    for shift in itertools.product((0.0, 0.5), repeat=centres.shape[1]):
+        places: dict[tuple[float, ...], list[int]] = {}
+        for i, place in enumerate(np.floor(centres / cell + shift).tolist()):
             if i in found:
                 continue
-            earlier = places.setdefault((float(x), float(y)), [])
-            twin = next((k for k in earlier if _same(outlines[k], outlines[i], SAME * sizes[i])), None)
+            earlier = places.setdefault(tuple(place), [])
+            twin = next((k for k in earlier if _same(blocks[k], blocks[i], SAME * sizes[i])), None)
             if twin is None:
                 earlier.append(i)
             else:
@@ -70,8 +72,24 @@ def overlaps(assembly: solver.Assembly, tolerance: float) -> list[tuple[int, int
     list of (int, int, float)
         Both blocks and the depth [m], the deepest overlap first.
     """
-    i, j, depth = solver.overlap_depths(assembly.vertices, assembly.offsets, tolerance)
+    i, j, depth = assembly.shapes.overlaps(assembly.vertices, tolerance)
     return [(int(i[k]), int(j[k]), float(depth[k])) for k in np.argsort(-depth)]
+
+
+def refuse_overlaps(assembly: solver.Assembly, found: Sequence[tuple[int, int, float]], tolerance: float) -> None:
+    """Refuse the deepest of some overlaps if it is deeper than a tolerance [m], with the place and the remedy."""
+    deep = [pair for pair in found if pair[2] > tolerance]
+    if not deep:
+        return
+    i, j, depth = deep[0]
+    corners = [assembly.vertices[assembly.block_of_vertex == block] for block in (i, j)]
+    low, high = np.max([c.min(axis=0) for c in corners], axis=0), np.min([c.max(axis=0) for c in corners], axis=0)
+    place = ", ".join(f"{x:.6g}" for x in (low + high) / 2.0)
+    others = f"; {len(deep) - 1} more pairs overlap" if len(deep) > 1 else ""
+    raise ValueError(
+        f"block {i} ('{assembly.names[i]}') overlaps block {j} ('{assembly.names[j]}') by {depth:.3g} m near "
+        f"({place}); move them apart or raise overlap_tolerance ({tolerance:.3g} m){others}"
+    )
 
 
 def repaired(
@@ -120,15 +138,7 @@ def repaired(
     if not (np.isfinite(tolerance) and tolerance >= 0):
         raise ValueError(f"overlap_tolerance is {tolerance:g} m; it must be a length of at least 0")
     found = [(i, j, d) for i, j, d in overlaps(assembly, ROUNDING * width) if not (anchored[i] and anchored[j])]
-    if found and found[0][2] > tolerance:
-        i, j, depth = found[0]
-        x, y = (assembly.centroids[i] + assembly.centroids[j]) / 2.0
-        deep = sum(1 for _, _, d in found if d > tolerance)
-        others = f"; {deep - 1} more pairs overlap" if deep > 1 else ""
-        raise ValueError(
-            f"block {i} ('{assembly.names[i]}') overlaps block {j} ('{assembly.names[j]}') by {depth:.3g} m near "
-            f"({x:.6g}, {y:.6g}); move them apart or raise overlap_tolerance ({tolerance:.3g} m){others}"
-        )
+    refuse_overlaps(assembly, found, tolerance)
     thickness, closing, notes = _thickness(joint_thickness, closing, [outlines[i] for i in np.flatnonzero(free)], width)
     if not found and thickness == 0:
         return outlines, notes

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import solver
 from blockvis.text import by_similarity
 
-from .layout import AnyLayout
+from .layout import Layout
 
 
 def checked_role(role: str, whose: str) -> str:
@@ -18,7 +18,7 @@ def checked_role(role: str, whose: str) -> str:
     return role
 
 
-def roles_of(layout: AnyLayout, roles: Mapping[str, str], *, all_match: bool = True) -> list[str]:
+def roles_of(layout: Layout, roles: Mapping[str, str], *, all_match: bool = True) -> list[str]:
     """Role of every block: the caller's, else the file's, else its group or name if that is a role, else free.
 
     Keys that match no block are refused, or left out where some blocks are still to come.
@@ -53,12 +53,12 @@ def roles_of(layout: AnyLayout, roles: Mapping[str, str], *, all_match: bool = T
     return found
 
 
-def dropped_twins(layout: AnyLayout, twins: Sequence[tuple[int, int]], roles: Mapping[str, str]) -> set[int]:
+def dropped_twins(layout: Layout, twins: Sequence[tuple[int, int]], roles: Mapping[str, str]) -> set[int]:
     """Which of two blocks that are drawn in the same place goes: the later, or the first where only the later holds.
 
     Parameters
     ----------
-    layout : Layout or SolidLayout
+    layout : Layout
     twins : sequence of (int, int)
         The first and its later copy.
     roles : mapping of str to {"free", "fixed", "moving"}
@@ -67,7 +67,7 @@ def dropped_twins(layout: AnyLayout, twins: Sequence[tuple[int, int]], roles: Ma
     return {first if said[first] == solver.FREE != said[copy] else copy for first, copy in twins}
 
 
-def twins_note(layout: AnyLayout, twins: Sequence[tuple[int, int]], dropped: set[int]) -> str:
+def twins_note(layout: Layout, twins: Sequence[tuple[int, int]], dropped: set[int]) -> str:
     """Say which blocks were dropped, and in favour of which."""
     pairs = [(copy, first) if copy in dropped else (first, copy) for first, copy in twins]
     listed = ", ".join(f"'{layout.names[gone]}' = '{layout.names[kept]}'" for gone, kept in pairs[:20])
@@ -75,7 +75,7 @@ def twins_note(layout: AnyLayout, twins: Sequence[tuple[int, int]], dropped: set
     return f"{len(twins)} of {layout.n_blocks} blocks are drawn twice and were dropped: {listed}{more}"
 
 
-def _unmatched(key: str, layout: AnyLayout) -> str:
+def _unmatched(key: str, layout: Layout) -> str:
     labels = [*dict.fromkeys(label for label in (*layout.groups, *layout.materials, *layout.names) if label)]
     listed = ", ".join(f"'{label}'" for label in by_similarity(key, labels[:2000])[:12])
     more = f" and {len(labels) - 12} more" if len(labels) > 12 else ""

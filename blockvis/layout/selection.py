@@ -13,6 +13,7 @@ from blockvis.text import by_similarity
 
 from .layout import Layout
 from .left_out import LeftOut, in_words, matches
+from .notes import LEFT_OUT, UNIT, Note
 from .outlines import ring_area, ring_width
 from .units import doubt
 
@@ -74,8 +75,14 @@ def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] =
         counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
         raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}")
     sizes = np.sqrt([abs(ring_area(ring)) for ring in layout.outlines])
-    notes = [*layout.notes, *in_words(layout.left_out), doubt(layout.unit, float(np.median(sizes)))]
-    return replace(layout, notes=tuple(note for note in notes if note))
+    return noted(layout, sizes)
+
+
+def noted(layout: Layout, sizes: np.ndarray) -> Layout:
+    """Note what is left out, and what makes the unit doubtful: blocks of these sizes [m]."""
+    notes = [*layout.notes, *in_words(layout.left_out)]
+    doubted = doubt(layout.unit, float(np.median(sizes)))
+    return replace(layout, notes=(*notes, Note(UNIT, doubted)) if doubted else tuple(notes))
 
 
 def as_asked(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:
@@ -105,7 +112,7 @@ def as_asked(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layo
         message = f"'{pattern}' matches no layer, group or name; the drawing has {listed or 'none'}"
         if pattern in only:
             raise ValueError(f"{layout.source or 'the drawing'}: only: {message}; correct it")
-        notes.append(f"ignore: {message}")
+        notes.append(Note(LEFT_OUT, f"ignore: {message}"))
     reasons = {
         i: LeftOut("asked", layout.outlines[i], "")
         for i, labels in enumerate(known)

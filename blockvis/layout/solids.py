@@ -47,6 +47,12 @@ def area_vectors(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray
     return np.asarray(np.add.reduceat(cross(b - a, c - a), starts, axis=0) / 2.0)
 
 
+def width_of(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> float:
+    """Six volumes over the surface: the edge of a cube, three times the thickness of a slab."""
+    surface = float(np.linalg.norm(area_vectors(points, faces), axis=1).sum())
+    return 6.0 * abs(volume(points, faces)) / surface if surface else 0.0
+
+
 def planes_of(points: np.ndarray, faces: Sequence[Sequence[int]]) -> np.ndarray:
     """(n_faces, 4) array: unit normals of faces, and the distances of their planes from the origin."""
     normals = area_vectors(points, faces)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .notes import UNIT_CLASH, Note
+
 #: Metres per unit.
 UNITS = {
     "m": 1.0,
@@ -83,9 +85,10 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
     low, high = PLAUSIBLE_SIZE
     in_stated, in_metres = median * metres_per(stated), median
     if not low <= in_stated <= high and low <= in_metres <= high:
-        return "m", (
+        return "m", Note(
+            UNIT_CLASH,
             f"unit clash: the file says its unit is {stated}, which makes the median block {in_stated:.3g} m in size; "
-            f"m was assumed, which makes it {in_metres:.3g} m; give unit=... to settle it"
+            f"m was assumed, which makes it {in_metres:.3g} m; give unit=... to settle it",
         )
     return stated, ""
 

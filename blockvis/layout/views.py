@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from .notes import UPRIGHT, Note
+
 #: Coordinates kept by each view: from +z, from -y and from +x, which mirrors nothing.
 VIEWS = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
@@ -48,3 +50,8 @@ def axis_across(view: str) -> int:
 def view_along(axis: int) -> str:
     """Name the view that looks along an axis: 0 for x, 1 for y, 2 for z."""
     return next(view for view in VIEWS if axis_across(view) == axis)
+
+
+def upright_note(view: str) -> Note:
+    """Say that a drawing that stands upright was turned into the plane of x and y."""
+    return Note(UPRIGHT, f"the drawing stands upright: its ({view[0]}, {view[1]}) were read as (x, y)")

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.inspect import Inspection
-from blockvis.layout.inspect_solids import SolidInspection
 
 #: Names are written where they fit into their block at this size [points]; smaller ones cannot be read.
 SMALLEST_TEXT, LARGEST_TEXT = 4.0, 9.0
@@ -23,12 +22,12 @@ GAPS = ("#2166ac", "#1b9e77", "#e6a100", "#d95f02", "#a50026")
 LEFT_OUT = "#b05ac8"
 
 
-def draw_inspection(inspection: Inspection | SolidInspection, path: str | Path) -> Path:
+def draw_inspection(inspection: Inspection, path: str | Path) -> Path:
     """Draw what was found: outlines with their names and roles, joints by their thickness, what was left out.
 
     Parameters
     ----------
-    inspection : Inspection or SolidInspection
+    inspection : Inspection
     path : str or Path
         .png, .svg or .pdf; of blocks in space .png or .pdf.
 
@@ -36,7 +35,7 @@ def draw_inspection(inspection: Inspection | SolidInspection, path: str | Path) 
     -------
     pathlib.Path
     """
-    if isinstance(inspection, SolidInspection):
+    if inspection.layout.dimension == 3:
         from .solid_inspection import draw_solid_inspection
 
         return draw_solid_inspection(inspection, path)

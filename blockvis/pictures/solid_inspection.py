@@ -17,7 +17,7 @@ from .solid_scene import SolidScene
 from .solid_view import ABOVE, AROUND, View, showing_faces
 
 if TYPE_CHECKING:
-    from blockvis.layout.inspect_solids import SolidInspection
+    from blockvis.layout.inspect import Inspection
 
 #: Pixels of the picture of an inspection, of which 0.8 are to hold names.
 SIZE = (1600, 1100)
@@ -26,12 +26,12 @@ SIZE = (1600, 1100)
 TWICE = (91, 143, 214)
 
 
-def draw_solid_inspection(inspection: SolidInspection, path: str | Path) -> Path:
+def draw_solid_inspection(inspection: Inspection, path: str | Path) -> Path:
     """Draw what a layout in space holds: blocks by their role, with their names where they can be read.
 
     Parameters
     ----------
-    inspection : SolidInspection
+    inspection : Inspection
     path : str or Path
         .png, .pdf or any format that Pillow writes.
 

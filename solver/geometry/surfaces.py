@@ -1,4 +1,4 @@
-"""Surfaces of blocks in space: checked, cleaned of what drawings add, and made into polyhedra."""
+"""Closed surfaces of blocks in space: checked, and made into polyhedra with one face in each plane."""
 
 from __future__ import annotations
 
@@ -16,10 +16,6 @@ from .flat_faces import ONE_WAY, SLIVER, edges_of, merged_faces, renumbered
 from .polyhedra import Polyhedra
 from .solids import Solids, dot
 
-#: Corners of a block nearer to each other than this fraction of its diagonal are one: files of triangles repeat them,
-#: in single precision.
-WELDED = 1e-6
-
 #: A block with less volume than this fraction of its surface to the power 3/2 is a sheet: double precision leaves about
 #: six digits of its centroid.
 SMALLEST_SHAPE_FACTOR = 1e-9
@@ -29,12 +25,13 @@ Surface = tuple[ArrayLike, Sequence[Sequence[int]]]
 
 
 def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
-    """Make polyhedra of closed surfaces: corners welded, right side out, with one face in each plane.
+    """Make polyhedra of closed surfaces, with one face in each plane.
 
     Parameters
     ----------
     solids : sequence of (vertices, faces)
-        Corners (n, 3) [m] of each block, and the numbers of the corners around each face.
+        Corners (n, 3) [m] of each block, no two at one place, and the numbers of the corners around each face, all in
+        the same sense seen from outside.
     names : sequence of str
         Of the blocks, for messages.
 
@@ -42,22 +39,13 @@ def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
     ------
     ValueError
         Names the block and the place: coordinates that are not finite, a surface that is not closed, in several pieces
-        or without volume, a face that is not plane to a thousandth of the width of its block, a surface that crosses
-        itself.
+        or without volume, faces in different senses, a face that is not plane to a thousandth of the width of its
+        block, a surface that crosses itself.
     """
-    surfaces = [_welded(*_checked(solid, name)) for solid, name in zip(solids, names, strict=True)]
-    for name, (vertices, faces) in zip(names, surfaces, strict=True):
-        if len(faces) < 4:
-            raise ValueError(
-                f"block '{name}' has {len(vertices)} different corners and {len(faces)} faces between them; "
-                "a block needs at least four of either"
-            )
+    surfaces = [_checked(solid, name) for solid, name in zip(solids, names, strict=True)]
     joined = _joined(surfaces)
-    faulty = _blocks_of_open_edges(joined)
-    for block in faulty:
-        surfaces[block] = surfaces[block][0], _oriented(*surfaces[block], names[block])
-    if len(faulty):
-        joined = _joined(surfaces)
+    for block in _blocks_of_open_edges(joined):
+        _refuse_open(*surfaces[block], names[block])
     _refuse_pieces(joined, names)
     volumes = joined.volumes
     for i in np.flatnonzero(np.abs(volumes) <= SMALLEST_SHAPE_FACTOR * joined.surfaces**1.5).tolist():
@@ -115,29 +103,7 @@ def _checked(solid: Surface, name: str) -> tuple[np.ndarray, list[list[int]]]:
             )
         if len(face) < 3:
             raise ValueError(f"block '{name}': face {k} has {len(face)} corners; a face needs at least three")
-    return vertices, faces
-
-
-def _welded(vertices: np.ndarray, faces: list[list[int]]) -> tuple[np.ndarray, list[list[int]]]:
-    """Make one corner of those at the same place, and drop corners of no face and faces that have shrunk to a line."""
-    from scipy.spatial import cKDTree
-
-    near = WELDED * float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    pairs = cKDTree(vertices).query_pairs(near, output_type="ndarray")
-    if len(pairs):
-        n = len(vertices)
-        links = coo_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
-        count, which = connected_components(links, directed=False)
-        first = np.full(count, n)
-        np.minimum.at(first, which, np.arange(n))
-        same = first[which].tolist()
-        faces = [_without_repeats([same[corner] for corner in face]) for face in faces]
-        faces = [face for face in faces if len(face) > 2]
     return renumbered(vertices, faces)
-
-
-def _without_repeats(face: list[int]) -> list[int]:
-    return [corner for k, corner in enumerate(face) if corner != face[k - 1]]
 
 
 def _joined(surfaces: Sequence[tuple[np.ndarray, list[list[int]]]]) -> Polyhedra:
@@ -165,8 +131,8 @@ def _blocks_of_open_edges(solids: Solids) -> list[int]:
     return np.unique(solids.block_of_face[solids.face_of_corner[~closed]]).tolist()
 
 
-def _oriented(vertices: np.ndarray, faces: list[list[int]], name: str) -> list[list[int]]:
-    """Turn faces so that each edge is run through once in each sense; refuse a surface that is not closed."""
+def _refuse_open(vertices: np.ndarray, faces: list[list[int]], name: str) -> None:
+    """Say where a surface is not run through once in each sense along each edge."""
     owners: dict[tuple[int, int], list[int]] = {}
     for k, face in enumerate(faces):
         if len(set(face)) < len(face):
@@ -177,25 +143,18 @@ def _oriented(vertices: np.ndarray, faces: list[list[int]], name: str) -> list[l
         for a, b in edges_of(face):
             owners.setdefault((min(a, b), max(a, b)), []).append(k)
     for (a, b), those in owners.items():
+        edge = f"the edge from {_place(vertices[a])} to {_place(vertices[b])}"
         if len(those) != 2:
             many = "only one face meets" if len(those) == 1 else f"{len(those)} faces meet"
             raise ValueError(
-                f"block '{name}': the surface is not closed; {many} the edge from {_place(vertices[a])} to "
-                f"{_place(vertices[b])}, where two should"
+                f"block '{name}': the surface is not closed; {many} {edge}, where two should; corners at the same "
+                "place must be one"
             )
-    turned: dict[int, bool] = {}
-    for seed in range(len(faces)):
-        queue = [seed] if seed not in turned else []
-        turned.setdefault(seed, False)
-        while queue:
-            k = queue.pop()
-            for a, b in edges_of(faces[k]):
-                first, second = owners[min(a, b), max(a, b)]
-                other = second if first == k else first
-                if other not in turned:
-                    turned[other] = turned[k] != ((a, b) in edges_of(faces[other]))
-                    queue.append(other)
-    return [face[::-1] if turned[k] else face for k, face in enumerate(faces)]
+        if ((a, b) in edges_of(faces[those[0]])) == ((a, b) in edges_of(faces[those[1]])):
+            raise ValueError(
+                f"block '{name}': faces {those[0]} and {those[1]} run the same way along {edge}; turn one of them "
+                "round: all must run counter-clockwise seen from outside"
+            )
 
 
 def _place(point: np.ndarray) -> str:

@@ -16,7 +16,7 @@ UNIT = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
 
 def row(n, **more):
     return Layout(
-        outlines=tuple(UNIT + np.array([k, 0]) for k in range(n)),
+        blocks=tuple(UNIT + np.array([k, 0]) for k in range(n)),
         names=tuple(f"brick {k + 1}" for k in range(n)),
         **more,
     )
@@ -56,7 +56,7 @@ def test_supports_are_added_and_checked():
 
 def test_duplicates_are_dropped_with_one_warning_that_names_them():
     drawing = row(3)
-    twice = Layout(outlines=(*drawing.outlines, drawing.outlines[1][[2, 1, 0, 3]]), names=(*drawing.names, "again"))
+    twice = Layout(blocks=(*drawing.outlines, drawing.outlines[1][[2, 1, 0, 3]]), names=(*drawing.names, "again"))
     with pytest.warns(UserWarning, match="1 of 4 blocks are drawn twice and were dropped: 'again' = 'brick 2'") as seen:
         assembly = assemble(twice)
     assert len(seen) == 1
@@ -65,7 +65,7 @@ def test_duplicates_are_dropped_with_one_warning_that_names_them():
 
 def test_small_overlaps_are_resolved_and_large_ones_name_both_blocks():
     def pair(depth):
-        return Layout(outlines=(UNIT, UNIT + np.array([1 - depth, 0])), names=("left", "right"))
+        return Layout(blocks=(UNIT, UNIT + np.array([1 - depth, 0])), names=("left", "right"))
 
     closed = assemble(pair(0.01))
     assert closed.outline(0)[:, 0].max() == pytest.approx(0.995, abs=1e-12)

@@ -12,8 +12,7 @@ from blockvis.cases.build import case_assembly, case_loads
 from blockvis.cli import main
 from blockvis.formats.read import save_layout, write_layout
 from blockvis.layout.assemble import assemble
-from blockvis.layout.layout import layout_of
-from blockvis.layout.solid_layout import SolidLayout
+from blockvis.layout.layout import Layout, layout_of
 from blockvis.layout.solids import box
 
 DOME = '[geometry]\nlayout = "dome"\nparameters = {lunes = 4, courses = 1}\n'
@@ -107,7 +106,7 @@ role = "moving"
 
 
 def test_stones_that_overlap_are_refused_with_the_place(tmp_path):
-    layout = SolidLayout((box((0, 0, 0), (1, 1, 1)), box((0, 0, 0.9), (1, 1, 2))), ("low", "high"))
+    layout = Layout((box((0, 0, 0), (1, 1, 1)), box((0, 0, 0.9), (1, 1, 2))), ("low", "high"))
     with pytest.raises(
         ValueError,
         match=r"block 0 \('low'\) overlaps block 1 \('high'\) by 0.1 m near \(0.5, 0.5, 0.95\); move them apart",

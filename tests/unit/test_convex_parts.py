@@ -112,7 +112,7 @@ def groin_stone(low, high, end=2.6):
     groin, first, second = (np.column_stack(at) for at in ((u, u, z), (u, np.full(4, end), z), (np.full(4, end), u, z)))
     sides = [[k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
     others = [[(k + 1) % 4, k, k + 8, (k + 1) % 4 + 8] for k in range(4)]
-    return np.concatenate([groin, first, second]), [*sides, *others, [7, 6, 5, 4], [8, 9, 10, 11]]
+    return np.concatenate([groin, first, second]), [*sides, *others, [4, 5, 6, 7], [11, 10, 9, 8]]
 
 
 @pytest.mark.parametrize("shift", [0.0, 1e-6, 1e-4, 1e-3])

@@ -12,7 +12,7 @@ from blockvis.formats.read import read_layout, write_layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.facing import faced
-from blockvis.layout.inspect_solids import inspected_solids
+from blockvis.layout.inspect import inspected
 from blockvis.layout.layout import layout_of
 from blockvis.layout.solids import box, triangles_of, volume
 
@@ -29,7 +29,7 @@ def shaken(layout, amount, seed=3):
     """Move every corner of every block by itself, up to an amount [m] along each axis."""
     random = np.random.default_rng(seed)
     moved = tuple((points + amount * random.uniform(-1, 1, points.shape), faces) for points, faces in layout.solids)
-    return replace(layout, solids=moved)
+    return replace(layout, blocks=moved)
 
 
 def joints(assembly, least):
@@ -142,7 +142,7 @@ def test_a_face_warped_beyond_the_tolerance_stays_two_triangles():
 def shrunk(layout, by):
     """Every stone smaller about the mean of its corners: joints open everywhere."""
     smaller = tuple((points + by * (points.mean(axis=0) - points), faces) for points, faces in layout.solids)
-    return replace(layout, solids=smaller)
+    return replace(layout, blocks=smaller)
 
 
 @pytest.mark.parametrize("name", ["extruded arch", "barrel vault", "L corner"])
@@ -150,7 +150,7 @@ def test_open_joints_are_measured_and_closed(name):
     """Named with their gaps, and closed by the joint thickness that is proposed, by hand or as "auto"."""
     drawn = generators.build(name, SMALL.get(name, {"voussoirs": 6}))
     layout = shrunk(layout_of(drawn), 0.05)
-    found = inspected_solids(layout)
+    found = inspected(layout)
     assert {frozenset(pair[:2]) for pair in found.open_joints} >= joints(drawn, 4) - {
         frozenset(np.flatnonzero(~drawn.free))
     }
@@ -169,11 +169,11 @@ def test_open_joints_are_measured_and_closed(name):
 def test_what_touches_has_no_open_joints_and_what_overlaps_is_named():
     drawn = generators.build("L corner", SMALL["L corner"])
     layout = layout_of(drawn)
-    found = inspected_solids(layout)
+    found = inspected(layout)
     assert (found.open_joints, found.overlapping, found.refused, found.joint_thickness) == ((), (), "", 0.0)
     points, faces = layout.solids[0]
-    pushed = replace(layout, solids=((points + np.array([0.01, 0.0, 0.0]), faces), *layout.solids[1:]))
-    found = inspected_solids(pushed)
+    pushed = replace(layout, blocks=((points + np.array([0.01, 0.0, 0.0]), faces), *layout.solids[1:]))
+    found = inspected(pushed)
     assert 0 in found.overlapping[0][:2]
     assert found.overlapping[0][2] == pytest.approx(0.01, rel=1e-6)
-    assert "a run refuses them: move the blocks apart or raise overlap_tolerance" in str(found)
+    assert "refused: move the blocks apart or raise overlap_tolerance" in str(found)

@@ -1,9 +1,10 @@
-"""Surfaces of blocks in space as files have them, and what is refused of them."""
+"""Surfaces of blocks in space as files have them, made clean, and what the solver refuses of them."""
 
 import numpy as np
 import pytest
 
 import solver
+from blockvis.layout.surfaces import cleaned
 
 CORNERS = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [0, 0, 3], [2, 0, 3], [2, 1, 3], [0, 1, 3]]
 FACES = [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
@@ -38,7 +39,7 @@ def loose(corners, faces):
 )
 def test_every_way_to_draw_a_box_is_the_same_box(surface, sense):
     corners, faces = surface
-    shapes = shapes_of(corners, [face[::sense] for face in faces])
+    shapes = shapes_of(*cleaned(np.asarray(corners, dtype=float), [list(face)[::sense] for face in faces]))
     assert len(shapes.vertices) == 8
     assert np.diff(shapes.face_offsets).tolist() == [4] * 6
     assert shapes.volumes[0] == pytest.approx(6.0, rel=1e-12)
@@ -47,7 +48,8 @@ def test_every_way_to_draw_a_box_is_the_same_box(surface, sense):
 
 def test_single_precision_far_away_is_welded_and_flat():
     corners = (np.asarray(CORNERS) * 0.1 + [40.0, 50.0, 6.0]).astype(np.float32)
-    shapes = shapes_of(*loose(corners, TRIANGLES))
+    corners, faces = loose(corners, TRIANGLES)
+    shapes = shapes_of(*cleaned(corners, [list(face) for face in faces]))
     assert np.diff(shapes.face_offsets).tolist() == [4] * 6
 
 
@@ -68,7 +70,9 @@ def test_facets_of_a_curved_face_stay():
         (CORNERS, [*FACES, [0, 1, 9]], "face 6 has the corner 9; there are corners 0 to 7"),
         (CORNERS, [*FACES, [0, 1]], "face 6 has 2 corners"),
         ([[0, np.nan, 0], *CORNERS[1:]], FACES, r"corner 0 is \[0.0, nan, 0.0\]; coordinates must be finite"),
-        (np.multiply(CORNERS, [1, 1, 1e-13]), FACES, "has 4 different corners and 2 faces between them"),
+        (np.multiply(CORNERS, [1, 1, 1e-13]), FACES, "it is a sheet, not a block"),
+        (CORNERS, [FACES[0][::-1], *FACES[1:]], "faces 0 and . run the same way along the edge from"),
+        (*loose(CORNERS, FACES), "not closed; only one face meets .*corners at the same place must be one"),
         (np.multiply(CORNERS, [1, 1, 1e-5]), [*FACES], None),
         ([[0, 0, 0.1], *CORNERS[1:]], FACES, r"face 0 is not plane: its corner .* is 0.025 m out of it"),
         (

@@ -48,6 +48,12 @@ class Facing:
     midline: np.ndarray
     lengths: np.ndarray
 
+    @classmethod
+    def none(cls) -> Facing:
+        """Make no stretch."""
+        number = np.zeros(0, dtype=np.int64)
+        return cls(number, number, np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0))
+
     def __len__(self) -> int:
         """Return the number of stretches."""
         return len(self.edge_a)

@@ -1,0 +1,53 @@
+"""Notes on a layout: what its reader assumed, changed or dropped, each with what it is about."""
+
+from __future__ import annotations
+
+#: The drawing was left out in part, or its shapes are not those of the file: a run repeats these notes.
+LEFT_OUT, CHANGED = "left out", "changed"
+
+#: The unit is in doubt, or clashes with the one that the file states.
+UNIT, UNIT_CLASH = "unit", "unit clash"
+
+#: A drawing that stands upright was turned into the plane of x and y.
+UPRIGHT = "upright"
+
+#: Kinds that change what is analysed.
+TOLD = (LEFT_OUT, CHANGED, UNIT, UNIT_CLASH)
+
+
+class Note(str):
+    """A sentence with its kind; a sentence without one, a plain ``str``, is a remark.
+
+    Parameters
+    ----------
+    kind : str
+        One of the constants of this module.
+    text : str
+
+    Examples
+    --------
+    >>> Note(CHANGED, "elevations were ignored")
+    'elevations were ignored'
+    """
+
+    kind: str
+
+    def __new__(cls, kind: str, text: str) -> Note:
+        """Make a note of what it is about and what it says."""
+        note = super().__new__(cls, text)
+        note.kind = kind
+        return note
+
+    def __reduce__(self) -> tuple[type[Note], tuple[str, str]]:
+        """Copy and pickle both."""
+        return Note, (self.kind, str(self))
+
+
+def is_told(note: str) -> bool:
+    """Whether a note changes what is analysed."""
+    return kind_of(note) in TOLD
+
+
+def kind_of(note: str) -> str:
+    """Return what a note is about; "" for a remark."""
+    return note.kind if isinstance(note, Note) else ""

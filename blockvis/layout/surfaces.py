@@ -1,0 +1,101 @@
+"""Closed surfaces as drawings have them, made clean: corners that coincide are one, and faces are seen from outside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .solids import Solid, outward
+
+#: Corners of a block nearer to each other than this fraction of its diagonal are one: files of triangles repeat them,
+#: in single precision.
+WELDED = 1e-6
+
+
+def cleaned(points: np.ndarray, faces: list[list[int]]) -> Solid:
+    """Weld the corners of a block, and turn its faces counter-clockwise seen from outside, as the solver takes it.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    faces : list of lists of int
+        Corners around each face, in either sense.
+
+    Returns
+    -------
+    Solid
+        Without corners of no face and faces without an area. What is not closed stays so, for the solver to refuse.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> cleaned(corners, [[0, 1, 2], [0, 1, 3], [1, 3, 2], [0, 2, 3]])[1]
+    [[2, 1, 0], [0, 1, 3], [1, 2, 3], [3, 2, 0]]
+    """
+    same = same_points(points, WELDED * float(np.linalg.norm(np.ptp(points, axis=0)))).tolist()
+    rings = [_without_repeats([same[corner] for corner in face]) for face in faces]
+    rings = [ring for ring in rings if len(ring) > 2]
+    used = sorted({corner for ring in rings for corner in ring})
+    if not used:
+        return points, faces
+    if len(used) < len(points):
+        place = {corner: k for k, corner in enumerate(used)}
+        points, rings = points[used], [[place[corner] for corner in ring] for ring in rings]
+    edges = [(ring[k - 1], ring[k]) for ring in rings for k in range(len(ring))]
+    if len(set(edges)) < len(edges) or not {(b, a) for a, b in edges} <= set(edges):
+        face = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
+        low, high = np.sort(np.array(edges), axis=1).T
+        edge, counts = np.unique(low * np.int64(len(points)) + high, return_inverse=True, return_counts=True)[1:]
+        if (counts == 2).all():
+            turned = turned_faces(np.array(edges), edge.ravel(), face)
+            rings = [ring[::-1] if turned[k] else ring for k, ring in enumerate(rings)]
+    return outward(points, rings)
+
+
+def _without_repeats(face: list[int]) -> list[int]:
+    return [corner for k, corner in enumerate(face) if corner != face[k - 1]]
+
+
+def same_points(points: np.ndarray, near: float) -> np.ndarray:
+    """(n,) int array: the point that stands for each, the same for those nearer to each other than ``near``."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    # Exact copies first: a million of them would make a million squared pairs.
+    unique, index, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    pairs = cKDTree(unique).query_pairs(near, output_type="ndarray")
+    if len(pairs) == 0:
+        return np.asarray(index[inverse.ravel()])
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(unique), len(unique)))
+    label = connected_components(graph, directed=False)[1]
+    return np.asarray(index[np.unique(label, return_index=True)[1]][label][inverse.ravel()])
+
+
+def turned_faces(edges: np.ndarray, edge: np.ndarray, face: np.ndarray) -> np.ndarray:
+    """(m,) bool array: the faces to turn round so that neighbours run the opposite ways along their edge.
+
+    Parameters
+    ----------
+    edges : (n, 2) int array
+        First and last corner of the edges of all faces, one face after another.
+    edge : (n,) int array
+        Which edge each is, whatever its sense; each is that of two faces.
+    face : (n,) int array
+        0 to m - 1, ascending.
+
+    Notes
+    -----
+    Each face is there twice, as it is and turned round, and goes with the one of each neighbour that fits: of a surface
+    that encloses something there are two sets, and the one with its first face as it is is taken.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    m = int(face[-1]) + 1
+    first, second = edge.argsort(kind="stable").reshape(-1, 2).T
+    forward = edges[:, 0] < edges[:, 1]
+    fits = forward[first] != forward[second]
+    one, other = face[first], face[second]
+    rows, columns = np.append(one, one + m), np.append(other + m * ~fits, other + m * fits)
+    label = connected_components(coo_matrix((np.ones(2 * len(one)), (rows, columns)), shape=(2 * m, 2 * m)))[1]
+    return np.asarray(label[:m] > label[m:])
