@@ -1,4 +1,4 @@
-"""What drives a path: supports that move, or a control displacement that grows under a live load."""
+"""Drivers of a path: supports that move, or a control displacement that grows under a live load."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from solver.loads import Settlement
 
 
 class Driver(Protocol):
-    """The one parameter of a path: what it moves, how far, and in which steps."""
+    """The parameter of a path: what it moves, how far, and in which increments."""
 
     @property
     def increment(self) -> float:
@@ -23,7 +23,7 @@ class Driver(Protocol):
 
     @property
     def limit(self) -> float:
-        """Where the path ends if nothing has collapsed."""
+        """Largest value of the parameter."""
         ...
 
     @property
@@ -50,28 +50,28 @@ class Driver(Protocol):
         ...
 
     def supports(self, s: float) -> Pose:
-        """Where the supports are; free blocks are not looked at."""
+        """Pose of the supports; that of free blocks has no meaning."""
         ...
 
     def rate(self, s: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity of the supports per unit of the parameter."""
         ...
 
-    def gone(self, pose: Pose) -> float:
+    def control_displacement(self, pose: Pose) -> float:
         """Control displacement at a pose; 0 where supports drive."""
         ...
 
     def control(self, pose: Pose) -> np.ndarray | None:
-        """(n_blocks, n_dof) array: times a movement the control displacement in it; None where supports drive."""
+        """(n_blocks, n_dof) array: gradient of the control displacement; None where supports drive."""
         ...
 
     def misdirected(self) -> str:
-        """What to say where a multiplier has to turn around for the parameter to grow."""
+        """Message where the multiplier has to change its sign for the parameter to grow."""
         ...
 
 
 class SupportMotion:
-    """Supports that follow a settlement, from where they stand."""
+    """Supports that follow a settlement, from a pose."""
 
     what = "settlement"
 
@@ -86,18 +86,18 @@ class SupportMotion:
         return float(np.linalg.norm(point_velocities(points, block, self.start, self.rate(0.0)), axis=1).max())
 
     def stops(self) -> tuple[float, ...]:
-        """The settlement's own."""
+        """Stops of the settlement."""
         return self.phase.stops
 
     def supports(self, s: float) -> Pose:
-        """On their way along the settlement."""
+        """Of the settlement."""
         return self.phase.displaced(self.assembly, self.start, s)
 
     def rate(self, s: float) -> np.ndarray:
         """Of the settlement."""
         return self.phase.rate(self.assembly, self.start, s)
 
-    def gone(self, pose: Pose) -> float:
+    def control_displacement(self, pose: Pose) -> float:
         """No control displacement."""
         return 0.0
 
@@ -112,7 +112,7 @@ class SupportMotion:
 
 @dataclass(frozen=True)
 class ControlDisplacement:
-    """The displacement that is made to grow in a pushover analysis.
+    """The control displacement of a pushover analysis.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class ControlDisplacement:
     increment : float [m]
         Largest step.
     limit : float [m]
-        Where to stop if capacity is left.
+        Largest control displacement.
     tolerance : float, optional [m]
         Width of the bracket of the displacement at the end; a hundredth of the increment by default.
     """
@@ -138,7 +138,7 @@ class ControlDisplacement:
     tolerance: float | None = None
 
     def __post_init__(self) -> None:
-        """Check what was given; directions come to unit length."""
+        """Check the numbers; the direction becomes a unit vector."""
         for name in ("direction", "point"):
             value = getattr(self, name)
             if value is None:
@@ -178,7 +178,7 @@ class ControlDisplacement:
         return float((point_velocities(point, np.array([block]), pose, velocity) @ self._along(assembly))[0])
 
     def weights(self, assembly: Assembly, pose: Pose) -> np.ndarray:
-        """(n_blocks, n_dof) array whose product with a movement of the blocks is that of the control point."""
+        """(n_blocks, n_dof) array: gradient of the control displacement by movements of the blocks."""
         block, arm = self._place(assembly)
         turned = rotation_matrices(pose.rotations[[block]])[0] @ arm
         along = self._along(assembly)
@@ -204,7 +204,7 @@ class ControlDisplacement:
 
 
 class ControlledLoad:
-    """A live load whose multiplier makes a control displacement grow; all supports stand still."""
+    """A live load whose multiplier makes a control displacement grow; all supports are fixed."""
 
     what = "control displacement"
 
@@ -215,7 +215,7 @@ class ControlledLoad:
         self.offset = chosen.displacement(assembly, start)
 
     def lever(self) -> float:
-        """The control displacement counts as it is."""
+        """The control displacement itself."""
         return 1.0
 
     def stops(self) -> tuple[float, ...]:
@@ -223,23 +223,23 @@ class ControlledLoad:
         return ()
 
     def supports(self, s: float) -> Pose:
-        """Where they were."""
+        """As at the start."""
         return self.start
 
     def rate(self, s: float) -> np.ndarray:
-        """Nothing moves."""
+        """Zero."""
         return np.zeros((self.assembly.n_blocks, self.start.positions.shape[1] + self.start.rotations.shape[1]))
 
-    def gone(self, pose: Pose) -> float:
+    def control_displacement(self, pose: Pose) -> float:
         """Since the start [m]."""
         return self.chosen.displacement(self.assembly, pose) - self.offset
 
     def control(self, pose: Pose) -> np.ndarray:
-        """Of the control point at the pose."""
+        """Gradient of the displacement of the control point."""
         return self.chosen.weights(self.assembly, pose)
 
     def misdirected(self) -> str:
-        """Names the block and the direction."""
+        """Message with the block and the direction."""
         return (
             f"the mechanism does not move block '{self.chosen.block}' along {self.chosen.direction or 'x'}; choose "
             "another control block, point or direction"

@@ -1,4 +1,4 @@
-"""What a path tells: its increments, and what it says of blocks in words."""
+"""The increments of a path, and its messages."""
 
 from __future__ import annotations
 
@@ -18,9 +18,6 @@ from .equilibrium_check import on_supports
 from .state import EquilibriumCheck, Note, Place
 from .stepping import Stepper
 
-#: Blocks that a message names.
-NAMED = 4
-
 
 class Reports:
     """Increments of a phase, and messages.
@@ -28,7 +25,7 @@ class Reports:
     Parameters
     ----------
     stepper : Stepper
-        That led to what is told; their programs are counted.
+        Whose programs are counted.
     number : int
         Of the phase.
     fell_at : (n_blocks,) array
@@ -43,7 +40,7 @@ class Reports:
     def increment(
         self, check: EquilibriumCheck, velocity: np.ndarray, works: tuple[float, float, float, float]
     ) -> Increment:
-        """Of an equilibrium and the movement that follows, with all notes so far and the works done until then."""
+        """The increment of an equilibrium and the movement that follows, with the notes since the last one."""
         bounds = check.bounds
         model, place, contacts = self.model, check.place, check.contacts
         resultant = (wrench_matrix(contacts, place.pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
@@ -77,8 +74,8 @@ class Reports:
             (bounds.low, bounds.high),
         )
 
-    def falling(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
-        """Of a place that is no equilibrium."""
+    def falling_increment(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
+        """The increment of a place that is not in equilibrium."""
         model, assembly = self.model, self.model.assembly
         contacts = self.stepper.contacts(place.pose)
         friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
@@ -86,7 +83,7 @@ class Reports:
         return self.reported(
             replace(place, s=s),
             contacts,
-            self.stepper.remembered(place, contacts)[0],
+            self.stepper.transferred(place, contacts)[0],
             friction,
             velocity,
             0.0,
@@ -110,7 +107,7 @@ class Reports:
         notes: tuple[str, ...],
         bounds: tuple[float, float] = (np.nan, np.nan),
     ) -> Increment:
-        """As given, with the programs since the last."""
+        """An increment, with the programs since the last one."""
         pushed = self.model.live is not None
         programs, self.stepper.programs = self.stepper.programs, 0
         return Increment(
@@ -139,12 +136,12 @@ class Reports:
         )
 
     def reached(self) -> Ending:
-        """How a path ends that has not collapsed."""
+        """The ending at the limit."""
         driver = self.driver
         return Ending(Status.LIMIT_REACHED, f"the {driver.what} reached its limit of {driver.limit:g} {driver.unit}")
 
     def locked(self, place: Place) -> str:
-        """Which blocks are wedged."""
+        """Message that names the wedged blocks."""
         assembly, contacts, normal = self.model.assembly, place.contacts, place.forces[:, 0]
         assert contacts is not None
         pressed = normal > 0.1 * normal.max()
@@ -153,14 +150,14 @@ class Reports:
         return f"the supports cannot move on: {len(blocks)} blocks are wedged ({self._named(blocks)})"
 
     def no_step(self, reason: str) -> str:
-        """Where, and what to do."""
+        """Message of a step that was not solved."""
         return (
             f"steps of the {self.driver.what}, however small, lead no further {reason}; repeat the analysis with "
             "another increment, and send the case to the developers if it stays"
         )
 
     def jump(self, start: Pose, end: Pose) -> str:
-        """Which blocks moved, and how far."""
+        """Message that names the blocks of a jump, and how far they moved."""
         assembly = self.model.assembly
         far = np.linalg.norm(moved_vertices(assembly, end) - moved_vertices(assembly, start), axis=1)
         way = np.zeros(assembly.n_blocks)
@@ -169,7 +166,7 @@ class Reports:
         return f"{self._named(fell)} moved by up to {way.max():.2g} m at once to the next equilibrium"
 
     def loss(self, fallen: np.ndarray, weight: float, share: float) -> str:
-        """Which blocks leave for good."""
+        """Message that names the blocks that have fallen."""
         falls = "falls" if fallen.sum() == 1 else "fall"
         return (
             f"{self._named(np.flatnonzero(fallen))} {falls}, {weight:.4g} N, {100.0 * share:.2g} % of the weight; "
@@ -177,13 +174,11 @@ class Reports:
         )
 
     def _named(self, blocks: np.ndarray) -> str:
-        shown = ", ".join(f"'{self.model.assembly.names[i]}'" for i in blocks[:NAMED])
-        more = f" and {len(blocks) - NAMED} more" if len(blocks) > NAMED else ""
-        return f"block{'' if len(blocks) == 1 else 's'} {shown}{more}"
+        return f"block{'' if len(blocks) == 1 else 's'} {_listed(self.model.assembly, blocks, 4)}"
 
 
 def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
-    """Which blocks fall before any settlement, and what to look for.
+    """Message that names the blocks that fall before any settlement.
 
     Parameters
     ----------
@@ -193,9 +188,14 @@ def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
     """
     size = np.abs(motion[:, : assembly.dimension]).max(axis=1)
     falling = np.flatnonzero(assembly.free & (size > 0.5 * size.max()))
-    shown = ", ".join(f"'{assembly.names[i]}'" for i in falling[:8])
-    more = f" and {len(falling) - 8} more" if len(falling) > 8 else ""
     return (
         f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
-        f"({shown}{more}); look for gaps between blocks (joint_thickness), a missing support or too little friction"
+        f"({_listed(assembly, falling, 8)}); look for gaps between blocks (joint_thickness), a missing support or too "
+        "little friction"
     )
+
+
+def _listed(assembly: Assembly, blocks: np.ndarray, most: int) -> str:
+    """Names of the first ``most`` blocks, and how many others there are."""
+    more = f" and {len(blocks) - most} more" if len(blocks) > most else ""
+    return ", ".join(f"'{assembly.names[i]}'" for i in blocks[:most]) + more
