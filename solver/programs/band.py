@@ -188,7 +188,7 @@ class _Method:
             return
         for _ in range(3):
             ray = np.maximum(ray - weight * (self.transposed @ self.band.solve(self.matrix @ ray)), 0.0)
-        self.program.raise_if_proved(ray)
+        self.program.raise_if_unbounded(ray)
 
     def _direction(self, residuals: tuple[np.ndarray, ...], products: np.ndarray) -> _Point:
         """Newton's direction that removes the residuals and changes the products primal · dual by those given."""
@@ -321,7 +321,7 @@ def _solved_in_pieces(program: LinearProgram, wide: np.ndarray) -> tuple[np.ndar
     try:
         solution, row_dual, iterations = _solved(unfolded)
     except Unbounded as ray:
-        program.raise_if_proved(folded(ray.x))
+        program.raise_if_unbounded(folded(ray.x))
         raise NoProgress("a ray of the pieces is none of the program") from None
     return folded(solution), row_dual[:rows], iterations
 
