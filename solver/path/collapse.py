@@ -84,18 +84,18 @@ class Fall:
                 return
             time = min(time * (2.0 if moved < largest / 3.0 else 1.0), 1e3)
 
-    def relaxed(self, place: Place, farthest: float = FARTHEST_FALL, gap: float = COMPUTED_GAP) -> Place | None:
+    def relaxed(self, place: Place, farthest: float = FARTHEST_FALL) -> Place | None:
         """The equilibrium in which blocks come to rest with the supports fixed; None where they move farther."""
-        end, at_rest = self.relax(place, farthest, gap)
+        end, at_rest = self.relax(place, farthest)
         return replace(end, velocity=None) if at_rest else None
 
-    def relax(self, place: Place, farthest: float = FARTHEST_FALL, gap: float = COMPUTED_GAP) -> tuple[Place, bool]:
+    def relax(self, place: Place, farthest: float = FARTHEST_FALL) -> tuple[Place, bool]:
         """Where blocks move with the supports fixed, and whether they come to rest in equilibrium there."""
         end = place
         for end, _, acceleration, speed in self.time_steps(place):
             if self.movements(place, end).max() > farthest:
                 return end, False
-            if acceleration < 1e-3 and speed < 1e-3 and self.checks.in_equilibrium(end, gap):
+            if acceleration < 1e-3 and speed < 1e-3 and self.checks.in_equilibrium(end, COMPUTED_GAP):
                 return end, True
         return end, False
 
@@ -129,33 +129,19 @@ class Fall:
         sizes = [float(motion_size(frame.velocity, model.length).max()) for frame in frames]
         chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))
         velocity, largest = frames[chosen].velocity, max(sizes[chosen], 1e-300)
-        at_last = self.reports.reported(
-            last.place,
-            last.contacts,
-            last.forces,
-            last.friction,
-            velocity / largest,
-            last.measured,
-            np.zeros_like(model.load),
-            frames[chosen].certificate,
-            Status.EQUILIBRIUM,
-            (),
-        )
+        at_last = self.reports.increment(last, velocity / largest, last.place.works)
         # A multiplier is interpolated to zero; an equilibrium is lost anywhere in the bracket.
         part = 0.5 if multiplier_beyond is None else last.measured / (last.measured - multiplier_beyond)
-        reaction = last.measured
-        if model.live is not None:
-            reaction *= model.live_force
+        multiplier = last.measured
         collapse = Collapse(
             displacement=last.place.s + part * (upper_bound - last.place.s),
             bracket=(last.place.s, upper_bound),
-            reaction=reaction,
+            reaction=multiplier if model.live is None else multiplier * model.live_force,
             mechanism=velocity / largest,
             unit=driver.unit,
             words=str(mechanism_of(model.assembly, at_last)),
             lost="equilibrium" if multiplier_beyond is None else "capacity",
         )
-        multiplier = at_last.load_multiplier
         del at_last, last, frames[self.n_frames :]
         while frames:
             yield frames.pop(0)

@@ -14,60 +14,44 @@ from solver.loads import Settlement
 
 
 class Driver(Protocol):
-    """The parameter of a path: what it moves, how far, and in which increments."""
+    """The parameter of a path: what it moves, how far, and in which increments.
 
-    @property
-    def increment(self) -> float:
-        """Largest step that is reported."""
-        ...
+    Attributes
+    ----------
+    increment, limit : float [m or rad]
+        Largest step that is reported, and largest value.
+    tolerance : float [m or rad]
+        Width of the bracket of a collapse.
+    unit, what : str
+        Unit of the parameter, m or rad, and its name.
+    lever : float
+        Largest displacement that it prescribes, per unit of it.
+    stops : tuple of float
+        Values that are reported, too.
+    """
 
-    @property
-    def limit(self) -> float:
-        """Largest value of the parameter."""
-        ...
-
-    @property
-    def tolerance(self) -> float:
-        """Width of the bracket of a collapse."""
-        ...
-
-    @property
-    def unit(self) -> str:
-        """Of the parameter: m or rad."""
-        ...
-
-    @property
-    def what(self) -> str:
-        """The parameter in words."""
-        ...
-
-    def lever(self) -> float:
-        """Largest displacement that the parameter prescribes, per unit of it."""
-        ...
-
-    def stops(self) -> tuple[float, ...]:
-        """Values that have an increment of their own."""
-        ...
+    increment: float
+    limit: float
+    tolerance: float
+    unit: str
+    what: str
+    lever: float
+    stops: tuple[float, ...]
 
     def supports(self, s: float) -> Pose:
         """Pose of the supports; that of free blocks has no meaning."""
-        ...
 
     def rate(self, s: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity of the supports per unit of the parameter."""
-        ...
 
     def control_displacement(self, pose: Pose) -> float:
         """Control displacement at a pose; 0 where supports drive."""
-        ...
 
     def control(self, pose: Pose) -> np.ndarray | None:
         """(n_blocks, n_dof) array: gradient of the control displacement; None where supports drive."""
-        ...
 
     def misdirected(self) -> str:
         """Message where the multiplier has to change its sign for the parameter to grow."""
-        ...
 
 
 class SupportMotion:
@@ -78,16 +62,9 @@ class SupportMotion:
     def __init__(self, assembly: Assembly, phase: Settlement, start: Pose) -> None:
         self.assembly, self.phase, self.start = assembly, phase, start
         self.increment, self.limit, self.unit = phase.increment, phase.limit, phase.unit
-        self.tolerance = float(phase.tolerance or phase.increment / 100.0)
-
-    def lever(self) -> float:
-        """1 for a translation, the largest radius for a rotation."""
-        points, block = moved_vertices(self.assembly, self.start), self.assembly.block_of_vertex
-        return float(np.linalg.norm(point_velocities(points, block, self.start, self.rate(0.0)), axis=1).max())
-
-    def stops(self) -> tuple[float, ...]:
-        """Stops of the settlement."""
-        return self.phase.stops
+        self.tolerance, self.stops = float(phase.tolerance or phase.increment / 100.0), phase.stops
+        points, block = moved_vertices(assembly, start), assembly.block_of_vertex
+        self.lever = float(np.linalg.norm(point_velocities(points, block, start, self.rate(0.0)), axis=1).max())
 
     def supports(self, s: float) -> Pose:
         """Of the settlement."""
@@ -206,21 +183,14 @@ class ControlDisplacement:
 class ControlledLoad:
     """A live load whose multiplier makes a control displacement grow; all supports are fixed."""
 
-    what = "control displacement"
+    what, lever = "control displacement", 1.0
+    stops: tuple[float, ...] = ()
 
     def __init__(self, assembly: Assembly, chosen: ControlDisplacement, start: Pose) -> None:
         self.assembly, self.chosen, self.start = assembly, chosen, start
         self.increment, self.limit, self.unit = chosen.increment, chosen.limit, chosen.unit
         self.tolerance = float(chosen.tolerance or chosen.increment / 100.0)
         self.offset = chosen.displacement(assembly, start)
-
-    def lever(self) -> float:
-        """The control displacement itself."""
-        return 1.0
-
-    def stops(self) -> tuple[float, ...]:
-        """None."""
-        return ()
 
     def supports(self, s: float) -> Pose:
         """As at the start."""

@@ -453,7 +453,7 @@ class Path:
         """Next parameter that is reported: a multiple of the driver's increment, one of its stops, or the limit."""
         near = 1e-9 * self.driver.increment
         number = np.floor(s / self.driver.increment + 1e-9) + 1.0
-        stops = [number * self.driver.increment, self.driver.limit, *self.driver.stops()]
+        stops = [number * self.driver.increment, self.driver.limit, *self.driver.stops]
         return float(
             min(stop for stop in stops if stop > s + near) if s < self.driver.limit - near else self.driver.limit
         )

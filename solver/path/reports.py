@@ -41,14 +41,11 @@ class Reports:
         self, check: EquilibriumCheck, velocity: np.ndarray, works: tuple[float, float, float, float]
     ) -> Increment:
         """The increment of an equilibrium and the movement that follows, with the notes since the last one."""
-        bounds = check.bounds
-        model, place, contacts = self.model, check.place, check.contacts
+        model, place, contacts, bounds = self.model, check.place, check.contacts, check.bounds
         resultant = (wrench_matrix(contacts, place.pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
         live, live_size = model.scaled_live
-        measured = check.measured
-        balance = (
-            resultant + model.scaled_load + (check.measured * live_size if model.live is not None else 0.0) * live
-        )[model.assembly.free]
+        multiplier = check.measured * live_size if model.live is not None else 0.0
+        balance = (resultant + model.scaled_load + multiplier * live)[model.assembly.free]
         certificate = Certificate(
             equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
             friction_excess=friction_excess(check.forces, check.friction) / model.total_load,
@@ -57,61 +54,42 @@ class Reports:
             duality_gap=bounds.gap,
             energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
         )
-        support_forces = on_supports(model, contacts, place.pose, check.forces)
         notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
         self.notes = []
-        return self.reported(
-            place,
-            contacts,
-            check.forces,
-            check.friction,
-            velocity,
-            measured,
-            support_forces,
-            certificate,
-            Status.EQUILIBRIUM,
-            notes,
-            (bounds.low, bounds.high),
-        )
+        support_forces = on_supports(model, contacts, place.pose, check.forces)
+        state = self._state(place.pose, contacts, check.forces, check.friction, velocity, support_forces)
+        found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
+        return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
 
     def falling_increment(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
         """The increment of a place that is not in equilibrium."""
-        model, assembly = self.model, self.model.assembly
         contacts = self.stepper.contacts(place.pose)
-        friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-        none = Certificate(largest_penetration=largest_penetration(contacts))
-        return self.reported(
-            replace(place, s=s),
-            contacts,
-            self.stepper.transferred(place, contacts)[0],
-            friction,
-            velocity,
-            0.0,
-            np.zeros_like(model.load),
-            none,
-            Status.FALLING,
-            (),
-        )
+        forces, friction = self.stepper.transferred(place, contacts)[0], self.stepper.friction(contacts)
+        state = self._state(place.pose, contacts, forces, friction, velocity, np.zeros_like(self.model.load))
+        certificate = Certificate(largest_penetration=largest_penetration(contacts))
+        return self._increment(s, state, 0.0, certificate, Status.FALLING)
 
-    def reported(
+    def _state(
         self,
-        place: Place,
+        pose: Pose,
         contacts: Contacts,
         forces: np.ndarray,
         friction: np.ndarray,
         velocity: np.ndarray,
-        measured: float,
         support_forces: np.ndarray,
-        certificate: Certificate,
-        status: Status,
-        notes: tuple[str, ...],
-        bounds: tuple[float, float] = (np.nan, np.nan),
+    ) -> State:
+        """The arrays of an increment, from forces in units of the program."""
+        rates = relative_velocities(contacts, pose, velocity)
+        return State(pose, contacts, forces * self.model.force, rates, friction, velocity, support_forces, self.fell_at)
+
+    def _increment(
+        self, s: float, state: State, measured: float, certificate: Certificate, status: Status
     ) -> Increment:
         """An increment, with the programs since the last one."""
         pushed = self.model.live is not None
         programs, self.stepper.programs = self.stepper.programs, 0
         return Increment(
-            parameter=place.s,
+            parameter=s,
             measured=measured,
             phase=self.number,
             load_multiplier=measured if pushed else 0.0,
@@ -120,19 +98,7 @@ class Reports:
             status=status,
             programs=programs,
             seconds=0.0,
-            held=State(
-                pose=place.pose,
-                contacts=contacts,
-                forces=forces * self.model.force,
-                displacements=relative_velocities(contacts, place.pose, velocity),
-                friction=friction,
-                velocity=velocity,
-                support_forces=support_forces,
-                fell_at=self.fell_at,
-            ),
-            least=bounds[0],
-            largest=bounds[1],
-            notes=notes,
+            held=state,
         )
 
     def reached(self) -> Ending:

@@ -114,7 +114,7 @@ class Stepper:
         self.free = model.assembly.free
         self.weights = viscous_weights(model)
         self.weight = float(np.linalg.norm(model.scaled_load[self.free, : model.dimension].sum(axis=0)))
-        self.lever = driver.lever()
+        self.lever = driver.lever
         self.unit = model.length / self.lever
         self.programs = 0
         self._last: tuple[Pose, Contacts] | None = None
