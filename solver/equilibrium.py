@@ -8,9 +8,6 @@ import scipy.sparse as sp
 from .geometry.contacts import Contacts
 from .kinematics import Pose, cross_rows
 
-#: Rays of a friction pyramid in space; in the plane two span the cone.
-FACETS = 16
-
 
 def wrench_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc_array:
     """Make the matrix of forces and moments on every block from unit forces at the contact points.
@@ -36,7 +33,7 @@ def wrench_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc
     values, rows = [], []
     for block, sign in ((contacts.block_a, 1.0), (contacts.block_b, -1.0)):
         arms = cross_rows(contacts.points - pose.positions[block])
-        # Summed coordinate by coordinate: a product of small matrices rounds as the processor likes.
+        # Summed coordinate by coordinate, as the rounding of small matrix products depends on the processor.
         products = [arms[:, :, k, None] * force[:, None, k] for k in range(d)]
         moment = sum(products[1:], products[0]) / length
         values.append(sign * np.concatenate([force, moment], axis=1))
@@ -48,38 +45,27 @@ def wrench_matrix(contacts: Contacts, pose: Pose, length: float = 1.0) -> sp.csc
     return sp.csc_array((data.ravel(), index.ravel(), pointers), shape=(n_dof * len(pose.positions), d * n))
 
 
-def friction_rays(friction: np.ndarray, d: int = 2, facets: int = FACETS) -> sp.csc_array:
-    """Combine normal and shear forces to the rays of each friction cone.
+def friction_rays(friction: np.ndarray) -> sp.csc_array:
+    """Combine normal and shear forces to the two rays of each friction cone in the plane.
 
     Parameters
     ----------
     friction : (n,) array
         Friction coefficients.
-    d : int
-        Dimensions.
-    facets : int
-        In space, how many rays of the cone span the pyramid that stands for it. It lies inside the cone, so that
-        forces found with it are admissible.
 
     Returns
     -------
-    (d n, k n) sparse array
-        In the plane, where k is 2, column 2i is n - μ t and column 2i + 1 is n + μ t of contact i; in space k is
-        ``facets``. Divided by √(1 + μ²) so that a large coefficient does not unbalance the program.
+    (2 n, 2 n) sparse array
+        Column 2i is n - μ t and column 2i + 1 is n + μ t of contact i, divided by √(1 + μ²) so that a large coefficient
+        does not unbalance the program.
     """
     n = len(friction)
-    if d == 2:
-        directions = np.array([[-1.0], [1.0]])
-    else:
-        angles = 2.0 * np.pi * np.arange(facets) / facets
-        directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    k = len(directions)
     scale = 1.0 / np.hypot(1.0, friction)
-    values = np.empty((n, k, d))
+    values = np.empty((n, 2, 2))
     values[:, :, 0] = scale[:, None]
-    values[:, :, 1:] = (friction * scale)[:, None, None] * directions
-    rows = np.broadcast_to(d * np.arange(n)[:, None, None] + np.arange(d), values.shape)
-    return sp.csc_array((values.ravel(), rows.ravel(), np.arange(0, d * k * n + 1, d)), shape=(d * n, k * n))
+    values[:, :, 1] = (friction * scale)[:, None] * [-1.0, 1.0]
+    rows = np.broadcast_to(2 * np.arange(n)[:, None, None] + np.arange(2), values.shape)
+    return sp.csc_array((values.ravel(), rows.ravel(), np.arange(0, 4 * n + 1, 2)), shape=(2 * n, 2 * n))
 
 
 def with_slack(*columns: sp.csc_array) -> sp.csc_array:

@@ -51,6 +51,7 @@ from solver.loads import Loads, Settlement
 from solver.path.controls import Controls, Ending
 from solver.path.reports import no_equilibrium
 from solver.path.state import PathState, Place
+from solver.program.admissible import UNBALANCED_COST
 from solver.programs.problem import LinearProgram, SolveError, Unbounded
 from solver.programs.solve import solve_lp
 from solver.results.certificate import Certificate, carrying_gap, friction_excess, largest_penetration
@@ -58,48 +59,39 @@ from solver.results.increment import Increment, State, Status, carries, used_up
 from solver.results.mechanism import mechanism_of
 from solver.results.response import Collapse
 from solver.tolerances import (
+    ACCEPTED_VIOLATION,
     AT_LIMIT,
     BALANCE_TOLERANCE,
     CARRYING_FRACTION,
     COMPUTED_GAP,
     FALLING_FRACTION,
     FARTHEST_FALL,
+    FEASIBILITY_TOLERANCE,
     GEOMETRY_TOLERANCE,
-    LEFT_WEDGED,
     OVERLAP,
-    ROUNDING,
 )
 
-#: Programs that close a step; after them, gaps and drift up to this part of the increment are left to the next step.
-LINEARISATIONS, GAP_LEFT = 10, 1e-2
-
-#: Part of its lift that is taken off a sliding joint in advance: all of it could end in penetration.
-LIFT_TAKEN_OFF = 0.999
-
-#: Cost of unbalanced force where forces are read, in speeds of the supports: above the speed of any mechanism.
-UNBALANCED_COST = 1e4
-
-#: Shortest step, as a part of the tolerance of a collapse.
-SHORTEST_STEP = 1.0 / 64.0
+#: Programs that close the joints after a step.
+LINEARISATIONS = 10
 
 
-class Wedged(Exception):
-    """Blocks are wedged between the supports: forces grow without limit."""
+class SupportsLocked(Exception):
+    """Blocks are wedged between the supports: the reaction has no bound."""
 
 
-class _NotClosed(Exception):
-    """The programs of a step have not closed its joints; those of a shorter step may."""
+class _JointsOpen(Exception):
+    """The programs of a step have not closed its joints."""
 
 
 class _NoEquilibrium(Exception):
-    """No forces balance the loads at a geometry: the solution tells which blocks fall."""
+    """No forces balance the loads at a geometry; the solution has the motion of the blocks that fall."""
 
-    def __init__(self, solution: Solution) -> None:
+    def __init__(self, solution: ProgramSolution) -> None:
         super().__init__("no equilibrium")
         self.solution = solution
 
 
-class Structure(NamedTuple):
+class Inputs(NamedTuple):
     """Blocks, the laws of their joints, and the (n_blocks, 3) loads on them [N, N, N·m]."""
 
     assembly: Assembly
@@ -108,7 +100,7 @@ class Structure(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Solution:
+class ProgramSolution:
     """Solution of a program.
 
     Attributes
@@ -130,13 +122,13 @@ class Solution:
 
 
 def solve_program(
-    structure: Structure, pose: Pose, contacts: Contacts, gaps: np.ndarray, supports: np.ndarray, trust: float
-) -> Solution:
+    inputs: Inputs, pose: Pose, contacts: Contacts, gaps: np.ndarray, supports: np.ndarray, trust: float
+) -> ProgramSolution:
     """State the program of an increment at a geometry, and solve it.
 
     Parameters
     ----------
-    structure : Structure
+    inputs : Inputs
     pose : Pose
     contacts : Contacts
         At the pose.
@@ -160,17 +152,17 @@ def solve_program(
     A c + f + r⁺ - r⁻ = 0. They are dual to the bound ρ of all displacements and cost too much to be used wherever the
     loads can be balanced. Equilibrium holds to a tolerance, lest a block without friction move sideways for nothing.
     """
-    assembly, interfaces, load = structure
+    assembly, interfaces, load = inputs
     length, free = assembly.block_size, assembly.free
     units = np.array([length, length, 1.0])
     force = float(np.hypot(*load[free, :2].T).mean())
     load = load / (force * length / units)
     total = float(np.abs(load[free, :2]).sum())
     friction = interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-    near = np.isfinite(gaps[:, 0])
-    rays, wrench = friction_rays(friction)[:, np.repeat(near, 2)], wrench_matrix(contacts, pose, length)
-    given = np.where(near[:, None] & (np.abs(gaps) >= ROUNDING * length), gaps, 0.0) / length
-    distance = given.ravel() + wrench.T @ (supports / units).ravel()
+    takes_part = np.isfinite(gaps[:, 0])
+    rays, wrench = friction_rays(friction)[:, np.repeat(takes_part, 2)], wrench_matrix(contacts, pose, length)
+    rounded = np.where(takes_part[:, None] & (np.abs(gaps) >= FEASIBILITY_TOLERANCE * length), gaps, 0.0) / length
+    distance = rounded.ravel() + wrench.T @ (supports / units).ravel()
     balance = sp.csc_array(sp.csr_array(wrench)[np.repeat(free, 3)] @ rays)
     rows, n = balance.shape
     program = LinearProgram(
@@ -181,20 +173,20 @@ def solve_program(
         places=np.repeat(pose.positions[free], 3, axis=0),
     )
     try:
-        found = solve_lp(program)
+        solution = solve_lp(program)
     except Unbounded as ray:
-        pressed = carries((rays @ ray.x[:n]).reshape(-1, 2), CARRYING_FRACTION)
-        blocks = np.unique(np.concatenate([contacts.block_a[pressed], contacts.block_b[pressed]]))
+        carrying = carries((rays @ ray.x[:n]).reshape(-1, 2), CARRYING_FRACTION)
+        blocks = np.unique(np.concatenate([contacts.block_a[carrying], contacts.block_b[carrying]]))
         names = [f"'{assembly.names[i]}'" for i in blocks if free[i]]
         shown = ", ".join(names[:6]) + (" ..." if len(names) > 6 else "")
-        raise Wedged(f"the supports cannot move on: {len(names)} blocks are wedged ({shown})") from None
-    forces = rays @ found.x[:n]
+        raise SupportsLocked(f"the supports cannot move on: {len(names)} blocks are wedged ({shown})") from None
+    forces = rays @ solution.x[:n]
     resultant = (wrench @ forces).reshape(-1, 3)
     displacements = np.zeros_like(supports)
-    displacements[free] = -found.row_dual.reshape(-1, 3)
-    room = rays.T @ (distance + wrench.T @ displacements.ravel())
+    displacements[free] = -solution.row_dual.reshape(-1, 3)
+    slack = rays.T @ (distance + wrench.T @ displacements.ravel())
     touching = np.zeros(len(contacts), dtype=bool)
-    touching[near] = room.reshape(-1, 2).min(axis=1) <= AT_LIMIT
+    touching[takes_part] = slack.reshape(-1, 2).min(axis=1) <= AT_LIMIT
     motion = supports + displacements * units
     on_supports = np.where(free[:, None], 0.0, resultant) * force * length / units
     relative = relative_velocities(contacts, pose, motion)
@@ -204,15 +196,15 @@ def solve_program(
         friction_excess=friction_excess(state.forces / force, friction) / total,
         carrying_gap=carrying_gap(contacts, state.forces),
         largest_penetration=largest_penetration(contacts),
-        duality_gap=found.gap,
-        kinematic_violation=float(np.maximum(-room, 0.0).max(initial=0.0)),
+        duality_gap=solution.gap,
+        kinematic_violation=float(np.maximum(-slack, 0.0).max(initial=0.0)),
     )
-    balanced = bool(found.x[n:].max(initial=0.0) <= FALLING_FRACTION * total)
-    return Solution(state, touching, balanced, certificate)
+    balanced = bool(solution.x[n:].max(initial=0.0) <= FALLING_FRACTION * total)
+    return ProgramSolution(state, touching, balanced, certificate)
 
 
-def left_open(contacts: Contacts, solution: Solution) -> tuple[float, np.ndarray]:
-    """Measure what a program and the exact motion after it have left in the joints.
+def joint_errors(contacts: Contacts, solution: ProgramSolution) -> tuple[float, np.ndarray]:
+    """Measure gaps and drift of the joints after the exact motion that follows a program.
 
     Parameters
     ----------
@@ -223,39 +215,40 @@ def left_open(contacts: Contacts, solution: Solution) -> tuple[float, np.ndarray
 
     Returns
     -------
-    left : float [m]
+    largest : float [m]
         Deepest penetration, largest gap of a point that carried force, or largest drift of one that stuck, too.
     gaps : (n_contacts, 2) array [m]
         Gap function and drift of each point, for the next program. Where slip leaves a part q of a gap g again, the
         gap function is g / (1 - q), which closes it at once. New points have no drift.
     """
-    before, now = solution.state, contacts.gaps
+    before, gap = solution.state, contacts.gaps
     place, same = matched_contacts(contacts, before.contacts)
     drift = contacts.slip[:, 0] - before.contacts.slip[place, 0] - before.displacements[place, 1]
     carried = same & carries(before.forces, CARRYING_FRACTION)[place]
-    stuck = carried & ~used_up(before.forces, before.friction)[place]
-    left = max(np.abs(now[carried]).max(initial=0.0), np.abs(drift[stuck]).max(initial=0.0), -now.min(initial=0.0))
+    sticking = carried & ~used_up(before.forces, before.friction)[place]
+    open_by = np.abs(gap[carried]).max(initial=0.0)
+    largest = max(open_by, np.abs(drift[sticking]).max(initial=0.0), -gap.min(initial=0.0))
     earlier = before.contacts.gaps[place]
-    again = same & solution.touching[place] & (now > 0.0) & (now < earlier)
-    part = np.divide(now, earlier, out=np.zeros_like(now), where=again)
-    return float(left), np.column_stack([now / (1.0 - LIFT_TAKEN_OFF * part), np.where(same, drift, 0.0)])
+    repeated = same & solution.touching[place] & (gap > 0.0) & (gap < earlier)
+    part = np.divide(gap, earlier, out=np.zeros_like(gap), where=repeated)
+    return float(largest), np.column_stack([gap / (1.0 - 0.999 * part), np.where(same, drift, 0.0)])
 
 
 @dataclass(frozen=True)
-class _Reached:
+class _Equilibrium:
     """An equilibrium: settlement s [m or rad], pose, the program that reads its forces, reaction [N or N·m]."""
 
     s: float
     pose: Pose
-    read: Solution
+    solution: ProgramSolution
     reaction: float
 
 
 class _Phase:
     """One settlement, phase ``number``, from the pose ``start``."""
 
-    def __init__(self, structure: Structure, phase: Settlement, number: int, start: Pose) -> None:
-        self.structure, self.assembly = structure, structure.assembly
+    def __init__(self, inputs: Inputs, phase: Settlement, number: int, start: Pose) -> None:
+        self.inputs, self.assembly = inputs, inputs.assembly
         self.phase, self.number, self.start, self.programs = phase, number, start, 0
         points, block = moved_vertices(self.assembly, start), self.assembly.block_of_vertex
         #: Largest displacement of a support per unit of s: 1 m/m where it only travels.
@@ -264,7 +257,7 @@ class _Phase:
         #: Largest gap [m] that one program may close, largest displacement [m] in it, largest gap [m] that may be left.
         self.reach = max(min(4.0 * movement, self.length / 2.0), self.length / 4.0)
         self.trust = max(self.length, 10.0 * movement)
-        self.gap_left = max(GAP_LEFT * movement, COMPUTED_GAP * self.length)
+        self.gap_left = max(1e-2 * movement, COMPUTED_GAP * self.length)
         self.tolerance = float(phase.tolerance or phase.increment / 100.0) * (1.0 + 1e-9)
 
     def contacts(self, pose: Pose) -> Contacts:
@@ -275,45 +268,47 @@ class _Phase:
         """Give the largest movement [m] in an (n_blocks, 3) motion, rotations times the block size."""
         return float(motion_size(motion, self.length).max(initial=0.0))
 
-    def solved(self, pose: Pose, contacts: Contacts, **given: Any) -> Solution:
+    def solve(self, pose: Pose, contacts: Contacts, **arguments: Any) -> ProgramSolution:
         """Solve a program, by default of the gaps at the pose, with the supports standing."""
         self.programs += 1
         gaps = np.column_stack([contacts.gaps, np.zeros(len(contacts))])
-        default: dict[str, Any] = {"gaps": gaps, "supports": np.zeros_like(self.structure.load), "trust": self.trust}
-        given = default | given
+        default: dict[str, Any] = {"gaps": gaps, "supports": np.zeros_like(self.inputs.load), "trust": self.trust}
+        arguments = default | arguments
         try:
-            return solve_program(self.structure, pose, contacts, **given)
-        except Wedged:
+            return solve_program(self.inputs, pose, contacts, **arguments)
+        except SupportsLocked:
             # Drawings and programs are off by as much; blocks that are wedged cannot give way to it.
-            given["gaps"] = np.where(np.abs(given["gaps"]) < LEFT_WEDGED * self.length, 0.0, given["gaps"])
-            return solve_program(self.structure, pose, contacts, **given)
+            arguments["gaps"] = np.where(
+                np.abs(arguments["gaps"]) < ACCEPTED_VIOLATION * self.length, 0.0, arguments["gaps"]
+            )
+            return solve_program(self.inputs, pose, contacts, **arguments)
 
     def rate(self, s: float) -> np.ndarray:
         """Give the (n_blocks, 3) velocity of the supports per unit of s."""
         return self.phase.rate(self.assembly, self.start, s)
 
-    def reached(self, s: float, pose: Pose) -> _Reached:
+    def evaluate(self, s: float, pose: Pose) -> _Equilibrium:
         """Read forces and velocities at a pose: the program of a vanishing step, of closed joints only."""
         contacts, rate = self.contacts(pose), self.rate(s)
         gaps = np.zeros((len(contacts), 2))
         gaps[contacts.gaps > self.gap_left, 0] = np.inf
         try:
-            read = self.solved(pose, contacts, supports=rate, gaps=gaps, trust=UNBALANCED_COST * self.lever)
-        except Wedged:
+            solution = self.solve(pose, contacts, supports=rate, gaps=gaps, trust=UNBALANCED_COST * self.lever)
+        except SupportsLocked:
             # No finite reaction belongs to this state, but forces in equilibrium do.
-            read = self.solved(pose, contacts, gaps=gaps)
-        return _Reached(s, pose, read, float((read.state.support_forces * rate).sum()))
+            solution = self.solve(pose, contacts, gaps=gaps)
+        return _Equilibrium(s, pose, solution, float((solution.state.support_forces * rate).sum()))
 
-    def stepped(self, here: _Reached, s: float) -> _Reached:
-        """Step from an equilibrium to the settlement s; raises Wedged and what ``closed`` raises."""
-        free, supports = self.assembly.free[:, None], self.rate(here.s) * (s - here.s)
-        solution = self.solved(here.pose, self.contacts(here.pose), supports=supports)
-        pose = moved(here.pose, solution.state.velocity)
-        given = self.phase.displaced(self.assembly, self.start, s)
-        positions = np.where(free, pose.positions, given.positions)
-        return self.closed(s, Pose(positions, np.where(free, pose.rotations, given.rotations)), solution)
+    def step_to(self, current: _Equilibrium, s: float) -> _Equilibrium:
+        """Step from an equilibrium to the settlement s; raises SupportsLocked and what ``close_joints`` raises."""
+        free, supports = self.assembly.free[:, None], self.rate(current.s) * (s - current.s)
+        solution = self.solve(current.pose, self.contacts(current.pose), supports=supports)
+        pose = moved(current.pose, solution.state.velocity)
+        supported = self.phase.displaced(self.assembly, self.start, s)
+        positions = np.where(free, pose.positions, supported.positions)
+        return self.close_joints(s, Pose(positions, np.where(free, pose.rotations, supported.rotations)), solution)
 
-    def closed(self, s: float, first: Pose, solution: Solution) -> _Reached:
+    def close_joints(self, s: float, first: Pose, solution: ProgramSolution) -> _Equilibrium:
         """Close what a program has left at the pose ``first``, with the supports standing, until forces balance there.
 
         Raises _NoEquilibrium, _NotClosed or SolveError.
@@ -324,23 +319,23 @@ class _Phase:
             if far or not solution.balanced:
                 raise _NoEquilibrium(solution)
             contacts, last = self.contacts(pose), number == LINEARISATIONS
-            left, gaps = left_open(contacts, solution)
-            if left <= (self.gap_left if last else GEOMETRY_TOLERANCE * self.length):
-                reached = self.reached(s, pose)
-                if reached.read.balanced:
+            largest, gaps = joint_errors(contacts, solution)
+            if largest <= (self.gap_left if last else GEOMETRY_TOLERANCE * self.length):
+                equilibrium = self.evaluate(s, pose)
+                if equilibrium.solution.balanced:
                     self.refuse_overlap(pose)
-                    return reached
+                    return equilibrium
                 if last:
-                    raise _NoEquilibrium(reached.read)
+                    raise _NoEquilibrium(equilibrium.solution)
             elif last:
                 break
             try:
-                solution = self.solved(pose, contacts, gaps=gaps)
-            except Wedged as error:
-                raise _NotClosed(str(error)) from None
+                solution = self.solve(pose, contacts, gaps=gaps)
+            except SupportsLocked as error:
+                raise _JointsOpen(str(error)) from None
             pose = moved(pose, solution.state.velocity)
-        raise _NotClosed(
-            f"after {LINEARISATIONS} programs a joint is still off by {left:.3g} m (accepted: {self.gap_left:.3g} m)"
+        raise _JointsOpen(
+            f"after {LINEARISATIONS} programs a joint is still off by {largest:.3g} m (accepted: {self.gap_left:.3g} m)"
         )
 
     def refuse_overlap(self, pose: Pose) -> None:
@@ -348,48 +343,48 @@ class _Phase:
         assembly, deepest = self.assembly, OVERLAP * float(self.assembly.widths.min())
         for a, b, depth in zip(*assembly.shapes.overlaps(moved_vertices(assembly, pose), deepest), strict=True):
             if assembly.free[a] or assembly.free[b]:
-                raise _NotClosed(f"block '{assembly.names[a]}' came {depth:.3g} m into block '{assembly.names[b]}'")
+                raise _JointsOpen(f"block '{assembly.names[a]}' came {depth:.3g} m into block '{assembly.names[b]}'")
 
     def follow(
-        self, here: _Reached, step: float, beyond: float, *, reported: bool
+        self, current: _Equilibrium, step: float, upper_bound: float, *, reported: bool
     ) -> Generator[Increment, None, tuple[Ending, Pose]]:
         """Follow the phase from an equilibrium, first with ``step``; return how and where it ended.
 
-        No equilibrium is known at ``beyond``, which may be infinite. Of a fall its first motion is yielded.
+        No equilibrium is known at ``upper_bound``, which may be infinite. Of a fall its first motion is yielded.
         """
-        phase, last = self.phase, here.s
+        phase, last = self.phase, current.s
         if not reported:
-            yield self.increment(here, step, beyond)
-        while here.s < phase.limit:
-            target = self.next_report(here.s)
-            enclosed = beyond - here.s <= self.tolerance
-            to = beyond if enclosed else min(here.s + step, target, (here.s + beyond) / 2.0)
+            yield self.increment(current, step, upper_bound)
+        while current.s < phase.limit:
+            target = self.next_report(current.s)
+            enclosed = upper_bound - current.s <= self.tolerance
+            to = upper_bound if enclosed else min(current.s + step, target, (current.s + upper_bound) / 2.0)
             to = target if target - to < 1e-9 * phase.increment else to
-            length = to - here.s
+            length = to - current.s
             try:
-                new = self.stepped(here, to)
-            except _NoEquilibrium as found:
-                beyond, step = to, length / 2.0
-                if length <= self.tolerance and here.s <= last:
-                    shown, collapse = self.collapsed(here, beyond, found.solution)
-                    yield shown
-                    return collapse, here.pose
+                new = self.step_to(current, to)
+            except _NoEquilibrium as error:
+                upper_bound, step = to, length / 2.0
+                if length <= self.tolerance and current.s <= last:
+                    fall, collapse = self.collapse(current, upper_bound, error.solution)
+                    yield fall
+                    return collapse, current.pose
                 failed = length <= self.tolerance
-            except (Wedged, _NotClosed, SolveError) as error:
-                step, wedged = length / 2.0, isinstance(error, Wedged) and length <= self.tolerance
-                failed = wedged or step < SHORTEST_STEP * self.tolerance
-                if failed and here.s <= last:
-                    stop = Status.LOCKED if wedged else Status.SOLVER_FAILED
-                    return Ending(stop, f"at a settlement of {here.s:.6g} {phase.unit}: {error}"), here.pose
+            except (SupportsLocked, _JointsOpen, SolveError) as error:
+                step, locked = length / 2.0, isinstance(error, SupportsLocked) and length <= self.tolerance
+                failed = locked or step < self.tolerance / 64.0
+                if failed and current.s <= last:
+                    stop = Status.LOCKED if locked else Status.SOLVER_FAILED
+                    return Ending(stop, f"at a settlement of {current.s:.6g} {phase.unit}: {error}"), current.pose
             else:
-                step, here, failed = min(2.0 * length, phase.increment), new, False
-                beyond = np.inf if here.s >= beyond else beyond
-            if here.s > last and (failed or here.s == target):
+                step, current, failed = min(2.0 * length, phase.increment), new, False
+                upper_bound = np.inf if current.s >= upper_bound else upper_bound
+            if current.s > last and (failed or current.s == target):
                 # The last equilibrium is reported, too, and the step from it repeated, as a resumed path does.
-                yield self.increment(here, step, beyond)
-                last = here.s
-        reached = f"the settlement reached its limit of {phase.limit:g} {phase.unit}"
-        return Ending(Status.LIMIT_REACHED, reached), here.pose
+                yield self.increment(current, step, upper_bound)
+                last = current.s
+        message = f"the settlement reached its limit of {phase.limit:g} {phase.unit}"
+        return Ending(Status.LIMIT_REACHED, message), current.pose
 
     def next_report(self, s: float) -> float:
         """Give the next settlement that is reported: a multiple of the increment, a stop, or the limit."""
@@ -398,26 +393,32 @@ class _Phase:
         target = min(multiple, s + phase.step_to_stop(s))
         return phase.limit if phase.limit - target < 1e-9 * phase.increment else float(target)
 
-    def increment(self, here: _Reached, step: float, beyond: float) -> Increment:
+    def increment(self, current: _Equilibrium, step: float, upper_bound: float) -> Increment:
         """Report an equilibrium, with the checkpoint from which the phase goes on."""
-        place, ended = Place.unloaded(here.pose, here.s), here.s >= self.phase.limit
-        checkpoint = PathState(self.number, self.start, place, step, beyond, ended=ended)
-        found = self.reported(here.read, here.s, here.reaction, Status.EQUILIBRIUM)
-        return replace(found, least=here.reaction, checkpoint=checkpoint)
+        place, ended = Place.unloaded(current.pose, current.s), current.s >= self.phase.limit
+        checkpoint = PathState(self.number, self.start, place, step, upper_bound, ended=ended)
+        solution = self.reported(current.solution, current.s, current.reaction, Status.EQUILIBRIUM)
+        return replace(solution, least=current.reaction, checkpoint=checkpoint)
 
-    def reported(self, found: Solution, s: float, reaction: float, status: Status) -> Increment:
+    def reported(self, solution: ProgramSolution, s: float, reaction: float, status: Status) -> Increment:
         """Report a program, and how many were solved since the last report."""
         programs, self.programs = self.programs, 0
-        certificate, number = found.certificate, self.number
-        return Increment(s, reaction, number, 0.0, reaction, certificate, status, programs, 0.0, found.state)
+        certificate, number = solution.certificate, self.number
+        return Increment(s, reaction, number, 0.0, reaction, certificate, status, programs, 0.0, solution.state)
 
-    def collapsed(self, here: _Reached, beyond: float, falls: Solution) -> tuple[Increment, Ending]:
+    def collapse(
+        self, current: _Equilibrium, upper_bound: float, solution: ProgramSolution
+    ) -> tuple[Increment, Ending]:
         """Give the fall, and the collapse, from the program that found no equilibrium beyond the last one."""
-        shown = self.reported(falls, beyond, 0.0, Status.FALLING)
-        bracket, motion, words = (here.s, beyond), falls.state.velocity, str(mechanism_of(self.assembly, shown))
+        fall = self.reported(solution, upper_bound, 0.0, Status.FALLING)
+        bracket, motion, words = (
+            (current.s, upper_bound),
+            solution.state.velocity,
+            str(mechanism_of(self.assembly, fall)),
+        )
         mechanism, unit = motion / self.size(motion), self.phase.unit
-        collapse = Collapse(sum(bracket) / 2.0, bracket, here.reaction, mechanism, unit, words)
-        return shown, Ending(Status.COLLAPSED, str(collapse), collapse)
+        collapse = Collapse(sum(bracket) / 2.0, bracket, current.reaction, mechanism, unit, words)
+        return fall, Ending(Status.COLLAPSED, str(collapse), collapse)
 
 
 def linear_program_increments(
@@ -453,21 +454,21 @@ def linear_program_increments(
     first, pose = (0, Pose.initial(assembly)) if resume is None else (resume.phase, resume.start)
     ending = Ending(Status.LIMIT_REACHED)
     for number, phase in enumerate(phases[first:], start=first):
-        path, goes_on = _Phase(Structure(assembly, interfaces, load), phase, number, pose), resume is not None
-        step, beyond = phase.increment, np.inf
+        path, reported = _Phase(Inputs(assembly, interfaces, load), phase, number, pose), resume is not None
+        step, upper_bound = phase.increment, np.inf
         try:
             if resume is not None:
-                s, pose, step, beyond = resume.place.s, resume.place.pose, resume.step, resume.upper_bound
-                here, resume, path.programs = path.reached(s, pose), None, 0
+                s, pose, step, upper_bound = resume.place.s, resume.place.pose, resume.step, resume.upper_bound
+                current, resume, path.programs = path.evaluate(s, pose), None, 0
             else:
                 # Gaps and overlaps of the drawing, or of larger increments, are closed before anything moves.
-                here = path.closed(0.0, pose, path.solved(pose, path.contacts(pose)))
-        except _NoEquilibrium as found:
-            yield path.reported(found.solution, 0.0, 0.0, Status.FALLING)
-            return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(assembly, found.solution.state.velocity))
-        except (Wedged, _NotClosed, SolveError) as error:
+                current = path.close_joints(0.0, pose, path.solve(pose, path.contacts(pose)))
+        except _NoEquilibrium as error:
+            yield path.reported(error.solution, 0.0, 0.0, Status.FALLING)
+            return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(assembly, error.solution.state.velocity))
+        except (SupportsLocked, _JointsOpen, SolveError) as error:
             return Ending(Status.SOLVER_FAILED, f"before any settlement: {error}")
-        ending, pose = yield from path.follow(here, step, beyond, reported=goes_on)
+        ending, pose = yield from path.follow(current, step, upper_bound, reported=reported)
         if ending.stop is not Status.LIMIT_REACHED:
             return ending
     return ending

@@ -9,9 +9,6 @@ import numpy as np
 from .assembly import Assembly
 from .loads import point_load
 
-#: Strips of the surface narrower than this fraction of its width are rounding of the drawing.
-NARROWEST = 1e-12
-
 
 def edge_pressure(assembly: Assembly, block: int, edge: int, pressure: float) -> np.ndarray:
     """Load one edge of a block with a uniform pressure perpendicular to it.
@@ -135,7 +132,8 @@ def _first_met(assembly: Assembly, pushed: np.ndarray, across: np.ndarray) -> tu
     start, stop = assembly.vertices, assembly.vertices[assembly.next_vertex]
     a, b = start @ across, stop @ across
     strips = np.unique(np.concatenate([a, b]))
-    strips = strips[np.append(True, np.diff(strips) > NARROWEST * (strips[-1] - strips[0]))]
+    # Narrower ones are rounding of the drawing.
+    strips = strips[np.append(True, np.diff(strips) > 1e-12 * (strips[-1] - strips[0]))]
     middle = (strips[:-1] + strips[1:]) / 2.0
     low, high = np.minimum(a, b), np.maximum(a, b)
     depth, block = np.full(len(middle), np.inf), np.full(len(middle), -1)

@@ -11,19 +11,12 @@ method for bands, which are of the method, not of masonry.
 #: HiGHS' smallest feasibility tolerance; the programs are scaled so that it is small against every force.
 FEASIBILITY_TOLERANCE = 1e-10
 
-#: Penetration and drift below this are rounding: a wedge that friction locks could not give way to them.
-ROUNDING = 1e-10
-
 #: Distance from the edge of the friction cone at which a contact point is on it.
 AT_LIMIT = 1e-9
 
 #: Feasibility of interior solutions of large programs: a tenth of the iterations less than the smallest, and far below
 #: what a certificate promises.
 INTERIOR_TOLERANCE = 1e-8
-
-#: Where a program has no solution, penetration and drift below this are left as they are: blocks wedged against each
-#: other cannot give way, and drawings and corrections are off by as much.
-LEFT_WEDGED = 1e-7
 
 #: What our own check of a solution accepts: violation of rows, bounds and reduced costs.
 ACCEPTED_VIOLATION = 1e-7

@@ -14,27 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .cones import Scaling, longest_step, product, quotient
+from .cones import ITERATIONS, Scaling, longest_step, product, quotient
 from .problem import NotSolved
 from .stiffness import ContactRows, Singular
-
-#: Iterations at most; part of the way to the nearest bound that is gone.
-ITERATIONS, FRACTION = 60, 0.995
 
 #: Force out of balance, and mean product of forces and multipliers, in block weights, at which it has converged.
 BALANCED, CONVERGED = 1e-11, 1e-12
 
-#: Force out of balance that is accepted where it comes no nearer, in block weights, and part of the way that is none.
-ACCEPTED, STUCK = 1e-9, 1e-6
-
-#: Start: least normal force, part of the friction cone, least multiplier.
-FIRST_FORCE, FIRST_SHEAR, FIRST_MULTIPLIER = 0.1, 0.9, 1e-2
-
-#: Least friction coefficient: a cone without width has no inside.
-LEAST_FRICTION = 1e-9
-
-#: Corrections of second order are cut off at so many times the mean product.
-CORRECTION = 10.0
+#: Force out of balance, in block weights, that is accepted of an iterate that no further one improves.
+ACCEPTED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -53,35 +41,38 @@ class _Iterate:
     def __init__(
         self,
         rows: ContactRows,
-        near: np.ndarray,
+        reference: np.ndarray,
         compliance: np.ndarray,
         friction: np.ndarray,
         load: np.ndarray,
-        along: np.ndarray | None,
+        unit_reaction: np.ndarray | None,
         reaction: float,
     ) -> None:
-        self.rows, self.near, self.load, self.along, self.reaction = rows, near, load, along, reaction
-        n, self.d = near.shape
+        self.rows, self.reference, self.load = rows, reference, load
+        self.unit_reaction, self.reaction = unit_reaction, reaction
+        n, self.d = reference.shape
         self.slope = np.ones((n, self.d))
-        self.slope[:, 0] = np.maximum(friction, LEAST_FRICTION)
+        self.slope[:, 0] = np.maximum(friction, 1e-9)  # A cone without width has no interior.
         self.weight = compliance / float(compliance[:, 0].mean())
-        self.forces = near.copy()
-        self.forces[:, 0] = np.maximum(near[:, 0], FIRST_FORCE)
-        length = np.sqrt((near[:, 1:] ** 2).sum(axis=1))
-        most = FIRST_SHEAR * self.slope[:, 0] * self.forces[:, 0]
-        self.forces[:, 1:] *= np.minimum(1.0, most / np.maximum(length, 1e-300))[:, None]
+        self.forces = reference.copy()
+        self.forces[:, 0] = np.maximum(reference[:, 0], 0.1)
+        length = np.sqrt((reference[:, 1:] ** 2).sum(axis=1))
+        limit = 0.9 * self.slope[:, 0] * self.forces[:, 0]
+        self.forces[:, 1:] *= np.minimum(1.0, limit / np.maximum(length, 1e-300))[:, None]
         self.z = np.zeros((self.d, n))
-        self.z[0] = np.maximum(FIRST_MULTIPLIER, FIRST_MULTIPLIER / (self.slope * self.forces)[:, 0])
+        self.z[0] = np.maximum(1e-2, 1e-2 / (self.slope * self.forces)[:, 0])
         self.motion, self.rho = np.zeros_like(load), 0.0
         self.measure()
 
     def measure(self) -> None:
-        """Work out what is out of balance, and the mean product."""
+        """Compute the forces out of balance and the mean product."""
         self.u = (self.slope * self.forces).T
-        self.out = self.load + self.rows.resultant(self.forces)
-        self.missing = 0.0 if self.along is None else self.reaction - float((self.along * self.forces).sum())
+        self.unbalanced = self.load + self.rows.resultant(self.forces)
+        self.reaction_error = 0.0
+        if self.unit_reaction is not None:
+            self.reaction_error = self.reaction - self._reaction_of(self.forces)
         self.mean = float((self.u * self.z).sum()) / (2 * len(self.forces))
-        self.worst = max(float(np.abs(self.out).max()), abs(self.missing))
+        self.residual = max(float(np.abs(self.unbalanced).max()), abs(self.reaction_error))
 
     def factorise(self) -> None:
         """Factorise Newton's equations at this iterate.
@@ -94,30 +85,35 @@ class _Iterate:
         self.scaling = Scaling(self.u, self.z)
         self.hessian = self.scaling.hessian()
         local = self.slope[:, :, None] * self.hessian * self.slope[:, None, :]
-        self.answer = np.linalg.inv(self.weight[:, :, None] * np.eye(self.d) + local)
-        self.solve = self.rows.factorised(self.answer, np.zeros_like(self.load))
-        self.error = self.weight * (self.forces - self.near) + self.rows.relative(self.motion) - self.slope * self.z.T
-        if self.along is not None:
-            self.error = self.error + self.rho * self.along
-            self.by_along = self._answered(self.along)
-            self.lifted = self.rows.resultant(self.by_along)
-            self.turned = self.solve(self.lifted)
-            self.room = float((self.along * self.by_along).sum() - self.lifted @ self.turned)
+        self.stiffness = np.linalg.inv(self.weight[:, :, None] * np.eye(self.d) + local)
+        self.solve = self.rows.factorised(self.stiffness, np.zeros_like(self.load))
+        metric = self.weight * (self.forces - self.reference)
+        self.error = metric + self.rows.relative(self.motion) - self.slope * self.z.T
+        if self.unit_reaction is not None:
+            self.error = self.error + self.rho * self.unit_reaction
+            self.unit_forces = self._forces_by(self.unit_reaction)
+            self.unit_resultant = self.rows.resultant(self.unit_forces)
+            self.unit_motion = self.solve(self.unit_resultant)
+            self.compliance = self._reaction_of(self.unit_forces) - float(self.unit_resultant @ self.unit_motion)
 
-    def _answered(self, distances: np.ndarray) -> np.ndarray:
-        return np.einsum("nij,nj->ni", self.answer, distances)
+    def _reaction_of(self, forces: np.ndarray) -> float:
+        return float((self.unit_reaction * forces).sum())
 
-    def direction(self, aim: np.ndarray) -> _Change:
+    def _forces_by(self, distances: np.ndarray) -> np.ndarray:
+        return np.einsum("nij,nj->ni", self.stiffness, distances)
+
+    def direction(self, products: np.ndarray) -> _Change:
         """Newton's direction with what the products in the scaling are to change by."""
-        wanted = self.scaling.scaled(quotient(aim, self.scaling.middle))
-        forces = self._answered(self.slope * wanted.T - self.error)
-        motion, rho = self.solve(self.out + self.rows.resultant(forces)), 0.0
-        if self.along is not None:
-            rho = (float((self.along * forces).sum()) - self.missing - float(self.lifted @ motion)) / self.room
-            motion = motion - rho * self.turned
-            forces = forces - rho * self.by_along
-        forces = forces - self._answered(self.rows.relative(motion))
-        z = wanted - np.einsum("nij,jn->in", self.hessian, (self.slope * forces).T)
+        target = self.scaling.scaled(quotient(products, self.scaling.scaled_point))
+        forces = self._forces_by(self.slope * target.T - self.error)
+        motion, rho = self.solve(self.unbalanced + self.rows.resultant(forces)), 0.0
+        if self.unit_reaction is not None:
+            by_motion = float(self.unit_resultant @ motion)
+            rho = (self._reaction_of(forces) - self.reaction_error - by_motion) / self.compliance
+            motion = motion - rho * self.unit_motion
+            forces = forces - rho * self.unit_forces
+        forces = forces - self._forces_by(self.rows.relative(motion))
+        z = target - np.einsum("nij,jn->in", self.hessian, (self.slope * forces).T)
         return _Change(forces, z, motion, rho)
 
     def longest(self, change: _Change) -> float:
@@ -130,20 +126,20 @@ class _Iterate:
         return float((u * (self.z + part * change.z)).sum()) / (2 * len(self.forces))
 
     def take(self, change: _Change, part: float) -> None:
-        """Go a part of a change."""
+        """Add a part of a change."""
         self.forces, self.z = self.forces + part * change.forces, self.z + part * change.z
         self.motion, self.rho = self.motion + part * change.motion, self.rho + part * change.rho
         self.measure()
 
 
-@np.errstate(all="ignore")  # A step that leaves the numbers is seen by what it gives.
+@np.errstate(all="ignore")  # A step that overflows is seen by its result.
 def nearest_equilibrium(
     rows: ContactRows,
-    near: np.ndarray,
+    reference: np.ndarray,
     compliance: np.ndarray,
     friction: np.ndarray,
     load: np.ndarray,
-    along: np.ndarray | None = None,
+    unit_reaction: np.ndarray | None = None,
     reaction: float = 0.0,
 ) -> np.ndarray:
     """Find the forces in equilibrium within friction that are nearest to given ones.
@@ -152,14 +148,14 @@ def nearest_equilibrium(
     ----------
     rows : ContactRows
         Of the closed contact points.
-    near : (n, d) array
+    reference : (n, d) array
         f⁰, in block weights.
     compliance : (n, d) array
         The metric; only ratios matter.
     friction : (n,) array
     load : (n_dof,) array
         On the free blocks.
-    along : (n, d) array, optional
+    unit_reaction : (n, d) array, optional
         r: the reaction of unit forces.
     reaction : float
         R.
@@ -173,35 +169,35 @@ def nearest_equilibrium(
     NotSolved
         Where there are none, or none were found.
     """
-    if len(near) == 0:
+    if len(reference) == 0:
         if np.abs(load).max(initial=0.0) > ACCEPTED:
             raise NotSolved("nothing touches the free blocks")
-        return near
-    now = _Iterate(rows, near, compliance, friction, load, along, reaction)
-    best, part = (now.worst, now.forces), 1.0
+        return reference
+    point = _Iterate(rows, reference, compliance, friction, load, unit_reaction, reaction)
+    best, part = (point.residual, point.forces), 1.0
     for _ in range(ITERATIONS):
-        converged = now.worst < BALANCED and now.mean < CONVERGED * max(1.0, float(now.forces[:, 0].max()))
-        if converged or part < STUCK:
+        converged = point.residual < BALANCED and point.mean < CONVERGED * max(1.0, float(point.forces[:, 0].max()))
+        if converged or part < 1e-6:
             break
         try:
-            now.factorise()
+            point.factorise()
         except (Singular, np.linalg.LinAlgError):
             break
-        middle = now.scaling.middle
-        slid = product(middle, middle)
-        change = now.direction(-slid)
-        part = now.longest(change)
-        centring = min(max((now.mean_after(change, part) / now.mean) ** 3, 1e-4), 0.5)
-        second = product(now.scaling.scaled((now.slope * change.forces).T), now.scaling.unscaled(change.z))
-        second *= np.minimum(1.0, CORRECTION * now.mean / np.maximum(np.abs(second).sum(axis=0), 1e-300))
-        aim = -slid - second
-        aim[0] += 2.0 * centring * now.mean
-        change = now.direction(aim)
-        part = FRACTION * now.longest(change)
-        now.take(change, part)
-        if not np.isfinite(now.worst):
+        scaled_point = point.scaling.scaled_point
+        present = product(scaled_point, scaled_point)
+        change = point.direction(-present)
+        part = point.longest(change)
+        centring = min(max((point.mean_after(change, part) / point.mean) ** 3, 1e-4), 0.5)
+        correction = product(point.scaling.scaled((point.slope * change.forces).T), point.scaling.unscaled(change.z))
+        correction *= np.minimum(1.0, 10.0 * point.mean / np.maximum(np.abs(correction).sum(axis=0), 1e-300))
+        products = -present - correction
+        products[0] += 2.0 * centring * point.mean
+        change = point.direction(products)
+        part = 0.995 * point.longest(change)
+        point.take(change, part)
+        if not np.isfinite(point.residual):
             break
-        best = min(best, (now.worst, now.forces), key=lambda found: found[0])
+        best = min(best, (point.residual, point.forces), key=lambda candidate: candidate[0])
     if best[0] > ACCEPTED:
         raise NotSolved(f"forces nearest to an equilibrium leave {best[0]:.1e} block weights out of balance")
     return best[1]

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-#: Nearest that a point comes to the boundary of its cone, squared, as a part of its axis: keeps the scaling finite.
-INSIDE = 1e-26
+#: Iterations of the interior methods.
+ITERATIONS = 60
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -20,29 +20,29 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def quotient(c: np.ndarray, a: np.ndarray) -> np.ndarray:
     """(d, n) array: what a has to be multiplied by to give c."""
-    first = (a[0] * c[0] - (a[1:] * c[1:]).sum(axis=0)) / inside(a)
+    first = (a[0] * c[0] - (a[1:] * c[1:]).sum(axis=0)) / determinant(a)
     return np.concatenate([first[None], (c[1:] - first * a[1:]) / a[0]])
 
 
-def inside(a: np.ndarray) -> np.ndarray:
-    """(n,) array: a₀² - |a|², written so that little cancels."""
+def determinant(a: np.ndarray) -> np.ndarray:
+    """(n,) array: a₀² - |a|², written so that little cancels, and not zero, so that the scaling stays finite."""
     size = np.sqrt((a[1:] ** 2).sum(axis=0))
-    return np.maximum((a[0] - size) * (a[0] + size), INSIDE * a[0] ** 2)
+    return np.maximum((a[0] - size) * (a[0] + size), 1e-26 * a[0] ** 2)
 
 
 def longest_step(a: np.ndarray, change: np.ndarray) -> float:
     """Largest part of a change that stays inside the cones, infinite where nothing stops it."""
     square = change[0] ** 2 - (change[1:] ** 2).sum(axis=0)
-    half = a[0] * change[0] - (a[1:] * change[1:]).sum(axis=0)
-    room = inside(a)
-    root = np.sqrt(np.maximum(half**2 - square * room, 0.0))
+    half_slope = a[0] * change[0] - (a[1:] * change[1:]).sum(axis=0)
+    constant = determinant(a)
+    root = np.sqrt(np.maximum(half_slope**2 - square * constant, 0.0))
     # The smallest positive root of square t² + 2 half t + room, where there is one.
-    meets = (half**2 >= square * room) & ((square < 0.0) | (half < 0.0))
+    crosses = (half_slope**2 >= square * constant) & ((square < 0.0) | (half_slope < 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        part = np.where(half < 0.0, room / (root - half), (-half - root) / square)
+        part = np.where(half_slope < 0.0, constant / (root - half_slope), (-half_slope - root) / square)
         # Through the apex rounding may see no root.
         apex = np.where(change[0] < 0.0, -a[0] / change[0], np.inf)
-    return float(np.minimum(np.where(meets & (part >= 0.0), part, np.inf), apex).min(initial=np.inf))
+    return float(np.minimum(np.where(crosses & (part >= 0.0), part, np.inf), apex).min(initial=np.inf))
 
 
 class Scaling:
@@ -54,28 +54,28 @@ class Scaling:
 
     Attributes
     ----------
-    middle : (d, n) array
+    scaled_point : (d, n) array
         W u.
     """
 
     def __init__(self, u: np.ndarray, z: np.ndarray) -> None:
-        inside_u, inside_z = np.sqrt(inside(u)), np.sqrt(inside(z))
-        a, b = u / inside_u, z / inside_z
-        half = np.sqrt(0.5 * (1.0 + (a * b).sum(axis=0)))
-        self.w = np.concatenate([(b[0] + a[0])[None], b[1:] - a[1:]]) / (2.0 * half)
-        self.square = inside_z / inside_u
+        size_u, size_z = np.sqrt(determinant(u)), np.sqrt(determinant(z))
+        a, b = u / size_u, z / size_z
+        half_slope = np.sqrt(0.5 * (1.0 + (a * b).sum(axis=0)))
+        self.w = np.concatenate([(b[0] + a[0])[None], b[1:] - a[1:]]) / (2.0 * half_slope)
+        self.square = size_z / size_u
         self.size = np.sqrt(self.square)
-        self.middle = self.scaled(u)
+        self.scaled_point = self.scaled(u)
 
     def scaled(self, u: np.ndarray) -> np.ndarray:
         """(d, n) array: W u, of forces."""
-        return self._turned(u, 1.0) * self.size
+        return self._transformed(u, 1.0) * self.size
 
     def unscaled(self, z: np.ndarray) -> np.ndarray:
         """(d, n) array: W⁻¹ z, of distances."""
-        return self._turned(z, -1.0) / self.size
+        return self._transformed(z, -1.0) / self.size
 
-    def _turned(self, a: np.ndarray, sign: float) -> np.ndarray:
+    def _transformed(self, a: np.ndarray, sign: float) -> np.ndarray:
         along = (self.w[1:] * a[1:]).sum(axis=0)
         rest = a[1:] + (sign * a[0] + along / (1.0 + self.w[0])) * self.w[1:]
         return np.concatenate([(self.w[0] * a[0] + sign * along)[None], rest])

@@ -16,30 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .cones import Scaling, longest_step, product, quotient
+from .cones import ITERATIONS, Scaling, longest_step, product, quotient
 from .problem import ContactProblem, NotSolved, StepSolution
 
-#: Iterations at most; part of the way to the nearest bound that is gone.
-ITERATIONS, FRACTION = 60, 0.99
-
-#: Start: mean product in parts of the movement, least normal force, largest part of a friction bound.
-FIRST_PRODUCT, FIRST_FORCE, FIRST_SHEAR = 0.03, 0.3, 0.9
-
-#: What the step counts as at least, in block sizes: below it the compliance decides.
-LEAST_STEP = 1e-5
-
-#: Mean product and what the equations miss, in parts of the movement, and force out of balance, in block weights, at
-#: which it has converged; the first where it comes no nearer.
+#: Mean product and residual of the geometry, as parts of the movement, and force out of balance, in block weights, at
+#: which the method has converged; a thousand times that is accepted where it goes no further.
 CONVERGED, BALANCED, ACCEPTED = 1e-8, 1e-9, 1e-6
-
-#: A part of the way this short calls for centring; no part at all.
-SHORT, STUCK = 0.1, 1e-9
-
-#: Corrections of second order are cut off at so many times the mean product.
-CORRECTION = 30.0
-
-#: Friction bounds below this are none.
-NO_FRICTION = 1e-8
 
 
 @dataclass(frozen=True)
@@ -60,38 +42,36 @@ class _Iterate:
     def __init__(self, problem: ContactProblem, multiplier: float) -> None:
         self.problem, self.multiplier = problem, multiplier
         self.motion = np.zeros_like(problem.load)
-        self.rough = np.flatnonzero(problem.bound > NO_FRICTION)
+        self.rough = np.flatnonzero(problem.bound > 1e-8)
         self.relative = problem.rows.relative(self.motion)
-        self.size = max(problem.size, LEAST_STEP)
-        mean = FIRST_PRODUCT * self.size
+        # In smaller steps the compliance of the joints decides.
+        self.size = max(problem.size, 1e-5)
+        mean = 0.03 * self.size
         before, bound = problem.forces[:, 0], problem.bound[self.rough]
-        normal = np.maximum(before, FIRST_FORCE)
+        normal = np.maximum(before, 0.3)
         self.opening = np.maximum(problem.gap + self.relative[:, 0], mean / normal)
         self.normal = np.where(before > 0.0, normal, np.minimum(normal, mean / self.opening))
         shear, slip = problem.forces[self.rough, 1:].T, problem.slip[self.rough].T
         length = np.sqrt((shear**2).sum(axis=0))
-        self.shear = np.concatenate(
-            [bound[None], shear * np.minimum(1.0, FIRST_SHEAR * bound / np.maximum(length, 1e-300))]
-        )
+        self.shear = np.concatenate([bound[None], shear * np.minimum(1.0, 0.9 * bound / np.maximum(length, 1e-300))])
         self.slide = np.concatenate([(np.sqrt((slip**2).sum(axis=0)) + 2.0 * mean / bound)[None], slip])
         self.factorisations = 0
         self.count = len(problem.gap) + 2 * len(self.rough)
         self._measure()
 
     def _measure(self) -> None:
-        """Work out what the equations miss, and the mean product."""
+        """Compute the residuals of the equations and the mean product."""
         p, rough = self.problem, self.rough
         self.unbalanced = p.unbalanced(self.motion, self.forces(self.normal, self.shear), self.multiplier)
-        self.out = float(np.abs(self.unbalanced).max())
-        self.missing = 0.0 if p.control is None else p.wanted - float(p.control @ self.motion)
-        give = p.compliance[:, 0] * (self.normal - p.forces[:, 0])
-        self.gap_error = self.opening - (p.gap + self.relative[:, 0] + give)
+        self.imbalance = float(np.abs(self.unbalanced).max())
+        self.control_error = 0.0 if p.control is None else p.control_target - float(p.control @ self.motion)
+        shortening = p.compliance[:, 0] * (self.normal - p.forces[:, 0])
+        self.gap_error = self.opening - (p.gap + self.relative[:, 0] + shortening)
         slip = (p.slip[rough] + self.relative[rough, 1:] - p.compliance[rough, 1:] * p.forces[rough, 1:]).T
         self.slip_error = self.slide[1:] - slip - p.compliance[rough, 1] * self.shear[1:]
         self.mean = self._mean(self.normal, self.opening, self.shear, self.slide)
-        self.wrong = max(
-            float(np.abs(self.gap_error).max()), float(np.abs(self.slip_error).max(initial=0.0)), abs(self.missing)
-        )
+        geometry_error = max(float(np.abs(self.gap_error).max()), float(np.abs(self.slip_error).max(initial=0.0)))
+        self.residual = max(geometry_error, abs(self.control_error))
 
     def forces(self, normal: np.ndarray, shear: np.ndarray) -> np.ndarray:
         """(n, d) array: normal and shear forces of all contact points."""
@@ -109,39 +89,39 @@ class _Iterate:
         self.factorisations += 1
         self.scaling = Scaling(self.shear, self.slide)
         self.normal_stiffness = 1.0 / (p.compliance[:, 0] + self.opening / self.normal)
-        # (even I + 2 η² w wᵀ)⁻¹ = (I - across w wᵀ) / even
-        lean, steep = self.scaling.w[1:].T, 2.0 * self.scaling.square
-        even = p.compliance[self.rough, 1] + self.scaling.square
-        across = steep / (even + steep * (lean**2).sum(axis=1))
-        self.shear_stiffness = np.eye(d - 1) - across[:, None, None] * lean[:, :, None] * lean[:, None, :]
-        self.shear_stiffness /= even[:, None, None]
+        # (isotropic I + 2 η² w wᵀ)⁻¹ = (I - reduction w wᵀ) / isotropic
+        axis, curvature = self.scaling.w[1:].T, 2.0 * self.scaling.square
+        isotropic = p.compliance[self.rough, 1] + self.scaling.square
+        reduction = curvature / (isotropic + curvature * (axis**2).sum(axis=1))
+        self.shear_stiffness = np.eye(d - 1) - reduction[:, None, None] * axis[:, :, None] * axis[:, None, :]
+        self.shear_stiffness /= isotropic[:, None, None]
         stiffness = np.zeros((len(p.gap), d, d))
         stiffness[:, 0, 0] = self.normal_stiffness
         stiffness[self.rough, 1:, 1:] = self.shear_stiffness
         self.solve = p.rows.factorised(stiffness, p.viscosity)
         self.by_live = None if p.live is None else self.solve(p.live)
 
-    def direction(self, opening_aim: np.ndarray, slide_aim: np.ndarray) -> _Change:
+    def direction(self, opening_products: np.ndarray, slide_products: np.ndarray) -> _Change:
         """Newton's direction with what the products, those of slides in the scaling, are to change by."""
         p, scaling = self.problem, self.scaling
-        across = opening_aim / self.normal + self.gap_error
-        wanted = scaling.scaled(quotient(slide_aim, scaling.middle))
-        along = wanted[1:] + self.slip_error
+        normal_target = opening_products / self.normal + self.gap_error
+        target = scaling.scaled(quotient(slide_products, scaling.scaled_point))
+        slip_target = target[1:] + self.slip_error
 
-        def answer(stiff: np.ndarray) -> np.ndarray:
-            return np.einsum("nij,jn->in", self.shear_stiffness, stiff)
+        def shear_of(distances: np.ndarray) -> np.ndarray:
+            return np.einsum("nij,jn->in", self.shear_stiffness, distances)
 
-        shear = np.concatenate([np.zeros((1, len(self.rough))), answer(along)])
-        forces = self.forces(self.normal_stiffness * across, shear)
+        shear = np.concatenate([np.zeros((1, len(self.rough))), shear_of(slip_target)])
+        forces = self.forces(self.normal_stiffness * normal_target, shear)
         motion, multiplier = self.solve(self.unbalanced + p.rows.resultant(forces)), 0.0
         if self.by_live is not None and p.control is not None:
-            multiplier = (self.missing - float(p.control @ motion)) / float(p.control @ self.by_live)
+            multiplier = (self.control_error - float(p.control @ motion)) / float(p.control @ self.by_live)
             motion = motion + multiplier * self.by_live
         relative = p.rows.relative(motion)
-        normal = self.normal_stiffness * (across - relative[:, 0])
+        normal = self.normal_stiffness * (normal_target - relative[:, 0])
         opening = relative[:, 0] + p.compliance[:, 0] * normal - self.gap_error
-        shear[1:] = answer(along - relative[self.rough, 1:].T)
-        first = wanted[0] - 2.0 * scaling.square * scaling.w[0] * (scaling.w[1:] * shear[1:]).sum(axis=0)
+        shear[1:] = shear_of(slip_target - relative[self.rough, 1:].T)
+        first = target[0] - 2.0 * scaling.square * scaling.w[0] * (scaling.w[1:] * shear[1:]).sum(axis=0)
         slide = relative[self.rough, 1:].T + p.compliance[self.rough, 1] * shear[1:] - self.slip_error
         return _Change(motion, multiplier, normal, opening, shear, np.concatenate([first[None], slide]))
 
@@ -160,7 +140,7 @@ class _Iterate:
         )
 
     def take(self, change: _Change, part: float) -> None:
-        """Go a part of a change."""
+        """Add a part of a change."""
         self.motion = self.motion + part * change.motion
         self.multiplier += part * change.multiplier
         self.relative = self.problem.rows.relative(self.motion)
@@ -176,35 +156,36 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
     ------
     NotSolved, Singular
     """
-    now, short = _Iterate(problem, multiplier), False
+    point, short = _Iterate(problem, multiplier), False
     for _ in range(ITERATIONS):
-        size = max(now.size, float(np.abs(now.motion).max()))
-        if now.mean <= CONVERGED * size and now.out < BALANCED and now.wrong <= CONVERGED * size:
+        size = max(point.size, float(np.abs(point.motion).max()))
+        if point.mean <= CONVERGED * size and point.imbalance < BALANCED and point.residual <= CONVERGED * size:
             break
-        now.factorise()
-        middle = now.scaling.middle
-        pushed, slid = now.normal * now.opening, product(middle, middle)
-        change = now.direction(-pushed, -slid)
-        part = now.longest(change)
-        centring = min(max((now.mean_after(change, part) / now.mean) ** 3, 1e-4), 0.5)
-        most = CORRECTION * now.mean
-        second = np.clip(change.normal * change.opening, -most, most)
-        third = product(now.scaling.scaled(change.shear), now.scaling.unscaled(change.slide))
-        third *= np.minimum(1.0, most / np.maximum(np.abs(third).sum(axis=0), 1e-300))
+        point.factorise()
+        scaled_point = point.scaling.scaled_point
+        normal_products, slide_products = point.normal * point.opening, product(scaled_point, scaled_point)
+        change = point.direction(-normal_products, -slide_products)
+        part = point.longest(change)
+        centring = min(max((point.mean_after(change, part) / point.mean) ** 3, 1e-4), 0.5)
+        limit = 30.0 * point.mean
+        second = np.clip(change.normal * change.opening, -limit, limit)
+        third = product(point.scaling.scaled(change.shear), point.scaling.unscaled(change.slide))
+        third *= np.minimum(1.0, limit / np.maximum(np.abs(third).sum(axis=0), 1e-300))
         if short:
             centring, second, third = 1.0, 0.0 * second, 0.0 * third
-        aim = -slid - third
-        aim[0] += 2.0 * centring * now.mean
-        change = now.direction(centring * now.mean - pushed - second, aim)
-        part = FRACTION * now.longest(change)
-        if not (part > STUCK and np.isfinite(change.motion).all()):
+        slide_target = -slide_products - third
+        slide_target[0] += 2.0 * centring * point.mean
+        change = point.direction(centring * point.mean - normal_products - second, slide_target)
+        part = 0.99 * point.longest(change)
+        if not (part > 1e-9 and np.isfinite(change.motion).all()):
             break
-        short = part < SHORT and not short
-        now.take(change, part)
-    if now.mean > ACCEPTED * size or now.out > ACCEPTED or now.wrong > ACCEPTED * size:
+        # After a short step the next one only centres.
+        short = part < 0.1 and not short
+        point.take(change, part)
+    if point.mean > ACCEPTED * size or point.imbalance > ACCEPTED or point.residual > ACCEPTED * size:
         raise NotSolved(
-            f"mean product {now.mean / size:.1e} of the movement, {now.out:.1e} out of balance after "
-            f"{now.factorisations} iterations"
+            f"mean product {point.mean / size:.1e} of the movement, {point.imbalance:.1e} out of balance after "
+            f"{point.factorisations} iterations"
         )
-    forces = now.forces(now.normal, now.shear)
-    return StepSolution(now.motion, forces, problem.trial(now.motion), now.multiplier, now.factorisations)
+    forces = point.forces(point.normal, point.shear)
+    return StepSolution(point.motion, forces, problem.trial(point.motion), point.multiplier, point.factorisations)

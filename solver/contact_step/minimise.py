@@ -10,12 +10,11 @@ from .interior import interior_point
 from .problem import ContactProblem, NotSolved, StepSolution
 from .stiffness import Singular
 
-#: Largest force that may be left out of balance, in block weights: a hundred times that moved reactions by 0.4 %.
+#: Largest force out of balance, in block weights: a hundred times that changed reactions by 0.4 %.
 BALANCED = 1e-9
 
-#: Newton's method goes on for so many iterations, while no more than this part of the points that changed their status
-#: in an iteration do so in the next.
-NEWTON_ITERATIONS, FEWER = 8, 0.5
+#: Iterations of Newton's method, after which the interior method takes over.
+NEWTON_ITERATIONS = 8
 
 
 def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplier: float = 0.0) -> StepSolution:
@@ -36,39 +35,40 @@ def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplie
     if len(problem.gap) == 0:
         motion = problem.load / problem.viscosity - problem.motion_so_far
         return StepSolution(motion, problem.forces, problem.forces, multiplier, 0)
+    trial = problem.trial(np.zeros_like(problem.load)) if trial is None else trial
     try:
-        found, used = newton(
-            problem, problem.trial(np.zeros_like(problem.load)) if trial is None else trial, multiplier
-        )
-        if found is None:
-            found = interior_point(problem, multiplier)
+        solution, iterations = newton(problem, trial, multiplier)
+        if solution is None:
+            solution = interior_point(problem, multiplier)
     except Singular as error:
         raise NotSolved(str(error)) from None
-    return replace(found, factorisations=used + found.factorisations)
+    return replace(solution, factorisations=iterations + solution.factorisations)
 
 
 def newton(problem: ContactProblem, trial: np.ndarray, multiplier: float) -> tuple[StepSolution | None, int]:
-    """Full semismooth Newton steps from trial forces; None where they do not converge soon. And how many there were."""
+    """Full semismooth Newton steps from trial forces: the solution, None where they do not converge, and iterations."""
     motion = np.zeros_like(problem.load)
     # The first linear problem is that of the given trial forces, from nothing moved.
-    stiffness, at = problem.stiffness(trial), problem.trial(motion)
-    forces = problem.allowed(trial) + np.einsum("nij,nj->ni", stiffness, (at - trial) * problem.compliance)
+    stiffness, start = problem.stiffness(trial), problem.trial(motion)
+    forces = problem.projected(trial) + np.einsum("nij,nj->ni", stiffness, (start - trial) * problem.compliance)
+    unbalanced = problem.unbalanced(motion, forces, multiplier)
     status, changes = problem.status(trial), len(trial)
     for iteration in range(1, NEWTON_ITERATIONS + 1):
-        out = problem.unbalanced(motion, forces, multiplier)
-        change, turned = _direction(problem, stiffness, out, motion)
-        motion, multiplier = motion + change, multiplier + turned
+        change, multiplier_change = _direction(problem, stiffness, unbalanced, motion)
+        motion, multiplier = motion + change, multiplier + multiplier_change
         trial = problem.trial(motion)
-        forces = problem.allowed(trial)
-        out = problem.unbalanced(motion, forces, multiplier)
-        missed = 0.0 if problem.control is None else abs(problem.wanted - float(problem.control @ motion))
-        if np.abs(out).max() < BALANCED * max(1.0, abs(multiplier)) and missed <= 1e-12 + BALANCED * problem.size:
+        forces = problem.projected(trial)
+        unbalanced = problem.unbalanced(motion, forces, multiplier)
+        missing = 0.0 if problem.control is None else problem.control_target - float(problem.control @ motion)
+        balanced = np.abs(unbalanced).max() < BALANCED * max(1.0, abs(multiplier))
+        if balanced and abs(missing) <= 1e-12 + BALANCED * problem.size:
             return StepSolution(motion, forces, trial, multiplier, 0), iteration
         before, status = status, problem.status(trial)
-        now = int((status != before).sum())
-        if now > FEWER * changes or not np.isfinite(out).all():
+        changed = int((status != before).sum())
+        # It converges where the contact points that change their status become fewer by half.
+        if changed > 0.5 * changes or not np.isfinite(unbalanced).all():
             break
-        changes, stiffness = now, problem.stiffness(trial)
+        changes, stiffness = changed, problem.stiffness(trial)
     return None, iteration
 
 
@@ -81,6 +81,6 @@ def _direction(
     if problem.live is None or problem.control is None:
         return change, 0.0
     by_live = solve(problem.live)
-    missing = problem.wanted - float(problem.control @ (motion + change))
-    turned = missing / float(problem.control @ by_live)
-    return change + turned * by_live, turned
+    missing = problem.control_target - float(problem.control @ (motion + change))
+    multiplier_change = missing / float(problem.control @ by_live)
+    return change + multiplier_change * by_live, multiplier_change

@@ -56,7 +56,7 @@ class ContactProblem:
         Load whose multiplier is one more unknown.
     control : (n_dof,) array, optional
         Weights of the movements that make up the control displacement: one more equation.
-    wanted : float
+    control_target : float
         Control displacement still to come.
     """
 
@@ -72,14 +72,14 @@ class ContactProblem:
     size: float
     live: np.ndarray | None = None
     control: np.ndarray | None = None
-    wanted: float = 0.0
+    control_target: float = 0.0
 
     def trial(self, motion: np.ndarray) -> np.ndarray:
         """(n, d) array: forces of the springs after a movement, whatever contact and friction allow."""
         distance = np.column_stack([self.gap, self.slip]) + self.rows.relative(motion)
         return np.asarray(self.forces - distance / self.compliance)
 
-    def allowed(self, trial: np.ndarray) -> np.ndarray:
+    def projected(self, trial: np.ndarray) -> np.ndarray:
         """(n, d) array: the forces nearest to trial forces that push and stay within the friction bound."""
         shear = trial[:, 1:]
         part = np.minimum(1.0, self.bound / np.maximum(_lengths(shear), 1e-300))

@@ -10,9 +10,6 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-#: What is added to the diagonal, as a part of its largest entry: blocks that nothing holds stay where they are.
-LEAST_STIFFNESS = 1e-14
-
 Solve = Callable[[np.ndarray], np.ndarray]
 
 
@@ -38,17 +35,17 @@ class Band:
         touching = pairs[(pairs >= 0).all(axis=1)]
         graph = sp.csr_array((np.ones(len(touching)), touching.T), shape=(n_blocks, n_blocks))
         order = reverse_cuthill_mckee(sp.csr_matrix(graph + graph.T), symmetric_mode=True)
-        place = np.full(n_blocks + 1, -1)
-        place[order] = np.arange(n_blocks)
+        position = np.full(n_blocks + 1, -1)
+        position[order] = np.arange(n_blocks)
         self.order = (order[:, None] * dof + np.arange(dof)).ravel()
-        placed = place[pairs]
-        both = (placed >= 0).all(axis=1)
-        apart = int(np.abs(placed[:, 0] - placed[:, 1])[both].max(initial=0))
-        self.shape = (n_blocks * dof, dof * (apart + 1))
-        rows = (placed[:, :, None] * dof + np.arange(dof)).reshape(len(pairs), 2 * dof)
-        held = np.repeat(placed < 0, dof, axis=1)
+        positions = position[pairs]
+        both = (positions >= 0).all(axis=1)
+        distance = int(np.abs(positions[:, 0] - positions[:, 1])[both].max(initial=0))
+        self.shape = (n_blocks * dof, dof * (distance + 1))
+        rows = (positions[:, :, None] * dof + np.arange(dof)).reshape(len(pairs), 2 * dof)
+        on_support = np.repeat(positions < 0, dof, axis=1)
         i, j = rows[:, :, None], rows[:, None, :]
-        lower = (~held[:, :, None] & ~held[:, None, :] & (i >= j)).ravel()
+        lower = (~on_support[:, :, None] & ~on_support[:, None, :] & (i >= j)).ravel()
         self.kept = np.flatnonzero(lower)
         self.entry = (j * self.shape[1] + i - j).ravel()[self.kept]
 
@@ -61,7 +58,8 @@ class Band:
         """
         size, width = self.shape
         band = np.bincount(self.entry, matrices.ravel()[self.kept], size * width).reshape(self.shape).T
-        band[0] += diagonal[self.order] + LEAST_STIFFNESS * band[0].max()
+        # Blocks without contact need some stiffness.
+        band[0] += diagonal[self.order] + 1e-14 * band[0].max()
         factor, bad = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
         if bad:
             raise Singular(f"pivot {bad} of {size} is not positive")

@@ -121,13 +121,13 @@ def _clipped(
     )
     areas, wide, long = corner_areas(owner, points, len(face_a))
     kept = wide[owner] > end[owner, 0]
-    found = owner[kept], features[kept], areas[kept], wide[owner[kept]]
+    clipped = owner[kept], features[kept], areas[kept], wide[owner[kept]]
     if parts.whole:
-        return found
+        return clipped
     narrow = ((wide <= end[:, 0]) & (long > 4.0 * end[:, 0]))[:, None]
     return _with_reentrant_corners(
         parts,
-        found,
+        clipped,
         (narrow & used_a, np.abs(a_in_b) <= tight, corner_a, face_b, edge_b),
         (narrow & used_b, np.abs(b_in_a) <= tight, corner_b, face_a, edge_a),
     )
@@ -136,21 +136,21 @@ def _clipped(
 _Corners = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
-def _with_reentrant_corners(parts: ConvexParts, found: _Corners, *sides: tuple[np.ndarray, ...]) -> _Corners:
+def _with_reentrant_corners(parts: ConvexParts, clipped: _Corners, *sides: tuple[np.ndarray, ...]) -> _Corners:
     """Add the corners, of those used, at the end of a face at which its block was cut: they touch it, and cover none.
 
     Where a face ends at an edge of its block, an edge that only lies along that one may leave it; in a re-entrant
     corner it may not.
     """
-    owners, features = [found[0]], [found[1]]
+    owners, features = [clipped[0]], [clipped[1]]
     for used, on_edge, corner, face, edge in sides:
         at_cut = (on_edge & parts.cut_edges[edge][:, None]).any(axis=2)
         pair, p = np.nonzero(used & at_cut & ~parts.made[parts.solids.corners[corner]])
         owners.append(pair)
         features.append(feature_rows(ON_FACE, parts.solids.corners[corner[pair, p]], face[pair], -1))
     owner = np.concatenate(owners)
-    none = np.zeros(len(owner) - len(found[0]))
-    return owner, np.concatenate(features), np.append(found[2], none), np.append(found[3], none + np.inf)
+    zeros = np.zeros(len(owner) - len(clipped[0]))
+    return owner, np.concatenate(features), np.append(clipped[2], zeros), np.append(clipped[3], zeros + np.inf)
 
 
 def _crossings(
@@ -171,16 +171,16 @@ def _crossings(
         on_b = np.where(crosses, np.swapaxes(b_in_a / (b_in_a - next_b), 1, 2), 0.0)
     # What crosses at a corner that counts already is that corner.
     for on, lengths, counts, axis in ((on_a, long[0][:, :, None], used[0], 1), (on_b, long[1][:, None], used[1], 2)):
-        here, there = np.expand_dims(counts, 3 - axis), np.expand_dims(np.roll(counts, -1, axis=1), 3 - axis)
-        crosses &= ~(here & (on * lengths <= 2.0 * tight)) & ~(there & ((1.0 - on) * lengths <= 2.0 * tight))
+        at_start, at_end = np.expand_dims(counts, 3 - axis), np.expand_dims(np.roll(counts, -1, axis=1), 3 - axis)
+        crosses &= ~(at_start & (on * lengths <= 2.0 * tight)) & ~(at_end & ((1.0 - on) * lengths <= 2.0 * tight))
     return crosses, on_a, on_b
 
 
 def _inside(points: np.ndarray, corners: np.ndarray, directions: np.ndarray) -> np.ndarray:
     """(n, n_points, n_edges) array [m]: how far points are to the left of edges that start at corners."""
-    rest = points[:, :, None] - corners[:, None]
-    way = directions[:, None]
-    return way[..., 0] * rest[..., 1] - way[..., 1] * rest[..., 0]
+    offset_to = points[:, :, None] - corners[:, None]
+    direction = directions[:, None]
+    return direction[..., 0] * offset_to[..., 1] - direction[..., 1] * offset_to[..., 0]
 
 
 def _on_face(
@@ -204,11 +204,11 @@ def _on_face(
     candidates = np.stack([own, solids.previous_corner[own]], axis=1)
     crossing = cross(unit(start[following[candidates]] - start[candidates]), along[:, None])
     sine = np.sqrt(dot(crossing, crossing))
-    best = sine.argmax(axis=1)
+    steepest = sine.argmax(axis=1)
     row = np.arange(len(own))
-    on_boundary = (depth[pair, p] <= end[pair, 0]) & (sine[row, best] >= SMALLEST_SINE)
-    on_boundary &= ~cut[other] & ~cut[candidates[row, best]]
-    code = np.where(on_boundary, other * np.int64(len(solids.corners)) + candidates[row, best], -1)
+    on_boundary = (depth[pair, p] <= end[pair, 0]) & (sine[row, steepest] >= SMALLEST_SINE)
+    on_boundary &= ~cut[other] & ~cut[candidates[row, steepest]]
+    code = np.where(on_boundary, other * np.int64(len(solids.corners)) + candidates[row, steepest], -1)
     return feature_rows(ON_FACE, solids.corners[own], face[pair], code)
 
 
@@ -231,8 +231,8 @@ def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.
     middle = total / np.maximum(number, 1)[:, None]
     arms = points - middle[owner]
     order = np.lexsort((np.arctan2(arms[:, 1], arms[:, 0]), owner))
-    there = number > 0
-    following = next_vertices(np.append(0, np.cumsum(number[there])))
+    present = number > 0
+    following = next_vertices(np.append(0, np.cumsum(number[present])))
     ring = arms[order]
     after = ring[following]
     triangle = (ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]) / 2.0

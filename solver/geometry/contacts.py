@@ -7,6 +7,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+#: Faces that cover each other on a strip may touch if its gap is at most this part of its width; others slide past.
+STEEPEST_LANDING = 0.25
+
 
 @dataclass(frozen=True)
 class Contacts:
@@ -75,12 +78,12 @@ def matched_contacts(contacts: Contacts, before: Contacts) -> tuple[np.ndarray, 
     -------
     place : (n,) int array
         Its number before; any number where it was not there.
-    known : (n,) bool array
+    same : (n,) bool array
         Whether it was there.
     """
-    features, earlier = contacts.features[:, :3].astype(np.int64), before.features[:, :3].astype(np.int64)
-    kinds, _, count = np.maximum(features.max(axis=0, initial=0), earlier.max(axis=0, initial=0)) + 1
-    keys, known = ((f[:, 1] * kinds + f[:, 0]) * count + f[:, 2] for f in (features, earlier))
-    order = np.argsort(known, kind="stable")
-    place = order[np.minimum(np.searchsorted(known[order], keys), len(known) - 1)]
-    return place, known[place] == keys
+    features, old = contacts.features[:, :3].astype(np.int64), before.features[:, :3].astype(np.int64)
+    kinds, _, count = np.maximum(features.max(axis=0, initial=0), old.max(axis=0, initial=0)) + 1
+    keys, earlier_keys = ((f[:, 1] * kinds + f[:, 0]) * count + f[:, 2] for f in (features, old))
+    order = np.argsort(earlier_keys, kind="stable")
+    place = order[np.minimum(np.searchsorted(earlier_keys[order], keys), len(earlier_keys) - 1)]
+    return place, earlier_keys[place] == keys

@@ -13,9 +13,6 @@ from .convex_parts import ConvexParts
 from .solids import dot
 from .spatial_features import ACROSS, ON_FACE
 
-#: Points between others count as on the straight line between them up to this angle [rad].
-STRAIGHT = 1e-3
-
 
 def without_points_of_cuts(parts: ConvexParts, contacts: Contacts, planes: np.ndarray) -> tuple[Contacts, np.ndarray]:
     """Leave out points at cuts that lie between others in the same two faces.
@@ -30,7 +27,7 @@ def without_points_of_cuts(parts: ConvexParts, contacts: Contacts, planes: np.nd
     Returns
     -------
     contacts : Contacts
-    kept : (n_left,) int array
+    remaining_points : (n_remaining,) int array
         Their numbers before.
 
     Notes
@@ -55,39 +52,39 @@ def without_points_of_cuts(parts: ConvexParts, contacts: Contacts, planes: np.nd
     if len(chosen) == 0:
         return contacts, np.arange(len(contacts))
     chosen = chosen[np.argsort(group[chosen], kind="stable")]
-    _, start, where = np.unique(group[chosen], return_index=True, return_inverse=True)
-    where = where.ravel()
+    _, start, group_of = np.unique(group[chosen], return_index=True, return_inverse=True)
+    group_of = group_of.ravel()
     # In the plane of the first point of each group, from there.
-    origin, frame = contacts.points[chosen[start]][where], contacts.frames[chosen[start]][where]
+    origin, frame = contacts.points[chosen[start]][group_of], contacts.frames[chosen[start]][group_of]
     arms = contacts.points[chosen] - origin
     places = np.stack([dot(arms, frame[:, 1]), dot(arms, frame[:, 2])], axis=1)
 
-    # The widest angle in which a point at a cut sees none of the others that are at no cut.
-    asked = np.flatnonzero(of_cut[chosen])
-    counts = np.bincount(where)
-    owner, position = expand_ranges(counts[where[asked]])
-    other = start[where[asked]][owner] + position
+    # The widest angle at a point of a cut without another point that is at no cut.
+    at_cuts = np.flatnonzero(of_cut[chosen])
+    counts = np.bincount(group_of)
+    owner, position = expand_ranges(counts[group_of[at_cuts]])
+    other = start[group_of[at_cuts]][owner] + position
     owner, other = owner[~of_cut[chosen[other]]], other[~of_cut[chosen[other]]]
-    ways = places[other] - places[asked[owner]]
-    angles = np.arctan2(ways[:, 1], ways[:, 0])
+    arms_to = places[other] - places[at_cuts[owner]]
+    angles = np.arctan2(arms_to[:, 1], arms_to[:, 0])
     order = np.lexsort((angles, owner))
     owner, angles = owner[order], angles[order]
-    lowest, highest = np.full(len(asked), np.pi), np.full(len(asked), -np.pi)
+    lowest, highest = np.full(len(at_cuts), np.pi), np.full(len(at_cuts), -np.pi)
     np.minimum.at(lowest, owner, angles)
     np.maximum.at(highest, owner, angles)
     widest = lowest - highest + 2.0 * np.pi
     next_to = np.flatnonzero(np.diff(owner) == 0)
     np.maximum.at(widest, owner[next_to], np.diff(angles)[next_to])
-    between = asked[widest <= np.pi + STRAIGHT]
+    between = at_cuts[widest <= np.pi + 1e-3]
     if len(between) == 0:
         return contacts, np.arange(len(contacts))
 
-    total = np.bincount(where, contacts.areas[chosen])
-    left = np.ones(len(chosen), dtype=bool)
-    left[between] = False
-    shares, _, _ = corner_areas(where[left], places[left], len(total))
-    whole = np.bincount(where[left], shares, minlength=len(total))
+    total = np.bincount(group_of, contacts.areas[chosen])
+    remaining = np.ones(len(chosen), dtype=bool)
+    remaining[between] = False
+    shares, _, _ = corner_areas(group_of[remaining], places[remaining], len(total))
+    share_sum = np.bincount(group_of[remaining], shares, minlength=len(total))
     areas = contacts.areas.copy()
-    areas[chosen[left]] = shares * (total / np.maximum(whole, 1e-300))[where[left]]
-    kept = np.setdiff1d(np.arange(len(contacts)), chosen[between])
-    return replace(contacts, areas=areas)[kept], kept
+    areas[chosen[remaining]] = shares * (total / np.maximum(share_sum, 1e-300))[group_of[remaining]]
+    remaining_points = np.setdiff1d(np.arange(len(contacts)), chosen[between])
+    return replace(contacts, areas=areas)[remaining_points], remaining_points

@@ -1,4 +1,4 @@
-"""Faces that near parts turn to each other."""
+"""Faces with which near parts face each other."""
 
 from __future__ import annotations
 
@@ -14,24 +14,13 @@ from .portions import alike
 from .separations import face_separations
 from .solids import Faces, Solids, dot
 
-#: Two faces face each other where the cosine between the outward normal of one and the inward normal of the other is
-#: at least this: steep ridges and tips touch a plane with flanks that hardly face it.
-FACING = 0.05
-
-#: Separations that differ by less than this, in widths, are equal: then the faces that oppose each other better count.
+#: Difference of separations, in widths, up to which they are equal, and the faces that oppose each other better lead.
 SAME_SEPARATION = 1e-6
-
-#: Others than those that oppose each other best have to do so at least with this cosine: neighbours across a corner,
-#: which touch along an edge alone, open by a right angle in a wall and by a little less in a dome.
-OTHERS_FACING = 0.5
-
-#: Faces of a part that are tried against the one that leads, beside the one that opposes it best.
-OTHERS_TRIED = 6
 
 
 @dataclass(frozen=True)
 class FacingParts:
-    """Pairs of near parts, with the faces they turn to each other.
+    """Pairs of near parts, with the faces that face each other.
 
     Attributes
     ----------
@@ -42,7 +31,7 @@ class FacingParts:
     apart_i, apart_j : (n,) array [m]
         How far; negative where the parts overlap.
     face_i, face_j : (n,) int arrays
-        The one that leads, because it keeps the parts farther apart, and the face that opposes it best.
+        The leading one, which separates the parts farther, and the face that opposes it best.
     width : (n,) array [m]
         Of the thinner of their blocks.
     cosine : (n,) array
@@ -70,7 +59,7 @@ class FacingParts:
 
     @property
     def apart(self) -> np.ndarray:
-        """(n,) array [m]: how far faces keep the parts apart; negative where they overlap."""
+        """(n,) array [m]: separation of the parts by a face; negative where they overlap."""
         return np.maximum(self.apart_i, self.apart_j)
 
     @property
@@ -81,39 +70,40 @@ class FacingParts:
     @property
     def face_each_other(self) -> np.ndarray:
         """(n,) bool array: whether the two faces do."""
-        return self.cosine <= -FACING
+        return self.cosine <= -0.05
 
     def other_faces(
         self, solids: Solids, faces: Faces, inner: np.ndarray
     ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Give other faces that face each other, round by round, those that oppose each other better first.
+        """Yield other pairs of faces, round by round, those that oppose each other better first.
 
         Yields
         ------
         pair, face_i, face_j : (n_round,) int arrays
         """
         equal = self.apart - SAME_SEPARATION * self.width
-        tried = []
-        for leads, lead, part, ours in (
+        columns = []
+        for leading, lead, part, of_i in (
             (self.apart_i >= equal, self.lead_i, self.j, True),
             (self.apart_j >= equal, self.lead_j, self.i, False),
         ):
-            k = np.flatnonzero(leads)
+            k = np.flatnonzero(leading)
             owner, position = expand_ranges(np.diff(solids.faces_of_block)[part[k]])
             pair = k[owner]
-            answer, first = solids.faces_of_block[part[pair]] + position, lead[pair]
-            face_i, face_j = (first, answer) if ours else (answer, first)
+            opposed, first = solids.faces_of_block[part[pair]] + position, lead[pair]
+            face_i, face_j = (first, opposed) if of_i else (opposed, first)
             new = (face_i != self.face_i[pair]) | (face_j != self.face_j[pair])
             cosine = dot(faces.normals[face_i], faces.normals[face_j])
-            new &= (cosine <= -OTHERS_FACING) & ~inner[answer]
-            tried.append((pair[new], face_i[new], face_j[new], cosine[new]))
-        pair, face_i, face_j, cosine = (np.concatenate(column) for column in zip(*tried, strict=True))
+            # Neighbours across a corner open by nearly a right angle, and touch along an edge alone.
+            new &= (cosine <= -0.5) & ~inner[opposed]
+            columns.append((pair[new], face_i[new], face_j[new], cosine[new]))
+        pair, face_i, face_j, cosine = (np.concatenate(column) for column in zip(*columns, strict=True))
         order = np.lexsort((face_j, face_i, cosine, pair))
         pair, face_i, face_j = pair[order], face_i[order], face_j[order]
         rank = np.arange(len(pair)) - np.searchsorted(pair, pair)
-        for number in range(min(OTHERS_TRIED, int(rank.max(initial=-1)) + 1)):
-            now = rank == number
-            yield pair[now], face_i[now], face_j[now]
+        for number in range(min(6, int(rank.max(initial=-1)) + 1)):
+            chosen = rank == number
+            yield pair[chosen], face_i[chosen], face_j[chosen]
 
 
 def near_parts(
@@ -131,12 +121,12 @@ def _opposed_faces(solids: Solids, faces: Faces, inner: np.ndarray, leading: np.
     """(n,) int array: the face of part j, not inside its block, that opposes the leading face best."""
     first = solids.faces_of_block
     counts = np.diff(first)[j]
-    answer = np.empty(len(j), dtype=np.int64)
+    opposed = np.empty(len(j), dtype=np.int64)
     for k in alike(counts):
         face = first[j[k]][:, None] + np.arange(counts[k[0]])
         cosine = dot(faces.normals[face], faces.normals[leading[k]][:, None])
-        answer[k] = face[np.arange(len(k)), np.where(inner[face], np.inf, cosine).argmin(axis=1)]
-    return answer
+        opposed[k] = face[np.arange(len(k)), np.where(inner[face], np.inf, cosine).argmin(axis=1)]
+    return opposed
 
 
 def facing_parts(
@@ -148,7 +138,7 @@ def facing_parts(
     width: np.ndarray,
     inner: np.ndarray,
 ) -> FacingParts:
-    """Choose the faces that near parts turn to each other, where no face keeps them farther apart than ``reach``.
+    """Choose the faces of near parts that face each other, where no face separates them farther than ``reach``.
 
     Parameters
     ----------
@@ -160,7 +150,7 @@ def facing_parts(
     width : (n,) array [m]
         Of the thinner of their blocks.
     inner : (n_faces,) bool array
-        Faces inside a block, where it was cut into parts: what they keep apart, touches another part, if any.
+        Faces inside a block, where it was cut into parts.
     """
     i, j = parts
     apart_i, lead_i, behind_i = face_separations(solids, faces, vertices, i, j, inner)
@@ -172,10 +162,10 @@ def facing_parts(
     i, j, apart_i, lead_i, apart_j, lead_j, width = (
         value[near] for value in (i, j, apart_i, lead_i, apart_j, lead_j, width)
     )
-    answer_j = _opposed_faces(solids, faces, inner, lead_i, j)
-    answer_i = _opposed_faces(solids, faces, inner, lead_j, i)
+    opposed_j = _opposed_faces(solids, faces, inner, lead_i, j)
+    opposed_i = _opposed_faces(solids, faces, inner, lead_j, i)
     normals = faces.normals
-    cosine_i, cosine_j = dot(normals[lead_i], normals[answer_j]), dot(normals[lead_j], normals[answer_i])
+    cosine_i, cosine_j = dot(normals[lead_i], normals[opposed_j]), dot(normals[lead_j], normals[opposed_i])
     equal = np.abs(apart_i - apart_j) <= SAME_SEPARATION * width
     i_leads = np.where(equal, cosine_i <= cosine_j, apart_i > apart_j)
     return FacingParts(
@@ -185,8 +175,8 @@ def facing_parts(
         lead_j=lead_j,
         apart_i=apart_i,
         apart_j=apart_j,
-        face_i=np.where(i_leads, lead_i, answer_i),
-        face_j=np.where(i_leads, answer_j, lead_j),
+        face_i=np.where(i_leads, lead_i, opposed_i),
+        face_j=np.where(i_leads, opposed_j, lead_j),
         width=width,
         cosine=np.where(i_leads, cosine_i, cosine_j),
     )

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from .broad_phase import box_pairs, boxes, expand_ranges
+from .portions import alike
 
 
 def next_vertices(offsets: np.ndarray) -> np.ndarray:
@@ -129,21 +130,17 @@ def self_crossings(vertices: np.ndarray, offsets: np.ndarray) -> dict[int, tuple
     """First pair of crossing edges of each polygon that crosses itself: {polygon: (edge, edge)}."""
     crossings: dict[int, tuple[int, int]] = {}
     counts = np.diff(offsets)
-    for n in np.unique(counts[counts > 3]):
-        members = np.flatnonzero(counts == n)
+    for chosen in alike(counts, counts):
+        n = int(counts[chosen[0]])
         first, second = np.triu_indices(n, k=2)
         apart = ~((first == 0) & (second == n - 1))
         first, second = first[apart], second[apart]
-        # Blocks are taken in portions so that one polygon of many corners cannot exhaust memory.
-        portion = max(1, int(2_000_000 // max(len(first), 1)))
-        for start in range(0, len(members), portion):
-            chosen = members[start : start + portion]
-            ring = vertices[offsets[chosen][:, None] + np.arange(n)]
-            end = np.roll(ring, -1, axis=1)
-            hit = segments_cross(ring[:, first], end[:, first], ring[:, second], end[:, second])
-            for row in np.flatnonzero(hit.any(axis=1)):
-                k = int(np.flatnonzero(hit[row])[0])
-                crossings.setdefault(int(chosen[row]), (int(first[k]), int(second[k])))
+        ring = vertices[offsets[chosen][:, None] + np.arange(n)]
+        end = np.roll(ring, -1, axis=1)
+        hit = segments_cross(ring[:, first], end[:, first], ring[:, second], end[:, second])
+        for row in np.flatnonzero(hit.any(axis=1)):
+            k = int(np.flatnonzero(hit[row])[0])
+            crossings[int(chosen[row])] = int(first[k]), int(second[k])
     return crossings
 
 

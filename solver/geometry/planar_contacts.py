@@ -7,32 +7,20 @@ import numpy as np
 from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import box_pairs, boxes, expand_ranges
-from .contacts import Contacts
+from .contacts import STEEPEST_LANDING, Contacts
 from .outlines import Outlines
 
-#: The flank of a corner may lean into the edge it faces by this much (sine of the angle) before the corner no
-#: longer counts as facing it: an open joint that may close again leans by its opening angle.
-LARGEST_LEAN = 0.5
+#: Sine of the angle by which the flanks of a corner may tilt into the edge it faces, as those of an open joint.
+LARGEST_TILT = 0.5
 
-#: A corner over the end of an edge, its face leading away, may touch the edge in this increment if its gap is at most
-#: this multiple of its overlap.
-STEEPEST_LANDING = 0.25
-
-#: Cosine of the angle between two faces that leave a corner from which on they face each other: up to 78 degrees, as a
-#: hinge of an arch that falls may open. Those of diagonal neighbours, which touch at a corner alone, open by a right
-#: angle, and by a little less once one of them has turned.
-FACING = 0.2
-
-#: Difference of cosines up to which two pairs of faces at a corner are open alike.
-SAME_OPENING = 1e-9
+#: Cosine of the angle between two faces at a corner from which on they face each other: up to 78 degrees, as a hinge
+#: may open, and less than the right angle between diagonal neighbours.
+FACING_COSINE = 0.2
 
 #: Kinds of contact in the plane, column 0 of the features. A corner on an edge: the corner (a vertex of ``block_a``),
 #: the edge (of ``block_b``, named by the vertex it starts at), -1. A corner on a corner: both vertices, and the edge of
 #: ``block_b`` that the first one faces.
 ON_EDGE, ON_CORNER = 0, 1
-
-#: Contact points of two blocks belong to one face while their normals differ by less than this sine.
-ONE_FACE = 0.5
 
 
 def features_of(vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray) -> np.ndarray:
@@ -88,7 +76,7 @@ def measured_points(shapes: Outlines, vertices: np.ndarray, features: np.ndarray
     # The edge runs counter-clockwise around block b: its outward normal is a quarter turn clockwise, and
     # the tangent a quarter turn counter-clockwise from that normal is the edge's own direction.
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
-    rest = v - base
+    offset = v - base
     points = np.where(on_corner[:, None], (v + base) / 2.0, v)
     block_a, block_b = shapes.block_of_vertex[vertex], shapes.block_of_vertex[edge]
     frames = np.stack([normal, tangent], axis=1)
@@ -98,8 +86,8 @@ def measured_points(shapes: Outlines, vertices: np.ndarray, features: np.ndarray
         block_b=block_b,
         points=points,
         frames=frames,
-        gaps=_dot(rest, normal),
-        slip=_dot(rest, tangent)[:, None],
+        gaps=_dot(offset, normal),
+        slip=_dot(offset, tangent)[:, None],
         areas=_areas(shapes, block_a, block_b, points, frames),
     )
 
@@ -115,7 +103,7 @@ def _areas(
     low, high = np.minimum(block_a, block_b).astype(np.int64), np.maximum(block_a, block_b).astype(np.int64)
     _, first, which = np.unique(low * len(shapes) + high, return_index=True, return_inverse=True)
     normal, reference = frames[:, 0], frames[first[which.ravel()], 0]
-    across = np.abs(normal[:, 0] * reference[:, 1] - normal[:, 1] * reference[:, 0]) > ONE_FACE
+    across = np.abs(normal[:, 0] * reference[:, 1] - normal[:, 1] * reference[:, 0]) > 0.5
     _, first, face = np.unique(2 * which.ravel() + across, return_index=True, return_inverse=True)
     face = face.ravel()
     along = np.einsum("ki,ki->k", points, frames[first[face], 1])
@@ -176,7 +164,7 @@ def _vertex_edge_candidates(
     shapes: Outlines, vertices: np.ndarray, pair_a: np.ndarray, pair_b: np.ndarray, reach: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Corners of block a in front of edges of block b, by distance and direction alone."""
-    offsets, following, previous = shapes.offsets, shapes.next_vertex, shapes.previous_vertex
+    offsets, following = shapes.offsets, shapes.next_vertex
     counts = np.diff(offsets)
     low, high = boxes(vertices, offsets)
     owner, position = expand_ranges(counts[pair_a])
@@ -200,48 +188,47 @@ def _vertex_edge_candidates(
     a_block, b_block = shapes.block_of_vertex[vertex], shapes.block_of_vertex[edge]
     deepest = PENETRATION_FRACTION * np.minimum(width[a_block], width[b_block])
     end = end_zone(shapes, vertex, edge)
-    keep = (gap >= -deepest) & (along >= -end) & (along <= length[edge] + end)
-    keep[keep] = _through_this_face(shapes, vertices, vertex[keep], edge[keep], gap[keep], end[keep])
-    vertex, edge = vertex[keep], edge[keep]
+    chosen = (gap >= -deepest) & (along >= -end) & (along <= length[edge] + end)
+    chosen[chosen] = _is_behind_face(shapes, vertices, vertex[chosen], edge[chosen], gap[chosen], end[chosen])
+    vertex, edge = vertex[chosen], edge[chosen]
 
-    directions = _unit(vertices[following] - vertices)
-    to_next, to_previous = directions, -directions[previous]
-    inward = np.stack([to_previous[:, 1] - to_next[:, 1], to_next[:, 0] - to_previous[:, 0]], axis=1)
+    to_next, to_previous = _flanks(shapes, vertices, vertex)
     normal = normals[edge]
     outside = (
-        (_dot(to_next[vertex], normal) >= -LARGEST_LEAN)
-        & (_dot(to_previous[vertex], normal) >= -LARGEST_LEAN)
-        & (_dot(inward[vertex], normal) > 0.0)
+        (_dot(to_next, normal) >= -LARGEST_TILT)
+        & (_dot(to_previous, normal) >= -LARGEST_TILT)
+        & (_dot(_inward(to_next, to_previous), normal) > 0.0)
     )
     return vertex[outside], edge[outside]
 
 
-def _through_this_face(
+def _is_behind_face(
     shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray, gap: np.ndarray, end: np.ndarray
 ) -> np.ndarray:
-    """Whether a corner behind an edge got there through it: not where a neighbouring face is nearer, or in front of it.
-
-    Without it a corner that bears on the last bit of a pier's top counts as deep inside the pier's flank.
-    """
+    """Whether a corner behind an edge penetrates that face, and not a neighbouring one that is nearer or before it."""
     through = np.ones(len(vertex), dtype=bool)
     k = np.flatnonzero(gap < -end)
     following, previous = shapes.next_vertex, shapes.previous_vertex
+    inward = _inward(*_flanks(shapes, vertices, vertex[k]))
     for neighbour, shared in ((following[edge[k]], following[edge[k]]), (previous[edge[k]], edge[k])):
         tangent = _unit(vertices[following[neighbour]] - vertices[neighbour])
-        rest = vertices[vertex[k]] - vertices[neighbour]
-        beside = rest[:, 0] * tangent[:, 1] - rest[:, 1] * tangent[:, 0]
+        offset = vertices[vertex[k]] - vertices[neighbour]
+        distance = offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
         # The block of a corner that came through the neighbouring face lies on that face's side.
-        inward = _inward(shapes, vertices, vertex[k])
-        from_there = inward[:, 0] * tangent[:, 1] - inward[:, 1] * tangent[:, 0] > 0.0
-        through[k] &= ~(shapes.convex_vertex[shared] & from_there & (beside > gap[k] + end[k]))
+        from_neighbour_side = inward[:, 0] * tangent[:, 1] - inward[:, 1] * tangent[:, 0] > 0.0
+        through[k] &= ~(shapes.convex_vertex[shared] & from_neighbour_side & (distance > gap[k] + end[k]))
     return through
 
 
-def _inward(shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray) -> np.ndarray:
-    """(n, 2) array: from each corner into its block, half-way between the flanks."""
-    p = vertices[vertex]
-    to_next = _unit(vertices[shapes.next_vertex[vertex]] - p)
-    to_previous = _unit(vertices[shapes.previous_vertex[vertex]] - p)
+def _flanks(shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Give the unit vectors from corners to the next and to the previous corner, (n, 2) arrays."""
+    to_next = vertices[shapes.next_vertex[vertex]] - vertices[vertex]
+    to_previous = vertices[shapes.previous_vertex[vertex]] - vertices[vertex]
+    return _unit(to_next), _unit(to_previous)
+
+
+def _inward(to_next: np.ndarray, to_previous: np.ndarray) -> np.ndarray:
+    """(n, 2) array: from corners into their blocks, along the bisectors of their flanks."""
     return np.stack([to_previous[:, 1] - to_next[:, 1], to_next[:, 0] - to_previous[:, 0]], axis=1)
 
 
@@ -252,32 +239,31 @@ def _classified_ends(
     following = shapes.next_vertex
     start, stop = edge, following[edge]
     tangent = _unit(vertices[stop] - vertices[start])
-    rest = vertices[vertex] - vertices[start]
-    along = _dot(rest, tangent)
-    gap = rest[:, 0] * tangent[:, 1] - rest[:, 1] * tangent[:, 0]
-    far = shapes.edge_lengths[edge] - along
-    at_start = along <= far
+    offset = vertices[vertex] - vertices[start]
+    along = _dot(offset, tangent)
+    gap = offset[:, 0] * tangent[:, 1] - offset[:, 1] * tangent[:, 0]
+    to_stop = shapes.edge_lengths[edge] - along
+    at_start = along <= to_stop
     other = np.where(at_start, start, stop)
-    overlap = np.minimum(along, far)
+    overlap = np.minimum(along, to_stop)
     end = end_zone(shapes, vertex, edge)
-    # Seen from the nearer end: the way the edge leaves it, and the way the face over the edge leaves the corner.
+    # Directions from the nearer end: of the edge, and of the face over the edge.
     sense = np.where(at_start, 1.0, -1.0)[:, None]
     facing = _facing_edge(shapes, vertex, edge, other)
     along_edge = sense * tangent
     along_facing = -sense * _unit(vertices[following[facing]] - vertices[facing])
-    same_way = _dot(along_edge, along_facing) > FACING
-    # At a re-entrant corner the edge ends at a wall: a corner that gets there is simply on the edge.
-    near_end = (overlap <= end) & shapes.convex_vertex[other]
-    # Faces that overlap on a bit at an angle touch at the corner below alone: the one above slides past the end
-    # before it comes down, and held up by the line of the edge it could not.
-    past = ~same_way & shapes.convex_vertex[other] & ((overlap <= end) | (gap > STEEPEST_LANDING * overlap))
-    # Both corners lie within the end zone of the other's face, seen along the half-way direction.
+    parallel = _dot(along_edge, along_facing) > FACING_COSINE
+    # At a re-entrant corner there is no corner to touch.
+    at_end = (overlap <= end) & shapes.convex_vertex[other]
+    # The corner of a face that opens slides past the end of the edge before it would touch it.
+    is_past = ~parallel & shapes.convex_vertex[other] & ((overlap <= end) | (gap > STEEPEST_LANDING * overlap))
+    # Both corners lie within the end zone of the other's face, along the bisector.
     halfway = _unit(along_edge + along_facing + 1e-300)
-    offset = np.abs(_dot(vertices[vertex] - vertices[other], halfway))
-    corner = np.where(near_end & same_way & (offset <= end), other, -1)
-    keep = ~past
-    vertex, edge, corner = vertex[keep], edge[keep], corner[keep]
-    return _once(shapes, vertex, edge, corner)
+    distance = np.abs(_dot(vertices[vertex] - vertices[other], halfway))
+    corner = np.where(at_end & parallel & (distance <= end), other, -1)
+    chosen = ~is_past
+    vertex, edge, corner = vertex[chosen], edge[chosen], corner[chosen]
+    return _without_duplicates(shapes, vertex, edge, corner)
 
 
 def _closest_faces(
@@ -298,22 +284,22 @@ def _closest_faces(
     back = -_unit(vertices[following[facing]] - vertices[facing])
     closeness = _dot(along, back)
     _, pair = np.unique(np.stack([vertex[k], corner[k]], axis=1), axis=0, return_inverse=True)
-    best = np.full(int(pair.max()) + 1, -np.inf)
-    np.maximum.at(best, pair.ravel(), closeness)
-    kept[k] = closeness >= best[pair.ravel()] - SAME_OPENING
+    closest = np.full(int(pair.max()) + 1, -np.inf)
+    np.maximum.at(closest, pair.ravel(), closeness)
+    kept[k] = closeness >= closest[pair.ravel()] - 1e-9
     return kept
 
 
-def _once(
+def _without_duplicates(
     shapes: Outlines, vertex: np.ndarray, edge: np.ndarray, corner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Keep each pair of corners once, seen from the lower numbered vertex."""
     k = np.flatnonzero(corner >= 0)
     facing = _facing_edge(shapes, vertex[k], edge[k], corner[k])
-    turn = vertex[k] > corner[k]
+    swap = vertex[k] > corner[k]
     v, e, c = vertex[k], edge[k], corner[k]
     vertex, edge, corner = vertex.copy(), edge.copy(), corner.copy()
-    vertex[k], edge[k], corner[k] = np.where(turn, c, v), np.where(turn, facing, e), np.where(turn, v, c)
+    vertex[k], edge[k], corner[k] = np.where(swap, c, v), np.where(swap, facing, e), np.where(swap, v, c)
     # The pair may have been found from both sides, and two corners may meet along two pairs of faces.
     low = np.minimum(edge, shapes.next_vertex[edge])
     end = np.where(corner < 0, 0, np.where(corner == low, 1, 2))

@@ -1,4 +1,4 @@
-"""Separations of convex parts: how far a face, or two edges across each other, keep them apart."""
+"""Separations of convex parts by a face, or by two edges across each other."""
 
 from __future__ import annotations
 
@@ -10,14 +10,11 @@ from .solids import Faces, Solids, cross, dot, unit
 #: Edges nearer to parallel than this sine have no common normal: they are clipped against each other.
 SMALLEST_SINE = 0.05
 
-#: Directions this far beyond a right angle still count as along a face.
-ALONG = 1e-6
-
 
 def face_separations(
     solids: Solids, faces: Faces, vertices: np.ndarray, i: np.ndarray, j: np.ndarray, inner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """How far faces keep two convex parts apart.
+    """Largest separation of two convex parts by a face of one.
 
     Parameters
     ----------
@@ -53,16 +50,16 @@ def face_separations(
         if cut:
             behind[k] = np.where(inner[face], distance, -np.inf).max(axis=1)
             distance = np.where(inner[face], -np.inf, distance)
-        best = distance.argmax(axis=1)
+        farthest = distance.argmax(axis=1)
         row = np.arange(len(k))
-        apart[k], leading[k] = distance[row, best], face[row, best]
+        apart[k], leading[k] = distance[row, farthest], face[row, farthest]
     return apart, leading, behind
 
 
 def edge_separations(
     solids: Solids, faces: Faces, vertices: np.ndarray, i: np.ndarray, j: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """How far two edges keep two convex parts apart.
+    """Largest separation of two convex parts by two edges.
 
     Parameters
     ----------
@@ -84,7 +81,7 @@ def edge_separations(
     first = np.searchsorted(once, solids.face_offsets[solids.faces_of_block])
     count = np.diff(first)
     apart = np.full(len(i), -np.inf)
-    found_own, found_other = np.zeros((2, len(i)), dtype=np.int64)
+    edge_i, edge_j = np.zeros((2, len(i)), dtype=np.int64)
     for k in alike(count[i], count[j]):
         own = once[first[i[k]][:, None] + np.arange(count[i[k[0]]])]
         other = once[first[j[k]][:, None] + np.arange(count[j[k[0]]])]
@@ -92,23 +89,23 @@ def edge_separations(
         along_a = unit(vertices[solids.corners[solids.next_corner[own]]] - a)
         along_b = unit(vertices[solids.corners[solids.next_corner[other]]] - b)
         normal = cross(along_a[:, :, None], along_b[:, None])
-        holds = dot(normal, normal) > SMALLEST_SINE**2
+        separates = dot(normal, normal) > SMALLEST_SINE**2
         sides = outward(solids, faces, other)[:, None] - outward(solids, faces, own)[:, :, None]
         sense = np.sign(dot(normal, sides))
-        normal, holds = unit(normal) * sense[..., None], holds & (sense != 0.0)
-        for edges, way, side, axis in ((own, along_a, 1.0, 2), (other, along_b, -1.0, 1)):
+        normal, separates = unit(normal) * sense[..., None], separates & (sense != 0.0)
+        for edges, along, side, axis in ((own, along_a, 1.0, 2), (other, along_b, -1.0, 1)):
             for face, sense in (
                 (solids.face_of_corner[edges], 1.0),
                 (solids.face_of_corner[solids.twins[edges]], -1.0),
             ):
-                inward = sense * cross(faces.normals[face], way)
-                holds &= side * dot(np.expand_dims(inward, axis), normal) >= -ALONG
-        distance = np.where(holds, dot(a[:, :, None] - b[:, None], normal), -np.inf).reshape(len(k), -1)
-        best = distance.argmax(axis=1)
+                inward = sense * cross(faces.normals[face], along)
+                separates &= side * dot(np.expand_dims(inward, axis), normal) >= -1e-6
+        distance = np.where(separates, dot(a[:, :, None] - b[:, None], normal), -np.inf).reshape(len(k), -1)
+        farthest = distance.argmax(axis=1)
         row = np.arange(len(k))
-        apart[k] = distance[row, best]
-        found_own[k], found_other[k] = own[row, best // other.shape[1]], other[row, best % other.shape[1]]
-    return apart, found_own, found_other
+        apart[k] = distance[row, farthest]
+        edge_i[k], edge_j[k] = own[row, farthest // other.shape[1]], other[row, farthest % other.shape[1]]
+    return apart, edge_i, edge_j
 
 
 def outward(solids: Solids, faces: Faces, edges: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from solver.tolerances import CORNER_TOLERANCE, PENETRATION_FRACTION
 
 from .broad_phase import expand_ranges
 from .clipping import ClippedCorners, clipped_faces
-from .contacts import Contacts, joined_contacts
+from .contacts import STEEPEST_LANDING, Contacts, joined_contacts
 from .convex_parts import ConvexParts
 from .cut_points import without_points_of_cuts
 from .facing import FacingParts, facing_parts, near_parts
@@ -21,26 +21,8 @@ from .separations import edge_separations, outward
 from .solids import Faces, Solids, cross, dot, unit
 from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
 
-#: An edge on an edge is a contact of its own where it keeps the parts apart by this much more than any face does, in
-#: widths.
-EDGES_APART = 1e-4
-
-#: Two faces that oppose each other better than this cosine leave no room for edges between them.
-OPPOSED = -0.94
-
-#: At a cut, what is narrower than this fraction of both faces and smaller than that of the area in which the same two
-#: stones touch is a sliver.
-SLIVER_WIDTH, SLIVER_AREA = 0.02, 0.02
-
-#: Points at one place with normals nearer to each other than this cosine are one.
-ONE_NORMAL = 1.0 - 1e-4
-
-#: Gap of a point below the separation of its parts by the planes of their faces, in widths, from which on it is none.
-BEHIND = 1e-3
-
-#: Faces that cover each other on a strip narrower than this fraction of either, with a gap of more than
-#: ``STEEPEST_LANDING`` times its width, slide past each other before they touch.
-STRIP, STEEPEST_LANDING = 0.5, 0.25
+#: Width of a sliver at a cut, as a part of both faces, and its area, as a part of that in which the two blocks touch.
+SLIVER = 0.02
 
 
 def measured_points(
@@ -107,15 +89,15 @@ def measured_points(
     x_b[k] = vertices[corners[second[k]]]
     normals[k] = unit(face_normals[k] - faces.normals[face_of[first[k]]])
 
-    # Swung about the edge; where there is none, only turned onto the plane of the contact.
-    swings = dot(along, along) > 0.0
+    # Rotated about the edge; where there is none, projected onto the plane of the contact.
+    has_edge = dot(along, along) > 0.0
     across = cross(face_normals, along)
-    swung = dot(tangents, along)[:, None] * along + dot(tangents, across)[:, None] * cross(normals, along)
-    turned = tangents - dot(tangents, normals)[:, None] * normals
-    tangents = unit(np.where(swings[:, None], swung, turned))
+    rotated = dot(tangents, along)[:, None] * along + dot(tangents, across)[:, None] * cross(normals, along)
+    projected = tangents - dot(tangents, normals)[:, None] * normals
+    tangents = unit(np.where(has_edge[:, None], rotated, projected))
     frames = np.stack([normals, tangents, cross(normals, tangents)], axis=1)
 
-    # From the middle of the face to the point of block b, which is the same for ever, then on to that of block a.
+    # From the middle of the face to the fixed point of block b, then to that of block a.
     fixed, apart = x_b - faces.middles[face_b], x_a - x_b
     place = np.stack([dot(fixed, face_tangents), dot(fixed, cross(face_normals, face_tangents))], axis=1)
     slip = place + np.stack([dot(apart, frames[:, 1]), dot(apart, frames[:, 2])], axis=1)
@@ -178,60 +160,56 @@ def find_points(
     alone = pairs.shallow & ~pairs.face_each_other
     tips = measured(*_tips(solids, faces, vertices, pairs[alone], reach))
     tips = tips[near(tips) & ~parts.made[tips.features[:, 1]]]
-    crossed = measured(*_crossed_edges(solids, faces, vertices, pairs[pairs.cosine > OPPOSED], reach))
+    # No edges fit between faces that oppose each other better.
+    crossed = measured(*_crossed_edges(solids, faces, vertices, pairs[pairs.cosine > -0.94], reach))
     crossed = crossed[near(crossed) & ~parts.cut_edges[crossed.features[:, 1:3]].any(axis=1)]
     found = [tips, crossed]
-    # The planes of both faces, and whether the point is near: those of cuts are left out by what lies around them.
-    marks = [np.tile([-1, -1, 1], (len(contacts), 1)) for contacts in found]
-    # Where the faces that oppose each other best do not cover each other, others may.
-    left = pairs[tried]
-    resolved = np.zeros(len(left), dtype=bool)
-    blocks = np.sort(np.stack([block_of_part[left.i], block_of_part[left.j]]), axis=0)
+    # The planes of both faces, and whether the point is near.
+    labels = [np.tile([-1, -1, 1], (len(contacts), 1)) for contacts in found]
+    # Other faces are tried where those that oppose each other best do not cover each other.
+    facing = pairs[tried]
+    resolved = np.zeros(len(facing), dtype=bool)
+    blocks = np.sort(np.stack([block_of_part[facing.i], block_of_part[facing.j]]), axis=0)
     _, joint = np.unique(blocks[0] * len(widths) + blocks[1], return_inverse=True)
-    largest = np.zeros(len(left))
-    rounds = chain([(np.arange(len(left)), left.face_i, left.face_j)], left.other_faces(solids, faces, inner))
+    largest = np.zeros(len(facing))
+    rounds = chain([(np.arange(len(facing)), facing.face_i, facing.face_j)], facing.other_faces(solids, faces, inner))
     for pair, face_i, face_j in rounds:
-        now = ~resolved[pair]
-        pair, face_i, face_j = pair[now], face_i[now], face_j[now]
+        unresolved = ~resolved[pair]
+        pair, face_i, face_j = pair[unresolved], face_i[unresolved], face_j[unresolved]
         corners = clipped_faces(parts, faces, vertices, face_i, face_j)
         contacts = measured(corners.features, corners.areas)
         lowest = np.full(len(pair), np.inf)
         np.minimum.at(lowest, corners.owner, contacts.gaps)
-        strip = (
-            corners.widths < STRIP * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])[corners.owner]
-        )
+        strip = corners.widths < 0.5 * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])[corners.owner]
         np.maximum.at(largest, joint[pair], np.bincount(corners.owner, corners.areas, minlength=len(pair)))
         sliver = _slivers(parts, face_i, face_j, corners, largest[joint[pair]])
-        slides = strip & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)
-        # Points are no nearer than a plane keeps their parts apart: edges that cross behind it do not touch.
+        slides_past = strip & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)
+        # Edges that cross behind a plane that separates their parts do not touch.
         owner = pair[corners.owner]
-        behind = contacts.gaps < left.apart[owner] - BEHIND * left.width[owner]
-        kept = ~slides & ~sliver & ~behind
+        behind = contacts.gaps < facing.apart[owner] - 1e-3 * facing.width[owner]
+        kept = ~slides_past & ~sliver & ~behind
         inside = near(contacts)
         resolved[pair[corners.owner[kept & inside & np.isfinite(corners.widths)]]] = True
         kept = np.flatnonzero(kept if not parts.whole else kept & inside)
         found.append(contacts[kept])
         owner = corners.owner[kept]
-        marks.append(np.stack([parts.plane[face_i[owner]], parts.plane[face_j[owner]], inside[kept]], axis=1))
-    contacts, mark = joined_contacts(found), np.concatenate(marks)
+        labels.append(np.stack([parts.plane[face_i[owner]], parts.plane[face_j[owner]], inside[kept]], axis=1))
+    contacts, label = joined_contacts(found), np.concatenate(labels)
     if not parts.whole:
-        contacts, kept = without_points_of_cuts(parts, contacts, mark[:, :2])
-        contacts = contacts[mark[kept, 2] > 0]
+        contacts, kept = without_points_of_cuts(parts, contacts, label[:, :2])
+        contacts = contacts[label[kept, 2] > 0]
     contacts = contacts[np.lexsort(contacts.features.T[[2, 1, 0]])]
     # Parts of one block may have a point in common, and edges across each other a corner of a polygon.
-    several = np.bincount(block_of_part, minlength=len(widths)) > 1
-    several[crossed.block_a] = True
-    twice = several[contacts.block_a] | several[contacts.block_b]
-    return _once(contacts, twice, CORNER_TOLERANCE * float(widths.min()))
+    in_parts = np.bincount(block_of_part, minlength=len(widths)) > 1
+    in_parts[crossed.block_a] = True
+    duplicates = in_parts[contacts.block_a] | in_parts[contacts.block_b]
+    return _without_duplicates(contacts, duplicates, CORNER_TOLERANCE * float(widths.min()))
 
 
 def _slivers(
     parts: ConvexParts, face_i: np.ndarray, face_j: np.ndarray, corners: ClippedCorners, largest: np.ndarray
 ) -> np.ndarray:
-    """Whether corners are those of a sliver at a cut, (n,) bool: beside the area in which two stones touch, it is none.
-
-    Where two stones of two arms each slide along each other, the arm of one comes over the end of the other's joint
-    before it comes down.
+    """Whether corners are those of a sliver at a cut, (n,) bool, beside the area in which their blocks touch.
 
     Parameters
     ----------
@@ -244,16 +222,16 @@ def _slivers(
     solids = parts.solids
     area = np.bincount(corners.owner, corners.areas, minlength=len(face_i))
     at_cut = np.bincount(solids.face_of_corner, parts.cut_edges) > 0
-    small = (area < SLIVER_AREA * largest) & (at_cut[face_i] | at_cut[face_j])
-    narrow = SLIVER_WIDTH * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])
+    small = (area < SLIVER * largest) & (at_cut[face_i] | at_cut[face_j])
+    narrow = SLIVER * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])
     return small[corners.owner] & (corners.widths < narrow[corners.owner])
 
 
-def _once(contacts: Contacts, twice: np.ndarray, near: float) -> Contacts:
+def _without_duplicates(contacts: Contacts, duplicates: np.ndarray, near: float) -> Contacts:
     """Keep one of several points of two blocks at one place with one normal, among those chosen, (n,) bool."""
     from scipy.spatial import cKDTree
 
-    chosen = np.flatnonzero(twice)
+    chosen = np.flatnonzero(duplicates)
     pairs = (
         cKDTree(contacts.points[chosen]).query_pairs(near, output_type="ndarray") if len(chosen) else np.zeros((0, 2))
     )
@@ -261,20 +239,20 @@ def _once(contacts: Contacts, twice: np.ndarray, near: float) -> Contacts:
     blocks = np.sort(np.stack([contacts.block_a, contacts.block_b], axis=1), axis=1)
     sense = np.where(contacts.block_a[first] == contacts.block_a[second], 1.0, -1.0)
     same = (blocks[first] == blocks[second]).all(axis=1)
-    same &= sense * dot(contacts.frames[first, 0], contacts.frames[second, 0]) > ONE_NORMAL
+    same &= sense * dot(contacts.frames[first, 0], contacts.frames[second, 0]) > 1.0 - 1e-4
     if not same.any():
         return contacts
     n = len(contacts)
     links = coo_array((np.ones(np.count_nonzero(same)), (first[same], second[same])), shape=(n, n))
-    count, which = connected_components(links, directed=False)
-    areas = np.bincount(which, contacts.areas, minlength=count)
-    return replace(contacts, areas=areas[which])[np.sort(np.unique(which, return_index=True)[1])]
+    count, group = connected_components(links, directed=False)
+    areas = np.bincount(group, contacts.areas, minlength=count)
+    return replace(contacts, areas=areas[group])[np.sort(np.unique(group, return_index=True)[1])]
 
 
 def _tips(
     solids: Solids, faces: Faces, vertices: np.ndarray, pairs: FacingParts, reach: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Corners before a leading face that no face of theirs opposes: a steep tip on a plane."""
+    """Corners before a leading face that none of their faces opposes: a steep tip on a plane."""
     i_leads = pairs.face_i == pairs.lead_i
     face, part = np.where(i_leads, pairs.lead_i, pairs.lead_j), np.where(i_leads, pairs.j, pairs.i)
     owner, position = expand_ranges(np.diff(solids.offsets)[part])
@@ -298,9 +276,9 @@ def _tips(
 def _crossed_edges(
     solids: Solids, faces: Faces, vertices: np.ndarray, pairs: FacingParts, reach: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Edges that keep two parts apart better than any of their faces: one point for a pair."""
+    """Edges that separate two parts better than any of their faces: one point for a pair."""
     apart, own, other = edge_separations(solids, faces, vertices, pairs.i, pairs.j)
-    k = np.flatnonzero((apart > pairs.apart + EDGES_APART * pairs.width) & (apart <= reach))
+    k = np.flatnonzero((apart > pairs.apart + 1e-4 * pairs.width) & (apart <= reach))
     own, other = own[k], other[k]
     a, b = vertices[solids.corners[own]], vertices[solids.corners[other]]
     along_a = vertices[solids.corners[solids.next_corner[own]]] - a

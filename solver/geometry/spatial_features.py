@@ -26,6 +26,6 @@ def places_of(along_a: np.ndarray, along_b: np.ndarray, parallel: np.ndarray) ->
 
 
 def read_places(places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fractions along both edges and whether they are nearly parallel, from what :func:`_places` made of them."""
+    """Fractions along both edges and whether they are nearly parallel, from :func:`places_of`."""
     both = places >> 1
     return (both >> 30) * GRAIN, (both & ((1 << 30) - 1)) * GRAIN, (places & 1).astype(bool)

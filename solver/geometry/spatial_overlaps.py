@@ -49,7 +49,7 @@ def overlap_depths_in_space(
     apart = np.maximum(apart, edge_separations(solids, faces, vertices, i, j)[0])
     deep = apart < -tolerance
     blocks = np.sort(np.stack([block_of_part[i[deep]], block_of_part[j[deep]]], axis=1), axis=1)
-    pairs, which = np.unique(blocks, axis=0, return_inverse=True)
+    pairs, pair_of = np.unique(blocks, axis=0, return_inverse=True)
     depth = np.zeros(len(pairs))
-    np.maximum.at(depth, which.ravel(), -apart[deep])
+    np.maximum.at(depth, pair_of.ravel(), -apart[deep])
     return pairs[:, 0], pairs[:, 1], depth

@@ -1,4 +1,4 @@
-"""What falls: whether it comes to rest nearby, and how it goes down after a collapse."""
+"""Falling blocks: whether they come to rest nearby, and their motion after a collapse."""
 
 from __future__ import annotations
 
@@ -20,46 +20,40 @@ from .reports import Reports
 from .state import EquilibriumCheck, Place
 from .stepping import Stepper
 
-#: Viscosity that is left where a collapse is enclosed.
+#: Viscosity where a collapse is enclosed, as a part of the model's.
 REFINED = 1e-3
 
-#: Movement in a step in time, in block sizes, above which it is taken again, shorter by the second more than that asks
-#: for; steps, with those that are taken again; growth of the steps while blocks move by less than a third of it.
-HASTY, SHORTER, STEPS_IN_TIME, GROWTH = 0.03, 0.8, 200, 2.0
+#: Steps in time, with those that are refused.
+TIME_STEPS = 200
 
-#: First and longest step in time, in units of √(block size / g).
-FIRST_TIME, LONGEST_TIME = 0.02, 1e3
-
-#: Acceleration, in units of g, and speed, in units of √(block size · g), under which what has moved may be at rest.
-STOPPED, SLOW = 1e-3, 1e-3
-
-#: Movement of a block, in block sizes, below which a step in time has moved none, and such steps after which none will:
-#: as each is twice as long, a force out of balance would have moved it.
-AT_REST, IDLE = 1e-7, 12
-
-#: A frame of the fall is a movement of this, in block sizes, the first one of that: large against the compliance of the
-#: joints, small enough for rotations to be velocities.
-FRAME, MECHANISM = 0.1, 1e-3
+#: Movement of the blocks in the first frame of a fall, in block sizes: large against the compliance of the joints.
+MECHANISM = 1e-3
 
 
-class Falling:
-    """What falls from a place of the path, the driver at rest.
+class Fall:
+    """The motion of blocks from a place of the path that is not in equilibrium, with the supports fixed.
 
     Parameters
     ----------
     stepper : Stepper
     checks : EquilibriumChecks
     reports : Reports
-    falling_frames : int
+    n_frames : int
         Frames of the fall after collapse.
     """
 
-    def __init__(self, stepper: Stepper, checks: EquilibriumChecks, reports: Reports, falling_frames: int) -> None:
-        self.stepper, self.checks, self.reports, self.falling_frames = stepper, checks, reports, falling_frames
+    def __init__(self, stepper: Stepper, checks: EquilibriumChecks, reports: Reports, n_frames: int) -> None:
+        self.stepper, self.checks, self.reports, self.n_frames = stepper, checks, reports, n_frames
         self.model, self.driver = stepper.model, stepper.driver
 
-    def in_time(self, place: Place, longest: float = HASTY) -> Iterator[tuple[Place, np.ndarray, float, float]]:
-        """Steps in time from rest, the supports at rest, in each of which blocks move by a little.
+    def time_steps(self, place: Place, largest: float = 0.03) -> Iterator[tuple[Place, np.ndarray, float, float]]:
+        """Steps in time from rest with the supports fixed.
+
+        Parameters
+        ----------
+        place : Place
+        largest : float
+            Movement of the blocks in a step, in block sizes, above which it is repeated with a shorter time.
 
         Yields
         ------
@@ -71,39 +65,41 @@ class Falling:
         speed : float
             Of the fastest block, in units of √(block size · g).
         """
-        place, time, idle = replace(place, velocity=None), FIRST_TIME, 0
-        for _ in range(STEPS_IN_TIME):
+        # In units of √(block size / g).
+        place, time, idle = replace(place, velocity=None), 0.02, 0
+        for _ in range(TIME_STEPS):
             try:
                 new, motion, error = self.stepper.step(place, time, in_time=True)
                 moved = error.moved
             except NotSolved as failure:
                 new, moved = None, getattr(failure, "moved", 0.0)
-            if new is None or moved > longest:
-                time *= min(0.5, SHORTER * np.sqrt(longest / max(moved, longest)))
+            if new is None or moved > largest:
+                time *= min(0.5, 0.8 * np.sqrt(largest / max(moved, largest)))
                 continue
             place = new
             yield place, motion, error.turn / time**2, moved / time
-            idle = idle + 1 if moved < AT_REST else 0
-            if idle == IDLE:
+            # Each is twice as long as the one before: forces out of balance would have moved the blocks.
+            idle = idle + 1 if moved < 1e-7 else 0
+            if idle == 12:
                 return
-            time = min(time * (GROWTH if moved < longest / 3.0 else 1.0), LONGEST_TIME)
+            time = min(time * (2.0 if moved < largest / 3.0 else 1.0), 1e3)
 
-    def at_rest(self, place: Place, farthest: float = FARTHEST_FALL, gap: float = COMPUTED_GAP) -> Place | None:
-        """The equilibrium in which what falls comes to rest with the supports still; None where it goes farther."""
-        end, rests = self.end(place, farthest, gap)
-        return replace(end, velocity=None) if rests else None
+    def relaxed(self, place: Place, farthest: float = FARTHEST_FALL) -> Place | None:
+        """The equilibrium in which blocks come to rest with the supports fixed; None where they move farther."""
+        end, at_rest = self.relax(place, farthest)
+        return replace(end, velocity=None) if at_rest else None
 
-    def end(self, place: Place, farthest: float = FARTHEST_FALL, gap: float = COMPUTED_GAP) -> tuple[Place, bool]:
-        """Where what falls ends with the supports still, and whether it rests there or goes farther."""
+    def relax(self, place: Place, farthest: float = FARTHEST_FALL) -> tuple[Place, bool]:
+        """Where blocks move with the supports fixed, and whether they come to rest in equilibrium there."""
         end = place
-        for end, _, acceleration, speed in self.in_time(place):
-            if self.ways(place, end).max() > farthest:
+        for end, _, acceleration, speed in self.time_steps(place):
+            if self.movements(place, end).max() > farthest:
                 return end, False
-            if acceleration < STOPPED and speed < SLOW and self.checks.in_equilibrium(end, gap):
+            if acceleration < 1e-3 and speed < 1e-3 and self.checks.in_equilibrium(end, COMPUTED_GAP):
                 return end, True
         return end, False
 
-    def ways(self, one: Place, other: Place) -> np.ndarray:
+    def movements(self, one: Place, other: Place) -> np.ndarray:
         """(n_blocks,) array: largest component of the movement of free blocks from place to place, in block sizes."""
         movement = np.abs(one.pose.movement_to(other.pose) / self.model.lengths).max(axis=1)
         return np.where(self.stepper.free, movement, 0.0)
@@ -111,7 +107,7 @@ class Falling:
     def collapse(
         self, last: EquilibriumCheck, beyond: Place, upper_bound: float, multiplier_beyond: float | None
     ) -> Generator[Increment, None, Ending]:
-        """Yield the frames of the fall that follows the last equilibrium.
+        """Yield the frames of the fall beyond the last equilibrium; return the collapse.
 
         Parameters
         ----------
@@ -126,41 +122,27 @@ class Falling:
         driver, model = self.driver, self.model
         frames = list(self._dead_load_alone()._fall(beyond))
         if not frames:
-            # What is held by less than counts as a bearing goes on as it came.
+            # Blocks that no time step moves keep the velocity of the path.
             velocity = np.zeros_like(model.load) if beyond.velocity is None else beyond.velocity
-            frames = [self.reports.falling(beyond, velocity, beyond.s)]
+            frames = [self.reports.falling_increment(beyond, velocity, beyond.s)]
         # The first movement that is large against the compliance of the joints.
         sizes = [float(motion_size(frame.velocity, model.length).max()) for frame in frames]
         chosen = next((k for k, size in enumerate(sizes) if size > MECHANISM * model.length), int(np.argmax(sizes)))
         velocity, largest = frames[chosen].velocity, max(sizes[chosen], 1e-300)
-        standing = self.reports.reported(
-            last.place,
-            last.contacts,
-            last.forces,
-            last.friction,
-            velocity / largest,
-            last.measured,
-            np.zeros_like(model.load),
-            frames[chosen].certificate,
-            Status.EQUILIBRIUM,
-            (),
-        )
-        # Where a multiplier reaches zero, it does so in between; an equilibrium that is lost, somewhere.
+        at_last = self.reports.increment(last, velocity / largest, last.place.works)
+        # A multiplier is interpolated to zero; an equilibrium is lost anywhere in the bracket.
         part = 0.5 if multiplier_beyond is None else last.measured / (last.measured - multiplier_beyond)
-        reaction = last.measured
-        if model.live is not None:
-            reaction *= model.live_force
+        multiplier = last.measured
         collapse = Collapse(
             displacement=last.place.s + part * (upper_bound - last.place.s),
             bracket=(last.place.s, upper_bound),
-            reaction=reaction,
+            reaction=multiplier if model.live is None else multiplier * model.live_force,
             mechanism=velocity / largest,
             unit=driver.unit,
-            words=str(mechanism_of(model.assembly, standing)),
+            words=str(mechanism_of(model.assembly, at_last)),
             lost="equilibrium" if multiplier_beyond is None else "capacity",
         )
-        multiplier = standing.load_multiplier
-        del standing, last, frames[self.falling_frames :]
+        del at_last, last, frames[self.n_frames :]
         while frames:
             yield frames.pop(0)
         if model.live is None:
@@ -170,26 +152,26 @@ class Falling:
             what = f"equilibrium is lost along the control at α = {multiplier:.6g},"
         return Ending(Status.COLLAPSED, f"{what} at a control displacement of {collapse.displacement:.6g} m", collapse)
 
-    def _dead_load_alone(self) -> Falling:
-        """The same without a live load: a fall knows none."""
+    def _dead_load_alone(self) -> Fall:
+        """The same without the live load, which does not act in a fall."""
         if self.model.live is None:
             return self
         stepper = Stepper(replace(self.model, live=None), self.driver)
-        return Falling(
+        return Fall(
             stepper,
             EquilibriumChecks(stepper),
             Reports(stepper, self.reports.number, self.reports.fell_at),
-            self.falling_frames,
+            self.n_frames,
         )
 
     def _fall(self, place: Place) -> Iterator[Increment]:
-        """Frames of the fall, each a movement of the same size, until what falls rests."""
-        for least in (MECHANISM, *[FRAME] * max(self.falling_frames - 1, 0)):
+        """Frames of the fall, each a movement of the same size, until the blocks are at rest."""
+        for least in (MECHANISM, *[0.1] * max(self.n_frames - 1, 0)):
             start, total = place, np.zeros_like(self.model.load)
-            for moved, motion, _, _ in self.in_time(start, 2.0 * least):
+            for moved, motion, _, _ in self.time_steps(start, 2.0 * least):
                 place, total = moved, total + motion
                 if np.abs(total).max() > least:
                     break
-            yield self.reports.falling(start, total * self.model.lengths, start.s)
+            yield self.reports.falling_increment(start, total * self.model.lengths, start.s)
             if np.abs(total).max() <= least:
                 return

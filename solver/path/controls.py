@@ -1,4 +1,4 @@
-"""How an increment loop proceeds, and how it ended."""
+"""Controls of an increment loop, and its ending."""
 
 from __future__ import annotations
 
@@ -8,17 +8,14 @@ from dataclasses import dataclass
 from solver.results.increment import Status
 from solver.results.response import Collapse
 
-#: How increments are found: along the path that Coulomb friction leaves, or by the paper's linear program.
+#: Methods to find increments: the path of Coulomb friction, or the linear programs of the paper.
 COULOMB, LINEAR_PROGRAM = "coulomb", "linear program"
 INCREMENTS = (COULOMB, LINEAR_PROGRAM)
-
-#: Frames of the fall after collapse, by dimension, where nothing else is asked for.
-FALLING_FRAMES = {2: 10, 3: 40}
 
 
 @dataclass(frozen=True)
 class Controls:
-    """How the increment loop proceeds; the defaults suit everything we have tried.
+    """Controls of the increment loop; the defaults suit all structures that we have tried.
 
     Attributes
     ----------
@@ -42,7 +39,7 @@ class Controls:
     Raises
     ------
     ValueError
-        For an unknown way to find increments, or a number out of its range.
+        For an unknown method to find increments, or a number out of its range.
     """
 
     increments: str | None = None
@@ -54,7 +51,7 @@ class Controls:
     imperfection_factor: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse an unknown way to find increments, and a tolerance or a factor that is none."""
+        """Refuse an unknown method, and numbers out of their range."""
         if self.increments not in (None, *INCREMENTS):
             raise ValueError(f"increments is '{self.increments}'; it is 'coulomb' or 'linear program'")
         if not 0.0 < self.step_tolerance < 1.0:
@@ -75,12 +72,12 @@ class Controls:
 
     def frames(self, dimension: int) -> int:
         """Frames of the fall after collapse of a structure in the plane, 2, or in space, 3."""
-        return FALLING_FRAMES[dimension] if self.falling_frames is None else self.falling_frames
+        return {2: 10, 3: 40}[dimension] if self.falling_frames is None else self.falling_frames
 
 
 @dataclass(frozen=True)
 class Ending:
-    """How an increment loop ended: the value its generator returns."""
+    """The ending of an increment loop: the value that its generator returns."""
 
     stop: Status
     message: str = ""

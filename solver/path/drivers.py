@@ -1,4 +1,4 @@
-"""What drives a path: supports that move, or a control displacement that grows under a live load."""
+"""Drivers of a path: supports that move, or a control displacement that grows under a live load."""
 
 from __future__ import annotations
 
@@ -14,90 +14,67 @@ from solver.loads import Settlement
 
 
 class Driver(Protocol):
-    """The one parameter of a path: what it moves, how far, and in which steps."""
+    """The parameter of a path: what it moves, how far, and in which increments.
 
-    @property
-    def increment(self) -> float:
-        """Largest step that is reported."""
-        ...
+    Attributes
+    ----------
+    increment, limit : float [m or rad]
+        Largest step that is reported, and largest value.
+    tolerance : float [m or rad]
+        Width of the bracket of a collapse.
+    unit, what : str
+        Unit of the parameter, m or rad, and its name.
+    lever : float
+        Largest displacement that it prescribes, per unit of it.
+    stops : tuple of float
+        Values that are reported, too.
+    """
 
-    @property
-    def limit(self) -> float:
-        """Where the path ends if nothing has collapsed."""
-        ...
-
-    @property
-    def tolerance(self) -> float:
-        """Width of the bracket of a collapse."""
-        ...
-
-    @property
-    def unit(self) -> str:
-        """Of the parameter: m or rad."""
-        ...
-
-    @property
-    def what(self) -> str:
-        """The parameter in words."""
-        ...
-
-    def lever(self) -> float:
-        """Largest displacement that the parameter prescribes, per unit of it."""
-        ...
-
-    def stops(self) -> tuple[float, ...]:
-        """Values that have an increment of their own."""
-        ...
+    increment: float
+    limit: float
+    tolerance: float
+    unit: str
+    what: str
+    lever: float
+    stops: tuple[float, ...]
 
     def supports(self, s: float) -> Pose:
-        """Where the supports are; free blocks are not looked at."""
-        ...
+        """Pose of the supports; that of free blocks has no meaning."""
 
     def rate(self, s: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity of the supports per unit of the parameter."""
-        ...
 
-    def gone(self, pose: Pose) -> float:
+    def control_displacement(self, pose: Pose) -> float:
         """Control displacement at a pose; 0 where supports drive."""
-        ...
 
     def control(self, pose: Pose) -> np.ndarray | None:
-        """(n_blocks, n_dof) array: times a movement the control displacement in it; None where supports drive."""
-        ...
+        """(n_blocks, n_dof) array: gradient of the control displacement; None where supports drive."""
 
     def misdirected(self) -> str:
-        """What to say where a multiplier has to turn around for the parameter to grow."""
-        ...
+        """Message where the multiplier has to change its sign for the parameter to grow."""
 
 
 class SupportMotion:
-    """Supports that follow a settlement, from where they stand."""
+    """Supports that follow a settlement, from a pose."""
 
     what = "settlement"
 
     def __init__(self, assembly: Assembly, phase: Settlement, start: Pose) -> None:
         self.assembly, self.phase, self.start = assembly, phase, start
         self.increment, self.limit, self.unit = phase.increment, phase.limit, phase.unit
-        self.tolerance = float(phase.tolerance or phase.increment / 100.0)
-
-    def lever(self) -> float:
-        """1 for a translation, the largest radius for a rotation."""
-        points, block = moved_vertices(self.assembly, self.start), self.assembly.block_of_vertex
-        return float(np.linalg.norm(point_velocities(points, block, self.start, self.rate(0.0)), axis=1).max())
-
-    def stops(self) -> tuple[float, ...]:
-        """The settlement's own."""
-        return self.phase.stops
+        self.tolerance, self.stops = float(phase.tolerance or phase.increment / 100.0), phase.stops
+        points, block = moved_vertices(assembly, start), assembly.block_of_vertex
+        self.lever = float(np.linalg.norm(point_velocities(points, block, start, self.rate(0.0)), axis=1).max())
 
     def supports(self, s: float) -> Pose:
-        """On their way along the settlement."""
+        """Of the settlement."""
         return self.phase.displaced(self.assembly, self.start, s)
 
     def rate(self, s: float) -> np.ndarray:
         """Of the settlement."""
         return self.phase.rate(self.assembly, self.start, s)
 
-    def gone(self, pose: Pose) -> float:
+    def control_displacement(self, pose: Pose) -> float:
         """No control displacement."""
         return 0.0
 
@@ -112,7 +89,7 @@ class SupportMotion:
 
 @dataclass(frozen=True)
 class ControlDisplacement:
-    """The displacement that is made to grow in a pushover analysis.
+    """The control displacement of a pushover analysis.
 
     Attributes
     ----------
@@ -125,7 +102,7 @@ class ControlDisplacement:
     increment : float [m]
         Largest step.
     limit : float [m]
-        Where to stop if capacity is left.
+        Largest control displacement.
     tolerance : float, optional [m]
         Width of the bracket of the displacement at the end; a hundredth of the increment by default.
     """
@@ -138,7 +115,7 @@ class ControlDisplacement:
     tolerance: float | None = None
 
     def __post_init__(self) -> None:
-        """Check what was given; directions come to unit length."""
+        """Check the numbers; the direction becomes a unit vector."""
         for name in ("direction", "point"):
             value = getattr(self, name)
             if value is None:
@@ -178,7 +155,7 @@ class ControlDisplacement:
         return float((point_velocities(point, np.array([block]), pose, velocity) @ self._along(assembly))[0])
 
     def weights(self, assembly: Assembly, pose: Pose) -> np.ndarray:
-        """(n_blocks, n_dof) array whose product with a movement of the blocks is that of the control point."""
+        """(n_blocks, n_dof) array: gradient of the control displacement by movements of the blocks."""
         block, arm = self._place(assembly)
         turned = rotation_matrices(pose.rotations[[block]])[0] @ arm
         along = self._along(assembly)
@@ -204,9 +181,10 @@ class ControlDisplacement:
 
 
 class ControlledLoad:
-    """A live load whose multiplier makes a control displacement grow; all supports stand still."""
+    """A live load whose multiplier makes a control displacement grow; all supports are fixed."""
 
-    what = "control displacement"
+    what, lever = "control displacement", 1.0
+    stops: tuple[float, ...] = ()
 
     def __init__(self, assembly: Assembly, chosen: ControlDisplacement, start: Pose) -> None:
         self.assembly, self.chosen, self.start = assembly, chosen, start
@@ -214,32 +192,24 @@ class ControlledLoad:
         self.tolerance = float(chosen.tolerance or chosen.increment / 100.0)
         self.offset = chosen.displacement(assembly, start)
 
-    def lever(self) -> float:
-        """The control displacement counts as it is."""
-        return 1.0
-
-    def stops(self) -> tuple[float, ...]:
-        """None."""
-        return ()
-
     def supports(self, s: float) -> Pose:
-        """Where they were."""
+        """As at the start."""
         return self.start
 
     def rate(self, s: float) -> np.ndarray:
-        """Nothing moves."""
+        """Zero."""
         return np.zeros((self.assembly.n_blocks, self.start.positions.shape[1] + self.start.rotations.shape[1]))
 
-    def gone(self, pose: Pose) -> float:
+    def control_displacement(self, pose: Pose) -> float:
         """Since the start [m]."""
         return self.chosen.displacement(self.assembly, pose) - self.offset
 
     def control(self, pose: Pose) -> np.ndarray:
-        """Of the control point at the pose."""
+        """Gradient of the displacement of the control point."""
         return self.chosen.weights(self.assembly, pose)
 
     def misdirected(self) -> str:
-        """Names the block and the direction."""
+        """Message with the block and the direction."""
         return (
             f"the mechanism does not move block '{self.chosen.block}' along {self.chosen.direction or 'x'}; choose "
             "another control block, point or direction"

@@ -1,4 +1,4 @@
-"""What equilibrium within friction says of a place of the path."""
+"""Equilibrium within friction at the places of a path."""
 
 from __future__ import annotations
 
@@ -13,15 +13,12 @@ from solver.contact_step.stiffness import ContactRows
 from solver.equilibrium import block_forces, wrench_matrix
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.program.admissible import Admissible, admissible, in_equilibrium
+from solver.program.admissible import EquilibriumBounds, admissible, in_equilibrium
 from solver.program.model import Model
 from solver.tolerances import COMPUTED_GAP
 
 from .state import EquilibriumCheck, Place
 from .stepping import Stepper
-
-#: Bounds of a reaction that differ by no more than this part of it leave nothing to choose.
-DETERMINED = 1e-6
 
 
 def on_supports(model: Model, contacts: Contacts, pose: Pose, forces: np.ndarray) -> np.ndarray:
@@ -31,7 +28,7 @@ def on_supports(model: Model, contacts: Contacts, pose: Pose, forces: np.ndarray
 
 
 class EquilibriumChecks:
-    """Equilibria within exact Coulomb friction, without viscosity, at places that steps lead to.
+    """Equilibrium within exact Coulomb friction, without viscosity, at the places of a path.
 
     Parameters
     ----------
@@ -42,7 +39,7 @@ class EquilibriumChecks:
         self.stepper, self.model, self.driver = stepper, stepper.model, stepper.driver
 
     def in_equilibrium(self, place: Place, gap: float) -> bool:
-        """Whether an equilibrium exists at a place, under a live load with some of it.
+        """Whether a place is in equilibrium, with some of the live load where there is one.
 
         Parameters
         ----------
@@ -50,10 +47,10 @@ class EquilibriumChecks:
         gap : float
             Of contact points that may carry, in block sizes.
         """
-        contacts, friction = self._at(place)
+        contacts, friction = self._contacts_at(place)
         if self.model.live is not None:
             bounds = self._bounds(place, contacts, friction, gap)
-            return bounds.exists and bounds.high > 0.0
+            return bounds.in_equilibrium and bounds.high > 0.0
         self.stepper.programs += 1
         return in_equilibrium(self.model, place.pose, contacts, friction, gap)
 
@@ -65,31 +62,31 @@ class EquilibriumChecks:
         place : Place
         gap : float
         reaction : float, optional [N or N·m]
-            That they are to have.
+            Of the forces that are looked for.
         at_rest : bool
-            Of least elastic energy.
+            Find those of least elastic energy.
 
         Raises
         ------
         NotSolved
         """
         model, free = self.model, self.stepper.free
-        contacts, friction = self._at(place)
+        contacts, friction = self._contacts_at(place)
         closed = contacts.gaps <= gap * model.length
         matrix = wrench_matrix(contacts, place.pose, model.length)
         live, live_size = model.scaled_live
         load = (model.scaled_load + place.multiplier * live_size * live)[free].ravel()
-        near = np.zeros_like(contacts.points) if at_rest else self.stepper.remembered(place, contacts)[0]
-        along = None if reaction is None else self._reaction_rows(place, matrix, len(contacts))[closed]
+        reference = np.zeros_like(contacts.points) if at_rest else self.stepper.transferred(place, contacts)[0]
+        unit_reaction = None if reaction is None else self._reaction_rows(place, matrix, len(contacts))[closed]
         self.stepper.programs += 1
-        forces = np.zeros_like(near)
+        forces = np.zeros_like(reference)
         forces[closed] = nearest_equilibrium(
             ContactRows(matrix, free)[closed],
-            near[closed],
+            reference[closed],
             self.stepper.compliance(contacts, model.compliance)[closed],
             friction[closed],
             load,
-            along,
+            unit_reaction,
             0.0 if reaction is None else reaction / (model.force * self.stepper.lever),
         )
         return forces
@@ -101,40 +98,44 @@ class EquilibriumChecks:
         ----------
         place : Place
         reaction : float [N or N·m]
-            Of the path; not looked at under a live load.
+            Of the path; not used under a live load.
         """
-        contacts, friction = self._at(place)
+        contacts, friction = self._contacts_at(place)
         bounds = self._bounds(place, contacts, friction, gap)
         wanted = place.multiplier if self.model.live is not None else reaction
-        if not bounds.exists:
-            # Those of the program that comes nearest to balance, never forces that nothing has balanced.
+        if not bounds.in_equilibrium:
+            # The forces of the program that comes nearest to equilibrium.
             nearest = bounds.high if self.model.live is not None else self.reaction(place, contacts, bounds.forces)
             return EquilibriumCheck(place, contacts, friction, bounds.forces, nearest, bounds)
         low, high = (value if np.isfinite(value) else wanted for value in (bounds.low, bounds.high))
         measured = float(np.clip(wanted, low, max(low, high)))
-        determined = high - low <= DETERMINED * max(abs(low), abs(high))
+        determined = high - low <= 1e-6 * max(abs(low), abs(high))
         try:
-            forces = self._with(place, measured, determined, gap)
+            forces = self._forces_with(place, measured, determined, gap)
         except NotSolved:
             forces = self._between_bounds(contacts, place, bounds, measured)
         return EquilibriumCheck(place, contacts, friction, forces, measured, bounds)
 
-    def _with(self, place: Place, measured: float, determined: bool, gap: float) -> np.ndarray:
-        """Forces with what is measured."""
+    def _forces_with(self, place: Place, measured: float, determined: bool, gap: float) -> np.ndarray:
+        """Forces in equilibrium with a reaction, or with a multiplier."""
         if self.model.live is None:
             return self.nearest(place, gap, None if determined else measured)
         return self.nearest(replace(place, multiplier=measured), gap)
 
-    def _between_bounds(self, contacts: Contacts, place: Place, bounds: Admissible, measured: float) -> np.ndarray:
-        """(n_contacts, d) array: a mean of the forces of the two bounds, which are in equilibrium, too."""
-        if bounds.others is None:
+    def _between_bounds(
+        self, contacts: Contacts, place: Place, bounds: EquilibriumBounds, measured: float
+    ) -> np.ndarray:
+        """(n_contacts, d) array: a mean of the forces of the two bounds, which is in equilibrium, too."""
+        if bounds.other_forces is None:
             return bounds.forces
         if self.model.live is None:
-            one, other = (self.reaction(place, contacts, f) for f in (bounds.forces, bounds.others))
+            of_forces, of_other = (self.reaction(place, contacts, f) for f in (bounds.forces, bounds.other_forces))
         else:
-            one, other = bounds.high, bounds.low
-        part = 0.0 if one == other else float(np.clip((measured - one) / (other - one), 0.0, 1.0))
-        return (1.0 - part) * bounds.forces + part * bounds.others
+            of_forces, of_other = bounds.high, bounds.low
+        part = (
+            0.0 if of_forces == of_other else float(np.clip((measured - of_forces) / (of_other - of_forces), 0.0, 1.0))
+        )
+        return (1.0 - part) * bounds.forces + part * bounds.other_forces
 
     def reaction(self, place: Place, contacts: Contacts, forces: np.ndarray) -> float:
         """Reaction of forces in units of the program [N or N·m]."""
@@ -146,16 +147,16 @@ class EquilibriumChecks:
         rate = np.where(model.assembly.free[:, None], 0.0, self.driver.rate(place.s)) / model.lengths * model.length
         return np.asarray(matrix.T @ rate.ravel()).reshape(n, -1) / self.stepper.lever
 
-    def bounds(self, place: Place, gap: float = COMPUTED_GAP) -> Admissible:
-        """The bounds that equilibrium sets at a place."""
-        return self._bounds(place, *self._at(place), gap)
+    def bounds(self, place: Place, gap: float = COMPUTED_GAP) -> EquilibriumBounds:
+        """Bounds of the reaction or multiplier in equilibrium at a place."""
+        return self._bounds(place, *self._contacts_at(place), gap)
 
-    def _bounds(self, place: Place, contacts: Contacts, friction: np.ndarray, gap: float) -> Admissible:
+    def _bounds(self, place: Place, contacts: Contacts, friction: np.ndarray, gap: float) -> EquilibriumBounds:
         rate = None if self.model.live is not None else self.driver.rate(place.s)
         bounds = admissible(self.model, place.pose, contacts, friction, rate, gap=gap)
         self.stepper.programs += bounds.programs
         return bounds
 
-    def _at(self, place: Place) -> tuple[Contacts, np.ndarray]:
+    def _contacts_at(self, place: Place) -> tuple[Contacts, np.ndarray]:
         contacts = self.stepper.contacts(place.pose)
         return contacts, self.stepper.friction(contacts)

@@ -1,4 +1,4 @@
-"""The equilibrium path: from one place to the next under a driver, to collapse, to its limit, or until it locks."""
+"""The equilibrium path under a driver: in steps to collapse, to its limit, or until the supports are locked."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from solver.program.model import Model
 from solver.results.increment import Increment, Status
 from solver.tolerances import CLOSING_GAP, COMPUTED_GAP, JUMP
 
-from .collapse import MECHANISM, REFINED, Falling
+from .collapse import MECHANISM, REFINED, Fall
 from .controls import Controls, Ending
 from .drivers import Driver
 from .equilibrium_check import EquilibriumChecks
@@ -25,40 +25,18 @@ from .reports import Reports, no_equilibrium
 from .state import EquilibriumCheck, Note, PathState, Place
 from .stepping import StepError, Stepper
 
-#: Steps, as movements of the supports in block sizes: the first, which is not made shorter for its error, the longest,
-#: and the shortest, which ends the analysis where its program is not solved.
+#: First, longest and shortest step, as movements of the supports in block sizes; the first is accepted at any error.
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 1e-5, 0.02, 1e-11
 
-#: What a step may change, in relative errors of the reaction that are aimed for: friction bounds, in weights of the
-#: structure, and movements, in block sizes. Measured on sliding walls: reactions then come to within the error.
+#: Changes in a step, per relative error of the reaction: of friction bounds, in weights of the structure, and of
+#: movements, in block sizes, as measured on sliding walls.
 LAG_PER_ERROR, TURN_PER_ERROR = 20.0, 2.0
-
-#: A step whose error is so many times that is taken again; it grows at most by the second.
-REFUSED, GROWTH = 4.0, 2.0
-
-#: A place is checked where a block moves so many times as fast as the supports, or so far in a step, in block sizes.
-FAST, FAR = 3.0, 0.05
 
 #: Steps tried for an increment before an analysis ends.
 MOST_STEPS = 3000
 
-#: Places kept to go back to.
-HISTORY = 6
-
-#: After a bound that was none the viscosity stays reduced for so many tolerances.
-ENCLOSED = 8.0
-
-#: Penetration, in block sizes, and normal force, in total loads, at which blocks may be wedged.
-PRESSED, LOCKED_FORCE = 1e-5, 1e2
-
-#: Movement, in block sizes, of what has left for good when the first block has gone as far as none comes back from.
-LEAVES = 0.1
-
-#: Part of the multiplier at the start under which one comes to zero within a bracket, and does not fall there at once.
-SPENT = 0.05
-
-#: Movement of the supports, in block sizes, in which the joints' compliance is used up.
-ONSET = 1e-3
+#: Penetration, in block sizes, at which blocks may be wedged.
+WEDGED = 1e-5
 
 
 class Outcome(Enum):
@@ -94,20 +72,20 @@ class Path:
         on_step: Callable[[PathState], None] | None = None,
     ) -> None:
         self.on_step = on_step
-        self.whole, self.driver, self.number = model, driver, number
+        self.full_model, self.driver, self.number = model, driver, number
         self.frames, self.local_loss = controls.frames(model.dimension), controls.local_loss
-        self._follow_without(np.zeros(0))
+        self._remove_blocks(np.zeros(0))
         self.largest_lag = LAG_PER_ERROR * controls.step_tolerance
         self.largest_turn = TURN_PER_ERROR * controls.step_tolerance
-        self.reported, self.failure, self.pressed = -np.inf, "", Place.unloaded(driver.supports(0.0))
+        self.reported, self.failure, self.wedged = -np.inf, "", Place.unloaded(driver.supports(0.0))
 
-    def _follow_without(self, fell_at: np.ndarray) -> None:
+    def _remove_blocks(self, fell_at: np.ndarray) -> None:
         """Follow the structure without blocks that have left; (n_blocks,) array as in ``PathState.fell_at``."""
-        self.model = self.whole if not len(fell_at) else self.whole.without(~np.isnan(fell_at))
+        self.model = self.full_model if not len(fell_at) else self.full_model.without(~np.isnan(fell_at))
         self.stepper = Stepper(self.model, self.driver)
         self.checks = EquilibriumChecks(self.stepper)
         self.reports = Reports(self.stepper, self.number, fell_at)
-        self.falling = Falling(self.stepper, self.checks, self.reports, self.frames)
+        self.fall = Fall(self.stepper, self.checks, self.reports, self.frames)
 
     # The start ---------------------------------------------------------------------------------------------------
 
@@ -115,15 +93,15 @@ class Path:
         """The state at the start of the phase: of the drawing at rest, or after the phase before."""
         fell_at = np.zeros(0)
         if before is not None:
-            # Joints remember what they carried in the phase before; the way blocks moved is another.
+            # Joints keep the forces of the phase before, blocks not their velocity.
             place, fell_at = replace(before.place, s=0.0, velocity=None, works=(0.0, 0.0, 0.0, 0.0)), before.fell_at
-            self._follow_without(fell_at)
+            self._remove_blocks(fell_at)
         else:
             place = Place.unloaded(start)
             rest = self._at_rest(place)
             if rest is None:
-                # What the drawing has left open closes.
-                closed = self.falling.at_rest(place, JUMP)
+                # Joints that the drawing leaves open close.
+                closed = self.fall.relaxed(place, JUMP)
                 rest = None if closed is None else self._at_rest(replace(closed, contacts=None, velocity=None))
             place = rest or place
         return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,), fell_at=fell_at)
@@ -134,11 +112,11 @@ class Path:
             forces = self.checks.nearest(replace(place, multiplier=0.0), COMPUTED_GAP, at_rest=True)
         except NotSolved:
             bounds = self.checks.bounds(place)
-            if not bounds.exists:
+            if not bounds.in_equilibrium:
                 return None
-            forces = bounds.forces if bounds.others is None else 0.5 * (bounds.forces + bounds.others)
+            forces = bounds.forces if bounds.other_forces is None else 0.5 * (bounds.forces + bounds.other_forces)
             if self.model.live is not None:
-                # A pose that is given may stand with its live load only.
+                # A given pose may be in equilibrium with its live load only.
                 if not np.isfinite(bounds.high):
                     return None
                 forces, place = bounds.forces, replace(place, multiplier=bounds.high)
@@ -159,10 +137,10 @@ class Path:
         """
         self.state = state
         if resumed:
-            self._follow_without(state.fell_at)
+            self._remove_blocks(state.fell_at)
             self.reported = state.place.s
         else:
-            ending = yield from self._begun(state)
+            ending = yield from self._report_start(state)
             if ending is not None:
                 return ending
         while not self.state.ended:
@@ -172,30 +150,34 @@ class Path:
                 yield from self._reached(state)
                 continue
             if outcome is Outcome.LOCKED:
-                # Blocks were wedged from the last report on: forces grew, and friction followed them.
-                return Ending(Status.LOCKED, self.reports.locked(self.pressed))
+                # Forces grew from the last report on, and friction bounds with them.
+                return Ending(Status.LOCKED, self.reports.locked(self.wedged))
             if outcome is Outcome.FAILED:
                 yield from self._unreported(state)
                 return Ending(Status.SOLVER_FAILED, self.reports.no_step(self.failure))
-            beyond = self._beyond(state)
-            end, rests = self.falling.end(beyond)
-            going_on = self._from(state, replace(end, velocity=None)) if rests else self._let_go(state, end)
-            if going_on is None:
+            beyond = self._place_beyond(state)
+            end, at_rest = self.fall.relax(beyond)
+            next_state = (
+                self._continue_from(state, replace(end, velocity=None)) if at_rest else self._remove_fallen(state, end)
+            )
+            if next_state is None:
                 yield from self._unreported(state)
-                check, lost = self._checked(state.place), None
+                check, multiplier_beyond = self._check(state.place), None
                 if self.model.live is not None:
                     first, bounds = (
                         self.checks.bounds(Place.unloaded(state.start)),
                         self.checks.bounds(beyond, CLOSING_GAP),
                     )
-                    spent = state.place.multiplier <= SPENT * first.high
-                    lost = bounds.high if spent and bounds.exists and bounds.high <= 0.0 else None
-                return (yield from self.falling.collapse(check, beyond, state.upper_bound, lost))
-            self.state = going_on
+                    vanishing = state.place.multiplier <= 0.05 * first.high
+                    multiplier_beyond = (
+                        bounds.high if vanishing and bounds.in_equilibrium and bounds.high <= 0.0 else None
+                    )
+                return (yield from self.fall.collapse(check, beyond, state.upper_bound, multiplier_beyond))
+            self.state = next_state
         return self.reports.reached()
 
-    def _begun(self, state: PathState) -> Generator[Increment, None, Ending | None]:
-        """Report the start; return how a path ends that cannot begin, None where it can.
+    def _report_start(self, state: PathState) -> Generator[Increment, None, Ending | None]:
+        """Report the start; return the ending of a path that has no start, None otherwise.
 
         Raises
         ------
@@ -203,69 +185,69 @@ class Path:
             Where the multiplier has to turn around for the parameter to grow.
         """
         place, model = state.place, self.model
-        check = self._checked(place)
+        check = self._check(place)
         bounds = check.bounds
-        if not bounds.exists:
-            motion = next((motion for _, motion, *_ in self.falling.in_time(place)), self.stepper.weights)
-            yield self.reports.falling(place, motion * model.lengths, place.s)
+        if not bounds.in_equilibrium:
+            motion = next((motion for _, motion, *_ in self.fall.time_steps(place)), self.stepper.weights)
+            yield self.reports.falling_increment(place, motion * model.lengths, place.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, motion))
         if model.live is not None and not 0.0 < bounds.high < np.inf:
             if bounds.high > 0.0:
                 return Ending(
                     Status.LOCKED, "at a control displacement of 0 m no live load of this pattern moves the structure"
                 )
-            yield self.reports.falling(place, np.zeros_like(model.load), place.s)
+            yield self.reports.falling_increment(place, np.zeros_like(model.load), place.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
         if model.live is not None:
-            begun, _ = self.advance(state, self._onset())
-            if begun.place.multiplier <= 0.0:
+            first_state, _ = self.advance(state, self._onset())
+            if first_state.place.multiplier <= 0.0:
                 raise ValueError(self.driver.misdirected())
         yield self._report(state, check)
         return None
 
     def _onset(self) -> float:
         """Parameter at which the joints' compliance is used up."""
-        return min(ONSET * self.stepper.unit, self._next_stop(0.0))
+        return min(1e-3 * self.stepper.unit, self._next_stop(0.0))
 
     def _reached(self, state: PathState) -> Iterator[Increment]:
-        """Report a settlement that was reached, or go back where no equilibrium is near."""
+        """Report the parameter that was reached, or go back where no equilibrium is near."""
         place = state.place
-        rest = place if self._stands(place) else self.falling.at_rest(place)
+        rest = place if self._in_equilibrium(place) else self.fall.relaxed(place)
         if rest is None:
-            self.state = self._back(state, place.s)
+            self.state = self._go_back(state, place.s)
             return
         ended = place.s >= self.driver.limit * (1.0 - 1e-12)
-        if self.falling.ways(place, rest).max() > JUMP:
-            state = self._from(state, rest)
+        if self.fall.movements(place, rest).max() > JUMP:
+            state = self._continue_from(state, rest)
         self.state = state = replace(state, history=(replace(rest, works=place.works),), ended=ended)
-        yield self._report(state, self._checked(rest, self._reaction(place)))
+        yield self._report(state, self._check(rest, self._reaction(place)))
 
     def _report(self, state: PathState, check: EquilibriumCheck) -> Increment:
-        """The increment of an equilibrium, from whose state the path goes on."""
-        found = self.reports.increment(check, self._next_motion(state.place), state.place.works)
+        """The increment of an equilibrium, with the state as its checkpoint."""
+        increment = self.reports.increment(check, self._next_motion(state.place), state.place.works)
         self.reported = state.place.s
-        return replace(found, checkpoint=state)
+        return replace(increment, checkpoint=state)
 
     def _unreported(self, state: PathState) -> Iterator[Increment]:
-        """The increment at the last equilibrium of the path, where none has been reported there."""
+        """The increment at the last equilibrium of the path, unless it has been reported."""
         if state.place.s > self.reported:
             velocity = state.place.velocity
             velocity = self.driver.rate(state.place.s) if velocity is None else velocity
-            yield self.reports.increment(self._checked(state.place), velocity, state.place.works)
+            yield self.reports.increment(self._check(state.place), velocity, state.place.works)
 
     # Advancing ---------------------------------------------------------------------------------------------------
 
     def advance(self, state: PathState, target: float) -> tuple[PathState, Outcome]:
-        """Go towards a parameter in steps that their error chooses.
+        """Advance to a parameter in steps whose length follows from their error.
 
-        Where no equilibrium exists at a place, shorter steps with reduced viscosity go on from the last place that has
-        one and enclose the parameter from which on there is none, to the driver's tolerance.
+        Where a place has no equilibrium, shorter steps of reduced viscosity, from the last place that has one, enclose
+        the parameter beyond which there is none, to the driver's tolerance.
         """
         for _ in range(MOST_STEPS):
             if state.place.s >= target * (1.0 - 1e-12):
                 return state, Outcome.REACHED
-            room = state.upper_bound - state.place.s
-            if state.refined and room <= self.driver.tolerance * (1.0 + 1e-9):
+            width = state.upper_bound - state.place.s
+            if state.refined and width <= self.driver.tolerance * (1.0 + 1e-9):
                 return state, Outcome.NO_EQUILIBRIUM
             state, outcome = self._step(state, target)
             if self.on_step is not None:
@@ -276,7 +258,7 @@ class Path:
         return state, Outcome.FAILED
 
     def _step(self, state: PathState, target: float) -> tuple[PathState, Outcome | None]:
-        """One step towards a parameter, taken or refused; with an outcome where there is no other to try."""
+        """Try one step towards a parameter; with an outcome where it was the last one to try."""
         place, unit = state.place, self.stepper.unit
         enclosing = np.isfinite(state.upper_bound)
         refining = enclosing or place.s < state.refine_until
@@ -285,94 +267,96 @@ class Path:
             new, motion, error = self.stepper.step(place, length, viscosity=REFINED if refining else 1.0)
         except NotSolved as failure:
             return self._unsolved(state, length, str(failure))
-        if self._presses(new, error):
-            if self._locked(place):
-                self.pressed = new
+        if self._may_be_wedged(new, error):
+            if self._supports_locked(place):
+                self.wedged = new
                 return state, Outcome.LOCKED
-            if error.pressed > PRESSED and length > FIRST_STEP * unit:
+            if error.penetration > WEDGED and length > FIRST_STEP * unit:
                 return replace(state, step=length / 3.0), None
         measure = max(error.lag / self.largest_lag, error.turn / self.largest_turn)
-        if measure > REFUSED and length > FIRST_STEP * unit:
+        if measure > 4.0 and length > FIRST_STEP * unit:
             return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
-        if not self._holds(new, error, length, refining):
+        if not self._is_on_path(new, error, length, refining):
             if not enclosing:
-                return self._back(state, new.s), None
+                return self._go_back(state, new.s), None
             return replace(state, upper_bound=new.s, refined=True, step=length / 3.0), None
         s = target if abs(new.s - target) <= 1e-12 * abs(target) else new.s
-        new = replace(new, s=s, works=self._works(place, new, motion))
-        history = (*state.history[:1], *state.history[1:][1 - HISTORY :], place)
+        new = replace(new, s=s, works=self._accumulated_works(place, new, motion))
+        history = (*state.history[:1], *state.history[1:][-5:], place)
         state = replace(state, place=new, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
-            until = s + ENCLOSED * self.driver.tolerance
+            # The equilibrium at the bound may be one of reduced viscosity only.
+            until = s + 8.0 * self.driver.tolerance
             state = replace(state, upper_bound=np.inf, refined=False, refine_until=until)
         return state, None
 
     def _unsolved(self, state: PathState, length: float, failure: str) -> tuple[PathState, Outcome | None]:
-        """Go on with a shorter step where one was not solved, or end where none is short enough."""
+        """Shorten a step that was not solved, or end where it is the shortest."""
         if length / 3.0 >= SHORTEST_STEP * self.stepper.unit:
             return replace(state, step=length / 3.0), None
-        if self._locked(state.place):
-            self.pressed = state.place
+        if self._supports_locked(state.place):
+            self.wedged = state.place
             return state, Outcome.LOCKED
         self.failure = f"at {state.place.s:.6g} {self.driver.unit}: {failure}"
         return state, Outcome.FAILED
 
-    def _presses(self, new: Place, error: StepError) -> bool:
-        """Whether blocks may be wedged: forces have grown much in a step, or beyond all loads."""
+    def _may_be_wedged(self, new: Place, error: StepError) -> bool:
+        """Whether blocks may be wedged: they penetrate, or their forces exceed all loads."""
         largest = float(new.forces[:, 0].max(initial=0.0))
-        return error.pressed > PRESSED or largest > LOCKED_FORCE * self.model.total_load
+        return error.penetration > WEDGED or largest > 100.0 * self.model.total_load
 
     def _length(self, state: PathState, target: float) -> float:
         """Length of the step to take [m or rad]."""
         ahead, step = target - state.place.s, state.step
-        room = state.upper_bound - state.place.s
-        if np.isfinite(room):
-            # Nearer than half-way only in the end, where the bound itself is tried.
-            ahead = min(ahead, room if room <= self.driver.tolerance else room / 2.0)
+        width = state.upper_bound - state.place.s
+        if np.isfinite(width):
+            # The bound itself is tried once the bracket is as narrow as the tolerance.
+            ahead = min(ahead, width if width <= self.driver.tolerance else width / 2.0)
         # Two equal steps rather than a long one and a sliver.
         return ahead if ahead <= 1.000001 * step else min(step, ahead / 2.0)
 
     def _next_step(self, step: float, length: float, measure: float) -> float:
         unit = self.stepper.unit
-        grow = min(GROWTH, max(0.5, 1.0 / max(measure, 1e-300)))
+        grow = min(2.0, max(0.5, 1.0 / max(measure, 1e-300)))
         if grow <= 1.0:
             return max(grow * length, min(length, FIRST_STEP * unit))
-        # A step that was cut to end at the target says nothing against the one before.
+        # A step that was cut at its target does not shorten the next.
         return min(LONGEST_STEP * unit, max(step if length < 0.99 * step else 0.0, grow * length))
 
-    def _holds(self, new: Place, error: StepError, length: float, refining: bool) -> bool:
-        """Whether a new place is one of the path: proved where blocks move fast, or a collapse is being enclosed."""
+    def _is_on_path(self, new: Place, error: StepError, length: float, refining: bool) -> bool:
+        """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""
         if self.model.live is not None and new.multiplier <= 0.0 and new.s > self._onset():
             return False
-        fast = error.moved > FAST * length / self.stepper.unit or error.moved > FAR
+        # Beside the supports, or in block sizes.
+        fast = error.moved > 3.0 * length / self.stepper.unit or error.moved > 0.05
         if not (fast or refining):
             return True
         if self.checks.in_equilibrium(new, self._closed_gap(refining)):
             return True
-        # What the viscosity holds back may only have to creep on.
-        return not refining and self.falling.at_rest(new, JUMP) is not None
+        # Blocks that the viscosity retards may come to rest nearby.
+        return not refining and self.fall.relaxed(new, JUMP) is not None
 
     def _closed_gap(self, refining: bool) -> float:
-        """Largest gap of contact points that may carry, in block sizes: the viscosity holds joints open that close."""
+        """Largest gap of contact points that may carry, in block sizes: viscosity retards joints that close."""
         return max(COMPUTED_GAP, min(CLOSING_GAP, self.driver.tolerance / self.stepper.unit))
 
-    def _back(self, state: PathState, without: float) -> PathState:
-        """Go back to the last place with an equilibrium from a parameter without."""
-        # The oldest place is an equilibrium that was reported, or where the path began.
+    def _go_back(self, state: PathState, bound: float) -> PathState:
+        """Go back to the last place in equilibrium from a parameter that has none."""
+        # The oldest place is in equilibrium: it was reported, or is the start.
         oldest, *later = state.history
-        places = [oldest, *(place for place in (*later, state.place) if oldest.s < place.s < without)]
+        places = [oldest, *(place for place in (*later, state.place) if oldest.s < place.s < bound)]
         gap = self._closed_gap(False)
         while len(places) > 1 and not self.checks.in_equilibrium(places[-1], gap):
-            without = min(without, places.pop().s)
+            bound = min(bound, places.pop().s)
         place = places[-1]
-        step = (without - place.s) / 4.0
-        return replace(state, place=place, step=step, upper_bound=without, refined=False, history=tuple(places[:-1]))
+        step = (bound - place.s) / 4.0
+        return replace(state, place=place, step=step, upper_bound=bound, refined=False, history=tuple(places[:-1]))
 
-    def _locked(self, place: Place) -> bool:
-        """Whether no movement whatever lets the supports go on: forces that press on them have no limit."""
+    def _supports_locked(self, place: Place) -> bool:
+        """Whether no movement of the blocks is compatible with that of the supports: the reaction has no bound."""
         return self.model.live is None and bool(np.isneginf(self.checks.bounds(place).low))
 
-    def _works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float, float]:
+    def _accumulated_works(self, before: Place, after: Place, motion: np.ndarray) -> tuple[float, float, float, float]:
         """Works of dead and live loads, on supports and of friction so far, with the forces at the end of the step."""
         model, contacts = self.model, after.contacts
         assert contacts is not None
@@ -391,12 +375,12 @@ class Path:
 
     # Places ------------------------------------------------------------------------------------------------------
 
-    def _stands(self, place: Place) -> bool:
+    def _in_equilibrium(self, place: Place) -> bool:
         return self.checks.in_equilibrium(place, COMPUTED_GAP)
 
-    def _from(self, state: PathState, rest: Place) -> PathState:
-        """Go on from where blocks came to rest."""
-        if self.falling.ways(state.place, rest).max() > JUMP:
+    def _continue_from(self, state: PathState, rest: Place) -> PathState:
+        """Continue from the place where blocks came to rest."""
+        if self.fall.movements(state.place, rest).max() > JUMP:
             self.reports.notes.append(Note(rest.s, self.reports.jump(state.place.pose, rest.pose)))
         place = replace(rest, velocity=None, works=state.place.works)
         return replace(
@@ -408,19 +392,19 @@ class Path:
             history=(place,),
         )
 
-    def _let_go(self, state: PathState, end: Place) -> PathState | None:
-        """Go on without the blocks that left for good; None where none did, too many, or the others fall, too."""
+    def _remove_fallen(self, state: PathState, end: Place) -> PathState | None:
+        """Continue without the blocks that have fallen; None where none have, too many, or the others fall, too."""
         if self.model.live is not None:
             return None
         weights = self.model.assembly.masses * self.model.assembly.free * GRAVITY
-        leaving = self.falling.ways(state.place, end) > LEAVES
+        leaving = self.fall.movements(state.place, end) > 0.1
         fell_at = np.where(leaving, state.place.s, state.fell_at if len(state.fell_at) else np.nan)
         if not leaving.any() or weights[~np.isnan(fell_at)].sum() > self.local_loss * weights.sum():
             return None
         before, notes, programs = state.fell_at, self.reports.notes, self.stepper.programs
-        lost = float(weights[leaving].sum())
-        words = self.reports.loss(leaving, lost, lost / float(weights.sum()))
-        self._follow_without(fell_at)
+        weight = float(weights[leaving].sum())
+        words = self.reports.loss(leaving, weight, weight / float(weights.sum()))
+        self._remove_blocks(fell_at)
         self.reports.notes, self.stepper.programs = [*notes, Note(state.place.s, words)], programs
         fallen = leaving[:, None]
         pose = Pose(
@@ -428,18 +412,20 @@ class Path:
             np.where(fallen, end.pose.rotations, state.place.pose.rotations),
         )
         without = replace(state, place=replace(state.place, pose=pose, velocity=None), fell_at=fell_at)
-        rests = self._stands(without.place)
+        at_rest = self._in_equilibrium(without.place)
         end = without.place
-        if not rests:
-            end, rests = self.falling.end(end)
-        going_on = self._from(without, replace(end, velocity=None)) if rests else self._let_go(without, end)
-        if going_on is None:
-            self._follow_without(before)
+        if not at_rest:
+            end, at_rest = self.fall.relax(end)
+        next_state = (
+            self._continue_from(without, replace(end, velocity=None)) if at_rest else self._remove_fallen(without, end)
+        )
+        if next_state is None:
+            self._remove_blocks(before)
             self.reports.notes = notes
-        return going_on
+        return next_state
 
-    def _beyond(self, state: PathState) -> Place:
-        """A place beyond the last equilibrium, at the upper bound or as near as a step is solved."""
+    def _place_beyond(self, state: PathState) -> Place:
+        """A place beyond the last equilibrium, at the upper bound or as near to it as a step is solved."""
         length = state.upper_bound - state.place.s
         for _ in range(20):
             try:
@@ -454,20 +440,20 @@ class Path:
             return 0.0
         return self.checks.reaction(place, place.contacts, place.forces)
 
-    def _checked(self, place: Place, reaction: float | None = None) -> EquilibriumCheck:
+    def _check(self, place: Place, reaction: float | None = None) -> EquilibriumCheck:
         """Equilibrium and bounds at a place; at the start of a pushover those of the limit load."""
         check = self.checks.check(place, self._reaction(place) if reaction is None else reaction)
-        if not check.bounds.exists:
+        if not check.bounds.in_equilibrium:
             check = self.checks.check(place, check.measured, CLOSING_GAP)
         if self.model.live is not None and place.s == 0.0 and np.isfinite(check.bounds.high):
             check = replace(check, forces=check.bounds.forces, measured=check.bounds.high)
         return check
 
     def _next_stop(self, s: float) -> float:
-        """Next parameter that has an increment: a multiple of the driver's increment, a stop of its own, the limit."""
+        """Next parameter that is reported: a multiple of the driver's increment, one of its stops, or the limit."""
         near = 1e-9 * self.driver.increment
         number = np.floor(s / self.driver.increment + 1e-9) + 1.0
-        stops = [number * self.driver.increment, self.driver.limit, *self.driver.stops()]
+        stops = [number * self.driver.increment, self.driver.limit, *self.driver.stops]
         return float(
             min(stop for stop in stops if stop > s + near) if s < self.driver.limit - near else self.driver.limit
         )

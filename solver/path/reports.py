@@ -1,4 +1,4 @@
-"""What a path tells: its increments, and what it says of blocks in words."""
+"""The increments of a path, and its messages."""
 
 from __future__ import annotations
 
@@ -18,9 +18,6 @@ from .equilibrium_check import on_supports
 from .state import EquilibriumCheck, Note, Place
 from .stepping import Stepper
 
-#: Blocks that a message names.
-NAMED = 4
-
 
 class Reports:
     """Increments of a phase, and messages.
@@ -28,7 +25,7 @@ class Reports:
     Parameters
     ----------
     stepper : Stepper
-        That led to what is told; their programs are counted.
+        Whose programs are counted.
     number : int
         Of the phase.
     fell_at : (n_blocks,) array
@@ -43,15 +40,12 @@ class Reports:
     def increment(
         self, check: EquilibriumCheck, velocity: np.ndarray, works: tuple[float, float, float, float]
     ) -> Increment:
-        """Of an equilibrium and the movement that follows, with all notes so far and the works done until then."""
-        bounds = check.bounds
-        model, place, contacts = self.model, check.place, check.contacts
+        """The increment of an equilibrium and the movement that follows, with the notes since the last one."""
+        model, place, contacts, bounds = self.model, check.place, check.contacts, check.bounds
         resultant = (wrench_matrix(contacts, place.pose, model.length) @ check.forces.ravel()).reshape(model.load.shape)
         live, live_size = model.scaled_live
-        measured = check.measured
-        balance = (
-            resultant + model.scaled_load + (check.measured * live_size if model.live is not None else 0.0) * live
-        )[model.assembly.free]
+        multiplier = check.measured * live_size if model.live is not None else 0.0
+        balance = (resultant + model.scaled_load + multiplier * live)[model.assembly.free]
         certificate = Certificate(
             equilibrium_residual=float(np.abs(balance).max(initial=0.0)) / model.total_load,
             friction_excess=friction_excess(check.forces, check.friction) / model.total_load,
@@ -60,61 +54,42 @@ class Reports:
             duality_gap=bounds.gap,
             energy_residual=abs(works[0] + works[1] - works[2] - works[3]) / max(sum(map(abs, works)), 1e-12),
         )
-        support_forces = on_supports(model, contacts, place.pose, check.forces)
         notes = tuple(f"at {note.s:.6g} {self.driver.unit}: {note.words}" for note in self.notes)
         self.notes = []
-        return self.reported(
-            place,
-            contacts,
-            check.forces,
-            check.friction,
-            velocity,
-            measured,
-            support_forces,
-            certificate,
-            Status.EQUILIBRIUM,
-            notes,
-            (bounds.low, bounds.high),
-        )
+        support_forces = on_supports(model, contacts, place.pose, check.forces)
+        state = self._state(place.pose, contacts, check.forces, check.friction, velocity, support_forces)
+        found = self._increment(place.s, state, check.measured, certificate, Status.EQUILIBRIUM)
+        return replace(found, least=bounds.low, largest=bounds.high, notes=notes)
 
-    def falling(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
-        """Of a place that is no equilibrium."""
-        model, assembly = self.model, self.model.assembly
+    def falling_increment(self, place: Place, velocity: np.ndarray, s: float) -> Increment:
+        """The increment of a place that is not in equilibrium."""
         contacts = self.stepper.contacts(place.pose)
-        friction = model.interfaces.friction(assembly, contacts.block_a, contacts.block_b)
-        none = Certificate(largest_penetration=largest_penetration(contacts))
-        return self.reported(
-            replace(place, s=s),
-            contacts,
-            self.stepper.remembered(place, contacts)[0],
-            friction,
-            velocity,
-            0.0,
-            np.zeros_like(model.load),
-            none,
-            Status.FALLING,
-            (),
-        )
+        forces, friction = self.stepper.transferred(place, contacts)[0], self.stepper.friction(contacts)
+        state = self._state(place.pose, contacts, forces, friction, velocity, np.zeros_like(self.model.load))
+        certificate = Certificate(largest_penetration=largest_penetration(contacts))
+        return self._increment(s, state, 0.0, certificate, Status.FALLING)
 
-    def reported(
+    def _state(
         self,
-        place: Place,
+        pose: Pose,
         contacts: Contacts,
         forces: np.ndarray,
         friction: np.ndarray,
         velocity: np.ndarray,
-        measured: float,
         support_forces: np.ndarray,
-        certificate: Certificate,
-        status: Status,
-        notes: tuple[str, ...],
-        bounds: tuple[float, float] = (np.nan, np.nan),
+    ) -> State:
+        """The arrays of an increment, from forces in units of the program."""
+        rates = relative_velocities(contacts, pose, velocity)
+        return State(pose, contacts, forces * self.model.force, rates, friction, velocity, support_forces, self.fell_at)
+
+    def _increment(
+        self, s: float, state: State, measured: float, certificate: Certificate, status: Status
     ) -> Increment:
-        """As given, with the programs since the last."""
+        """An increment, with the programs since the last one."""
         pushed = self.model.live is not None
         programs, self.stepper.programs = self.stepper.programs, 0
         return Increment(
-            parameter=place.s,
+            parameter=s,
             measured=measured,
             phase=self.number,
             load_multiplier=measured if pushed else 0.0,
@@ -123,28 +98,16 @@ class Reports:
             status=status,
             programs=programs,
             seconds=0.0,
-            held=State(
-                pose=place.pose,
-                contacts=contacts,
-                forces=forces * self.model.force,
-                displacements=relative_velocities(contacts, place.pose, velocity),
-                friction=friction,
-                velocity=velocity,
-                support_forces=support_forces,
-                fell_at=self.fell_at,
-            ),
-            least=bounds[0],
-            largest=bounds[1],
-            notes=notes,
+            held=state,
         )
 
     def reached(self) -> Ending:
-        """How a path ends that has not collapsed."""
+        """The ending at the limit."""
         driver = self.driver
         return Ending(Status.LIMIT_REACHED, f"the {driver.what} reached its limit of {driver.limit:g} {driver.unit}")
 
     def locked(self, place: Place) -> str:
-        """Which blocks are wedged."""
+        """Message that names the wedged blocks."""
         assembly, contacts, normal = self.model.assembly, place.contacts, place.forces[:, 0]
         assert contacts is not None
         pressed = normal > 0.1 * normal.max()
@@ -153,14 +116,14 @@ class Reports:
         return f"the supports cannot move on: {len(blocks)} blocks are wedged ({self._named(blocks)})"
 
     def no_step(self, reason: str) -> str:
-        """Where, and what to do."""
+        """Message of a step that was not solved."""
         return (
             f"steps of the {self.driver.what}, however small, lead no further {reason}; repeat the analysis with "
             "another increment, and send the case to the developers if it stays"
         )
 
     def jump(self, start: Pose, end: Pose) -> str:
-        """Which blocks moved, and how far."""
+        """Message that names the blocks of a jump, and how far they moved."""
         assembly = self.model.assembly
         far = np.linalg.norm(moved_vertices(assembly, end) - moved_vertices(assembly, start), axis=1)
         way = np.zeros(assembly.n_blocks)
@@ -169,7 +132,7 @@ class Reports:
         return f"{self._named(fell)} moved by up to {way.max():.2g} m at once to the next equilibrium"
 
     def loss(self, fallen: np.ndarray, weight: float, share: float) -> str:
-        """Which blocks leave for good."""
+        """Message that names the blocks that have fallen."""
         falls = "falls" if fallen.sum() == 1 else "fall"
         return (
             f"{self._named(np.flatnonzero(fallen))} {falls}, {weight:.4g} N, {100.0 * share:.2g} % of the weight; "
@@ -177,13 +140,11 @@ class Reports:
         )
 
     def _named(self, blocks: np.ndarray) -> str:
-        shown = ", ".join(f"'{self.model.assembly.names[i]}'" for i in blocks[:NAMED])
-        more = f" and {len(blocks) - NAMED} more" if len(blocks) > NAMED else ""
-        return f"block{'' if len(blocks) == 1 else 's'} {shown}{more}"
+        return f"block{'' if len(blocks) == 1 else 's'} {_listed(self.model.assembly, blocks, 4)}"
 
 
 def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
-    """Which blocks fall before any settlement, and what to look for.
+    """Message that names the blocks that fall before any settlement.
 
     Parameters
     ----------
@@ -193,9 +154,14 @@ def no_equilibrium(assembly: Assembly, motion: np.ndarray) -> str:
     """
     size = np.abs(motion[:, : assembly.dimension]).max(axis=1)
     falling = np.flatnonzero(assembly.free & (size > 0.5 * size.max()))
-    shown = ", ".join(f"'{assembly.names[i]}'" for i in falling[:8])
-    more = f" and {len(falling) - 8} more" if len(falling) > 8 else ""
     return (
         f"no equilibrium before any settlement: {len(falling)} of {int(assembly.free.sum())} blocks fall "
-        f"({shown}{more}); look for gaps between blocks (joint_thickness), a missing support or too little friction"
+        f"({_listed(assembly, falling, 8)}); look for gaps between blocks (joint_thickness), a missing support or too "
+        "little friction"
     )
+
+
+def _listed(assembly: Assembly, blocks: np.ndarray, most: int) -> str:
+    """Names of the first ``most`` blocks, and how many others there are."""
+    more = f" and {len(blocks) - most} more" if len(blocks) > most else ""
+    return ", ".join(f"'{assembly.names[i]}'" for i in blocks[:most]) + more

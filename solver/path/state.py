@@ -1,4 +1,4 @@
-"""The state of a path: what is stored is what is advanced."""
+"""The state of a path, which is what a checkpoint stores."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from solver.geometry.contacts import Contacts
 from solver.kinematics import Pose
-from solver.program.admissible import Admissible
+from solver.program.admissible import EquilibriumBounds
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a path stands: everything that the next step remembers.
+    """A place of a path: everything that the next step needs of the ones before.
 
     Attributes
     ----------
@@ -21,18 +21,17 @@ class Place:
         Parameter of the driver.
     pose : Pose
     contacts : Contacts, optional
-        The contact points whose forces are remembered; None where there are none.
+        Those of the forces; None where there are none.
     forces : (n_contacts, d) array
         Their normal and shear forces, in units of the program.
     trial : (n_contacts, d) array
-        Forces of the springs before contact and friction cut them: which points push and slide, where the next program
-        starts.
+        Trial forces, from which the next program starts.
     followed : (n_contacts,) array
-        Normal forces that the friction bounds have followed to: B = μ times these.
+        Normal forces of the friction bounds: B = μ times these.
     multiplier : float
         Of the live load.
     velocity : (n_blocks, n_dof) array, optional
-        In the steps that led here, per unit of the parameter, or of time where blocks fall; None where nothing moved.
+        Per unit of the parameter, or of time where blocks fall; None at rest.
     works : tuple of float
         Of dead and live loads, on supports and of friction since the start of the phase, in units of the program.
     """
@@ -49,14 +48,14 @@ class Place:
 
     @classmethod
     def unloaded(cls, pose: Pose, s: float = 0.0) -> Place:
-        """Return the place of a pose that remembers no forces."""
+        """Return the place of a pose without forces."""
         none = np.zeros((0, pose.positions.shape[1]))
         return cls(s, pose, None, none, none, np.zeros(0))
 
 
 @dataclass(frozen=True)
 class PathState:
-    """Everything a path remembers: given back, it goes on bit for bit.
+    """The state of a path between two steps: a path that is resumed from it goes on bit for bit.
 
     Attributes
     ----------
@@ -66,17 +65,17 @@ class PathState:
         Where the phase began.
     place : Place
     step : float [m or rad]
-        To try next.
+        Length of the next step.
     upper_bound : float [m or rad]
-        Smallest parameter known to have no equilibrium, while a collapse is being enclosed; infinite otherwise.
+        Smallest parameter known to have no equilibrium, while a collapse is enclosed; infinite otherwise.
     refined : bool
         Whether the upper bound was found with reduced viscosity.
     refine_until : float [m or rad]
         Parameter up to which the viscosity stays reduced.
     history : tuple of Place
-        Places passed of late, oldest first, to go back to from where no equilibrium exists.
+        Places before, oldest first, to go back to from one without equilibrium.
     ended : bool
-        The phase has reached its limit.
+        Whether the phase has reached its limit.
     fell_at : (n_blocks,) array
         As in :class:`solver.results.increment.State`.
     """
@@ -95,7 +94,7 @@ class PathState:
 
 @dataclass(frozen=True)
 class EquilibriumCheck:
-    """What equilibrium within friction says of a place.
+    """Equilibrium within friction at a place of the path.
 
     Attributes
     ----------
@@ -115,12 +114,12 @@ class EquilibriumCheck:
     friction: np.ndarray
     forces: np.ndarray
     measured: float
-    bounds: Admissible
+    bounds: EquilibriumBounds
 
 
 @dataclass(frozen=True)
 class Note:
-    """What happened at a place of the path: parameter s [m or rad], and words."""
+    """An event on the path: parameter s [m or rad], and words."""
 
     s: float
     words: str

@@ -36,47 +36,25 @@ from solver.tolerances import (
 from .drivers import Driver
 from .state import Place
 
-#: Geometries at which a step is linearised, at most; normal force from which on a contact point carries, in block
-#: weights; what a linearisation did not foresee of the gaps of carrying points, in block sizes, up to which it is not
-#: repeated, where joints slide and where they only hinge; where a collapse is enclosed the last counts for gaps, too.
-LINEARISATIONS, CARRIES, EXACT_SLIDING, EXACT = 6, 1e-3, 1e-6, 1e-8
+#: Linearisations of a step at most.
+LINEARISATIONS = 6
 
-#: Penetration, in block sizes, at which a step is refused.
-UNSEEN = 1e-4
+#: Error of the gaps that a linearisation predicts, in block sizes, up to which it is not repeated: where joints slide,
+#: and where they only hinge.
+EXACT_SLIDING, EXACT = 1e-6, 1e-8
 
-#: Contact points of two blocks no farther apart than this, in block sizes, are one, by whichever corner and edge; those
-#: whose distances differ by less than the second are alike.
-SAME_PLACE, ALIKE = 1e-2, 1e-6
+#: Penetration, in block sizes, at which a step is refused, and gap up to which blocks touch as drawn.
+LARGEST_PENETRATION = 1e-4
 
-#: As drawn, what is no farther apart than this, in block sizes, touches.
-TOUCHES = 1e-4
-
-#: A point slides from this part of its friction bound on.
+#: Part of its friction bound from which on a contact point slides.
 SLIDES = 0.99
-
-#: Part of the way to μ N that a friction bound follows in a step at most: more goes to and fro where the normal force
-#: falls as the bound grows. And in a step in time.
-AT_ONCE = 0.5
-IN_TIME = 0.9
-
-#: Gap, in block sizes, at which half the friction that a contact point remembers is lost in a step.
-OPEN = 1e-6
 
 #: Damping of steps in time, in units of mass · √(g / block size): critical for a block that rocks.
 DAMPING = 2.0
 
-#: Movement, in block sizes, that the program of a step in time is solved to a small part of.
-SMALL = 1e-3
 
-#: Least part of a joint that a contact point stands for.
-LEAST_SHARE = 0.05
-
-#: Least weight that resists a movement, as a part of a block's mass over the mean: what weighs nothing resists, too.
-LEAST_WEIGHT = 1e-3
-
-
-class Unseen(NotSolved):
-    """Blocks came into each other where the step saw no contact point, in a movement of so many block sizes."""
+class Penetration(NotSolved):
+    """A block penetrates another where the step has no contact point, in a movement of so many block sizes."""
 
     def __init__(self, moved: float) -> None:
         super().__init__("a corner comes into a block from the side")
@@ -85,7 +63,7 @@ class Unseen(NotSolved):
 
 @dataclass(frozen=True)
 class StepError:
-    """What a step says of its length.
+    """Measures of the error of a step.
 
     Attributes
     ----------
@@ -95,14 +73,14 @@ class StepError:
         Change of the movement against that of the steps before, in block sizes.
     moved : float
         Movement of the fastest block, in block sizes.
-    pressed : float
+    penetration : float
         Deepest penetration at a contact point that carries, in block sizes.
     """
 
     lag: float
     turn: float
     moved: float
-    pressed: float
+    penetration: float
 
 
 def viscous_weights(model: Model) -> np.ndarray:
@@ -110,7 +88,8 @@ def viscous_weights(model: Model) -> np.ndarray:
     assembly, d = model.assembly, model.dimension
     weight = np.linalg.norm(model.load[:, :d], axis=1) / model.force
     mean = max(float(assembly.masses[assembly.free].mean()), 1e-300)
-    weight = np.maximum(weight, LEAST_WEIGHT * assembly.masses / mean)
+    # Blocks without weight resist, too.
+    weight = np.maximum(weight, 1e-3 * assembly.masses / mean)
     turning = weight * assembly.shapes.gyration / model.length**2
     return np.column_stack([weight] * d + [turning] * (len(model.lengths) - d))
 
@@ -135,27 +114,27 @@ class Stepper:
         self.free = model.assembly.free
         self.weights = viscous_weights(model)
         self.weight = float(np.linalg.norm(model.scaled_load[self.free, : model.dimension].sum(axis=0)))
-        self.lever = driver.lever()
+        self.lever = driver.lever
         self.unit = model.length / self.lever
         self.programs = 0
-        self._seen: tuple[Pose, Contacts] | None = None
+        self._last: tuple[Pose, Contacts] | None = None
         d = model.dimension
-        sideways = driver.rate(0.0)[model.assembly.moving, :d].sum(axis=0)
-        size = float(np.linalg.norm(sideways))
+        support_motion = driver.rate(0.0)[model.assembly.moving, :d].sum(axis=0)
+        size = float(np.linalg.norm(support_motion))
         self.imperfection = np.zeros_like(model.load)
         if size > 0.0:
             imperfection = model.imperfection * IMPERFECTION
-            self.imperfection[:, :d] = imperfection * self.weights[:, :1] * sideways / size
+            self.imperfection[:, :d] = imperfection * self.weights[:, :1] * support_motion / size
 
     def contacts(self, pose: Pose) -> Contacts:
-        """Return the contact points at a pose; those at the last one asked for are remembered."""
-        if self._seen is None or self._seen[0] is not pose:
+        """Return the contact points at a pose; those of the last pose are kept."""
+        if self._last is None or self._last[0] is not pose:
             model = self.model
             found = find_contacts(model.assembly, moved_vertices(model.assembly, pose), model.reach)
             if model.fallen is not None:
                 found = found[~(model.fallen[found.block_a] | model.fallen[found.block_b])]
-            self._seen = pose, found
-        return self._seen[1]
+            self._last = pose, found
+        return self._last[1]
 
     def friction(self, contacts: Contacts) -> np.ndarray:
         """(n,) array: friction coefficients."""
@@ -166,21 +145,21 @@ class Stepper:
         """(n, d) array: factor times the joint's, shared over its contact points by area, in units of the program."""
         n, d = contacts.points.shape
         pairs, joint = contacts.joints()
-        whole = np.bincount(joint, contacts.areas, len(pairs))[joint]
-        share = np.divide(contacts.areas, whole, out=np.full(n, 0.5), where=whole > 0.0)
+        joint_area = np.bincount(joint, contacts.areas, len(pairs))[joint]
+        share = np.divide(contacts.areas, joint_area, out=np.full(n, 0.5), where=joint_area > 0.0)
         of_joint = factor * np.array([COMPLIANCE] + [SHEAR_COMPLIANCE] * (d - 1))
-        return of_joint / np.clip(share, LEAST_SHARE, 1.0)[:, None]
+        return of_joint / np.clip(share, 0.05, 1.0)[:, None]
 
-    def remembered(self, place: Place, contacts: Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Forces, trial forces, followed normal forces, and which points are new, at these contact points.
+    def transferred(self, place: Place, contacts: Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Forces, trial forces and followed normal forces of a place at these contact points, and which are new.
 
-        A corner that passes the end of an edge gives a contact point another name: the lost point hands its forces on
-        to another one of the same two blocks at the same place, which may be new.
+        A corner that passes the end of an edge makes another contact point: the one that vanishes passes its forces to
+        the nearest one of the same two blocks.
         """
         n, d = contacts.points.shape
         before = place.contacts
         if before is None or not n or not len(before):
-            touches = np.where(contacts.gaps < TOUCHES * self.model.length, 1.0, -1.0)
+            touches = np.where(contacts.gaps < LARGEST_PENETRATION * self.model.length, 1.0, -1.0)
             return np.zeros((n, d)), touches[:, None] * np.eye(d)[0], np.zeros(n), np.ones(n, dtype=bool)
         number, same = matched_contacts(contacts, before)
         forces, followed = (
@@ -189,29 +168,29 @@ class Stepper:
         )
         trial = np.where(same[:, None], place.trial[number], -np.eye(d)[0])
         _, kept = matched_contacts(before, contacts)
-        lost = np.flatnonzero(~kept & ((place.forces[:, 0] > 0.0) | (place.followed > 0.0)))
-        fresh = ~same
-        if len(lost):
-            apart = np.linalg.norm(before.points[lost][:, None] - contacts.points[None], axis=2)
+        vanished = np.flatnonzero(~kept & ((place.forces[:, 0] > 0.0) | (place.followed > 0.0)))
+        is_new = ~same
+        if len(vanished):
+            apart = np.linalg.norm(before.points[vanished][:, None] - contacts.points[None], axis=2)
             one, other = (
                 np.sort(np.stack([c.block_a[k], c.block_b[k]], axis=1), axis=1)
-                for c, k in ((before, lost), (contacts, slice(None)))
+                for c, k in ((before, vanished), (contacts, slice(None)))
             )
             apart = np.where((one[:, None] == other[None]).all(axis=2), apart, np.inf)
             least = apart.min(axis=1)
-            near = (apart <= least[:, None] + ALIKE * self.model.length) & (apart < SAME_PLACE * self.model.length)
-            # What lies at one place shares alike, lest the order of the points decide.
-            row, heir = np.nonzero(near)
-            part, lost = 1.0 / near.sum(axis=1)[row], lost[row]
-            sense = np.where(before.block_a[lost] == contacts.block_a[heir], 1.0, -1.0)
-            vectors = np.einsum("nji,nj->ni", before.frames[lost], place.forces[lost]) * sense[:, None]
-            handed = np.einsum("nij,nj->ni", contacts.frames[heir], vectors)
-            handed[:, 0] = np.maximum(handed[:, 0], 0.0)
-            np.add.at(forces, heir, part[:, None] * handed)
-            trial[heir] = forces[heir]
-            np.add.at(followed, heir, part * place.followed[lost])
-            fresh[heir] = False
-        return forces, trial, followed, fresh
+            near = (apart <= least[:, None] + 1e-6 * self.model.length) & (apart < 1e-2 * self.model.length)
+            # Equally near ones share them, so that their order does not matter.
+            row, successor = np.nonzero(near)
+            part, vanished = 1.0 / near.sum(axis=1)[row], vanished[row]
+            sense = np.where(before.block_a[vanished] == contacts.block_a[successor], 1.0, -1.0)
+            vectors = np.einsum("nji,nj->ni", before.frames[vanished], place.forces[vanished]) * sense[:, None]
+            passed = np.einsum("nij,nj->ni", contacts.frames[successor], vectors)
+            passed[:, 0] = np.maximum(passed[:, 0], 0.0)
+            np.add.at(forces, successor, part[:, None] * passed)
+            trial[successor] = forces[successor]
+            np.add.at(followed, successor, part * place.followed[vanished])
+            is_new[successor] = False
+        return forces, trial, followed, is_new
 
     def step(
         self,
@@ -220,7 +199,7 @@ class Stepper:
         *,
         in_time: bool = False,
         viscosity: float = 1.0,
-        among: Contacts | None = None,
+        candidates: Contacts | None = None,
     ) -> tuple[Place, np.ndarray, StepError]:
         """Take one step of the driver, or one in time with the supports at rest.
 
@@ -230,11 +209,11 @@ class Stepper:
         length : float [m or rad]
             In time in units of √(block size / g).
         in_time : bool
-            The driver stands still, and what is not in equilibrium moves against its inertia: M/h² for the viscosity.
+            The supports are fixed, and blocks out of balance move against their inertia: M/h² for the viscosity.
         viscosity : float
             Times the model's; and the imperfection times the model's.
-        among : Contacts, optional
-            Contact points that the step has to see; by default those at the place.
+        candidates : Contacts, optional
+            Contact points of the step; by default those at the place.
 
         Returns
         -------
@@ -249,10 +228,10 @@ class Stepper:
         """
         model, assembly, driver, free = self.model, self.model.assembly, self.driver, self.free
         scales, n_dof = model.lengths, len(model.lengths)
-        s, size = (place.s, SMALL) if in_time else (place.s + length, length / self.unit)
+        s, size = (place.s, 1e-3) if in_time else (place.s + length, length / self.unit)
         supports = driver.supports(s)
-        start = self.contacts(place.pose) if among is None else among
-        forces, trial, followed, fresh = self.remembered(place, start)
+        start = self.contacts(place.pose) if candidates is None else candidates
+        forces, trial, followed, is_new = self.transferred(place, start)
         friction, compliance = self.friction(start), self.compliance(start, model.compliance)
         bound = friction * followed
         resisting, before = self._resistance(place, length, in_time, viscosity)
@@ -280,39 +259,40 @@ class Stepper:
                 size=size,
                 live=live[free].ravel() if control is not None else None,
                 control=None if control is None else (control * scales / model.length)[free].ravel(),
-                wanted=0.0 if control is None else (s - driver.gone(pose)) / model.length,
+                control_target=0.0 if control is None else (s - driver.control_displacement(pose)) / model.length,
             )
             self.programs += 1
-            found = minimise(problem, trial, multiplier)
-            forces, trial, multiplier = found.forces, found.trial, found.multiplier
-            # A turn by the first linearisation makes blocks grow: what that presses is not remembered.
+            solution = minimise(problem, trial, multiplier)
+            forces, trial, multiplier = solution.forces, solution.trial, solution.multiplier
+            # A linearised rotation makes blocks grow: the first linearisation's forces are not kept.
             normal = forces[:, 0] if number else normal
-            motion_so_far = motion_so_far + found.motion
+            motion_so_far = motion_so_far + solution.motion
             full = np.zeros((assembly.n_blocks, n_dof))
             full[free] = motion_so_far.reshape(-1, n_dof) * scales
             pose = self._with_supports(moved(place.pose, full), supports)
-            foreseen = problem.gap + rows.relative(found.motion)[:, 0]
+            predicted = problem.gap + rows.relative(solution.motion)[:, 0]
             contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
-            gap, carries = contacts.gaps / model.length, forces[:, 0] > CARRIES
+            gap, carries = contacts.gaps / model.length, forces[:, 0] > 1e-3
             slides = (np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * bound)[carries].any()
             exact = EXACT_SLIDING if slides else EXACT
-            left = max(
+            residual = max(
                 np.abs(gap)[carries].max(initial=0.0) / closed,
-                np.abs(gap - foreseen)[carries].max(initial=0.0) / exact,
+                np.abs(gap - predicted)[carries].max(initial=0.0) / exact,
             )
-            missed = 0.0 if control is None else abs(s - driver.gone(pose)) / model.length
-            if left <= 1.0 and missed <= EXACT:
+            control_error = 0.0 if control is None else abs(s - driver.control_displacement(pose)) / model.length
+            if residual <= 1.0 and control_error <= EXACT:
                 break
         if not np.isfinite(motion_so_far).all():
             raise NotSolved("the movement is not finite")
-        moved_by = float(np.abs(motion_so_far).max(initial=0.0))
-        if moved_by > UNSEEN:
-            unseen = self._unseen(start, place.pose, pose, moved_by)
-            if len(unseen):
-                among = joined_contacts([start, unseen])
-                return self.step(place, length, in_time=in_time, viscosity=viscosity, among=among)
-        share = IN_TIME if in_time else min(AT_ONCE, size / (size + min(FRICTION_MEMORY, s / self.unit)))
-        lag, followed = self._follow(forces, np.maximum(gap, 0.0), friction, bound, followed, fresh, share)
+        movement_size = float(np.abs(motion_so_far).max(initial=0.0))
+        if movement_size > LARGEST_PENETRATION:
+            missed_contacts = self._missed_contacts(start, place.pose, pose, movement_size)
+            if len(missed_contacts):
+                candidates = joined_contacts([start, missed_contacts])
+                return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=candidates)
+        # A larger share alternates where the normal force falls as the bound grows.
+        share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
+        lag, followed = self._updated_bounds(forces, np.maximum(gap, 0.0), friction, bound, followed, is_new, share)
         motion = np.where(free[:, None], full, place.pose.movement_to(pose))
         new = Place(
             s,
@@ -324,14 +304,14 @@ class Stepper:
             multiplier / (live_size or 1.0),
             motion / length if in_time else self._velocity(place, motion, length),
         )
-        # The first step of the supports has none before it to turn from.
+        # The first step has no earlier movement to compare with.
         turn = (in_time or place.velocity is not None) * float(np.abs(motion_so_far - before).max(initial=0.0))
-        return new, motion / scales, StepError(lag, turn, moved_by, float(-gap[carries].min(initial=0.0)))
+        return new, motion / scales, StepError(lag, turn, movement_size, float(-gap[carries].min(initial=0.0)))
 
     def _resistance(
         self, place: Place, length: float, in_time: bool, viscosity: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """(n_dof,) arrays: force per movement by viscosity or inertia, and the movement that meets none of it."""
+        """(n_dof,) arrays: force per movement by viscosity or inertia, and the movement that has none of it."""
         weights, kept = self.weights[self.free].ravel(), 1.0
         resisting = VISCOSITY * viscosity * self.unit / length * weights
         if in_time:
@@ -340,48 +320,48 @@ class Stepper:
             return resisting, np.zeros_like(resisting)
         return resisting, kept * (place.velocity / self.model.lengths * length)[self.free].ravel()
 
-    def _follow(
+    def _updated_bounds(
         self,
         forces: np.ndarray,
         gap: np.ndarray,
         friction: np.ndarray,
         bound: np.ndarray,
         followed: np.ndarray,
-        fresh: np.ndarray,
+        is_new: np.ndarray,
         share: float | np.ndarray,
     ) -> tuple[float, np.ndarray]:
-        """Let the friction bounds follow a share of the way; how much those of sliding points change, and followed."""
-        drag, push = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0]
-        sliding = ((drag >= SLIDES * bound) | (drag > friction * push)) & ~fresh
-        # Where a joint opens friction goes with the gap: the less a point can carry, the sooner.
-        share = np.maximum(share, gap / (gap + OPEN))
-        # What is new has all the friction of its normal force at once.
-        after = np.where(fresh, push, followed + share * (push - followed))
+        """Change of the friction bounds of sliding points, in weights of the structure, and followed normal forces."""
+        shear_force, normal = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0]
+        sliding = ((shear_force >= SLIDES * bound) | (shear_force > friction * normal)) & ~is_new
+        # In a joint that opens friction vanishes sooner.
+        share = np.maximum(share, gap / (gap + 1e-6))
+        # New contact points have the friction of their normal force at once.
+        after = np.where(is_new, normal, followed + share * (normal - followed))
         return float((friction * np.abs(after - followed))[sliding].sum()) / self.weight, after
 
     def _velocity(self, place: Place, motion: np.ndarray, length: float) -> np.ndarray:
-        """(n_blocks, n_dof) array: velocity after a step, in it and in those before."""
+        """(n_blocks, n_dof) array: velocity after a step, averaged with those before."""
         before = np.zeros_like(motion) if place.velocity is None else place.velocity
         return before + (motion - length * before) / (length + VELOCITY_MEMORY * self.unit)
 
-    def _unseen(self, seen: Contacts, before: Pose, pose: Pose, moved_by: float) -> Contacts:
-        """Contact points that a step has to see, too, where they were before it: at its end a corner is in a block.
+    def _missed_contacts(self, stepped: Contacts, before: Pose, pose: Pose, movement_size: float) -> Contacts:
+        """Contact points that a step has missed, where they were before it: at its end a corner is in a block.
 
         Raises
         ------
         Unseen
-            Where that corner was behind the edge already, or the step has seen it.
+            Where that corner was behind the edge already, or the step had its contact point.
         """
         end = self.contacts(pose)
         earlier, known = np.zeros(len(end)), np.zeros(len(end), dtype=bool)
-        if len(end) and len(seen):
-            number, known = matched_contacts(end, seen)
-            earlier = np.where(known, np.minimum(seen.gaps[number], 0.0), 0.0)
-        deepest = -UNSEEN * self.model.length
+        if len(end) and len(stepped):
+            number, known = matched_contacts(end, stepped)
+            earlier = np.where(known, np.minimum(stepped.gaps[number], 0.0), 0.0)
+        deepest = -LARGEST_PENETRATION * self.model.length
         deep = end.gaps - earlier < deepest
         found = measure_contacts(self.model.assembly, moved_vertices(self.model.assembly, before), end[deep])
         if known[deep].any() or (found.gaps < deepest).any():
-            raise Unseen(moved_by)
+            raise Penetration(movement_size)
         return found
 
     def _with_supports(self, pose: Pose, supports: Pose) -> Pose:

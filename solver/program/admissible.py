@@ -1,4 +1,4 @@
-"""What equilibrium allows at a pose: whether one within friction exists, and what bounds a reaction or multiplier."""
+"""Bounds of equilibrium within friction at a pose: whether there is one, and of its reaction or multiplier."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ UNBALANCED_COST = 1e4
 
 
 @dataclass(frozen=True)
-class Admissible:
+class EquilibriumBounds:
     """Bounds over all forces in equilibrium within friction at a pose.
 
     Attributes
@@ -37,7 +37,7 @@ class Admissible:
     forces : (n_contacts, d) array
         Normal and shear forces of the least reaction or largest multiplier, in units of the program; of another
         equilibrium where that has no bound or was not found.
-    others : (n_contacts, d) array, optional
+    other_forces : (n_contacts, d) array, optional
         Those of the other bound, where there is one.
     """
 
@@ -47,11 +47,11 @@ class Admissible:
     gap: float
     programs: int
     forces: np.ndarray
-    others: np.ndarray | None = None
+    other_forces: np.ndarray | None = None
 
     @property
-    def exists(self) -> bool:
-        """Whether an equilibrium exists."""
+    def in_equilibrium(self) -> bool:
+        """Whether an equilibrium within friction exists."""
         return self.unbalanced <= FALLING_FRACTION
 
 
@@ -67,8 +67,8 @@ def in_equilibrium(
     SolveError
     """
     program = _StaticProgram(model, pose, contacts, friction, None, gap)
-    found = program.extreme(0.0)
-    return found is not None and program.unbalanced(found) <= FALLING_FRACTION
+    solution = program.bound(0.0)
+    return solution is not None and program.unbalanced(solution) <= FALLING_FRACTION
 
 
 def admissible(
@@ -79,8 +79,8 @@ def admissible(
     rate: np.ndarray | None = None,
     *,
     gap: float = COMPUTED_GAP,
-) -> Admissible:
-    """Whether an equilibrium within friction exists at a pose, and what it leaves free.
+) -> EquilibriumBounds:
+    """Bound the reaction or the multiplier of all equilibria within friction at a pose.
 
     Parameters
     ----------
@@ -88,12 +88,12 @@ def admissible(
         Where it has a live load, its multiplier is bounded.
     pose : Pose
     contacts : Contacts
-        At the pose; points that are open carry nothing.
+        At the pose; open ones carry no force.
     friction : (n_contacts,) array
     rate : (n_blocks, n_dof) array, optional
         Movement of the supports along which the reaction is bounded.
     gap : float
-        Of contact points that carry at most, in block sizes.
+        Largest one of a contact point that carries force, in block sizes.
 
     Raises
     ------
@@ -103,36 +103,36 @@ def admissible(
     -----
     Two linear programs over the multipliers of the friction cones' rays, in space two conic programs over the forces in
     round cones: the least and the largest reaction (or multiplier). The least is that of Portioli & Cascini (2017) at
-    this geometry. What neither program can balance, at a cost above that of any mechanism, is what is out of balance.
+    this geometry. Forces out of balance have a cost above that of any mechanism.
     """
     program = _StaticProgram(model, pose, contacts, friction, rate, gap)
-    # A bound may stay unknown, but for the load that a pushover is about: what exists is proved without it.
-    with_forces = 1.0 if program.live_size == 0.0 else -1.0
+    # A bound may stay unknown, except that of a pushover.
+    forces_sign = 1.0 if program.live_size == 0.0 else -1.0
     unknown: set[float] = set()
-    found: dict[float, Solution | None] = {}
+    solutions: dict[float, Solution | None] = {}
     for sign in (1.0, -1.0):
         try:
-            found[sign] = program.extreme(sign)
+            solutions[sign] = program.bound(sign)
         except SolveError:
-            if sign == with_forces and program.live_size > 0.0:
+            if sign == forces_sign and program.live_size > 0.0:
                 raise
             unknown.add(sign)
-            found[sign] = None
-    any_forces = None
-    if found[with_forces] is None and (with_forces in unknown or found[-with_forces] is None):
-        # No forces yet: some that no bound asks for. Where both run away along wedged blocks, others may fall.
-        any_forces = program.extreme(0.0)
-    out = {k: program.unbalanced(s) for k, s in {**found, 0.0: any_forces}.items() if s is not None}
-    unbalanced = min(out.values())
+            solutions[sign] = None
+    arbitrary = None
+    if solutions[forces_sign] is None and (forces_sign in unknown or solutions[-forces_sign] is None):
+        # Where blocks are wedged neither bound is finite, and others may fall.
+        arbitrary = program.bound(0.0)
+    imbalance = {k: program.unbalanced(s) for k, s in {**solutions, 0.0: arbitrary}.items() if s is not None}
+    unbalanced = min(imbalance.values())
     values, gaps = [], [0.0]
-    carried: dict[float, np.ndarray] = {}
-    for sign, solution in found.items():
+    forces_of: dict[float, np.ndarray] = {}
+    for sign, solution in solutions.items():
         slack = True
-        if solution is not None and out[sign] > FALLING_FRACTION >= unbalanced:
-            # Cheaper out of balance, though forces in balance exist: blocks would move ten thousand times as fast.
+        if solution is not None and imbalance[sign] > FALLING_FRACTION >= unbalanced:
+            # Forces out of balance cost less than this bound, though an equilibrium exists.
             slack = False
             try:
-                solution = program.extreme(sign, slack=False)
+                solution = program.bound(sign, slack=False)
             except SolveError:
                 unknown.add(sign)
                 solution = None
@@ -141,12 +141,12 @@ def admissible(
             continue
         values.append(program.value(solution, slack))
         gaps.append(solution.gap)
-        carried[sign] = program.forces(solution)
-    if any_forces is not None:
-        carried[0.0] = program.forces(any_forces)
-    given = [carried[sign] for sign in (with_forces, -with_forces, 0.0) if sign in carried]
-    others = given[1] if len(given) > 1 else None
-    return Admissible(unbalanced, values[0], values[1], max(gaps), program.solved, given[0], others)
+        forces_of[sign] = program.forces(solution)
+    if arbitrary is not None:
+        forces_of[0.0] = program.forces(arbitrary)
+    ordered = [forces_of[sign] for sign in (forces_sign, -forces_sign, 0.0) if sign in forces_of]
+    other_forces = ordered[1] if len(ordered) > 1 else None
+    return EquilibriumBounds(unbalanced, values[0], values[1], max(gaps), program.programs, ordered[0], other_forces)
 
 
 class _StaticProgram:
@@ -170,7 +170,7 @@ class _StaticProgram:
         self.rays = forces_of[:, np.repeat(d * closed, d) + np.tile(np.arange(d), len(closed))]
         balance = sp.csc_array(matrix[free] @ self.rays)
         self.rows, self.n = balance.shape
-        self.d, self.friction, self.total, self.solved = d, friction[closed], model.total_load, 0
+        self.d, self.friction, self.total, self.programs = d, friction[closed], model.total_load, 0
         self.load, self.tolerance = model.scaled_load.ravel()[free], BALANCE_TOLERANCE * model.total_load
         live, self.live_size = model.scaled_live
         columns, objective = [balance], np.zeros(self.n)
@@ -181,15 +181,15 @@ class _StaticProgram:
             self.unit = 1.0 / self.live_size
         else:
             along = np.zeros(len(free)) if rate is None else (rate / model.lengths).ravel()
-            # In the speed of the supports: blocks out of balance are to cost more whatever the unit of the drawing.
-            fastest = float(np.abs(along).max(initial=0.0)) or 1.0
-            along = np.where(free, 0.0, along / fastest)
+            # Relative to the speed of the supports, as the cost of forces out of balance is.
+            speed = float(np.abs(along).max(initial=0.0)) or 1.0
+            along = np.where(free, 0.0, along / speed)
             objective = np.concatenate([self.rays.T @ (matrix.T @ along), np.zeros(2 * self.rows)])
-            self.unit = model.force * model.length * fastest
+            self.unit = model.force * model.length * speed
         self.objective, self.matrix = objective, with_slack(*columns)
         self.places = np.repeat(pose.positions[blocks], model.n_dof, axis=0)
 
-    def extreme(self, sign: float, *, slack: bool = True) -> Solution | None:
+    def bound(self, sign: float, *, slack: bool = True) -> Solution | None:
         """Least or, by sign, largest value, or 0 for any; with or without unbalanced forces; None without a bound.
 
         Raises
@@ -200,7 +200,7 @@ class _StaticProgram:
         cost[self._slack] = UNBALANCED_COST if sign else 1.0
         if not slack:
             cost, matrix = np.delete(cost, self._slack), matrix[:, np.delete(np.arange(len(cost)), self._slack)]
-        self.solved += 1
+        self.programs += 1
         try:
             if self.d == 3:
                 return solve_cones(ConicProgram(cost, matrix, -self.load, self.friction))

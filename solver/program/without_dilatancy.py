@@ -15,7 +15,7 @@ UNBALANCED_COST = 1e3
 
 
 @dataclass(frozen=True)
-class Found:
+class FlowSolution:
     """What the program found, in its units.
 
     Attributes
@@ -37,22 +37,22 @@ def solve_without_dilatancy(
     matrix: sp.csr_array,
     dead: np.ndarray,
     live: np.ndarray,
-    left: np.ndarray,
+    tolerance: np.ndarray,
     bound: np.ndarray,
     crushing: np.ndarray,
-    price: np.ndarray,
+    normal_cost: np.ndarray,
     normal: np.ndarray,
     change_cost: np.ndarray,
-) -> Found:
+) -> FlowSolution:
     """Maximise α with |T| ≤ B; where changes cost, take of equal α the normal forces nearest to N⁰.
 
     Parameters
     ----------
     matrix : (m, d n) sparse array
         Forces and moments on the free blocks from the d forces of each of n contact points.
-    dead, live, left : (m,) arrays
+    dead, live, tolerance : (m,) arrays
         Loads, and what may stay out of balance, in the plane.
-    bound, crushing, price : (n,) arrays
+    bound, crushing, normal_cost : (n,) arrays
         B and largest normal force of each contact point, and what a unit of normal force costs, in multipliers.
     normal : (n,) array
         N⁰.
@@ -73,14 +73,14 @@ def solve_without_dilatancy(
         half = sp.diags_array(np.full(n, 0.5))
         shears = sp.hstack([half, -half])
         to_shear = matrix[:, 1::2] @ shears
-        level, right, slopes, off = sp.hstack([eye, eye]), 2.0 * bound, np.zeros(0), left
+        level, bound_of_rows, slopes, slack = sp.hstack([eye, eye]), 2.0 * bound, np.zeros(0), tolerance
     else:
-        in_disc = np.ones((n, size)) * bound[:, None]
-        in_disc[:, 0] = 0.0
-        shears = sp.diags_array(in_disc.ravel())
+        disc = np.ones((n, size)) * bound[:, None]
+        disc[:, 0] = 0.0
+        shears = sp.diags_array(disc.ravel())
         to_shear = matrix @ shears
         level = sp.csr_array((np.ones(n), (np.arange(n), size * np.arange(n))), shape=(n, size * n))
-        right, slopes, off = np.ones(n), np.ones(n), np.zeros(rows)
+        bound_of_rows, slopes, slack = np.ones(n), np.ones(n), np.zeros(rows)
     first = shears.shape[1]
     blocks = [
         [to_shear, matrix[:, 0::size], None, None, sp.csr_array(live[:, None]), identity, -identity],
@@ -89,13 +89,13 @@ def solve_without_dilatancy(
         [None, sp.csr_array(eye)[brittle], None, None, None, None, None],
     ]
     costs = np.concatenate(
-        [np.zeros(first), price, change_cost, change_cost, [-1.0], np.full(2 * rows, UNBALANCED_COST)]
+        [np.zeros(first), normal_cost, change_cost, change_cost, [-1.0], np.full(2 * rows, UNBALANCED_COST)]
     )
     solution = solve_between(
         costs,
         sp.csc_array(sp.block_array(blocks, format="csc")),
-        np.concatenate([-dead - off, right, normal, np.zeros(len(brittle))]),
-        np.concatenate([-dead + off, right, normal, crushing[brittle]]),
+        np.concatenate([-dead - slack, bound_of_rows, normal, np.zeros(len(brittle))]),
+        np.concatenate([-dead + slack, bound_of_rows, normal, crushing[brittle]]),
         slopes,
         size,
     )
@@ -104,4 +104,4 @@ def solve_without_dilatancy(
     forces = np.column_stack([x[first : first + n], forces[:, int(size > 2) :]])
     multiplier = first + 3 * n
     unbalanced = x[multiplier + 1 : multiplier + 1 + 2 * rows]
-    return Found(forces, float(x[multiplier]), float(unbalanced.max(initial=0.0)), solution)
+    return FlowSolution(forces, float(x[multiplier]), float(unbalanced.max(initial=0.0)), solution)

@@ -18,45 +18,18 @@ from .threads import NotLimited, one_thread
 #: Violation of rows and reduced costs, absolute, and relative difference of the objectives at which a point is optimal.
 TOLERANCE = 1e-8
 
-#: A point that has come so near, half of what our own check accepts, is taken if so many iterations find none better:
-#: forces move on among those that cost the same, and what they cost is lost in rounding.
-GOOD, PATIENCE = ACCEPTED_GAP / 2.0, 5
+#: Iterations at most: walls of 6,500 blocks take 90.
+ITERATIONS = 200
 
-#: Iterations after which it is given up, and how many in a row may be shorter than a thousandth of the way: walls of
-#: 6,500 blocks take 90.
-ITERATIONS, SHORT_STEPS = 200, 20
-
-#: Largest number of operations of one factorisation, rows times the square of the band's width; walls of 10,000 blocks
-#: need 2e9, a tenth of a second. They grow with the square of the blocks: larger programs go to HiGHS.
+#: Largest number of operations of a factorisation, rows times the square of the width: 2e9 for walls of 10,000 blocks.
 OPERATIONS = 1e10
 
-#: A column with more entries than the first number, such as a load on every block, would fill the band: it is cut into
-#: pieces of so many rows that lie beside each other, which equations chain together.
+#: Columns with more entries than the first number, such as a load on every block, would fill the band: they are cut
+#: into pieces of as many rows as the second.
 WIDE, PIECE = 64, 12
 
-#: Rows are put in order along the longest side, by lines that lean by this much: upright ones come to be shuffled as
-#: bricks move that stand one above the other, and the band half as wide again.
-TILTS = (0.01, 0.1, 0.3)
-
-#: Half the width that a row has at least: an equation has no inside.
-LEAST_WIDTH = 1e-11
-
-#: Weight of the proximal term. Without it the multipliers that carry force weigh 1e16 at the end, and the balance of
-#: the blocks is lost in rounding at 1e-6; with it the point strays from dual feasibility by this times the last step.
+#: Weight of the proximal term, without which rounding of the final iterates leaves blocks out of balance by 1e-6.
 PROXIMAL = 1e-11
-
-#: Where the method starts: multipliers, slack beyond what balances them, and least reduced cost.
-START, START_SLACK, START_COST = 1.0, 0.1, 0.03
-
-#: Part of the way to the boundary that a step takes.
-TO_BOUNDARY = 0.9995
-
-#: A solution is refined once where its residual is above this and above a hundredth of what it is to remove.
-RESIDUAL = 1e-9
-
-#: Multipliers of this size are looked at, every so many iterations, for a ray along which the objective falls without
-#: limit; as many passes remove its unbalanced part, with this on the diagonal beside its weights.
-RAY_SIZE, RAY_EVERY, RAY_PASSES, RAY_DIAGONAL = 1e3, 5, 3, 1e-16
 
 
 class NoProgress(Exception):
@@ -65,7 +38,7 @@ class NoProgress(Exception):
 
 @dataclass(frozen=True)
 class _Point:
-    """An iterate, or its change: x, then how far rows are from their lower and upper bounds; and what prices them."""
+    """An iterate, or its change: x, then the distances of rows from their lower and upper bounds; and multipliers."""
 
     primal: np.ndarray
     dual: np.ndarray
@@ -87,14 +60,14 @@ class _Band:
         self._refuse_wide(int(counts.max(initial=0)))
         self.order, self.width = narrowest(matrix, places)
         self._refuse_wide(self.width)
-        place = places_in(self.order)
+        position = positions_in(self.order)
         slots, weights, columns, pairs = [], [], [], []
         for count in np.unique(counts[counts > 0]):
             members = np.flatnonzero(counts == count)
             entries = matrix.indptr[members][:, None] + np.arange(count)
-            at, value = place[matrix.indices[entries]], matrix.data[entries]
+            row, value = position[matrix.indices[entries]], matrix.data[entries]
             first, second = np.tril_indices(count)
-            i, j = np.maximum(at[:, first], at[:, second]), np.minimum(at[:, first], at[:, second])
+            i, j = np.maximum(row[:, first], row[:, second]), np.minimum(row[:, first], row[:, second])
             slots.append((j * self.width + i - j).ravel())
             weights.append((value[:, first] * value[:, second]).ravel())
             columns.append(members)
@@ -132,16 +105,17 @@ class _Method:
 
     def __init__(self, program: LinearProgram) -> None:
         rows, columns = program.matrix.shape
-        middle = (program.lower + program.upper) / 2.0
+        # An equation has no interior.
+        middle, half = (program.lower + program.upper) / 2.0, 1e-11
         self.program, self.cost = program, program.cost
-        self.lower = np.minimum(program.lower, middle - LEAST_WIDTH)
-        self.upper = np.maximum(program.upper, middle + LEAST_WIDTH)
+        self.lower = np.minimum(program.lower, middle - half)
+        self.upper = np.maximum(program.upper, middle + half)
         self.matrix, self.transposed = sp.csr_array(program.matrix), sp.csr_array(program.matrix.T)
         self.x = slice(0, columns)
         self.below, self.above = slice(columns, columns + rows), slice(columns + rows, columns + 2 * rows)
         self.band = _Band(sp.csc_array(sp.hstack([program.matrix, sp.eye_array(rows)])), program.places)
         self.point = self._start(program.matrix)
-        self.tried = 0
+        self.short_steps = 0
 
     def _start(self, matrix: sp.csc_array) -> _Point:
         """Start from equal multipliers, the rows balanced by their unit columns where they have any."""
@@ -154,22 +128,22 @@ class _Method:
             unit[row[of_sign]] = single[of_sign]
         rows = np.flatnonzero((units >= 0).all(axis=0))
         single = single[np.isin(row, rows)]
-        x = np.full(matrix.shape[1], START)
+        x = np.ones(matrix.shape[1])
         x[single] = 0.0
         missing = (middle - matrix @ x)[rows]
         for unit, sign in zip(units[:, rows], (1.0, -1.0), strict=True):
             x[unit] = np.maximum(sign * missing, 0.0) / np.abs(matrix.data[matrix.indptr[unit]])
-        x[single] += START_SLACK
-        reduced = np.maximum(self.cost, START_COST)
-        price = np.minimum(float(x @ reduced) / len(x) / (middle - self.lower), reduced.max())
+        x[single] += 0.1
+        reduced = np.maximum(self.cost, 0.03)
+        multiplier = np.minimum(float(x @ reduced) / len(x) / (middle - self.lower), reduced.max())
         return _Point(
             np.concatenate([x, middle - self.lower, self.upper - middle]),
-            np.concatenate([reduced, price, price]),
+            np.concatenate([reduced, multiplier, multiplier]),
             np.zeros(len(middle)),
         )
 
     def residuals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of the rows, of the reduced costs, and of the rows' prices."""
+        """Residuals of the rows, of the reduced costs, and of the multipliers of the rows."""
         primal, dual, row_dual = self.point.primal, self.point.dual, self.point.row_dual
         return (
             self.lower + primal[self.below] - self.matrix @ primal[self.x],
@@ -195,39 +169,38 @@ class _Method:
         mean = float(primal @ dual) / len(primal)
         target = (float(end.primal @ end.dual) / len(primal) / mean) ** 3 * mean
         step = self._direction(residuals, target - primal * dual - step.primal * step.dual)
-        lengths = [
-            TO_BOUNDARY * _longest(u, v, 1.0 / TO_BOUNDARY) for u, v in ((primal, step.primal), (dual, step.dual))
-        ]
+        part = 0.9995
+        lengths = [part * _longest(u, v, 1.0 / part) for u, v in ((primal, step.primal), (dual, step.dual))]
         self.point = self.point.moved(step, *lengths)
-        self.tried = self.tried + 1 if min(lengths) < 1e-3 else 0
+        self.short_steps = self.short_steps + 1 if min(lengths) < 1e-3 else 0
 
-    def show_ray(self) -> None:
-        """Raise ``Unbounded`` where the multipliers point along a ray, once they are corrected until they balance."""
+    def check_ray(self) -> None:
+        """Raise ``Unbounded`` where large multipliers, once they are balanced, are a ray that proves it."""
         x = self.point.primal[self.x]
         size = float(x.max())
-        if size < RAY_SIZE or self.cost @ x >= 0.0:
+        if size < 1e3 or self.cost @ x >= 0.0:
             return
         weight, ray = (x / size) ** 2, x / size
         try:
-            self.band.factorise(np.concatenate([weight, np.full(self.matrix.shape[0], RAY_DIAGONAL)]))
+            self.band.factorise(np.concatenate([weight, np.full(self.matrix.shape[0], 1e-16)]))
         except NoProgress:
-            # Blocks that the ray leaves alone have nothing else on their diagonal.
+            # Blocks that take no part in the ray have nothing else on their diagonal.
             return
-        for _ in range(RAY_PASSES):
+        for _ in range(3):
             ray = np.maximum(ray - weight * (self.transposed @ self.band.solve(self.matrix @ ray)), 0.0)
-        self.program.raise_if_proved(ray)
+        self.program.raise_if_unbounded(ray)
 
     def _direction(self, residuals: tuple[np.ndarray, ...], products: np.ndarray) -> _Point:
         """Newton's direction that removes the residuals and changes the products primal · dual by those given."""
         primal, dual = self.point.primal, self.point.dual
-        rows, costs, prices = residuals
+        rows, cost_errors, row_errors = residuals
         below, above = products[self.below] / primal[self.below], products[self.above] / primal[self.above]
-        free, moved = prices + below - above, products[self.x] / self.pivot
+        free, moved = row_errors + below - above, products[self.x] / self.pivot
         weight = primal[self.x] / self.pivot
-        row_dual = self.band.solve(rows - self.matrix @ (moved - weight * costs) + free * self.slack)
-        enough = max(RESIDUAL, 1e-2 * float(np.abs(rows).max(initial=0.0)))
+        row_dual = self.band.solve(rows - self.matrix @ (moved - weight * cost_errors) + free * self.slack)
+        enough = max(1e-9, 1e-2 * float(np.abs(rows).max(initial=0.0)))
         for refine in (True, False):
-            reduced = costs - self.transposed @ row_dual
+            reduced = cost_errors - self.transposed @ row_dual
             x, w = moved - weight * reduced, (free - row_dual) * self.slack
             residual = rows - (self.matrix @ x - w)
             if not refine or np.abs(residual).max(initial=0.0) <= enough:
@@ -253,20 +226,23 @@ def narrowest(matrix: sp.csc_array, places: np.ndarray | None) -> tuple[np.ndarr
     orders = [reverse_cuthill_mckee(sp.csr_matrix(joined), symmetric_mode=True)]
     if places is not None:
         axis = int(np.argmax(np.ptp(places, axis=0)))
+        # Along the longest side, by inclined lines, as bricks above each other move to either side.
         across = np.delete(places, axis, axis=1).sum(axis=1)
-        orders += [np.argsort(places[:, axis] + tilt * across, kind="stable") for tilt in TILTS]
+        orders += [np.argsort(places[:, axis] + tilt * across, kind="stable") for tilt in (0.01, 0.1, 0.3)]
     row = np.repeat(np.arange(matrix.shape[0]), np.diff(joined.indptr))
-    found = [(order, places_in(order)) for order in orders]
-    widths = [int(np.abs(place[row] - place[joined.indices]).max(initial=0)) + 1 for _, place in found]
+    widths = []
+    for order in orders:
+        position = positions_in(order)
+        widths.append(int(np.abs(position[row] - position[joined.indices]).max(initial=0)) + 1)
     least = int(np.argmin(widths))
     return orders[least], widths[least]
 
 
-def places_in(order: np.ndarray) -> np.ndarray:
+def positions_in(order: np.ndarray) -> np.ndarray:
     """(m,) int array: where in an order each row comes."""
-    place = np.empty(len(order), dtype=np.int64)
-    place[order] = np.arange(len(order))
-    return place
+    position = np.empty(len(order), dtype=np.int64)
+    position[order] = np.arange(len(order))
+    return position
 
 
 def _longest(values: np.ndarray, change: np.ndarray, most: float = 1.0) -> float:
@@ -287,9 +263,9 @@ def run_band(program: LinearProgram) -> tuple[Solution | None, str]:
     Returns
     -------
     Solution or None
-        None where it comes to nothing; its check is up to the caller.
+        None where there is none; its check is up to the caller.
     str
-        What came of it.
+        How it ended.
 
     Raises
     ------
@@ -316,13 +292,13 @@ def _solved_in_pieces(program: LinearProgram, wide: np.ndarray) -> tuple[np.ndar
     """Solve with wide columns cut into pieces along the rows, and equations that all pieces of one are the same."""
     rows, columns = program.matrix.shape
     narrow = np.delete(np.arange(columns), wide)
-    place = places_in(narrowest(sp.csc_array(program.matrix[:, narrow]), program.places)[0])
-    n = int(place.max()) // PIECE + 1
-    each = sp.csc_array((np.ones(rows), (np.arange(rows), place // PIECE)), shape=(rows, n))
+    position = positions_in(narrowest(sp.csc_array(program.matrix[:, narrow]), program.places)[0])
+    n = int(position.max()) // PIECE + 1
+    each = sp.csc_array((np.ones(rows), (np.arange(rows), position // PIECE)), shape=(rows, n))
     cut = [sp.diags_array(program.matrix[:, [k]].toarray()[:, 0]) @ each for k in wide]
     chain = sp.diags_array([np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1], shape=(n - 1, n))
     links = sp.block_diag([chain] * len(wide))
-    nothing = np.zeros(links.shape[0])
+    zeros = np.zeros(links.shape[0])
     # The cost of a wide column is that of its first piece.
     costs = np.zeros((len(wide), n))
     costs[:, 0] = program.cost[wide]
@@ -331,38 +307,38 @@ def _solved_in_pieces(program: LinearProgram, wide: np.ndarray) -> tuple[np.ndar
         program,
         cost=np.concatenate([program.cost[narrow], costs.ravel()]),
         matrix=sp.csc_array(sp.block_array([[program.matrix[:, narrow], sp.hstack(cut)], [None, links]])),
-        lower=np.concatenate([program.lower, nothing]),
-        upper=np.concatenate([program.upper, nothing]),
-        places=np.concatenate([place, between])[:, None],
+        lower=np.concatenate([program.lower, zeros]),
+        upper=np.concatenate([program.upper, zeros]),
+        places=np.concatenate([position, between])[:, None],
     )
 
     def folded(x: np.ndarray) -> np.ndarray:
-        whole = np.empty(columns)
-        whole[narrow] = x[: len(narrow)]
-        whole[wide] = x[len(narrow) :].reshape(len(wide), -1).mean(axis=1)
-        return whole
+        joined = np.empty(columns)
+        joined[narrow] = x[: len(narrow)]
+        joined[wide] = x[len(narrow) :].reshape(len(wide), -1).mean(axis=1)
+        return joined
 
     try:
-        found, row_dual, iterations = _solved(unfolded)
+        solution, row_dual, iterations = _solved(unfolded)
     except Unbounded as ray:
-        program.raise_if_proved(folded(ray.x))
+        program.raise_if_unbounded(folded(ray.x))
         raise NoProgress("a ray of the pieces is none of the program") from None
-    return folded(found), row_dual[:rows], iterations
+    return folded(solution), row_dual[:rows], iterations
 
 
 def _solved(program: LinearProgram) -> tuple[np.ndarray, np.ndarray, int]:
     method = _Method(program)
-    least, best, at = math.inf, method.point, 0
+    least, best, least_at = math.inf, method.point, 0
     for iteration in range(ITERATIONS):
         residuals = method.residuals()
         error = method.error(residuals)
         if error < least:
-            least, best, at = error, method.point, iteration
-        if error < TOLERANCE or (least < GOOD and iteration - at >= PATIENCE):
+            least, best, least_at = error, method.point, iteration
+        if error < TOLERANCE or (least < ACCEPTED_GAP / 2.0 and iteration - least_at >= 5):
             return best.primal[method.x], best.row_dual, iteration
         method.iterate(residuals)
-        if iteration % RAY_EVERY == 0:
-            method.show_ray()
-        if method.tried >= SHORT_STEPS:
+        if iteration % 5 == 0:
+            method.check_ray()
+        if method.short_steps >= 20:
             raise NoProgress(f"the steps became too short after {iteration + 1} iterations")
     raise NoProgress(f"no solution after {ITERATIONS} iterations")

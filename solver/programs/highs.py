@@ -9,11 +9,7 @@ from solver.tolerances import FEASIBILITY_TOLERANCE, INTERIOR_TOLERANCE
 
 from .problem import LinearProgram, Solution
 
-#: Iterations after which a route is given up: twenty times what interior methods need, and simplex iterations per row
-#: and column.
-IPM_ITERATIONS, SIMPLEX_ITERATIONS = 1000, 200
-
-#: Ways through HiGHS: (name, options). Each is judged by our own check, so the order is a matter of speed only.
+#: Options of HiGHS by route.
 ROUTES: dict[str, dict[str, object]] = {
     "simplex": {"solver": "simplex"},
     "hipo": {
@@ -22,7 +18,7 @@ ROUTES: dict[str, dict[str, object]] = {
         "primal_feasibility_tolerance": INTERIOR_TOLERANCE,
         "dual_feasibility_tolerance": INTERIOR_TOLERANCE,
         "ipm_optimality_tolerance": INTERIOR_TOLERANCE,
-        # Trying out the other system first takes a fifth of the time, and it is never the better one here.
+        # The other system is never the faster one, and trying both costs a fifth of the time.
         "hipo_system": "normaleq",
     },
     "crossover": {"solver": "hipo", "run_crossover": "on"},
@@ -43,7 +39,7 @@ def run_highs(program: LinearProgram, route: str) -> tuple[Solution | None, str]
     Solution or None
         None where HiGHS has none; its check is up to the caller.
     str
-        What HiGHS says of it.
+        Its status.
 
     Raises
     ------
@@ -60,9 +56,9 @@ def run_highs(program: LinearProgram, route: str) -> tuple[Solution | None, str]
         "ipm_optimality_tolerance": FEASIBILITY_TOLERANCE,
         # HiGHS drops entries below 1e-9 otherwise, and forces of hundreds of blocks at such arms are missing.
         "small_matrix_value": 1e-12,
-        # Without limits an interior method that stalls never ends, nor does a simplex method that cycles.
-        "ipm_iteration_limit": IPM_ITERATIONS,
-        "simplex_iteration_limit": SIMPLEX_ITERATIONS * sum(program.matrix.shape),
+        # Without limits a method that stalls or cycles never ends.
+        "ipm_iteration_limit": 1000,
+        "simplex_iteration_limit": 200 * sum(program.matrix.shape),
         **ROUTES[route],
     }
     for name, value in options.items():
@@ -87,14 +83,14 @@ def run_highs(program: LinearProgram, route: str) -> tuple[Solution | None, str]
     if highs.getModelStatus() == highspy.HighsModelStatus.kUnbounded:
         _, has_ray, ray = highs.getPrimalRay()
         if has_ray:
-            program.raise_if_proved(np.asarray(ray))
+            program.raise_if_unbounded(np.asarray(ray))
         return None, status
-    found = highs.getSolution()
-    if not (found.value_valid and found.dual_valid):
+    solution = highs.getSolution()
+    if not (solution.value_valid and solution.dual_valid):
         return None, status
     info = highs.getInfo()
     iterations = max(info.simplex_iteration_count, 0) + max(info.ipm_iteration_count, 0)
-    # Interior solutions stray below zero by their tolerance; what they gain from it shows up as row violation.
-    x = np.maximum(np.asarray(found.col_value), 0.0)
-    y = np.asarray(found.row_dual)
+    # Interior solutions are negative by up to their tolerance; the rows show what that gains.
+    x = np.maximum(np.asarray(solution.col_value), 0.0)
+    y = np.asarray(solution.row_dual)
     return program.checked(x, y, route, int(iterations)), status

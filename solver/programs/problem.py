@@ -61,19 +61,19 @@ class LinearProgram:
             As of :class:`Solution`.
         """
         activity = self.matrix @ x
-        off = np.maximum(self.lower - activity, activity - self.upper).max(initial=0.0)
+        violation = np.maximum(self.lower - activity, activity - self.upper).max(initial=0.0)
         return Solution(
             x=x,
             row_dual=y,
             objective=float(self.cost @ x),
             dual_objective=float(np.where(y > 0, y * self.lower, y * self.upper).sum()),
-            primal_violation=max(float(off), float(-x.min(initial=0.0))),
+            primal_violation=max(float(violation), float(-x.min(initial=0.0))),
             dual_violation=float(-(self.cost - self.matrix.T @ y).min(initial=0.0)),
             route=route,
             iterations=iterations,
         )
 
-    def raise_if_proved(self, ray: np.ndarray) -> None:
+    def raise_if_unbounded(self, ray: np.ndarray) -> None:
         """Raise ``Unbounded`` where the ray, (n,), proves it by our own check, whatever its solver says."""
         x = np.maximum(ray, 0.0)
         size = float(np.abs(x).max(initial=0.0))
@@ -129,16 +129,16 @@ class ConicProgram:
     def outside(self, x: np.ndarray) -> float:
         """How far x, (n,), leaves the cones and goes below 0, at most."""
         cones = x[: self.in_cones].reshape(-1, self.size)
-        beyond = np.linalg.norm(cones[:, 1:], axis=1) - self.friction * cones[:, 0]
-        beyond = np.maximum(beyond / np.hypot(1.0, self.friction), -cones[:, 0])
-        return max(float(beyond.max(initial=0.0)), float(-x[self.in_cones :].min(initial=0.0)))
+        excess = np.linalg.norm(cones[:, 1:], axis=1) - self.friction * cones[:, 0]
+        excess = np.maximum(excess / np.hypot(1.0, self.friction), -cones[:, 0])
+        return max(float(excess.max(initial=0.0)), float(-x[self.in_cones :].min(initial=0.0)))
 
     def outside_dual(self, reduced: np.ndarray) -> float:
         """How far reduced costs, (n,), leave the dual cones and go below 0, at most."""
         cones = reduced[: self.in_cones].reshape(-1, self.size)
-        beyond = self.friction * np.linalg.norm(cones[:, 1:], axis=1) - cones[:, 0]
-        beyond /= np.hypot(1.0, self.friction)
-        return max(float(beyond.max(initial=0.0)), float(-reduced[self.in_cones :].min(initial=0.0)))
+        excess = self.friction * np.linalg.norm(cones[:, 1:], axis=1) - cones[:, 0]
+        excess /= np.hypot(1.0, self.friction)
+        return max(float(excess.max(initial=0.0)), float(-reduced[self.in_cones :].min(initial=0.0)))
 
     def checked(self, x: np.ndarray, y: np.ndarray, route: str, iterations: int) -> Solution:
         """Measure a solution by the program alone; violations are relative to 1 + the largest number of their kind.
@@ -151,14 +151,14 @@ class ConicProgram:
         route, iterations
             As of :class:`Solution`.
         """
-        off = float(np.abs(self.matrix @ x - self.right).max(initial=0.0))
+        violation = float(np.abs(self.matrix @ x - self.right).max(initial=0.0))
         return Solution(
             x=x,
             row_dual=y,
             objective=float(self.cost @ x),
             dual_objective=float(self.right @ y),
             primal_violation=max(
-                off / (1.0 + float(np.abs(self.right).max(initial=0.0))),
+                violation / (1.0 + float(np.abs(self.right).max(initial=0.0))),
                 self.outside(x) / (1.0 + float(np.abs(x).max(initial=0.0))),
             ),
             dual_violation=self.outside_dual(self.cost - self.matrix.T @ y) / (1.0 + float(np.abs(y).max(initial=0.0))),
@@ -166,18 +166,18 @@ class ConicProgram:
             iterations=iterations,
         )
 
-    def raise_if_proved(self, ray: np.ndarray) -> None:
+    def raise_if_unbounded(self, ray: np.ndarray) -> None:
         """Raise ``Unbounded`` where the ray, (n,), proves it by our own check, whatever its solver says."""
         size = float(np.abs(ray).max(initial=0.0))
         if not (np.isfinite(size) and size > 0.0):
             return
         x = ray / size
-        left, outside = np.abs(self.matrix @ x), self.outside(x)
-        if max(float(left.max(initial=0.0)), outside) > RAY_BALANCE:
+        residual, outside = np.abs(self.matrix @ x), self.outside(x)
+        if max(float(residual.max(initial=0.0)), outside) > RAY_BALANCE:
             return
         # It has to gain far more than what it is off by could cost.
-        off = float(left.sum()) + outside * len(self.friction)
-        if self.cost @ x < -RAY_BALANCE - 10.0 * off * float(np.abs(self.cost).max(initial=0.0)):
+        violation = float(residual.sum()) + outside * len(self.friction)
+        if self.cost @ x < -RAY_BALANCE - 10.0 * violation * float(np.abs(self.cost).max(initial=0.0)):
             raise Unbounded(x)
 
 

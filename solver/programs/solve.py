@@ -1,4 +1,4 @@
-"""Which ways to a solution are tried, and in which order."""
+"""The routes by which programs are solved, and their order."""
 
 from __future__ import annotations
 
@@ -17,17 +17,13 @@ from .problem import ConicProgram, LinearProgram, Solution, SolveError
 #: Up to this many rows the simplex method is the fastest, and gives a vertex.
 SIMPLEX_ROWS = 250
 
-#: Up to this many rows crossover from an interior solution to a vertex may be asked for: it takes as long again at
-#: 1,200 rows or eight times as long, and more beyond.
+#: Up to this many rows a vertex is found by crossover, which takes up to eight times as long as the interior solution.
 CROSSOVER_ROWS = 1500
 
-#: Our own way, for programs whose rows form a band.
+#: Route of our own method for programs whose rows form a band.
 BAND = "band"
 
-#: The ladders: of small programs, of those of which a vertex is wanted, of all others. HiPO takes what is no
-#: narrow band, or where that makes no progress; then the simplex method alone gives a ray.
-SMALL_LADDER = ("simplex", "hipo")
-VERTEX_LADDER = ("crossover", "simplex")
+#: Routes of large programs, of which the simplex method alone gives a ray where the band does not apply.
 LADDER = (BAND, "hipo", "simplex")
 
 
@@ -40,7 +36,7 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, v
     routes : tuple of str, optional
         ``BAND`` or names out of ``ROUTES``, in the order to try; chosen by size by default.
     vertex : bool
-        Whether a vertex is looked for, up to ``CROSSOVER_ROWS`` rows.
+        Find a vertex, up to ``CROSSOVER_ROWS`` rows.
 
     Raises
     ------
@@ -51,11 +47,11 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, v
     """
     rows, columns = program.matrix.shape
     if routes is None:
-        routes = VERTEX_LADDER if vertex and rows <= CROSSOVER_ROWS else LADDER
-        routes = SMALL_LADDER if rows <= SIMPLEX_ROWS else routes
-    ways = {route: partial(run_band, program) if route == BAND else partial(run_highs, program, route)
+        routes = ("crossover", "simplex") if vertex and rows <= CROSSOVER_ROWS else LADDER
+        routes = ("simplex", "hipo") if rows <= SIMPLEX_ROWS else routes
+    runs = {route: partial(run_band, program) if route == BAND else partial(run_highs, program, route)
             for route in routes}  # fmt: skip
-    return _first_accepted(ways, f"linear program with {rows} rows and {columns} columns")
+    return _first_accepted(runs, f"linear program with {rows} rows and {columns} columns")
 
 
 def solve_cones(program: ConicProgram) -> Solution:
@@ -76,9 +72,9 @@ def solve_cones(program: ConicProgram) -> Solution:
     return _first_accepted({route: partial(run_clarabel, program, route) for route in CONIC_ROUTES}, what)
 
 
-def _first_accepted(ways: Mapping[str, Callable[[], tuple[Solution | None, str]]], what: str) -> Solution:
+def _first_accepted(runs: Mapping[str, Callable[[], tuple[Solution | None, str]]], what: str) -> Solution:
     outcomes = []
-    for route, run in ways.items():
+    for route, run in runs.items():
         solution, status = run()
         if solution is not None and solution.accepted:
             return solution
@@ -107,7 +103,7 @@ def solve_between(
     -------
     Solution
         With cones, the first n numbers of x are those of the program, and the first multipliers those of the
-        equations; what is left of a row to its bounds follows.
+        equations; the slack of the other rows follows.
 
     Raises
     ------
@@ -115,17 +111,17 @@ def solve_between(
         As of :func:`solve_lp` and :func:`solve_cones`.
     """
     if len(friction) == 0:
-        # Of limit loads: a vertex is one mechanism, an interior point a mean of several: fixed points wander from it.
+        # A vertex is one mechanism; an interior point, a mean of several, lets fixed-point iterations drift.
         return solve_lp(LinearProgram(cost=cost, matrix=matrix, lower=lower, upper=upper), vertex=True)
-    by_row, equal = sp.csr_array(matrix), lower == upper
+    rows_of, equal = sp.csr_array(matrix), lower == upper
     below, above = np.flatnonzero(~equal & np.isfinite(lower)), np.flatnonzero(~equal & np.isfinite(upper))
-    rows = sp.vstack([by_row[equal], by_row[below], by_row[above]])
-    left = np.concatenate([np.full(len(below), -1.0), np.ones(len(above))])
-    left_at = sp.vstack([sp.csr_array((int(equal.sum()), len(left))), sp.diags_array(left)])
+    rows = sp.vstack([rows_of[equal], rows_of[below], rows_of[above]])
+    slack = np.concatenate([np.full(len(below), -1.0), np.ones(len(above))])
+    slack_columns = sp.vstack([sp.csr_array((int(equal.sum()), len(slack))), sp.diags_array(slack)])
     return solve_cones(
         ConicProgram(
-            cost=np.concatenate([cost, np.zeros(len(left))]),
-            matrix=sp.csc_array(sp.hstack([rows, left_at], format="csc")),
+            cost=np.concatenate([cost, np.zeros(len(slack))]),
+            matrix=sp.csc_array(sp.hstack([rows, slack_columns], format="csc")),
             right=np.concatenate([lower[equal], lower[below], upper[above]]),
             friction=friction,
             size=size,

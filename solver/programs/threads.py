@@ -12,9 +12,6 @@ from functools import cache
 import numpy as np
 from scipy.linalg import lapack
 
-#: Names of the functions in the builds of OpenBLAS that the wheels of scipy and numpy come with, and in others.
-NAMES = ("scipy_openblas_{}_num_threads", "scipy_openblas_{}_num_threads64_", "openblas_{}_num_threads")
-
 Function = Callable[..., int]
 
 
@@ -40,14 +37,14 @@ def one_thread() -> Iterator[None]:
         yield
         return
     libraries = _libraries()
-    before = [get() for get, _ in libraries]
-    for _, put in libraries:
-        put(1)
+    previous = [get_threads() for get_threads, _ in libraries]
+    for _, set_threads in libraries:
+        set_threads(1)
     try:
         yield
     finally:
-        for (_, put), threads in zip(libraries, before, strict=True):
-            put(threads)
+        for (_, set_threads), threads in zip(libraries, previous, strict=True):
+            set_threads(threads)
 
 
 @cache
@@ -60,7 +57,8 @@ def _libraries() -> list[tuple[Function, Function]]:
 def _functions(extension: str | None) -> tuple[Function, Function]:
     # Those of a library are found through the extension module that is linked to it.
     library = ctypes.CDLL(extension)
-    for name in NAMES:
+    # In the builds of OpenBLAS that the wheels of scipy and numpy come with, and in others.
+    for name in ("scipy_openblas_{}_num_threads", "scipy_openblas_{}_num_threads64_", "openblas_{}_num_threads"):
         try:
             return library[name.format("get")], library[name.format("set")]
         except AttributeError:

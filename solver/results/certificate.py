@@ -1,4 +1,4 @@
-"""Certificate: the measures by which a result proves itself, each recomputed from forces, geometry and loads."""
+"""Certificate: measures of the error of a result, each computed from forces, geometry and loads."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from solver.tolerances import CARRYING_FRACTION
+
 if TYPE_CHECKING:
     from solver.geometry.contacts import Contacts
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """Measures by which a result proves itself: with W the total load on the free blocks, n and t contact forces.
+    """Measures of the error of a result: with W the total load on the free blocks, n and t contact forces.
 
     Attributes
     ----------
@@ -32,7 +34,7 @@ class Certificate:
         Relative difference of the static and the kinematic value of the programs that bound the result.
     energy_residual : float
         |works of dead and live loads - on the supports - of friction| / the sum of their sizes, since the start of the
-        phase: what viscosity, compliance and steps have taken. Not a number where no path led there.
+        phase: the energy that viscosity, compliance and steps dissipate. Not a number where no path led there.
     kinematic_violation : float
         max (μ |T(q)| - N(q), 0) / max |q| of the mechanism q of a limit load. Not a number where there is none.
     """
@@ -46,14 +48,10 @@ class Certificate:
     kinematic_violation: float = math.nan
 
 
-#: A contact point carries from this part of the largest normal force on, where its gap is looked at.
-CARRIES = 1e-6
-
-
 def carrying_gap(contacts: Contacts, forces: np.ndarray) -> float:
     """Largest gap [m] of the contact points that carry, from their (n, d) forces in any unit."""
     normal = forces[:, 0]
-    return float(contacts.gaps[normal > CARRIES * normal.max(initial=0.0)].max(initial=0.0))
+    return float(contacts.gaps[normal > CARRYING_FRACTION * normal.max(initial=0.0)].max(initial=0.0))
 
 
 def friction_excess(forces: np.ndarray, friction: np.ndarray, cohesion: np.ndarray | float = 0.0) -> float:

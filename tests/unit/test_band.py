@@ -150,8 +150,8 @@ def test_an_objective_that_falls_without_limit_is_proved_by_its_ray():
 
 def test_a_ray_that_does_not_prove_it_counts_for_nothing():
     program = chain(2, 10)
-    program.raise_if_proved(np.ones(program.matrix.shape[1]))
-    program.raise_if_proved(np.zeros(program.matrix.shape[1]))
+    program.raise_if_unbounded(np.ones(program.matrix.shape[1]))
+    program.raise_if_unbounded(np.zeros(program.matrix.shape[1]))
 
 
 def test_a_wall_squeezed_between_its_supports_is_locked():

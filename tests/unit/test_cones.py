@@ -111,7 +111,7 @@ def test_an_unlimited_objective_is_proved_by_a_ray():
     assert cost @ found.value.x < 0.0
     # Neither a ray that does not balance, nor one outside of the cones, nor one that costs.
     for ray in ([1.0, 0, 0, 0, 0, 0], [1.0, 1.0, 0, 1.0, 0, 0], [-1.0, 0, 0, -1.0, 0, 0], [0, 0, 0, 0, 0, 0]):
-        given.raise_if_proved(np.array(ray))
+        given.raise_if_unbounded(np.array(ray))
 
 
 def test_a_failure_says_what_it_ended_with():

@@ -105,8 +105,8 @@ def test_a_prism_stands_up_to_its_angle_and_not_beyond(azimuth, friction):
     assembly = on_ground([prism(PRISM, 0.0, 2.0)])
     a = np.radians(azimuth)
     angle = np.arctan(min(0.5 / np.cos(a), 0.3 / max(np.sin(a), 1e-9), friction))
-    assert bounds(assembly, friction, turned_by=angle * (1.0 - EXACT), azimuth=azimuth).exists
-    assert not bounds(assembly, friction, turned_by=angle * (1.0 + EXACT), azimuth=azimuth).exists
+    assert bounds(assembly, friction, turned_by=angle * (1.0 - EXACT), azimuth=azimuth).in_equilibrium
+    assert not bounds(assembly, friction, turned_by=angle * (1.0 + EXACT), azimuth=azimuth).in_equilibrium
 
 
 @pytest.mark.parametrize(("azimuth", "exact"), [(0.0, 1.414214), (20.0, 1.504975)])
@@ -190,7 +190,7 @@ def test_a_plug_between_faces_that_give_way(count):
     assembly = solver.Assembly.from_solids(solids, roles=["free"] + ["moving"] * count)
     found = bounds(assembly, friction, out)
     weight = assembly.masses[0] * solver.GRAVITY
-    assert found.exists
+    assert found.in_equilibrium
     assert 1.0 / np.tan(beta + np.arctan(friction)) == pytest.approx(1.3416399, abs=1e-7)
     assert found.low / weight == pytest.approx(1.3416399, rel=EXACT)
 
@@ -203,7 +203,7 @@ def test_a_harmonic_stack_of_eight_along_the_diagonal(overhang, stands):
         solids.append(box((at, at, 0.2 * level), (at + 1.0, at + 1.0, 0.2 * (level + 1))))
         at += overhang / (2.0 * (7 - level)) if level < 7 else 0.0
     assembly = on_ground(solids)
-    assert bounds(assembly, 0.6).exists is stands
+    assert bounds(assembly, 0.6).in_equilibrium is stands
 
 
 TURNED = (np.sqrt(2.0) + np.arcsinh(1.0)) / 6.0
@@ -349,7 +349,7 @@ def test_blocks_between_a_support_that_presses_and_one_that_does_not_give_way():
         presses[-1, 0] = -1.0
         found = bounds(assembly, 0.6, presses)
         weight = count * assembly.masses[0] * solver.GRAVITY
-        assert found.exists
+        assert found.in_equilibrium
         # Friction at both ends takes W = 2 μ R; a flat arch of n cubes thrusts with W n / 8.
         assert -found.high == pytest.approx(max(weight / 1.2, weight * count / 8.0), rel=EXACT)
         assert found.low == -np.inf
