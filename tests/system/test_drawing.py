@@ -82,7 +82,7 @@ def test_the_process_writes_what_viewers_open_and_says_what_fails(arch, arch_res
 def test_ctrl_c_is_for_the_first_process_even_before_the_other_has_loaded(arch, arch_results, capfd):
     process = FilmProcess()
     process.follow(arch_results, arch.assembly, "moved", 0)
-    process._process.send_signal(signal.SIGINT)
+    process._worker._process.send_signal(signal.SIGINT)
     assert process.finish()
     process.close()
     assert "KeyboardInterrupt" not in capfd.readouterr().err
@@ -92,8 +92,8 @@ def test_ctrl_c_is_for_the_first_process_even_before_the_other_has_loaded(arch, 
 def test_a_process_that_is_ended_leaves_all_but_the_film(case, tmp_path, monkeypatch, capsys):
     def killed():
         process = FilmProcess()
-        process._process.kill()
-        process._process.wait()
+        process._worker._process.kill()
+        process._worker._process.wait()
         return process
 
     with pytest.raises(FilmFailed, match=r"ended with code -9; draw it by blockvis render"):

@@ -1,7 +1,6 @@
 """``blockvis run``: the same path with half the step tolerance, and the error that follows, told and written."""
 
 import json
-import queue
 import subprocess
 import sys
 from argparse import Namespace
@@ -205,7 +204,7 @@ class Late:
         pass
 
     def found(self, seconds):
-        raise queue.Empty
+        raise TimeoutError
 
     def close(self):
         pass
