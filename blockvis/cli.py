@@ -30,6 +30,7 @@ from .system.processes import is_broken_pipe
 if TYPE_CHECKING:
     from .cases.contents import Case
     from .dynamics.fall import Fall
+    from .runs.outputs import Output
     from .runs.run import Run
     from .runs.step_check import StepChecking
 
@@ -59,16 +60,19 @@ SHELLS = {
 }
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Output] | None = None) -> int:
     """Run the command line and return its exit code.
 
     Parameters
     ----------
     arguments : sequence of str, optional
         Those of the process by default.
+    outputs : sequence of Output, optional
+        What runs make beside their numbers, in place of what the arguments say.
     """
     parser = _parser()
     options, left = parser.parse_known_args(arguments)
+    options.outputs = outputs
     if options.verb is _layout and not any(word.startswith("-") for word in left):
         # Parameters on either side of an option.
         options.parameters += left
@@ -422,15 +426,18 @@ def _run_numbers(text: str) -> tuple[int, ...]:
 
 def _run(options: argparse.Namespace) -> int:
     from .case_files.read import read_case
+    from .runs.outputs import Drawing
     from .runs.run import resume_run, run_case
 
-    drawn = {"film": not options.no_film, "pictures": not options.no_pictures}
+    outputs = options.outputs
+    if outputs is None:
+        outputs = (Drawing(film=not options.no_film, pictures=not options.no_pictures),)
     started = time.perf_counter()
     if options.resume is not None:
         if options.case is not None or options.output is not None or options.force or options.set:
             raise ValueError("--resume takes the results folder alone; the case is stored in it")
         with _checking(options, None) as checking:
-            run = resume_run(options.resume, **drawn)
+            run = resume_run(options.resume, outputs=outputs)
             if run.had_finished:
                 print(
                     f"blockvis: this run had finished ({run.response.stop}); nothing was left to solve", file=sys.stderr
@@ -440,7 +447,7 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError("name a case file: blockvis run CASE.toml, or go on with a run: blockvis run --resume OUT")
     case = read_case(options.case, [*options.set, *(["analysis.range=true"] if options.range else [])])
     with _checking(options, case) as checking:
-        run = run_case(case, options.output, overwrite=options.force, **drawn)
+        run = run_case(case, options.output, overwrite=options.force, outputs=outputs)
         return _told(options, run, checking, started)
 
 

@@ -1,10 +1,8 @@
-"""What tests share: solved structures, their results folders, a Dask cluster; and pictures only where a test looks."""
+"""What tests share: solved structures, their results folders, a Dask cluster."""
 
 import os
 import shutil
-import sys
 from collections.abc import Iterator
-from contextlib import nullcontext
 from pathlib import Path
 
 # pytest-xdist has a worker for each core: threads of the linear algebra, which is loaded below, would wait for cores
@@ -17,35 +15,11 @@ import structures
 import blockvis
 import solver
 
-_RUN = sys.modules[blockvis.run_case.__module__]
-_DRAW_RESULTS, _STARTED_FILM = _RUN.draw_results, _RUN.started_film
-
 
 def pytest_configure(config: pytest.Config) -> None:
     """End the run where a worker dies: its replacement can keep the others waiting without end (pytest-xdist 3.8)."""
     if getattr(config.option, "maxworkerrestart", "absent") is None:
         config.option.maxworkerrestart = "0"
-
-
-@pytest.fixture(scope="session", autouse=True)
-def undrawn() -> Iterator[None]:
-    """Runs write no pictures and no report: most tests look at numbers, and pictures take longer than the solution."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(_RUN, "draw_results", lambda *_, **__: ())
-        patched.setattr(_RUN, "started_film", lambda *_, **__: None)
-        # Nor do those of the command line called from here follow a second path in shorter steps.
-        patched.setattr("blockvis.cli._checking", lambda *_: nullcontext())
-        yield
-
-
-@pytest.fixture(autouse=True)
-def drawn_where_marked(request: pytest.FixtureRequest, undrawn: None) -> Iterator[None]:
-    """Runs draw all they draw in a test that is marked ``pictures``."""
-    with pytest.MonkeyPatch.context() as patched:
-        if request.node.get_closest_marker("pictures"):
-            patched.setattr(_RUN, "draw_results", _DRAW_RESULTS)
-            patched.setattr(_RUN, "started_film", _STARTED_FILM)
-        yield
 
 
 @pytest.fixture(scope="session")

@@ -16,6 +16,7 @@ import numpy as np
 
 import solver
 from blockvis import generators
+from blockvis.cli import main
 
 #: Bent outlines that VTK would fill wrongly: an L, a U, a comb.
 BENT = {
@@ -170,3 +171,8 @@ def started_cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen, list[
         for process in [*workers, scheduler]:
             process.kill()
             process.wait(timeout=20)
+
+
+def run_command(*arguments, drawn=False):
+    """The exit code of ``blockvis run``, which follows no second path in shorter steps, and draws where it is to."""
+    return main(["run", "--no-check-steps", *map(str, arguments)], outputs=None if drawn else ())

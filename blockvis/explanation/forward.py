@@ -15,6 +15,8 @@ import numpy as np
 import solver
 from blockvis.cases.build import case_interfaces, case_loads
 from blockvis.cases.contents import Case
+from blockvis.kinds.kind import RunInput
+from blockvis.kinds.settlement import SettlementKind
 from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.runs.progress import StudyProgress
 from blockvis.system.extras import require
@@ -44,6 +46,10 @@ COLLAPSE = 2e-3
 FEWEST_FOR_PROCESSES = 8
 
 
+#: The kind of analysis that candidates are followed by.
+FOLLOWED = SettlementKind()
+
+
 @dataclass(frozen=True)
 class Variant:
     """What a run assumes besides the movement of the supports.
@@ -66,22 +72,19 @@ class Order:
 
     Attributes
     ----------
-    assembly : solver.Assembly
-        Its supports that move have the role "moving".
-    settlement : solver.Settlement
-    interfaces : solver.Interfaces
-    loads : solver.Loads
-    controls : solver.Controls
+    given : RunInput
+        The case has the one settlement of the supports that move, which have the role "moving".
     enough : float [m]
         Opening at which the run may stop.
     """
 
-    assembly: solver.Assembly
-    settlement: solver.Settlement
-    interfaces: solver.Interfaces
-    loads: solver.Loads
-    controls: solver.Controls
+    given: RunInput
     enough: float
+
+    @property
+    def settlement(self) -> solver.Settlement:
+        """How its supports move."""
+        return self.given.case.settlements[0]
 
 
 @dataclass(frozen=True)
@@ -142,7 +145,7 @@ def lever_of(assembly: solver.Assembly, settlement: solver.Settlement) -> float:
     pose = solver.Pose.initial(assembly)
     rate = settlement.rate(assembly, pose, 0.0)
     speeds = [
-        np.hypot(*solver.point_velocities(contacts.points, block, pose, rate).T)
+        np.hypot.reduce(solver.point_velocities(contacts.points, block, pose, rate), axis=1)
         for block in (contacts.block_a, contacts.block_b)
     ]
     return float(np.max(speeds)) or 1.0
@@ -182,28 +185,27 @@ def ordered(
         pair: replace(law, friction_coefficient=factor * law.friction_coefficient)
         for pair, law in case.interfaces.items()
     }
-    varied = replace(case, friction_coefficient=friction, interfaces=laws)
-    controls = replace(case.controls, falling_frames=0)
+    varied = replace(
+        case,
+        friction_coefficient=friction,
+        interfaces=laws,
+        settlements=(settlement,),
+        controls=replace(case.controls, falling_frames=0),
+    )
     loads = case_loads(case, moving)
     x = moving.centroids[:, 0]
     middle, half = (x.max() + x.min()) / 2.0, max(float(np.ptp(x)) / 2.0, 1e-300)
     heavier = 1.0 + LEANING * variant.lean * (x - middle) / half
     loads = replace(loads, dead=loads.dead * heavier[:, None])
-    return Order(moving, settlement, case_interfaces(varied), loads, controls, reach[1])
+    return Order(RunInput(varied, moving, case_interfaces(varied), loads), reach[1])
 
 
 def followed(order: Order) -> Run:
     """Carry out a run; one that cannot be solved ends where it came to."""
-    assembly = order.assembly
+    assembly = order.given.assembly
     joints = initial_joints(assembly)
     amounts, moved = [], []
-    steps = solver.settlement_increments(
-        assembly,
-        (order.settlement,),
-        interfaces=order.interfaces,
-        loads=order.loads,
-        controls=order.controls,
-    )
+    steps = FOLLOWED.start(order.given, None, ()).steps
     collapsed, message = False, ""
     try:
         for increment in steps:

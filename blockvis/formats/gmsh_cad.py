@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
 import re
-import subprocess
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -17,10 +13,10 @@ import numpy as np
 from blockvis.layout.layout import Layout
 from blockvis.layout.units import metres_per
 from blockvis.system.extras import install_command
+from blockvis.system.worker import Worker, WorkerEnded
 
 from . import gmsh_mesh
 from .bodies import Bodies, Body
-from .gmsh_process import NO_LIBRARY, NO_MEMORY
 from .reading import Reading
 
 #: A geometry script that takes longer is stopped: it may never end.
@@ -55,43 +51,45 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     allowed = min(max(reading.chord_tolerance or 1e-3, 1e-6), 0.5)
     chords = math.ceil(math.pi / math.acos(1.0 - allowed))
     with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / "found"
-        command = [sys.executable, "-m", "blockvis.formats.gmsh_process", str(path.resolve()), str(target)]
-        command += [str(chords), str(MOST_MEMORY)]
-        try:
-            done = subprocess.run(
-                command,
-                capture_output=True,
-                encoding="utf-8",
-                errors="replace",
-                env={**os.environ, "PYTHONIOENCODING": "utf-8:backslashreplace"},
-                timeout=LONGEST_SECONDS,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            raise ValueError(f"'{path}': gmsh did not finish within {LONGEST_SECONDS} s; give it as .msh") from None
-        if done.returncode == NO_LIBRARY:
-            raise ValueError(
-                f"'{path}' needs gmsh, which could not be loaded ({done.stderr.strip()}); install with: "
-                f"{install_command('cad')} and, on Debian, apt-get install {_PACKAGES}"
-            )
-        if done.returncode:
-            raise _failed(path, done, str(target))
+        target = Path(folder) / "found.msh"
+        bodies = _meshed(path, target, chords)
         unit, per_mm = ("", 1.0) if path.suffix.lower() not in (".step", ".stp") else _step_unit(path)
-        if done.stdout.strip().endswith("json"):
-            content = json.loads(target.with_suffix(".json").read_text(encoding="utf-8"))
-            return _bodies_of_volumes(content, path, unit, per_mm)
-        surfaces = gmsh_mesh.layout_of_mesh(target.with_suffix(".msh").read_bytes(), path, reading)
+        if bodies is not None:
+            return _bodies_of_volumes(bodies, path, unit, per_mm)
+        surfaces = gmsh_mesh.layout_of_mesh(target.read_bytes(), path, reading)
     assert isinstance(surfaces, Layout)
     return replace(surfaces, blocks=tuple(ring * per_mm for ring in surfaces.outlines), unit=unit)
 
 
-def _failed(path: Path, done: subprocess.CompletedProcess[str], target: str) -> ValueError:
-    """Make the error for a process that ended with a code other than 0."""
-    reason = " ".join(done.stderr.split())[-300:].replace(target, "the mesh")
+def _meshed(path: Path, target: Path, chords: int) -> list[dict[str, object]] | None:
+    """Have a file meshed: its bodies, or None where it has surfaces only, whose mesh is then in the target."""
+    worker = Worker("blockvis.formats.gmsh_process", errors=True)
+    try:
+        worker.say("mesh", (str(path.resolve()), str(target), chords, MOST_MEMORY))
+        bodies: list[dict[str, object]] | None = worker.hear("mesh", "bodies", seconds=LONGEST_SECONDS)[1]
+    except TimeoutError:
+        raise ValueError(f"'{path}': gmsh did not finish within {LONGEST_SECONDS} s; give it as .msh") from None
+    except ImportError as error:
+        raise ValueError(
+            f"'{path}' needs gmsh, which could not be loaded ({error}); install with: "
+            f"{install_command('cad')} and, on Debian, apt-get install {_PACKAGES}"
+        ) from None
+    except WorkerEnded as ended:
+        raise _failed(path, ended.errors, target) from None
+    except Exception as error:  # noqa: BLE001
+        # gmsh raises a bare Exception with the last line of its log.
+        raise _failed(path, "MemoryError" if isinstance(error, MemoryError) else str(error), target) from None
+    finally:
+        worker.close()
+    return bodies
+
+
+def _failed(path: Path, said: str, target: Path) -> ValueError:
+    """Make the error for what gmsh has said of its failure."""
+    reason = " ".join(said.split())[-300:].replace(str(target), "the mesh")
     most = f"{MOST_MEMORY / 2**30:.3g} GiB of memory"
     remedy = "run gmsh on it yourself, with a coarser mesh, and give the .msh"
-    if done.returncode == NO_MEMORY or "bad_alloc" in reason or "MemoryError" in reason:
+    if "alloc" in reason or "MemoryError" in reason:
         return ValueError(f"'{path}': gmsh needs more than {most} for it; {remedy}")
     if not reason:
         # Where gmsh cannot have more memory, it mostly ends without a word.

@@ -1,20 +1,16 @@
-"""Gmsh in a process of its own: ``python -m blockvis.formats.gmsh_process IN OUT CHORDS MEMORY``.
+"""Gmsh in a process of its own.
 
 A geometry script can loop for ever, fill the memory or crash the library; in its own process it harms nothing else.
-OUT is a mesh (.msh) if the file has surfaces only, or bodies of triangles (.json) if it has volumes; the last line on
-standard output says which. CHORDS is the number of chords of a full circle, MEMORY the most bytes for the file.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import sys
+from typing import Any
 
 import numpy as np
 
-#: Exit codes: the library cannot be loaded; the memory did not suffice.
-NO_LIBRARY, NO_MEMORY = 3, 4
+from blockvis.system.worker import Say, end_with_caller, serve
 
 #: Points of a curve at which its direction is looked at.
 SAMPLES = 129
@@ -23,15 +19,50 @@ SAMPLES = 129
 MOST_CHORDS = 4096
 
 
-def main(source: str, target: str, chords: str, memory: str) -> int:
-    """Mesh a geometry file and write its surfaces or bodies; return the exit code, 0 on success."""
+def main() -> None:
+    """Mesh the geometry file that comes in, and say its bodies, or the mesh file of what has surfaces only."""
+    serve(_answer)
+
+
+def _answer(say: Say, word: str, about: Any) -> bool:
+    end_with_caller()
+    say(*_meshed(*about))
+    return True
+
+
+def _meshed(source: str, target: str, chords: int, memory: int) -> tuple[str, Any]:
+    """Mesh a geometry file.
+
+    Parameters
+    ----------
+    source, target : str
+        The file, and the mesh (.msh) to write if it has surfaces only.
+    chords : int
+        Of a full circle.
+    memory : int
+        The most bytes for the file.
+
+    Returns
+    -------
+    word : {"bodies", "mesh"}
+    about
+        Bodies of triangles, if the file has volumes.
+
+    Raises
+    ------
+    ImportError
+        If the library cannot be loaded.
+    MemoryError
+        If the memory does not suffice.
+    Exception
+        As gmsh raises it.
+    """
     try:
         import gmsh
-    except (ImportError, OSError) as error:
-        sys.stderr.write(str(error))
-        return NO_LIBRARY
+    except OSError as error:
+        raise ImportError(str(error)) from None
     gmsh.initialize(["gmsh", "-nopopup"], readConfigFiles=False, interruptible=False)
-    _limit_memory(int(memory))
+    _limit_memory(memory)
     try:
         options = {
             "General.Terminal": 0,
@@ -47,23 +78,14 @@ def main(source: str, target: str, chords: str, memory: str) -> int:
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
         gmsh.open(source)
         volumes = [tag for _, tag in gmsh.model.getEntities(3)]
-        _only_outlines(gmsh, int(chords))
+        _only_outlines(gmsh, chords)
         gmsh.model.mesh.generate(2)
         if volumes:
-            with open(target + ".json", "w", encoding="utf-8") as stream:
-                json.dump([_body(gmsh, tag) for tag in volumes], stream)
-        else:
-            gmsh.write(target + ".msh")
-    except MemoryError:
-        return NO_MEMORY
-    except Exception as error:  # noqa: BLE001
-        # gmsh raises a bare Exception with the last line of its log.
-        sys.stderr.write(str(error))
-        return NO_MEMORY if "alloc" in str(error) else 1
+            return "bodies", [_body(gmsh, tag) for tag in volumes]
+        gmsh.write(target)
+        return "mesh", None
     finally:
         gmsh.finalize()
-    sys.stdout.write("json" if volumes else "msh")
-    return 0
 
 
 def _limit_memory(most: int) -> None:
@@ -152,7 +174,3 @@ def _triangles(kind: int, nodes: np.ndarray) -> np.ndarray:
     if kind == 3:
         return nodes.reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     return np.zeros((0, 3), dtype=np.int64)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main(*sys.argv[1:5]))

@@ -493,7 +493,7 @@ def _swinging(assembly: solver.Assembly, state: solver.Increment) -> Iterator[so
     block, free = assembly.block_of_vertex, assembly.free
     corners = solver.moved_vertices(assembly, state.pose)
     velocity = solver.point_velocities(corners, block, state.pose, state.velocity)
-    fastest = float(np.hypot(*velocity.T)[free[block]].max(initial=0.0))
+    fastest = float(np.hypot.reduce(velocity, axis=1)[free[block]].max(initial=0.0))
     if fastest == 0.0:
         return
     reach = SWING * float(np.ptp(corners[free[block]], axis=0).max())

@@ -4,12 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import os
-import pickle
-import queue
-import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -20,15 +14,12 @@ from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.results.increments import StoredIncrements
 from blockvis.results.viewer_files import ViewerFiles
 from blockvis.system.atomic_files import partial_of, remove
-from blockvis.system.processes import interpreter, is_broken_pipe, unread
+from blockvis.system.worker import Say, Worker, WorkerEnded, serve
 
 from .video import find_encoder
 
 #: Seconds that a process has to remove its half-written film.
 PATIENCE = 5.0
-
-#: Seconds between looks for Ctrl-C while waiting: Windows sees it between two waits only.
-LOOK = 0.2
 
 #: What drawing needs, loaded by the process while the first one solves.
 _LOADED = ("blockvis.pictures.render", "blockvis.pictures.curves", "pymunk")
@@ -49,10 +40,7 @@ class FilmProcess:
 
     def __init__(self) -> None:
         self._path: Path | None = None
-        self._process = interpreter("blockvis.pictures.film_process")
-        self._said: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
-        # What it says is read at once: it never waits for this process.
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._worker = Worker("blockvis.pictures.film_process")
 
     def follow(self, folder: Path, assembly: solver.Assembly, shape: str, count: int) -> None:
         """Write the files for viewers of a results folder, from an increment on.
@@ -66,7 +54,7 @@ class FilmProcess:
         count : int
             Increments whose files are there already.
         """
-        self._say("follow", (folder, assembly, shape, count))
+        self._worker.say("follow", (folder, assembly, shape, count))
 
     def add(self, increment: solver.Increment) -> None:
         """Write the files for viewers of the next increment, whose state is in the folder; returns at once.
@@ -75,7 +63,7 @@ class FilmProcess:
         ----------
         increment : solver.Increment
         """
-        self._say("add", None)
+        self._worker.say("add")
 
     def finish(self) -> bool:
         """Wait until the files for viewers are written; False if the process has ended before.
@@ -85,9 +73,9 @@ class FilmProcess:
         OSError
             That kept it from writing.
         """
-        self._say("finish", None)
+        self._worker.say("finish")
         try:
-            self._hear("finished", {})
+            self._hear("finished")
         except FilmFailed:
             return False
         return True
@@ -104,7 +92,7 @@ class FilmProcess:
             Whether the process works out the fall; :meth:`fall` waits for it.
         """
         self._path = path
-        self._say("draw", (response, path, fall, falls))
+        self._worker.say("draw", (response, path, fall, falls))
 
     def fall(self, progress: Callable[[float], None]) -> Fall | None:
         """Wait for the fall.
@@ -119,7 +107,9 @@ class FilmProcess:
         FilmFailed
             If the process ends before.
         """
-        found: Fall | None = self._hear("fall", {"falling": progress})
+        while (heard := self._hear("falling", "fall"))[0] == "falling":
+            progress(heard[1])
+        found: Fall | None = heard[1]
         return found
 
     def wait(self, progress: Callable[[int, int], None]) -> None:
@@ -138,95 +128,47 @@ class FilmProcess:
             As in :func:`blockvis.animate`.
         """
         try:
-            self._hear("drawn", {"drawing": lambda counts: progress(*counts)})
+            while (heard := self._hear("drawing", "drawn"))[0] == "drawing":
+                progress(*heard[1])
         finally:
             self.close()
 
     def close(self) -> None:
         """End the process, drawn or not."""
-        if self._process.poll() is None:
-            self._process.terminate()
-            try:
-                self._process.wait(PATIENCE)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
-            if self._path is not None:
-                # Windows ends a process without asking it; it then leaves its half-written film.
-                remove(partial_of(self._path))
-        assert self._process.stdin is not None
-        with unread():
-            self._process.stdin.close()
+        if self._worker.close(PATIENCE) and self._path is not None:
+            # Windows ends a process without asking it; it then leaves its half-written film.
+            remove(partial_of(self._path))
 
-    def _say(self, what: str, about: Any) -> None:
-        assert self._process.stdin is not None
-        # A process that has ended says why where it is waited for.
-        with unread():
-            if not self._process.stdin.closed:
-                pickle.dump((what, about), self._process.stdin)
-                self._process.stdin.flush()
-
-    def _listen(self) -> None:
-        assert self._process.stdout is not None
-        with self._process.stdout as out, contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):
-            while True:
-                self._said.put(pickle.load(out))
-        self._said.put(("ended", None))
-
-    def _hear(self, wanted: str, others: dict[str, Callable[[Any], None]]) -> Any:
-        """Wait for an answer; what comes before it is handed to those who asked for it, or is of no interest."""
-        while True:
-            try:
-                what, about = self._said.get(timeout=LOOK)
-            except queue.Empty:
-                continue
-            if what == wanted:
-                return about
-            if what == "failed":
-                raise about
-            if what == "ended":
-                # Whoever waits next hears it, too.
-                self._said.put((what, about))
-                code = self._process.wait()
-                raise FilmFailed(
-                    f"the film was not drawn, its process ended with code {code}; draw it by blockvis render"
-                )
-            if what in others:
-                others[what](about)
+    def _hear(self, *words: str) -> tuple[str, Any]:
+        try:
+            return self._worker.hear(*words)
+        except WorkerEnded as ended:
+            raise FilmFailed(
+                f"the film was not drawn, its process ended with code {ended.code}; draw it by blockvis render"
+            ) from None
 
 
 def main() -> None:
     """Do what comes in; what there is to say goes out."""
-    # Where it was not started deaf, as on Windows.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-    out, sys.stdout = sys.stdout.buffer, sys.stderr
-
-    def say(what: str, about: Any = None) -> None:
-        pickle.dump((what, about), out)
-        out.flush()
-
     loading = threading.Thread(target=_load, daemon=True)
     loading.start()
-    # Nobody listens where the first process has ended: the next word ends this one, and no half film stays.
-    with unread():
-        while True:
-            try:
-                what, about = pickle.load(sys.stdin.buffer)
-            except EOFError:
-                return
-            if what == "follow":
-                viewer = _Followed(*about)
-            elif what == "add":
-                viewer.add()
-            elif what == "finish":
-                say(*viewer.finished())
-            elif what == "draw":
-                loading.join()
-                find_encoder()
-                say(*_drawn(say, *about))
-                # The film is whole: taking this interpreter down piece by piece would only keep the first one waiting.
-                os._exit(0)
+    followed: list[_Followed] = []
+
+    def answer(say: Say, word: str, about: Any) -> bool:
+        if word == "follow":
+            followed.append(_Followed(*about))
+        elif word == "add":
+            followed[-1].add()
+        elif word == "finish":
+            followed[-1].finish()
+            say("finished", None)
+        elif word == "draw":
+            loading.join()
+            find_encoder()
+            _draw(say, *about)
+        return word == "draw"
+
+    serve(answer)
 
 
 def _load() -> None:
@@ -264,27 +206,21 @@ class _Followed:
                 self._failed = error
         self._count += 1
 
-    def finished(self) -> tuple[str, Exception | None]:
-        """Tell that all is written, or why not."""
-        return ("finished", None) if self._failed is None else ("failed", self._failed)
+    def finish(self) -> None:
+        """Raise what has kept it from writing, if anything has."""
+        if self._failed is not None:
+            raise self._failed
 
 
-def _drawn(
-    say: Callable[[str, Any], None], response: solver.Response, path: Path, fall: Fall | None, falls: bool
-) -> tuple[str, Exception | None]:
-    """Draw a film, its fall worked out here where it is asked for; tells what came of it."""
+def _draw(say: Say, response: solver.Response, path: Path, fall: Fall | None, falls: bool) -> None:
+    """Draw a film, its fall worked out here where it is asked for."""
     from .curves import draw_curve
     from .render import animate
 
-    try:
-        if falls:
-            fall = fall_of(response, lambda seconds: say("falling", seconds))
-            say("fall", fall)
-        if response.path:
-            draw_curve(response, path.with_name("curve.png"))
-        animate(response, path, fall=fall, progress=lambda done, total: say("drawing", (done, total)))
-    except Exception as error:
-        if isinstance(error, OSError) and is_broken_pipe(error):
-            raise
-        return "failed", error
-    return "drawn", None
+    if falls:
+        fall = fall_of(response, lambda seconds: say("falling", seconds))
+        say("fall", fall)
+    if response.path:
+        draw_curve(response, path.with_name("curve.png"))
+    animate(response, path, fall=fall, progress=lambda done, total: say("drawing", (done, total)))
+    say("drawn", None)

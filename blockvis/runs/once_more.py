@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
-import pickle
-import queue
-import sys
-import threading
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +15,7 @@ from blockvis.cases.build import case_assembly
 from blockvis.cases.contents import Case
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import stored_assembly
-from blockvis.system.processes import interpreter, unread
+from blockvis.system.worker import Say, Worker, WorkerEnded, end_with_caller, serve
 
 from .plan import planned
 
@@ -76,58 +73,47 @@ class OnceMore:
     """
 
     def __init__(self, case: Case, folder: Path | None = None) -> None:
-        self._process = interpreter(__name__)
-        assert self._process.stdin is not None
-        with unread():
-            pickle.dump((case, folder), self._process.stdin)
-            self._process.stdin.flush()
-        self._found: queue.SimpleQueue[Traced | None] = queue.SimpleQueue()
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._worker = Worker(__name__)
+        self._worker.say("follow", (case, folder))
 
     def found(self, seconds: float) -> Traced | None:
         """Wait so long for the path; None where it came to nothing.
 
         Raises
         ------
-        queue.Empty
+        TimeoutError
             Where it takes longer; short waits let Windows see Ctrl-C.
         """
-        return self._found.get(timeout=seconds)
+        try:
+            path: Traced | None = self._worker.hear("path", seconds=seconds)[1]
+        except WorkerEnded:
+            return None
+        return path
 
     def close(self) -> None:
         """End the process."""
-        self._process.kill()
-        self._process.wait()
-        assert self._process.stdin is not None
-        with unread():
-            self._process.stdin.close()
-
-    def _listen(self) -> None:
-        assert self._process.stdout is not None
-        found = None
-        with self._process.stdout as out, contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):
-            found = pickle.load(out)
-        self._found.put(found)
+        self._worker.close()
 
 
 def main() -> None:
     """Follow the path of a case that comes in, and say what came out."""
-    case, folder = pickle.load(sys.stdin.buffer)
-    # Where the first process ends, however that happens, nobody waits for this one.
-    threading.Thread(target=lambda: (sys.stdin.buffer.read(), os._exit(0)), daemon=True).start()
-    with open(os.dup(1), "wb") as out, open(os.devnull, "wb") as nowhere:
-        # What HiGHS and warnings say is said by the first process.
-        os.dup2(nowhere.fileno(), 1)
-        os.dup2(nowhere.fileno(), 2)
-        if hasattr(os, "nice"):
-            os.nice(LESS_URGENT)
-        found = None
-        with contextlib.suppress(Exception):
-            found = followed(case, case_assembly(case) if folder is None else stored_assembly(folder))
-        with unread():
-            pickle.dump(found, out)
-            out.flush()
-    os._exit(0)
+    serve(_answer)
+
+
+def _answer(say: Say, word: str, about: Any) -> bool:
+    case, folder = about
+    end_with_caller()
+    # What HiGHS and warnings say is said by the first process.
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.dup2(nowhere, 2)
+    if hasattr(os, "nice"):
+        os.nice(LESS_URGENT)
+    found = None
+    with contextlib.suppress(Exception):
+        found = followed(case, case_assembly(case) if folder is None else stored_assembly(folder))
+    say("path", found)
+    return True
 
 
 def takes_steps(case: Case) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import queue
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -187,7 +186,7 @@ def _all_followed(cases: Sequence[Case], folder: Path, at_once: int) -> list[Tra
                 running[begun] = OnceMore(cases[begun], folder)
                 begun += 1
             for number, process in list(running.items()):
-                with contextlib.suppress(queue.Empty):
+                with contextlib.suppress(TimeoutError):
                     found[number] = process.found(LOOK / at_once)
                     running.pop(number).close()
     finally:

@@ -3,37 +3,34 @@
 from __future__ import annotations
 
 import json
-import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import solver
-from blockvis.case_files.read import Case, parse_case, read_case
+from blockvis.case_files.read import parse_case, read_case
 from blockvis.cases.build import case_assembly
-from blockvis.dynamics.fall import Fall, fall_of
+from blockvis.cases.contents import Case
 from blockvis.formats.files import checksum_of_files
 from blockvis.kinds.kind import AnalysisRun
 from blockvis.kinds.kinds import KINDS
-from blockvis.results.fall_files import remove_fall, stored_fall, write_fall
+from blockvis.results.fall_files import remove_fall
 from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
 from blockvis.results.viewer_files import restore_grids
 from blockvis.system.atomic_files import PARTIAL
 
+from .outputs import Clock, Drawing, Output
 from .plan import planned
-from .progress import DrawingProgress, Progress
+from .progress import Progress
 from .reopen import open_results
 from .write import finish
-
-if TYPE_CHECKING:
-    from blockvis.pictures.film_process import FilmProcess
 
 #: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
 AS_DRAWN = 0.002
@@ -83,39 +80,6 @@ class DrawingInterrupted(KeyboardInterrupt):
     """Ctrl-C while drawing: the results are complete; the message says which command draws the rest."""
 
 
-@dataclass(frozen=True)
-class Drawing:
-    """What a run draws: its film, and anything at all."""
-
-    film: bool = True
-    pictures: bool = True
-
-
-class Clock:
-    """Wall-clock seconds of each part of a run."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def counting(self, part: str) -> Iterator[None]:
-        """Count the seconds of a block to a part."""
-        started = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[part] = self.seconds.get(part, 0.0) + time.perf_counter() - started
-
-    def each(self, part: str, increments: solver.Increments) -> Iterator[solver.Increment]:
-        """Give each of the increments, and count the seconds it takes to find it to a part."""
-        while True:
-            with self.counting(part):
-                increment = next(increments, None)
-            if increment is None:
-                return
-            yield increment
-
-
 def run_case(
     case: Case | str | Path,
     folder: str | Path | None = None,
@@ -123,6 +87,7 @@ def run_case(
     overwrite: bool = False,
     film: bool = True,
     pictures: bool = True,
+    outputs: Sequence[Output] | None = None,
 ) -> Run:
     """Solve a case and write everything: VTU, PVD, CSV, summary, pictures.
 
@@ -135,6 +100,8 @@ def run_case(
         Whether results that are there already may be replaced.
     film, pictures : bool
         Draw the film of the case; draw anything at all, the report included.
+    outputs : sequence of Output, optional
+        What is made beside the numbers, in place of what ``film`` and ``pictures`` say.
 
     Returns
     -------
@@ -151,8 +118,8 @@ def run_case(
         case = read_case(case)
     folder = Path(f"{case.source.stem}-results") if folder is None else Path(folder)
     refuse_results(folder, overwrite)
-    drawing = Drawing(film=film, pictures=pictures)
-    with _film_apart(case, drawing) as process:
+    outputs = (Drawing(film=film, pictures=pictures),) if outputs is None else outputs
+    with _begun(case, outputs):
         with clock.counting("read"):
             assembly = case_assembly(case)
         with clock.counting("solve"):
@@ -169,17 +136,23 @@ def run_case(
         except OSError as error:
             raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
         remove_fall(folder)
-        return _followed(case, results, run, drawing, clock, process)
+        return _followed(case, results, run, outputs, clock)
 
 
-def resume_run(folder: str | Path, *, film: bool = True, pictures: bool = True) -> Run:
+def resume_run(
+    folder: str | Path,
+    *,
+    film: bool = True,
+    pictures: bool = True,
+    outputs: Sequence[Output] | None = None,
+) -> Run:
     """Go on with a run that was stopped, from its results folder alone, to the result it would have had.
 
     Parameters
     ----------
     folder : str or Path
         That a run has written, whatever ended it.
-    film, pictures : bool
+    film, pictures, outputs
         As in :func:`run_case`.
 
     Returns
@@ -202,23 +175,22 @@ def resume_run(folder: str | Path, *, film: bool = True, pictures: bool = True) 
     if not record.case:
         raise ValueError(f"'{folder}' was written from Python, without a case file; run it again from there")
     case = parse_case(record.case, Path(record.case_file or folder / "case.toml"))
-    drawing = Drawing(film=film, pictures=pictures)
+    outputs = (Drawing(film=film, pictures=pictures),) if outputs is None else outputs
     finished = _finished(folder)
     if finished is not None:
         response = open_results(folder)
         restore_grids(folder, response.assembly, response.increments, case.vtu)
-        missing: tuple[str, ...] = ()
-        if not all((folder / name).is_file() for name in _drawn(case, drawing)):
-            missing = _drawn_results(case, response, folder, drawing, Clock())
+        absent = [output for output in outputs if not output.is_there(case, folder)]
+        missing = _made(absent, case, response, folder, Clock())
         return Run(response, folder, finished, missing, had_finished=True)
     for note in record.changes(checksum_of_files):
         warnings.warn(note, stacklevel=2)
     kind = KINDS[case.analysis]
-    with _film_apart(case, drawing) as process:
+    with _begun(case, outputs):
         results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint, case.vtu)
         remove_fall(folder)
         run = planned(case, results.assembly, checkpoint, tuple(results.increments))
-        return _followed(case, results, run, drawing, Clock(), process)
+        return _followed(case, results, run, outputs, Clock())
 
 
 def _finished(folder: Path) -> dict[str, Any] | None:
@@ -229,30 +201,12 @@ def _finished(folder: Path) -> dict[str, Any] | None:
     return None if summary["status"] == solver.Status.INTERRUPTED else summary
 
 
-def _drawn(case: Case, drawing: Drawing) -> list[str]:
-    film = [case.animation] if case.animation and drawing.film else []
-    return ["report.html", "mechanism.png", *film] if drawing.pictures else []
-
-
-def _drawn_results(
-    case: Case,
-    response: solver.Response,
-    folder: Path,
-    drawing: Drawing,
-    clock: Clock,
-    process: FilmProcess | None = None,
+def _made(
+    outputs: Sequence[Output], case: Case, response: solver.Response, folder: Path, clock: Clock
 ) -> tuple[str, ...]:
-    """Draw what is wanted; what Ctrl-C leaves undrawn is said."""
+    """Make what is wanted beside the numbers; what Ctrl-C leaves undrawn is said."""
     try:
-        return draw_results(
-            response,
-            folder,
-            animation=case.animation if drawing.film else None,
-            case_text=case.text,
-            pictures=drawing.pictures,
-            film=process,
-            clock=clock,
-        )
+        return tuple(missing for output in outputs for missing in output.finish(case, response, folder, clock))
     except KeyboardInterrupt:
         raise DrawingInterrupted(
             f"interrupted while drawing; the results are complete, what is not drawn yet is by: "
@@ -261,45 +215,31 @@ def _drawn_results(
 
 
 @contextmanager
-def _film_apart(case: Case, drawing: Drawing) -> Iterator[FilmProcess | None]:
-    """Start the process that draws the film, if there is one to draw: it has time until the case is solved."""
-    process = started_film(case, film=drawing.film, pictures=drawing.pictures)
+def _begun(case: Case, outputs: Sequence[Output]) -> Iterator[None]:
+    """Have the outputs of a case begin, and end with it."""
     try:
-        yield process
+        for output in outputs:
+            output.begin(case)
+        yield
     finally:
-        if process is not None:
-            process.close()
+        for output in outputs:
+            output.close()
 
 
-def _followed(
-    case: Case,
-    results: ResultsFolder,
-    run: AnalysisRun,
-    drawing: Drawing,
-    clock: Clock,
-    process: FilmProcess | None,
-) -> Run:
-    """Follow the increments of a run and draw; what only viewers open is written by the film's process meanwhile."""
-    if process is not None:
-        process.follow(results.path, results.assembly, results.shape, len(results.increments))
-        results.viewer = process
+def _followed(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Sequence[Output], clock: Clock) -> Run:
+    """Follow the increments of a run, and make what is wanted beside."""
+    for output in outputs:
+        output.follow(results)
     try:
-        return _solved(case, results, run, drawing, clock, process)
+        return _solved(case, results, run, outputs, clock)
     except OSError as error:
-        if process is not None:
-            # It may have a half-written file, too.
-            process.close()
+        for output in outputs:
+            # They may have half-written files, too.
+            output.close()
         raise _given_up(results.path, error) from None
 
 
-def _solved(
-    case: Case,
-    results: ResultsFolder,
-    run: AnalysisRun,
-    drawing: Drawing,
-    clock: Clock,
-    process: FilmProcess | None,
-) -> Run:
+def _solved(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Sequence[Output], clock: Clock) -> Run:
     """Follow the increments to their end or to Ctrl-C, write each, and draw what came out."""
     folder = results.path
     progress = Progress(run.course, names=results.assembly.names)
@@ -330,7 +270,7 @@ def _solved(
     with ThreadPoolExecutor(1) as waiting:
         flushed = waiting.submit(results.flush)
         if ending.stop is not solver.Status.INTERRUPTED:
-            missing = _drawn_results(case, response, folder, drawing, clock, process)
+            missing = _made(outputs, case, response, folder, clock)
         flushed.result()
     return Run(response, folder, summary, missing, stages=dict(clock.seconds))
 
@@ -359,115 +299,3 @@ def _given_up(folder: Path, error: OSError) -> OSError:
 
 def _reason(error: OSError) -> str:
     return error.strerror or str(error).strip().partition("\n")[0]
-
-
-def started_film(case: Case, *, film: bool, pictures: bool) -> FilmProcess | None:
-    """Start the process that draws the film, so that it loads what it needs while the first one solves."""
-    if case.animation is None or not film or not pictures:
-        return None
-    from blockvis.pictures.film_process import FilmProcess
-
-    return FilmProcess()
-
-
-def draw_results(
-    response: solver.Response,
-    folder: Path,
-    *,
-    animation: str | None = "collapse.mp4",
-    case_text: str = "",
-    pictures: bool = True,
-    film: FilmProcess | None = None,
-    clock: Clock | None = None,
-) -> tuple[str, ...]:
-    """Write the fall of a results folder, its pictures, its report and its film.
-
-    Parameters
-    ----------
-    response : solver.Response
-    folder : Path
-    animation : str or None
-        File name in the folder; the suffix chooses mp4, gif or webp.
-    case_text : str
-        Shown in the report.
-    pictures : bool
-        Draw; the fall is written in any case.
-    film : FilmProcess, optional
-        That draws the film meanwhile; it is drawn here by default.
-    clock : Clock, optional
-        Counts the seconds of each part.
-
-    Returns
-    -------
-    tuple of str
-        What could not be drawn, and why; empty where all is there.
-    """
-    clock = Clock() if clock is None else clock
-    if not response.increments:
-        return ()
-    progress = DrawingProgress()
-    stored = stored_fall(folder)
-    apart = film if animation is not None else None
-    if apart is not None:
-        # It works out the fall as well, and what needs none is drawn here meanwhile.
-        apart.draw(response, folder / str(animation), stored, falls=stored is None)
-    if pictures:
-        with clock.counting("mechanism"):
-            from blockvis.pictures.render import draw_mechanism
-
-            draw_mechanism(response, folder / "mechanism.png")
-    with clock.counting("fall"):
-        fall = _fall(response, apart, progress) if stored is None else stored
-        progress.done()
-        if fall is not None and stored is None:
-            write_fall(fall, response, folder)
-    if not pictures:
-        return ()
-    with clock.counting("report"):
-        from blockvis.pictures.paraview import write_paraview_macro
-        from blockvis.report.page import write_report
-
-        write_paraview_macro(folder)
-        write_report(response, folder / "report.html", case_text, fall=fall)
-    problem = ""
-    if apart is not None:
-        problem = _awaited(apart, progress, clock)
-    if response.path and (apart is None or problem):
-        with clock.counting("curve"):
-            from blockvis.pictures.curves import draw_curve
-
-            draw_curve(response, folder / "curve.png")
-    if animation is not None and apart is None:
-        with clock.counting("film"):
-            from blockvis.pictures.render import animate
-
-            try:
-                animate(response, folder / animation, fall=fall, progress=progress.frame)
-            finally:
-                progress.done()
-    return (problem,) if problem else ()
-
-
-def _awaited(film: FilmProcess, progress: DrawingProgress, clock: Clock) -> str:
-    """Wait for the process that draws curve and film; returns why it has ended without them, or nothing."""
-    from blockvis.pictures.film_process import FilmFailed
-
-    try:
-        with clock.counting("film"):
-            film.wait(progress.frame)
-    except FilmFailed as error:
-        return str(error)
-    finally:
-        progress.done()
-    return ""
-
-
-def _fall(response: solver.Response, film: FilmProcess | None, progress: DrawingProgress) -> Fall | None:
-    """Find the fall of a response: that of the process that draws the film, or worked out here."""
-    if film is not None:
-        from blockvis.pictures.film_process import FilmFailed
-
-        # What became of the process is told where the film is waited for.
-        with suppress(FilmFailed):
-            return film.fall(progress.fall)
-    return fall_of(response, progress.fall)

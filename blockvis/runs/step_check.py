@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import queue
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -145,7 +144,7 @@ class StepChecking:
         """
         began, told = time.monotonic(), False
         while True:
-            with contextlib.suppress(queue.Empty):
+            with contextlib.suppress(TimeoutError):
                 other = self._other.found(LOOK)
                 break
             waited = time.monotonic() - began

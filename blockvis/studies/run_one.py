@@ -14,12 +14,13 @@ import numpy as np
 
 import solver
 from blockvis.case_files.read import case_of
-from blockvis.cases.build import case_assembly, case_interfaces, case_loads, case_settlements
+from blockvis.cases.build import case_assembly
 from blockvis.cases.contents import Case
 from blockvis.pictures.annotations import settlement_arrows
 from blockvis.pictures.solid_marks import settlement_arrows_in_space
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import least_reaction, loss_in
+from blockvis.runs.plan import planned
 
 from .study_file import run_values
 
@@ -98,61 +99,27 @@ def _reason(error: Exception) -> str:
 
 
 def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
-    assembly = case_assembly(case)
-    case = replace(case, settlements=case_settlements(case, assembly), profiles=())
+    """Follow a case by its kind of analysis; give what the table says of it, and the shape of its mechanism."""
     # Where nothing stands at all the first frame of the fall shows the mechanism; the others are not needed.
-    controls = replace(case.controls, falling_frames=1)
-    steps = solver.settlement_increments(
-        assembly,
-        case.settlements,
-        interfaces=case_interfaces(case),
-        loads=case_loads(case, assembly),
-        controls=controls,
-    )
+    case = replace(case, controls=replace(case.controls, falling_frames=1))
+    run = planned(case, case_assembly(case))
     started = time.perf_counter()
     # Only the ends of the path are kept.
-    first = last = falling = None
+    kept: list[solver.Increment] = []
     n_path = n_programs = 0
-    for increment in steps:
-        if increment.status is solver.Status.FALLING:
-            falling = increment
-        else:
-            first, last = first or increment, increment
+    for increment in run.steps:
+        if increment.status is not solver.Status.FALLING:
+            kept = kept[:1]
             n_path, n_programs = n_path + 1, n_programs + increment.programs
+        kept.append(increment)
         if seconds is not None and time.perf_counter() - started > seconds:
             raise _OutOfTime(f"took longer than {seconds:g} s, at a settlement of {increment.settlement:.6g}")
-    ending = steps.ending
-    before = [0.0, *np.cumsum([s.limit for s in case.settlements])]
-    found: dict[str, Any] = {
-        "status": str(ending.stop),
-        "message": ending.message if ending.collapse is None else "",
-        "unit": case.settlements[-1].unit,
-        "last_settlement": float(last.settlement + before[last.phase]) if last else 0.0,
-        "initial_reaction": least_reaction(first) if first else None,
-        "collapse_reaction": None,
-        "total_weight": solver.total_weight(assembly),
-        "increments": n_path,
-        "programs": n_programs,
-    }
-    if last is not None:
-        weights = assembly.masses * assembly.free
-        found["lost_share"] = float(weights[last.fallen].sum() / weights.sum())
-    if ending.collapse is not None and last is not None:
-        offset = before[last.phase]
-        low, high = (float(offset + s) for s in ending.collapse.bracket)
-        found |= {"collapse_displacement": (low + high) / 2.0, "bracket_low": low, "bracket_high": high}
-        found["last_settlement"] = low
-        found["collapse_reaction"] = float(ending.collapse.reaction)
-    elif ending.stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
-        # It collapses before any settlement.
-        found |= {"collapse_displacement": 0.0, "bracket_low": 0.0, "bracket_high": 0.0}
-    if ending.collapse is not None and last is not None:
-        # As everywhere else: the mechanism at the last equilibrium. In the fall other joints may touch.
-        falls: solver.Increment | None = solver.with_motion(last, ending.collapse.mechanism)
-    else:
-        falls = falling
+    response = run.response(kept, run.steps.ending)
+    found = _numbers(response) | {"increments": n_path, "programs": n_programs}
+    falls = _falling(response)
     if falls is None or "collapse_displacement" not in found:
         return found, b""
+    assembly = response.assembly
     mechanism = solver.mechanism_of(assembly, falls)
     found |= {
         "falling_share": loss_in(assembly, falls).share,
@@ -162,7 +129,41 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
         "hinges": len(mechanism.hinges),
         "sliding_joints": len(mechanism.sliding),
     }
-    return found, _shape(assembly, falls, mechanism, case.settlements[falls.phase])
+    return found, _shape(assembly, falls, mechanism, response.settlements[falls.phase])
+
+
+def _numbers(response: solver.Response) -> dict[str, Any]:
+    """Give what the table says of how a run ended; settlements count from the start of the first phase."""
+    before = [0.0, *np.cumsum([s.limit for s in response.settlements])]
+    path, collapse, assembly = response.path, response.collapse, response.assembly
+    found: dict[str, Any] = {
+        "status": str(response.stop),
+        "message": response.message if collapse is None else "",
+        "unit": response.settlements[-1].unit,
+        "last_settlement": float(path[-1].settlement + before[path[-1].phase]) if path else 0.0,
+        "initial_reaction": least_reaction(path[0]) if path else None,
+        "collapse_reaction": None,
+        "total_weight": response.total_weight,
+    }
+    if path:
+        weights = assembly.masses * assembly.free
+        found["lost_share"] = float(weights[path[-1].fallen].sum() / weights.sum())
+    if collapse is not None and path:
+        low, high = (float(before[path[-1].phase] + s) for s in collapse.bracket)
+        found |= {"collapse_displacement": (low + high) / 2.0, "bracket_low": low, "bracket_high": high}
+        found["last_settlement"] = low
+        found["collapse_reaction"] = float(collapse.reaction)
+    elif response.stop is solver.Status.NO_INITIAL_EQUILIBRIUM:
+        # It collapses before any settlement.
+        found |= {"collapse_displacement": 0.0, "bracket_low": 0.0, "bracket_high": 0.0}
+    return found
+
+
+def _falling(response: solver.Response) -> solver.Increment | None:
+    """Find what moves as the mechanism does: the last equilibrium, as everywhere else, or what falls from the start."""
+    if response.collapse is not None and response.path:
+        return solver.with_motion(response.path[-1], response.collapse.mechanism)
+    return next((i for i in response.increments if i.status is solver.Status.FALLING), None)
 
 
 def mechanism_class(mechanism: solver.Mechanism) -> str:

@@ -1,7 +1,6 @@
 """Geometry through gmsh: scripts and STEP, surfaces and volumes."""
 
 import math
-import sys
 import time
 
 import numpy as np
@@ -58,7 +57,7 @@ def test_a_script_without_end_is_stopped(tmp_path, monkeypatch):
 def test_a_missing_library_names_the_packages(tmp_path, monkeypatch):
     (tmp_path / "gmsh.py").write_text("raise OSError('libGLU.so.1: cannot open shared object file')", encoding="utf-8")
     (tmp_path / "a.geo").write_text("x = 1;", encoding="utf-8")
-    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{':'.join(sys.path)}")
+    monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(ValueError, match=r"libGLU.so.1.*pip install 'blockvis\[cad\]'.*libglu1-mesa"):
         read(tmp_path / "a.geo")
 

@@ -92,7 +92,7 @@ def test_info_convert_and_a_case_take_them(tmp_path, capsys):
 def test_a_run_knows_when_one_of_its_files_changes(tmp_path):
     folder = stones(tmp_path / "stones", n=3)
     (tmp_path / "case.toml").write_text(CASE.format(file="stones/*.stl"), encoding="utf-8")
-    run = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out")
+    run = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=())
     assert run.summary["inputs"]["layout_file"] == "*.stl"
     assert run.summary["inputs"]["layout_sha256"] == checksum_of_files(folder / "*.stl") == checksum_of_files(folder)
     at = trimesh.transformations.translation_matrix((2.5, 0.25, 0.6))

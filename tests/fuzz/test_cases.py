@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from structures import run_command
 
 from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly, case_interfaces, case_loads
-from blockvis.cli import main
 
 ROOT = Path(__file__).parents[2]
 
@@ -132,7 +132,7 @@ def test_traps_are_refused(tmp_path, capsys, old, new, words):
     assert old in CASE
     path = tmp_path / "case.toml"
     path.write_text(CASE.replace(old, new), encoding="utf-8")
-    assert main(["run", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert run_command(path, "-o", tmp_path / "out") == 2
     said = capsys.readouterr().err
     assert words in said
     assert len(said) < 1000
@@ -154,5 +154,5 @@ def test_layouts_that_would_fill_the_memory_are_refused(tmp_path, capsys):
             f'[geometry]\nlayout = "{name}"\n[geometry.parameters]\n{parameters}\n[settlement]\ndirection = [0, -1]\n',
             encoding="utf-8",
         )
-        assert main(["run", str(path), "-o", str(tmp_path / "out")]) == 2, name
+        assert run_command(path, "-o", tmp_path / "out") == 2, name
         assert "blocks" in capsys.readouterr().err

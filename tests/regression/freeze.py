@@ -19,7 +19,6 @@ import argparse
 import csv
 import hashlib
 import json
-import sys
 import tempfile
 import tomllib
 import warnings
@@ -27,7 +26,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 import blockvis
 from blockvis.runs.run import Run
@@ -107,12 +105,9 @@ def ran(name: str, folder: Path) -> Run:
     -------
     Run
     """
-    with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patched:
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        run = sys.modules[blockvis.run_case.__module__]
-        patched.setattr(run, "draw_results", lambda *_, **__: ())
-        patched.setattr(run, "started_film", lambda *_, **__: None)
-        return blockvis.run_case(CASES[name], folder)
+        return blockvis.run_case(CASES[name], folder, outputs=())
 
 
 def numbers_of(name: str, folder: Path) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from structures import run_command
 
 import blockvis
 import solver
@@ -50,10 +51,10 @@ animation = false
 """
 
 
-def ran(text, tmp_path, *more, code=0):
+def ran(text, tmp_path, *more, code=0, drawn=False):
     path = tmp_path / "case.toml"
     path.write_text(text, encoding="utf-8")
-    assert main(["run", str(path), "-o", str(tmp_path / "out"), *more]) == code
+    assert run_command(path, "-o", tmp_path / "out", *more, drawn=drawn) == code
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     return tmp_path / "out", summary
 
@@ -70,10 +71,9 @@ def table(path):
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
 
 
-@pytest.mark.pictures
 def test_limit_load_of_a_block_from_its_case_file(tmp_path, capsys):
     text = COLUMN + '[analysis]\nkind = "limit load"\n[output]\nanimation = "swing.gif"\n' + SIDEWAYS
-    folder, summary = ran(text, tmp_path)
+    folder, summary = ran(text, tmp_path, drawn=True)
     assert summary["status"] == "collapsed"
     assert summary["analysis"] == "limit load"
     assert summary["limit_load_multiplier"] == pytest.approx(0.2, rel=1e-9)
@@ -225,9 +225,8 @@ increment = 0.03
 )
 
 
-@pytest.mark.pictures
 def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
-    folder, summary = ran(PUSHED + "[output]\nanimation = false\n", tmp_path)
+    folder, summary = ran(PUSHED + "[output]\nanimation = false\n", tmp_path, drawn=True)
     rows = table(folder / "response.csv")
     d = np.array([float(row["control_displacement"]) for row in rows])
     alpha = np.array([float(row["load_multiplier"]) for row in rows])
@@ -250,12 +249,11 @@ def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
 
 
 @pytest.mark.thorough
-@pytest.mark.pictures
 @pytest.mark.path
 def test_pushover_that_snaps_says_at_which_multiplier(tmp_path, capsys):
     text = '[geometry]\nlayout = "arch on piers"\n[material]\nfriction_coefficient = 0.75\n' + SIDEWAYS
     control = '[analysis]\nkind = "pushover"\n[control]\nblock = "voussoir 4"\nincrement = 0.02\nlimit = 0.3\n'
-    folder, summary = ran(text + control + "[output]\nanimation = false\n", tmp_path)
+    folder, summary = ran(text + control + "[output]\nanimation = false\n", tmp_path, drawn=True)
     assert summary["status"] == "collapsed"
     assert summary["last_reaction"] > 0.1 * summary["total_weight"]
     words = "equilibrium lost along the control at α = 0.1"
@@ -270,7 +268,7 @@ def test_pushover_that_snaps_says_at_which_multiplier(tmp_path, capsys):
 @pytest.mark.thorough
 def test_pushover_written_from_python_comes_back(tmp_path):
     case = parse_case(PUSHED, tmp_path / "case.toml")
-    run = blockvis.run_case(replace(case, animation=None), tmp_path / "out")
+    run = blockvis.run_case(replace(case, animation=None), tmp_path / "out", outputs=())
     again = blockvis.open_results(blockvis.write(run.response, tmp_path / "python"))
     assert again.control == run.response.control
     assert again.analysis == "pushover"
@@ -353,7 +351,7 @@ MOVING = '[[loads]]\nkind = "live"\nforce = [0.0, -1.0]\npositions = {}\n'
 def test_what_cannot_be_analysed_is_refused_before_anything_is_written(tmp_path, capsys, text, words):
     path = tmp_path / "case.toml"
     path.write_text(text, encoding="utf-8")
-    assert main(["run", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert run_command(path, "-o", tmp_path / "out") == 2
     message = capsys.readouterr().err
     for word in words:
         assert word in message, message

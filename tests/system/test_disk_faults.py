@@ -7,9 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from structures import run_command
 
 import blockvis
-from blockvis.cli import main
 
 CASE = """
 [geometry]
@@ -65,8 +65,8 @@ def test_full_disk_leaves_what_is_there_and_the_run_goes_on(case, tmp_path):
             if (disk / "out" / "assembly.npz").exists():
                 blockvis.open_results(disk / "out")
         subprocess.run(["mount", "-o", "remount,size=50m", str(disk)], check=True)
-        assert main(["run", "--resume", str(disk / "out")]) == 0
-        assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 0
+        assert run_command("--resume", disk / "out") == 0
+        assert run_command(case, "-o", tmp_path / "out") == 0
         whole, rest = (
             (f / "response.csv").read_text(encoding="utf-8").splitlines() for f in (tmp_path / "out", disk / "out")
         )
@@ -75,14 +75,14 @@ def test_full_disk_leaves_what_is_there_and_the_run_goes_on(case, tmp_path):
 
 def test_read_only_folder(case, tmp_path, capsys):
     with _mounted(tmp_path / "disk", "ro"):
-        assert main(["run", str(case), "-o", str(tmp_path / "disk" / "out")]) == 2
+        assert run_command(case, "-o", tmp_path / "disk" / "out") == 2
     assert "Read-only file system; choose another folder with -o" in capsys.readouterr().err
 
 
 def test_a_file_where_the_folder_should_be(case, tmp_path, capsys):
     (tmp_path / "out").write_text("mine", encoding="utf-8")
     for name in ("out", "out/below"):
-        assert main(["run", str(case), "-o", str(tmp_path / name)]) == 2
+        assert run_command(case, "-o", tmp_path / name) == 2
         assert "choose" in capsys.readouterr().err
     assert (tmp_path / "out").read_text(encoding="utf-8") == "mine"
 
@@ -91,7 +91,7 @@ def test_a_file_where_the_folder_should_be(case, tmp_path, capsys):
 def test_nothing_of_that_name_is_overwritten_without_force(case, tmp_path, capsys, name):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / name).write_text("mine", encoding="utf-8")
-    assert main(["run", str(case), "-o", str(tmp_path / "out")]) == 2
+    assert run_command(case, "-o", tmp_path / "out") == 2
     assert f"({name})" in capsys.readouterr().err
     assert [p.name for p in (tmp_path / "out").iterdir()] == [name]
     assert (tmp_path / "out" / name).read_text(encoding="utf-8") == "mine"

@@ -73,7 +73,7 @@ parameters = { blocks = 2 }
             + "\n[settlement]\ndirection = [1.0, 0.0]\nincrement = 0.01\nlimit = 0.01",
         }[kind]
     )
-    blockvis.run_case(tmp_path / "case.toml", tmp_path / "out")
+    blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=())
     assert missing(keys_of(json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8")))) == []
     tables = list((tmp_path / "out").glob("*.csv"))
     assert kind not in ("moving load", "capacity") or len(tables) == 3

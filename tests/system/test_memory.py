@@ -68,7 +68,7 @@ FEW = 5
 
 def ran(text, folder):
     """The run of a case, nothing drawn."""
-    return blockvis.run_case(parse_case(ARCH + text, folder / "case.toml"), folder / "out")
+    return blockvis.run_case(parse_case(ARCH + text, folder / "case.toml"), folder / "out", outputs=())
 
 
 @pytest.fixture(scope="module")

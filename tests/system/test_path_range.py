@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from structures import run_command
 from test_step_check import CASE, LIMIT_LOAD, SHORT, run_here
 
 import blockvis
@@ -65,15 +66,14 @@ def test_a_range_is_told_written_and_drawn(tmp_path, monkeypatch, capsys):
     assert (np.interp(response.parameters, total, most) >= response.values * (1.0 - 1e-12)).all()
     assert next(csv.DictReader((out / "range.csv").open(encoding="utf-8")))["runs"] == "2"
     # The case in the folder asks for it now; what is known is not worked out again, unless it is asked for again.
-    assert main(["run", "--resume", str(out), "--no-pictures"]) == 0
+    assert run_command("--resume", out, "--no-pictures") == 0
     assert "range of" not in capsys.readouterr().out
 
 
 @pytest.mark.slow
-@pytest.mark.pictures
 def test_processes_give_the_range_of_all_variations(tmp_path, capsys):
     (tmp_path / "case.toml").write_text(CASE + "\n[analysis]\nrange = true\n", encoding="utf-8")
-    assert main(["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out"), "--no-film"]) == 0
+    assert main(["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out"), "--no-film", "--no-check-steps"]) == 0
     assert "range of collapse " in capsys.readouterr().out
     found = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert len(found["range"]["runs"]) == 1 + len(VARIATIONS)

@@ -163,7 +163,6 @@ def test_names_of_any_kind_are_shown_as_they_are(tmp_path_factory, names, materi
 
 
 @browser
-@pytest.mark.pictures
 def test_hostile_files_from_the_command_line_to_the_browser(tmp_path):
     """Block, group, material, support, case and layout file, with the real reading, solving and writing in between."""
     bodies = {HOSTILE[3]: [0.0, 0.0], HOSTILE[4]: [1.0, 0.5], HOSTILE[8].replace("/", ""): [3.0, 4.0]}

@@ -63,7 +63,7 @@ def test_title_names_case_file_date_and_version(tmp_path):
         "[analysis]\nfalling_frames = 0\n[output]\nanimation = false\n"
     )
     (tmp_path / "garden wall.toml").write_text(text, encoding="utf-8")
-    run = blockvis.run_case(tmp_path / "garden wall.toml", tmp_path / "out")
+    run = blockvis.run_case(tmp_path / "garden wall.toml", tmp_path / "out", outputs=())
     page = report_html(run.response, text)
     title = re.search("<title>(.*?)</title>", page).group(1)
     assert title == "garden wall · Standing at the end of the settlement"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from structures import run_command
 
 from blockvis.case_files.read import parse_case
 from blockvis.cli import main
@@ -43,15 +44,13 @@ def _without_timings(path: Path) -> bytes:
     return re.sub(*TIMINGS[path.name], data) if path.name in TIMINGS else data
 
 
-@pytest.mark.parametrize(
-    "drawn", [pytest.param(True, marks=[pytest.mark.slow, pytest.mark.pictures]), False], ids=["drawn", "undrawn"]
-)
+@pytest.mark.parametrize("drawn", [pytest.param(True, marks=pytest.mark.slow), False], ids=["drawn", "undrawn"])
 def test_two_runs_write_the_same_bytes_and_can_be_run_again(tmp_path, drawn):
     assert main(["layout", "arch", "voussoirs=8", "-o", str(tmp_path / "arch.json")]) == 0
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
     one, other = tmp_path / "one", tmp_path / "other"
     for folder in (one, other):
-        assert main(["run", str(tmp_path / "case.toml"), "-o", str(folder)]) in (0, 4)
+        assert run_command(tmp_path / "case.toml", "-o", folder, drawn=drawn) in (0, 4)
     names = sorted(str(p.relative_to(one)) for p in one.rglob("*") if p.is_file())
     assert names == sorted(str(p.relative_to(other)) for p in other.rglob("*") if p.is_file())
     assert len(names) > 30

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from structures import run_command
 
 import blockvis
 import solver
@@ -76,16 +77,10 @@ OTHERS = {
 }
 
 
-#: Code that has a process draw nothing, as in this one.
-UNDRAWN = """import sys, blockvis
-run = sys.modules[blockvis.run_case.__module__]
-run.draw_results, run.started_film = lambda *_, **__: (), lambda *_, **__: None"""
-
-
 def _command(folder, *arguments, code=""):
     """The command line in a process of its own; ``code`` runs before it."""
-    run = f"import sys; from blockvis.cli import main; sys.exit(main({[str(a) for a in arguments]!r}))"
-    script = f"{UNDRAWN}\n{code}\n{run}"
+    run = f"import sys; from blockvis.cli import main; sys.exit(main({[str(a) for a in arguments]!r}, outputs=()))"
+    script = f"{code}\n{run}"
     return subprocess.Popen(
         [sys.executable, "-c", script], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -125,7 +120,7 @@ def _main_until(moment, *arguments):
         unlink = Path.unlink
         patched.setattr(Path, "unlink", lambda self, **options: None if dead else unlink(self, **options))
         with suppress(Killed):
-            main([str(argument) for argument in arguments])
+            run_command(*arguments)
         # What the run held, its lock on the folder among it, goes with its last frame.
         gc.collect()
     assert dead, f"the run was over before {moment}"
@@ -173,7 +168,7 @@ def whole(tmp_path_factory):
     """A case and the folder of its run that nobody disturbed."""
     folder = tmp_path_factory.mktemp("whole")
     (folder / "case.toml").write_text(CASE, encoding="utf-8")
-    assert main(["run", str(folder / "case.toml"), "-o", str(folder / "out")]) == 0
+    assert run_command(folder / "case.toml", "-o", folder / "out") == 0
     summary = json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
     assert summary["status"] == "collapsed"
     assert blockvis.open_results(folder / "out").path[-1].phase == 1
@@ -188,7 +183,7 @@ def test_run_killed_by_the_signal_goes_on(whole, tmp_path):
     _, said = process.communicate(timeout=120)
     assert process.returncode == -signal.SIGKILL, said
     _readable(out)
-    assert main(["run", "--resume", str(out)]) == 0
+    assert run_command("--resume", out) == 0
     _same_result(whole / "out", out)
 
 
@@ -201,18 +196,18 @@ def test_run_killed_by_the_signal_goes_on(whole, tmp_path):
 )
 def test_killed_run_goes_on(whole, tmp_path, moments):
     out = tmp_path / "out"
-    arguments = ["run", whole / "case.toml", "-o", out]
+    arguments = [whole / "case.toml", "-o", out]
     for moment in moments:
         _main_until(moment, *arguments)
         assert len(list(out.rglob(".*.part*"))) == 1, "half a file is there"
         _readable(out)
-        arguments = ["run", "--resume", out]
+        arguments = ["--resume", out]
     if moments == (2,):
         # Killed between the assembly and the record of the case: nothing has begun.
-        assert main(["run", "--resume", str(out)]) == 2
-        assert main(["run", str(whole / "case.toml"), "-o", str(out), "--force"]) == 0
+        assert run_command("--resume", out) == 2
+        assert run_command(whole / "case.toml", "-o", out, "--force") == 0
     else:
-        assert main(["run", "--resume", str(out)]) == 0
+        assert run_command("--resume", out) == 0
     _same_result(whole / "out", out)
 
 
@@ -229,8 +224,8 @@ def test_killed_run_goes_on(whole, tmp_path, moments):
 def test_killed_limit_loads_and_pushovers_go_on(tmp_path, monkeypatch, kind, moment, kept):
     case = tmp_path / "case.toml"
     case.write_text(ARCH + OTHERS[kind], encoding="utf-8")
-    assert main(["run", str(case), "-o", str(tmp_path / "whole")]) == 0
-    _main_until(moment, "run", case, "-o", tmp_path / "out")
+    assert run_command(case, "-o", tmp_path / "whole") == 0
+    _main_until(moment, case, "-o", tmp_path / "out")
     _readable(tmp_path / "out")
     before = [file.stat().st_mtime_ns for file in sorted((tmp_path / "out" / "increments").glob("state_*"))][:kept]
     assert len(before) == kept
@@ -240,7 +235,7 @@ def test_killed_limit_loads_and_pushovers_go_on(tmp_path, monkeypatch, kind, mom
         monkeypatch.setattr(
             solver, name, lambda *a, name=name, function=function, **k: found.append(name) or function(*a, **k)
         )
-    assert main(["run", "--resume", str(tmp_path / "out")]) == 0
+    assert run_command("--resume", tmp_path / "out") == 0
     _same_result(tmp_path / "whole", tmp_path / "out")
     # What had been found was neither solved nor written again.
     after = [file.stat().st_mtime_ns for file in sorted((tmp_path / "out" / "increments").glob("state_*"))][:kept]
@@ -262,7 +257,7 @@ def test_killed_from_outside_while_it_runs(whole, tmp_path):
     if process.returncode == 0:
         pytest.skip("the run was over before the signal came")
     _readable(out)
-    assert main(["run", "--resume", str(out)]) == 0
+    assert run_command("--resume", out) == 0
     _same_result(whole / "out", out)
 
 
@@ -276,23 +271,22 @@ def test_ctrl_c_ends_cleanly_and_the_run_goes_on(whole, tmp_path, monkeypatch, c
 
     out = tmp_path / "out"
     monkeypatch.setattr(ResultsFolder, "add", stopped)
-    assert main(["run", str(whole / "case.toml"), "-o", str(out)]) == 130
+    assert run_command(whole / "case.toml", "-o", out) == 130
     assert "--resume" in capsys.readouterr().err
     assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["status"] == "interrupted"
     _readable(out)
     monkeypatch.undo()
-    assert main(["run", "--resume", str(out)]) == 0
+    assert run_command("--resume", out) == 0
     _same_result(whole / "out", out)
 
 
-@pytest.mark.pictures
 def test_finished_run_says_so_and_draws_what_is_missing(whole, tmp_path, capsys):
     out = shutil.copytree(whole / "out", tmp_path / "out")
     before = (out / "response.csv").read_bytes()
     assert not (out / "mechanism.png").exists()
     cut = out / "increments" / "joints_00001.vtu"
     cut.write_bytes(b"")
-    assert main(["run", "--resume", str(out)]) == 0
+    assert main(["run", "--resume", str(out), "--no-check-steps"]) == 0
     assert "had finished (collapsed)" in capsys.readouterr().err
     assert (out / "mechanism.png").stat().st_size > 500
     assert cut.read_bytes() == (whole / "out" / "increments" / cut.name).read_bytes(), "as a power cut may leave it"
@@ -302,9 +296,9 @@ def test_finished_run_says_so_and_draws_what_is_missing(whole, tmp_path, capsys)
 def test_files_that_changed_are_named_and_not_read_again(whole, tmp_path, monkeypatch, capsys):
     case, out = tmp_path / "case.toml", tmp_path / "out"
     case.write_text(CASE, encoding="utf-8")
-    _main_until(30, "run", case, "-o", out)
+    _main_until(30, case, "-o", out)
     case.write_text(CASE.replace("0.7", "0.3"), encoding="utf-8")
-    assert main(["run", "--resume", str(out)]) == 0
+    assert run_command("--resume", out) == 0
     assert "case.toml' has changed" in capsys.readouterr().err
     rows = [(f / "response.csv").read_text(encoding="utf-8").splitlines() for f in (out, whole / "out")]
     assert [row.rsplit(",", 1)[0] for row in rows[0]] == [row.rsplit(",", 1)[0] for row in rows[1]]
@@ -321,7 +315,7 @@ def test_files_that_changed_are_named_and_not_read_again(whole, tmp_path, monkey
 )
 def test_what_cannot_go_on(tmp_path, monkeypatch, capsys, arguments, words):
     monkeypatch.chdir(tmp_path)
-    assert main(["run", *arguments]) == 2
+    assert run_command(*arguments) == 2
     assert words in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
@@ -333,7 +327,7 @@ def test_damaged_checkpoint_is_refused(whole, tmp_path, capsys):
     data = (out / "checkpoint.npz").read_bytes()
     for damaged in (b"", data[:120], data[: len(data) // 2], b"PK" + bytes(500)):
         (out / "checkpoint.npz").write_bytes(damaged)
-        assert main(["run", "--resume", str(out)]) == 2
+        assert run_command("--resume", out) == 2
         assert "cannot go on" in capsys.readouterr().err
 
 

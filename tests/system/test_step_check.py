@@ -1,7 +1,6 @@
 """``blockvis run``: the same path with half the step tolerance, and the error that follows, told and written."""
 
 import json
-import queue
 import subprocess
 import sys
 from argparse import Namespace
@@ -10,11 +9,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from structures import run_command
 
 import blockvis
 import solver
 from blockvis.case_files.read import parse_case
-from blockvis.cli import _say_error, _write_report, main
+from blockvis.cli import _say_error, _write_report
 from blockvis.report.page import add_error, write_report
 from blockvis.runs import step_check
 from blockvis.runs.once_more import takes_steps, traced
@@ -69,7 +69,7 @@ def run(folder, text, *options, pictures=False):
 
 def run_here(folder, text, *options):
     (folder / "case.toml").write_text(text, encoding="utf-8")
-    return main(["run", str(folder / "case.toml"), "-o", str(folder / "out"), "--no-pictures", *options])
+    return run_command(folder / "case.toml", "-o", folder / "out", "--no-pictures", *options)
 
 
 def test_a_run_tells_its_error_without_being_asked(tmp_path):
@@ -94,7 +94,6 @@ def test_a_run_tells_its_error_without_being_asked(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.pictures
 def test_the_report_of_a_run_says_so_too(tmp_path):
     done = run(tmp_path, CASE, "--check-steps", pictures=True)
     assert done.returncode == 0, done.stderr
@@ -205,7 +204,7 @@ class Late:
         pass
 
     def found(self, seconds):
-        raise queue.Empty
+        raise TimeoutError
 
     def close(self):
         pass

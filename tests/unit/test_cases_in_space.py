@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from structures import run_command
 
 import solver
 from blockvis import generators
@@ -154,5 +155,5 @@ def test_a_pushover_counts_along_x_unless_told_otherwise(tmp_path):
         '[control]\nblock = "block"\nincrement = 0.05\nlimit = 0.05\n',
         encoding="utf-8",
     )
-    assert main(["run", str(tmp_path / "case.toml"), "--no-pictures", "-o", str(tmp_path / "out")]) == 0
+    assert run_command(tmp_path / "case.toml", "--no-pictures", "-o", tmp_path / "out") == 0
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["limit_load_multiplier"] == pytest.approx(0.4)

@@ -66,7 +66,7 @@ def test_the_collapse_has_the_count_of_its_mechanism_and_the_case_its_name(tmp_p
         "[analysis]\nfalling_frames = 0\n[output]\nanimation = false\n",
         encoding="utf-8",
     )
-    run = blockvis.run_case(tmp_path / "garden.toml", tmp_path / "out")
+    run = blockvis.run_case(tmp_path / "garden.toml", tmp_path / "out", outputs=())
     assert "garden" in said(run.response, tmp_path / "named.svg")
 
 

@@ -223,11 +223,11 @@ def test_stones_lean_to_a_side():
     case = parse_case(text, CASE)
     _, (one, *_) = candidates(ARCH)
     orders = {lean: ordered(case, ARCH, one.motions, Variant(0.6, lean), (0.02, 0.01)) for lean in (-1, 0, 1)}
-    ratio = orders[1].loads.dead[:, 1] / orders[0].loads.dead[:, 1]
+    ratio = orders[1].given.loads.dead[:, 1] / orders[0].given.loads.dead[:, 1]
     x = ARCH.centroids[:, 0]
     assert ratio[x.argmax()] == pytest.approx(1.0 + LEANING)
     assert ratio[x.argmin()] == pytest.approx(1.0 - LEANING)
-    np.testing.assert_allclose(orders[-1].loads.dead[:, 1] / orders[0].loads.dead[:, 1], 2.0 - ratio)
+    np.testing.assert_allclose(orders[-1].given.loads.dead[:, 1] / orders[0].given.loads.dead[:, 1], 2.0 - ratio)
 
 
 @pytest.mark.slow

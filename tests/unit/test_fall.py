@@ -200,7 +200,6 @@ def test_the_page_plays_the_fall_in_real_time():
     assert CAPTION not in report_html(response)
 
 
-@pytest.mark.pictures
 @pytest.mark.slow
 def test_a_run_writes_the_fall_and_nothing_else_knows_of_it(tmp_path, monkeypatch):
     case = tmp_path / "case.toml"
@@ -209,9 +208,9 @@ def test_a_run_writes_the_fall_and_nothing_else_knows_of_it(tmp_path, monkeypatc
         "[material]\nfriction_coefficient = 0.7\n[analysis]\nfalling_frames = 2\n",
         encoding="utf-8",
     )
-    assert main(["run", str(case), "-o", str(tmp_path / "with")]) == 0
+    assert main(["run", str(case), "-o", str(tmp_path / "with"), "--no-check-steps"]) == 0
     monkeypatch.setitem(sys.modules, "pymunk", None)
-    assert main(["run", str(case), "-o", str(tmp_path / "without"), "--no-film"]) == 0
+    assert main(["run", str(case), "-o", str(tmp_path / "without"), "--no-film", "--no-check-steps"]) == 0
     for folder, there in ((tmp_path / "with", True), (tmp_path / "without", False)):
         assert (folder / "fall.pvd").is_file() == there
         assert (CAPTION in (folder / "report.html").read_text(encoding="utf-8")) == there
@@ -220,7 +219,7 @@ def test_a_run_writes_the_fall_and_nothing_else_knows_of_it(tmp_path, monkeypatc
     assert rows[0] == rows[1]
     summaries = [(tmp_path / one / "summary.json").read_text(encoding="utf-8") for one in ("with", "without")]
     assert len(summaries[0].splitlines()) == len(summaries[1].splitlines())
-    assert main(["run", str(case), "-o", str(tmp_path / "with"), "--force", "--no-pictures"]) == 0
+    assert main(["run", str(case), "-o", str(tmp_path / "with"), "--force", "--no-pictures", "--no-check-steps"]) == 0
     assert not (tmp_path / "with" / "fall.pvd").exists()
     assert not (tmp_path / "with" / "report.html").exists()
 

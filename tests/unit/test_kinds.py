@@ -119,9 +119,8 @@ tilt_step = 0.03
 def test_a_new_kind_is_an_object_of_its_own(tmp_path, monkeypatch):
     """A block of b × h on ground that tilts turns over at tan θ = b/h."""
     monkeypatch.setitem(KINDS, "tilt", TiltKind())
-    monkeypatch.setattr("blockvis.runs.run.draw_results", lambda *_, **__: ())
     case = parse_case(TILT, tmp_path / "tilt.toml")
-    run = blockvis.run_case(case, tmp_path / "out")
+    run = blockvis.run_case(case, tmp_path / "out", outputs=())
     low, high = run.summary["collapse_bracket"]
     assert low < np.arctan(0.2) < high == pytest.approx(low + 0.03)
     stored = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import ezdxf
 import pytest
+from structures import run_command
 
 from blockvis import generators, read, save_layout
 from blockvis.case_files.new_case import relative_to
@@ -27,7 +28,7 @@ def _written(drawing, *options):
 def _ran(case, capsys):
     capsys.readouterr()
     out = case.parent / "out"
-    assert main(["run", str(case), "-o", str(out)]) == 0, capsys.readouterr().err
+    assert run_command(case, "-o", out) == 0, capsys.readouterr().err
     return json.loads((out / "summary.json").read_text(encoding="utf-8"))
 
 

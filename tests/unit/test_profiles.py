@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import structures
+from structures import run_command
 
 import blockvis
 import solver
@@ -145,7 +146,9 @@ def test_a_trough_and_its_mirror_open_the_wall_alike(tmp_path):
     short, found = WALL.replace("limit = 0.004", "limit = 0.002"), []
     for centre in (0.15, 0.6):
         run = blockvis.run_case(
-            case_of(short, f'{{ kind = "gaussian", centre = {centre}, inflection = 0.2 }}'), tmp_path / str(centre)
+            case_of(short, f'{{ kind = "gaussian", centre = {centre}, inflection = 0.2 }}'),
+            tmp_path / str(centre),
+            outputs=(),
         )
         found.append(np.sort(openings(run.response)))
     np.testing.assert_allclose(found[0], found[1], atol=2e-5)
@@ -180,7 +183,7 @@ def test_a_profile_that_names_no_support_says_which_there_are(tmp_path, capsys):
     (tmp_path / "case.toml").write_text(
         PORTAL.replace("[settlement]", '[settlement]\nprofile = { supports = { "grounds right" = [0, -1] } }')
     )
-    assert cli.main(["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out")]) == cli.BAD_INPUT
+    assert run_command(tmp_path / "case.toml", "-o", tmp_path / "out") == cli.BAD_INPUT
     said = capsys.readouterr().err
     assert "'grounds right' is no block (did you mean" in said
     assert not (tmp_path / "out").exists()

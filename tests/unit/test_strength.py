@@ -4,11 +4,11 @@ import re
 
 import numpy as np
 import pytest
+from structures import run_command
 
 import solver
 from blockvis import generators
 from blockvis.case_files.read import parse_case
-from blockvis.cli import main
 
 WIDTH, HEIGHT, THICKNESS = 0.8, 0.5, 0.3
 AREA = WIDTH * THICKNESS
@@ -139,7 +139,7 @@ animation = false
 def test_strength_from_the_case_file(tmp_path, capsys):
     path = tmp_path / "case.toml"
     path.write_text(CASE.format(""), encoding="utf-8")
-    assert main(["run", str(path), "-o", str(tmp_path / "out")]) == 0
+    assert run_command(path, "-o", tmp_path / "out") == 0
     weight = 0.8 * 0.5 * 2000.0 * solver.GRAVITY
     assert f"{(0.3 * weight + 2000.0 * 0.8) / 1000.0:12.6g}" in capsys.readouterr().out
     for text, words in (

@@ -1,0 +1,182 @@
+"""What a run makes beside its numbers: fall, pictures, report and film."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import solver
+from blockvis.cases.contents import Case
+from blockvis.dynamics.fall import Fall, fall_of
+from blockvis.results.fall_files import stored_fall, write_fall
+from blockvis.results.folder import ResultsFolder
+
+from .progress import DrawingProgress
+
+if TYPE_CHECKING:
+    from blockvis.pictures.film_process import FilmProcess
+
+
+class Clock:
+    """Wall-clock seconds of each part of a run."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def counting(self, part: str) -> Iterator[None]:
+        """Count the seconds of a block to a part."""
+        started = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[part] = self.seconds.get(part, 0.0) + time.perf_counter() - started
+
+    def each(self, part: str, increments: solver.Increments) -> Iterator[solver.Increment]:
+        """Give each of the increments, and count the seconds it takes to find it to a part."""
+        while True:
+            with self.counting(part):
+                increment = next(increments, None)
+            if increment is None:
+                return
+            yield increment
+
+
+class Output:
+    """What a run makes beside its numbers; it is told of the run by these methods, in this order."""
+
+    def begin(self, case: Case) -> None:
+        """Prepare, before the assembly of the case is built."""
+
+    def follow(self, results: ResultsFolder) -> None:
+        """Take note of the results folder, before the first increment is added to it."""
+
+    def finish(self, case: Case, response: solver.Response, folder: Path, clock: Clock) -> tuple[str, ...]:
+        """Make what there is to make of a run that came to its end; returns what could not be made, and why."""
+        return ()
+
+    def close(self) -> None:
+        """End what is still at work, whatever has ended the run."""
+
+    def is_there(self, case: Case, folder: Path) -> bool:
+        """Whether all of it is in the folder of a finished run."""
+        return True
+
+
+class Drawing(Output):
+    """The fall, pictures, report and film of a run; a film is drawn by a process of its own.
+
+    Parameters
+    ----------
+    film, pictures : bool
+        Draw the film of the case; draw anything at all, the report included.
+
+    Notes
+    -----
+    The process has time until the case is solved: it loads what it needs and writes what only viewers open meanwhile.
+    """
+
+    def __init__(self, *, film: bool = True, pictures: bool = True) -> None:
+        self._film, self._pictures = film, pictures
+        self._process: FilmProcess | None = None
+
+    def _animation(self, case: Case) -> str | None:
+        return case.animation if self._film and self._pictures else None
+
+    def begin(self, case: Case) -> None:
+        """Start the process that draws the film, if there is one to draw."""
+        if self._animation(case) is not None:
+            from blockvis.pictures.film_process import FilmProcess
+
+            self._process = FilmProcess()
+
+    def follow(self, results: ResultsFolder) -> None:
+        """Have the files for viewers written by the process."""
+        if self._process is not None:
+            self._process.follow(results.path, results.assembly, results.shape, len(results.increments))
+            results.viewer = self._process
+
+    def is_there(self, case: Case, folder: Path) -> bool:
+        """Whether the last of what is drawn is there."""
+        animation = self._animation(case)
+        names = ["report.html", "mechanism.png", *([animation] if animation else [])] if self._pictures else []
+        return all((folder / name).is_file() for name in names)
+
+    def close(self) -> None:
+        """End the process, drawn or not."""
+        if self._process is not None:
+            self._process.close()
+
+    def finish(self, case: Case, response: solver.Response, folder: Path, clock: Clock) -> tuple[str, ...]:
+        """Write the fall, the pictures, the report and the film of a results folder."""
+        if not response.increments:
+            return ()
+        progress = DrawingProgress()
+        stored = stored_fall(folder)
+        animation, apart = self._animation(case), self._process
+        if apart is not None:
+            # It works out the fall as well, and what needs none is drawn here meanwhile.
+            apart.draw(response, folder / str(animation), stored, falls=stored is None)
+        if self._pictures:
+            with clock.counting("mechanism"):
+                from blockvis.pictures.render import draw_mechanism
+
+                draw_mechanism(response, folder / "mechanism.png")
+        with clock.counting("fall"):
+            fall = _fall(response, apart, progress) if stored is None else stored
+            progress.done()
+            if fall is not None and stored is None:
+                write_fall(fall, response, folder)
+        if not self._pictures:
+            return ()
+        with clock.counting("report"):
+            from blockvis.pictures.paraview import write_paraview_macro
+            from blockvis.report.page import write_report
+
+            write_paraview_macro(folder)
+            write_report(response, folder / "report.html", case.text, fall=fall)
+        problem = ""
+        if apart is not None:
+            problem = _awaited(apart, progress, clock)
+        if response.path and (apart is None or problem):
+            with clock.counting("curve"):
+                from blockvis.pictures.curves import draw_curve
+
+                draw_curve(response, folder / "curve.png")
+        if animation is not None and apart is None:
+            with clock.counting("film"):
+                from blockvis.pictures.render import animate
+
+                try:
+                    animate(response, folder / animation, fall=fall, progress=progress.frame)
+                finally:
+                    progress.done()
+        return (problem,) if problem else ()
+
+
+def _awaited(film: FilmProcess, progress: DrawingProgress, clock: Clock) -> str:
+    """Wait for the process that draws curve and film; returns why it has ended without them, or nothing."""
+    from blockvis.pictures.film_process import FilmFailed
+
+    try:
+        with clock.counting("film"):
+            film.wait(progress.frame)
+    except FilmFailed as error:
+        return str(error)
+    finally:
+        progress.done()
+    return ""
+
+
+def _fall(response: solver.Response, film: FilmProcess | None, progress: DrawingProgress) -> Fall | None:
+    """Find the fall of a response: that of the process that draws the film, or worked out here."""
+    if film is not None:
+        from blockvis.pictures.film_process import FilmFailed
+
+        # What became of the process is told where the film is waited for.
+        with suppress(FilmFailed):
+            return film.fall(progress.fall)
+    return fall_of(response, progress.fall)
