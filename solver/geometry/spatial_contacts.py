@@ -183,6 +183,7 @@ def find_points(
         strip = corners.widths < 0.5 * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])[corners.owner]
         np.maximum.at(largest, joint[pair], np.bincount(corners.owner, corners.areas, minlength=len(pair)))
         sliver = _slivers(parts, face_i, face_j, corners, largest[joint[pair]])
+        # What overlaps on a strip at a large gap slides past before it would touch.
         slides_past = strip & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)
         # Edges that cross behind a plane that separates their parts do not touch.
         owner = pair[corners.owner]
@@ -278,6 +279,7 @@ def _crossed_edges(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Edges that separate two parts better than any of their faces: one point for a pair."""
     apart, own, other = edge_separations(solids, faces, vertices, pairs.i, pairs.j)
+    # By more than rounding, in widths.
     k = np.flatnonzero((apart > pairs.apart + 1e-4 * pairs.width) & (apart <= reach))
     own, other = own[k], other[k]
     a, b = vertices[solids.corners[own]], vertices[solids.corners[other]]

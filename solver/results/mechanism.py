@@ -1,4 +1,4 @@
-"""Mechanism: which blocks move together, and what happens at the joints between them."""
+"""Mechanism: macro-blocks, and the hinges and sliding joints between them."""
 
 from __future__ import annotations
 
@@ -13,16 +13,15 @@ from solver.tolerances import CLOSED, NOTICEABLE, TOGETHER
 
 from .increment import Increment, at_rest, carries, slides
 
-#: Joints that are named one by one in words; the others are counted.
+#: Joints that are named in words; the others are counted.
 NAMED = 8
 
 
 @dataclass(frozen=True)
 class Mechanism:
-    """How a structure moves in the motion that follows an increment.
+    """The mechanism in the motion that follows an increment.
 
-    Words, pictures, curves, tables and the report all count these hinges and sliding joints: joints, that is pairs of
-    blocks, not contact points, and only those that move noticeably beside the fastest block.
+    Hinges and sliding joints are pairs of blocks, not contact points, that move noticeably beside the fastest block.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Quantities: what the increments of an analysis run over and what is measured along them."""
+"""Quantities: parameters and measured values of analyses."""
 
 from __future__ import annotations
 
