@@ -262,7 +262,7 @@ class Assembly:
 
     @property
     def convex_vertex(self) -> np.ndarray:
-        """(n_vertices,) bool array: in the plane, false at re-entrant corners, which touch nothing first."""
+        """(n_vertices,) bool array: in the plane, false at re-entrant corners."""
         return self.polygons.convex_vertex
 
     def outline(self, block: int) -> np.ndarray:

@@ -271,8 +271,7 @@ def moving_together(
     spins : (n_blocks, n_rot) array [m]
         Rotation of each block times a length.
     together : float [m]
-        Two blocks belong together where all their contact points move apart by less than this, and their rotations too:
-        a single point cannot tell that blocks turn about it.
+        Largest relative movement of the contact points, and of the rotations, of two blocks of one group.
     """
     pairs, which = contacts.joints()
     most = np.zeros(len(pairs))

@@ -13,7 +13,7 @@ FEASIBILITY_TOLERANCE = 1e-10
 #: Distance from the boundary of its friction cone at which a contact point is on it.
 AT_LIMIT = 1e-9
 
-#: Feasibility of interior solutions of large programs, which the smallest tolerance costs a tenth more iterations.
+#: Feasibility of interior solutions of large programs; the smallest one costs a tenth more iterations.
 INTERIOR_TOLERANCE = 1e-8
 
 #: Violation of rows, bounds and reduced costs that our own check of a solution accepts.

@@ -2,7 +2,7 @@
 
 Over the forces f = (N, T) of the closed contact points, with their compliance as metric::
 
-    minimise  1/2 Σ c (f - f⁰)²   subject to   A f + load = 0,   |T| ≤ μ N,   and, where asked for,   r · f = R
+    minimise  1/2 Σ c (f - f⁰)²   subject to   A f + load = 0,   |T| ≤ μ N,   and, optionally,   r · f = R
 
 From f⁰ = 0 these are the forces of least elastic energy, which are unique: those of a structure at rest. Primal-dual
 interior method in the scaling of Nesterov & Todd, see :mod:`.cones`.

@@ -45,8 +45,8 @@ def measured_points(
     Notes
     -----
     A corner inside a face has the normal of the face. On the boundary of a face its normal is half-way between that of
-    the face and that of the edges that cross there, so that a corner that comes in from outside turns by the same
-    angle twice and not at once. A corner on a corner, and edges that are nearly parallel, have the normal half-way
+    the face and that of the edges that cross there, so that the normal of a corner that enters the face changes in two
+    equal steps. A corner on a corner, and edges that are nearly parallel, have the normal half-way
     between the two faces. An edge across an edge has the normal to both.
 
     The gap is the distance along the normal of two material points. Tangents ride on the face of ``block_b``: swung
@@ -122,7 +122,7 @@ def find_points(
     Parameters
     ----------
     parts : ConvexParts
-        Those of one block do not touch each other, and faces inside it touch nothing.
+        Those of one block and the faces inside it have no contact points.
     vertices : (n_vertices, 3) array [m]
         Current corners of all parts.
     reach : float [m]

@@ -61,7 +61,7 @@ class Model:
 
     @property
     def lengths(self) -> np.ndarray:
-        """(n_dof,) array: divide movements by it, multiply moments' rows by it, to get to the units of the program."""
+        """(n_dof,) array [m or 1]: units of movements in the program."""
         return np.where(np.arange(self.n_dof) < self.dimension, self.length, 1.0)
 
     @property

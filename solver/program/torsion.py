@@ -30,7 +30,7 @@ class Faces:
         Centroids of the polygons that their points span.
     radii : (n_faces,) array [m]
         Mean distance of a polygon's points from its centroid: torsional strength over friction and normal force; of
-        two points a quarter of their distance, of one nothing.
+        two points a quarter of their distance, of one zero.
     """
 
     face: np.ndarray

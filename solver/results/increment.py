@@ -96,7 +96,7 @@ class State:
     support_forces : (n_blocks, 3) array [N, N, N·m]
         Resultant of the structure on each support about its centroid; zero for free blocks.
     fell_at : (n_blocks,) array
-        Parameter at which blocks that have left for good were let go, nan for those that stand; empty where all stand.
+        Parameter at which blocks have fallen, nan for the others; empty where none have.
     """
 
     pose: Pose

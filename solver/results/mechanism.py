@@ -26,7 +26,7 @@ class Mechanism:
     Attributes
     ----------
     parts : (n_blocks,) int array
-        Macro-block of each block, largest first; -1 for blocks that stand still.
+        Macro-block of each block, largest first; -1 for blocks at rest.
     motions : (n_parts, n_dof) array
         Velocity of the centroid of each macro-block and its angular velocity, in the scale of the increment.
     hinges, sliding : (n, 2) int arrays
@@ -64,7 +64,7 @@ class Mechanism:
 def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     """(n_blocks,) int array: the part each block moves with in the motion that follows an increment.
 
-    Part -1 stands still. The others are numbered from 0, the largest volume first.
+    Part -1 is at rest. The others are numbered from 0, the largest volume first.
     """
     contacts, n = increment.contacts, assembly.n_blocks
     d = contacts.points.shape[1]
