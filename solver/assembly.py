@@ -1,4 +1,4 @@
-"""Assembly: the shapes of all blocks, with what belongs to each block."""
+"""Assembly: shapes, names, roles, densities and materials of all blocks."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ from .views import Shown
 
 FREE, FIXED, MOVING = ROLES = ("free", "fixed", "moving")
 
-#: A block thinner than this fraction of its own perimeter squared is a line, not a block: double
-#: precision leaves about six digits of its centroid.
+#: Area of a block, as a part of its perimeter squared, below which it is a line: its centroid has six digits only.
 SMALLEST_SHAPE_FACTOR = 1e-9
 
 
@@ -29,12 +28,12 @@ SMALLEST_SHAPE_FACTOR = 1e-9
 class Assembly(Shown):
     """Rigid blocks of a masonry structure, supports included.
 
-    Use :meth:`from_outlines` or :meth:`from_solids` unless the shapes are at hand: they check their input.
+    :meth:`from_outlines` and :meth:`from_solids` check their input.
 
     Attributes
     ----------
     shapes : Shapes
-        Where the blocks are drawn, and how they touch: :class:`Polygons` in the plane, :class:`Polyhedra` in space.
+        Of the blocks as drawn: :class:`Polygons` in the plane, :class:`Polyhedra` in space.
     names : tuple of str
         One name per block, all different.
     roles : (n_blocks,) str array
@@ -164,7 +163,7 @@ class Assembly(Shown):
         )
 
     def __repr__(self) -> str:
-        """One line: how many blocks, and what they are."""
+        """One line with the number of blocks by role."""
         kinds = ", ".join(f"{int((self.roles == role).sum())} {role}" for role in ROLES)
         return f"<Assembly of {self.n_blocks} blocks: {kinds}>"
 
@@ -205,7 +204,7 @@ class Assembly(Shown):
 
     @property
     def widths(self) -> np.ndarray:
-        """(n_blocks,) array [m]: how thick each block is where it is thin, near b for a long a × b."""
+        """(n_blocks,) array [m]: thickness of each block where it is thin, near b for a long a × b."""
         return self.shapes.widths
 
     @cached_property
@@ -239,7 +238,7 @@ class Assembly(Shown):
 
     @property
     def thickness(self) -> np.ndarray:
-        """(n_blocks,) array [m]: in the plane, how thick the blocks are out of it."""
+        """(n_blocks,) array [m]: in the plane, thickness of the blocks out of it."""
         return self.polygons.thickness
 
     @property
@@ -264,7 +263,7 @@ class Assembly(Shown):
 
     @property
     def convex_vertex(self) -> np.ndarray:
-        """(n_vertices,) bool array: in the plane, false at re-entrant corners, which touch nothing first."""
+        """(n_vertices,) bool array: in the plane, false at re-entrant corners."""
         return self.polygons.convex_vertex
 
     def outline(self, block: int) -> np.ndarray:
@@ -318,7 +317,7 @@ def check_blocks(assembly: Assembly, overlap_tolerance: float | None = None) -> 
 
 
 def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Contacts:
-    """Find the points at which blocks touch or may touch within one increment.
+    """Find the contact points of the blocks, closed or with a gap up to a reach.
 
     Parameters
     ----------
@@ -337,7 +336,7 @@ def find_contacts(assembly: Assembly, vertices: np.ndarray, reach: float) -> Con
 
 
 def measure_contacts(assembly: Assembly, vertices: np.ndarray, contacts: Contacts) -> Contacts:
-    """Measure the same contact points where the corners now are.
+    """Measure the same contact points with the corners elsewhere.
 
     Parameters
     ----------
@@ -345,7 +344,7 @@ def measure_contacts(assembly: Assembly, vertices: np.ndarray, contacts: Contact
     vertices : (n_vertices, d) array [m]
         Current corners of all blocks.
     contacts : Contacts
-        Of which only the features count.
+        Whose features are measured.
     """
     return assembly.shapes.measure(vertices, contacts)
 
@@ -357,7 +356,7 @@ def _labels(
     roles: Sequence[str] | None,
     materials: Sequence[str] | None,
 ) -> tuple[tuple[str, ...], np.ndarray, tuple[str, ...]]:
-    """Names, roles and materials of n blocks, checked, with what is not given filled in."""
+    """Names, roles and materials of n blocks, checked, with their defaults."""
     if n == 0:
         raise ValueError("an assembly needs at least one block; none was given")
     names = _unique_names([f"block {i}" for i in range(n)] if names is None else list(map(str, names)))

@@ -1,4 +1,4 @@
-"""Kinematics: where the blocks are, how points ride on them, which of them move together."""
+"""Kinematics: poses, movements and velocities of rigid blocks and of their points."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Pose:
 
     @classmethod
     def initial(cls, assembly: Assembly) -> Pose:
-        """Put the blocks where the drawing has them."""
+        """Pose of the blocks as drawn."""
         n, d = assembly.centroids.shape
         return cls(assembly.centroids.copy(), np.zeros((n, rotation_count(d))))
 
@@ -39,7 +39,7 @@ class Pose:
         return np.concatenate([self.positions - assembly.centroids, self.rotations], axis=1)
 
     def movement_to(self, other: Pose) -> np.ndarray:
-        """(n_blocks, n_dof) array: displacement of each centroid [m] and rotation [rad] from here to another pose."""
+        """(n_blocks, n_dof) array: displacement of each centroid [m] and rotation [rad] to another pose."""
         turn = composed_rotations(-self.rotations, other.rotations)
         return np.concatenate([other.positions - self.positions, turn], axis=1)
 
@@ -129,7 +129,7 @@ def moved(pose: Pose, q: np.ndarray) -> Pose:
 
 
 def moved_vertices(assembly: Assembly, pose: Pose) -> np.ndarray:
-    """(n_vertices, d) array [m]: corners of all blocks where the pose has them."""
+    """(n_vertices, d) array [m]: corners of all blocks at a pose."""
     block = assembly.block_of_vertex
     arms = assembly.vertices - assembly.centroids[block]
     turned = np.einsum("nij,nj->ni", rotation_matrices(pose.rotations)[block], arms)
@@ -142,14 +142,14 @@ def turned(vectors: np.ndarray, rotations: np.ndarray) -> np.ndarray:
 
 
 def carried(points: np.ndarray, blocks: np.ndarray, before: Pose, after: Pose) -> np.ndarray:
-    """(n, d) array [m]: where points that ride on blocks get to.
+    """(n, d) array [m]: points that move with blocks, at another pose.
 
     Parameters
     ----------
     points : (n, d) array [m]
-        Where they are when the blocks are at ``before``.
+        At the pose ``before``.
     blocks : (n,) int array
-        The block each rides on.
+        The block of each.
     before, after : Pose
     """
     turn = composed_rotations(-before.rotations[blocks], after.rotations[blocks])
@@ -159,12 +159,12 @@ def carried(points: np.ndarray, blocks: np.ndarray, before: Pose, after: Pose) -
 def carried_between(
     points: np.ndarray, block_a: np.ndarray, block_b: np.ndarray, before: Pose, after: Pose
 ) -> np.ndarray:
-    """(n, d) array [m]: half-way between where both of their blocks carry points.
+    """(n, d) array [m]: contact points at another pose, half-way between those that move with either block.
 
     Parameters
     ----------
     points : (n, d) array [m]
-        Contact points when the blocks are at ``before``. At another pose the blocks carry them to different places.
+        At the pose ``before``.
     block_a, block_b : (n,) int arrays
     before, after : Pose
     """
@@ -172,7 +172,7 @@ def carried_between(
 
 
 def swung(pose: Pose, motion: np.ndarray) -> Pose:
-    """Turn each block about its own pole, so that blocks that move together stay together.
+    """Move each block on the arc about its own pole, so that macro-blocks stay together.
 
     Parameters
     ----------
@@ -271,8 +271,7 @@ def moving_together(
     spins : (n_blocks, n_rot) array [m]
         Rotation of each block times a length.
     together : float [m]
-        Two blocks belong together where all their contact points move apart by less than this, and their rotations too:
-        a single point cannot tell that blocks turn about it.
+        Largest relative movement of the contact points, and of the rotations, of two blocks of one group.
     """
     pairs, which = contacts.joints()
     most = np.zeros(len(pairs))

@@ -26,7 +26,7 @@ variables of the equilibrium rows are the displacements -u; that of λ ≥ 0 is 
 is closed, and shear up to friction where it slides.
 
 **Increments.** A program is linear: after it the blocks are moved by exact rotations, and what it has left in the
-joints is measured: gaps, and the drift d, slip that it did not ask for. Further programs with the supports standing,
+joints is measured: gaps, and the drift d, slip beyond that of the program. Further programs, the supports fixed,
 N + g ≥ μ |T + d|, close both. A step is halved where they do not, and where no forces balance the loads. The mechanism
 of a step is that at its start, so that the method is of the first order in the increment. Structures that hinge
 converge to their exact path. Where joints slide, forces are those with the least reaction under an associative flow
@@ -150,7 +150,7 @@ def solve_program(
     -----
     The static form above, and with unbalanced forces r⁺, r⁻ ≥ 0 on every free block: + ρ Σ (r⁺ + r⁻) in the cost and
     A c + f + r⁺ - r⁻ = 0. They are dual to the bound ρ of all displacements and cost too much to be used wherever the
-    loads can be balanced. Equilibrium holds to a tolerance, lest a block without friction move sideways for nothing.
+    loads can be balanced. Equilibrium holds to a tolerance, so that frictionless blocks do not move at no cost.
     """
     assembly, interfaces, load = inputs
     length, free = assembly.block_size, assembly.free
@@ -269,7 +269,7 @@ class _Phase:
         return float(motion_size(motion, self.length).max(initial=0.0))
 
     def solve(self, pose: Pose, contacts: Contacts, **arguments: Any) -> ProgramSolution:
-        """Solve a program, by default of the gaps at the pose, with the supports standing."""
+        """Solve a program, by default of the gaps at the pose, with the supports fixed."""
         self.programs += 1
         gaps = np.column_stack([contacts.gaps, np.zeros(len(contacts))])
         default: dict[str, Any] = {"gaps": gaps, "supports": np.zeros_like(self.inputs.load), "trust": self.trust}
@@ -309,7 +309,7 @@ class _Phase:
         return self.close_joints(s, Pose(positions, np.where(free, pose.rotations, supported.rotations)), solution)
 
     def close_joints(self, s: float, first: Pose, solution: ProgramSolution) -> _Equilibrium:
-        """Close what a program has left at the pose ``first``, with the supports standing, until forces balance there.
+        """Close what a program has left at the pose ``first``, with the supports fixed, until forces balance there.
 
         Raises _NoEquilibrium, _NotClosed or SolveError.
         """
@@ -394,7 +394,7 @@ class _Phase:
         return phase.limit if phase.limit - target < 1e-9 * phase.increment else float(target)
 
     def increment(self, current: _Equilibrium, step: float, upper_bound: float) -> Increment:
-        """Report an equilibrium, with the checkpoint from which the phase goes on."""
+        """Report an equilibrium with its checkpoint."""
         place, ended = Place.unloaded(current.pose, current.s), current.s >= self.phase.limit
         checkpoint = PathState(self.number, self.start, place, step, upper_bound, ended=ended)
         solution = self.reported(current.solution, current.s, current.reaction, Status.EQUILIBRIUM)
@@ -409,7 +409,7 @@ class _Phase:
     def collapse(
         self, current: _Equilibrium, upper_bound: float, solution: ProgramSolution
     ) -> tuple[Increment, Ending]:
-        """Give the fall, and the collapse, from the program that found no equilibrium beyond the last one."""
+        """Give the fall and the collapse, from the program without equilibrium beyond the last one."""
         fall = self.reported(solution, upper_bound, 0.0, Status.FALLING)
         bracket, motion, words = (
             (current.s, upper_bound),
@@ -439,7 +439,7 @@ def linear_program_increments(
     interfaces : Interfaces
     loads : Loads
     controls : Controls
-        Not used: the method has nothing to choose.
+        Not used.
     resume : PathState, optional
         Of an increment that such a loop has yielded, with the same other arguments: those after it follow bit for bit.
 

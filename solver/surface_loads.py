@@ -125,9 +125,9 @@ def _first_met(assembly: Assembly, pushed: np.ndarray, across: np.ndarray) -> tu
     strips : (n + 1,) array [m]
         Where they begin and end, measured across.
     depth : (n,) array [m]
-        Along the direction in the middle of the strip; infinite where it meets nothing.
+        Along the direction in the middle of the strip; infinite where there is no block.
     block : (n,) int array
-        -1 where it meets nothing.
+        -1 where there is none.
     """
     start, stop = assembly.vertices, assembly.vertices[assembly.next_vertex]
     a, b = start @ across, stop @ across

@@ -2,7 +2,7 @@
 
 Over the forces f = (N, T) of the closed contact points, with their compliance as metric::
 
-    minimise  1/2 Σ c (f - f⁰)²   subject to   A f + load = 0,   |T| ≤ μ N,   and, where asked for,   r · f = R
+    minimise  1/2 Σ c (f - f⁰)²   subject to   A f + load = 0,   |T| ≤ μ N,   and, optionally,   r · f = R
 
 From f⁰ = 0 these are the forces of least elastic energy, which are unique: those of a structure at rest. Primal-dual
 interior method in the scaling of Nesterov & Todd, see :mod:`.cones`.
@@ -54,6 +54,7 @@ class _Iterate:
         self.slope = np.ones((n, self.d))
         self.slope[:, 0] = np.maximum(friction, 1e-9)  # A cone without width has no interior.
         self.weight = compliance / float(compliance[:, 0].mean())
+        # The start lies well inside the cones.
         self.forces = reference.copy()
         self.forces[:, 0] = np.maximum(reference[:, 0], 0.1)
         length = np.sqrt((reference[:, 1:] ** 2).sum(axis=1))
@@ -189,6 +190,7 @@ def nearest_equilibrium(
         part = point.longest(change)
         centring = min(max((point.mean_after(change, part) / point.mean) ** 3, 1e-4), 0.5)
         correction = product(point.scaling.scaled((point.slope * change.forces).T), point.scaling.unscaled(change.z))
+        # Corrections of second order are bounded by the mean product.
         correction *= np.minimum(1.0, 10.0 * point.mean / np.maximum(np.abs(correction).sum(axis=0), 1e-300))
         products = -present - correction
         products[0] += 2.0 * centring * point.mean

@@ -1,6 +1,6 @@
 """The algebra of round cones |a| ≤ a₀, for interior methods: (d, n) arrays, one column for each contact point.
 
-In the plane a cone of two numbers is its two rays; nothing else tells plane and space apart. Scaling of Nesterov & Todd
+In the plane a cone of two numbers is its two rays. Scaling of Nesterov & Todd
 (1997), https://doi.org/10.1287/moor.22.1.1, for what Andersen, Roos & Terlaky (2003),
 https://doi.org/10.1007/s10107-002-0349-3, call the quadratic cone.
 """
@@ -31,7 +31,7 @@ def determinant(a: np.ndarray) -> np.ndarray:
 
 
 def longest_step(a: np.ndarray, change: np.ndarray) -> float:
-    """Largest part of a change that stays inside the cones, infinite where nothing stops it."""
+    """Largest part of a change that stays inside the cones, infinite where none leaves them."""
     square = change[0] ** 2 - (change[1:] ** 2).sum(axis=0)
     half_slope = a[0] * change[0] - (a[1:] * change[1:]).sum(axis=0)
     constant = determinant(a)

@@ -48,6 +48,7 @@ class _Iterate:
         self.size = max(problem.size, 1e-5)
         mean = 0.03 * self.size
         before, bound = problem.forces[:, 0], problem.bound[self.rough]
+        # The start lies well inside the cones.
         normal = np.maximum(before, 0.3)
         self.opening = np.maximum(problem.gap + self.relative[:, 0], mean / normal)
         self.normal = np.where(before > 0.0, normal, np.minimum(normal, mean / self.opening))
@@ -167,6 +168,7 @@ def interior_point(problem: ContactProblem, multiplier: float = 0.0) -> StepSolu
         change = point.direction(-normal_products, -slide_products)
         part = point.longest(change)
         centring = min(max((point.mean_after(change, part) / point.mean) ** 3, 1e-4), 0.5)
+        # Corrections of second order are bounded by the mean product.
         limit = 30.0 * point.mean
         second = np.clip(change.normal * change.opening, -limit, limit)
         third = product(point.scaling.scaled(change.shear), point.scaling.unscaled(change.slide))

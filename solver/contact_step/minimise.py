@@ -48,7 +48,7 @@ def minimise(problem: ContactProblem, trial: np.ndarray | None = None, multiplie
 def newton(problem: ContactProblem, trial: np.ndarray, multiplier: float) -> tuple[StepSolution | None, int]:
     """Full semismooth Newton steps from trial forces: the solution, None where they do not converge, and iterations."""
     motion = np.zeros_like(problem.load)
-    # The first linear problem is that of the given trial forces, from nothing moved.
+    # The first linear problem is that of the given trial forces, at the start.
     stiffness, start = problem.stiffness(trial), problem.trial(motion)
     forces = problem.projected(trial) + np.einsum("nij,nj->ni", stiffness, (start - trial) * problem.compliance)
     unbalanced = problem.unbalanced(motion, forces, multiplier)

@@ -9,8 +9,8 @@ Over the movement v of the free blocks at a linearised geometry, with the moveme
     T = P min(1, B / |P|)                   shear force within the friction bound B, H Huber's function of |P|
 
 D is the viscosity, V the velocity of the steps before (both are in ``load`` and ``viscosity``), c_n and c_t the
-compliance of the contact point, N⁰ and T⁰ the forces before, so that the give is taken back by the next program. In a
-step B is given, so that the function is strictly convex and its minimum, forces and movement, unique. The same form
+compliance of the contact point, N⁰ and T⁰ the forces before, so that the next program takes the elastic deformation
+back. In a step B is given, so that the function is strictly convex and its minimum, forces and movement, unique. The same form
 with a bound that lags by a step: Castro et al., https://arxiv.org/abs/2312.03908, and Li et al. (2020),
 https://doi.org/10.1145/3386569.3392425.
 """
@@ -57,7 +57,7 @@ class ContactProblem:
     control : (n_dof,) array, optional
         Weights of the movements that make up the control displacement: one more equation.
     control_target : float
-        Control displacement still to come.
+        Change of the control displacement.
     """
 
     rows: ContactRows
@@ -75,7 +75,7 @@ class ContactProblem:
     control_target: float = 0.0
 
     def trial(self, motion: np.ndarray) -> np.ndarray:
-        """(n, d) array: forces of the springs after a movement, whatever contact and friction allow."""
+        """(n, d) array: forces of the springs after a movement, without limits of contact and friction."""
         distance = np.column_stack([self.gap, self.slip]) + self.rows.relative(motion)
         return np.asarray(self.forces - distance / self.compliance)
 
@@ -118,7 +118,7 @@ class StepSolution:
         Movement of the free blocks.
     forces : (n, d) array
     trial : (n, d) array
-        Forces of the springs before contact and friction cut them: where the next program starts.
+        Trial forces, from which the next program starts.
     multiplier : float
         Of the live load.
     factorisations : int

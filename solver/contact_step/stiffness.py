@@ -28,7 +28,7 @@ class Band:
 
     Notes
     -----
-    Blocks in the order of reverse Cuthill-McKee; the band is stored as LAPACK's ``pbtrf`` wants it, lower, by columns.
+    Blocks in the order of reverse Cuthill-McKee; the band is stored as in LAPACK's ``pbtrf``, lower, by columns.
     """
 
     def __init__(self, pairs: np.ndarray, n_blocks: int, dof: int) -> None:

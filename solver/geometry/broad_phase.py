@@ -1,4 +1,4 @@
-"""Broad phase: which boxes come near each other, without looking at every pair."""
+"""Broad phase: pairs of near boxes by sort and sweep."""
 
 from __future__ import annotations
 

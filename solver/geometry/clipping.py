@@ -26,9 +26,9 @@ class ClippedCorners:
         The pair of faces.
     features : (n, 4) int array
     areas : (n,) array [m²]
-        The part of its polygon that each corner stands for.
+        Tributary area of each corner in its polygon.
     widths : (n,) array [m]
-        How wide the polygon is; infinite where a corner stands in a re-entrant corner, whatever it covers of its walls.
+        Width of the polygon; infinite at a corner in a re-entrant corner.
     """
 
     owner: np.ndarray
@@ -213,7 +213,7 @@ def _on_face(
 
 
 def corner_areas(owner: np.ndarray, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Part of its convex polygon that each corner stands for, (n,) [m²], and width and length of all, (count,) [m].
+    """Tributary area of each corner in its convex polygon, (n,) [m²], and widths and lengths of these, (count,) [m].
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ class Contacts:
     ----------
     features : (n, 4) int array
         Kind of contact, feature of ``block_a``, feature of ``block_b``, and what else the geometry needs to measure it
-        again. The first three name the contact point; what they mean only the geometry knows.
+        again. The first three name the contact point; their meaning is that of the geometry.
     block_a, block_b : (n,) int arrays
     points : (n, d) array [m]
     frames : (n, d, d) array
@@ -30,7 +30,7 @@ class Contacts:
     slip : (n, d - 1) array [m]
         Position of the feature of ``block_a`` along the tangents, from a place that is fixed on ``block_b``.
     areas : (n,) array [m²]
-        Part of the face that each contact point stands for; zero for a corner alone.
+        Tributary area of each contact point; zero for a corner alone.
     """
 
     features: np.ndarray

@@ -70,6 +70,7 @@ class FacingParts:
     @property
     def face_each_other(self) -> np.ndarray:
         """(n,) bool array: whether the two faces do."""
+        # Flanks of steep tips hardly do.
         return self.cosine <= -0.05
 
     def other_faces(

@@ -83,7 +83,7 @@ class Outlines:
 
     @cached_property
     def convex_vertex(self) -> np.ndarray:
-        """(n_vertices,) bool array: false at re-entrant corners, which touch nothing first."""
+        """(n_vertices,) bool array: false at re-entrant corners, which have no contact points of their own."""
         to_next = self.vertices[self.next_vertex] - self.vertices
         from_previous = self.vertices - self.vertices[self.previous_vertex]
         cross = from_previous[:, 0] * to_next[:, 1] - from_previous[:, 1] * to_next[:, 0]

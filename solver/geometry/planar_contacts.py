@@ -1,4 +1,4 @@
-"""Contact points in the plane: which corners face which edges, with their frames and gaps."""
+"""Contact points in the plane: corners that face edges, with their frames and gaps."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def measured_points(shapes: Outlines, vertices: np.ndarray, features: np.ndarray
 def _areas(
     shapes: Outlines, block_a: np.ndarray, block_b: np.ndarray, points: np.ndarray, frames: np.ndarray
 ) -> np.ndarray:
-    """(n,) array [m²]: what each contact point stands for of the face between two blocks, ends and middles.
+    """(n,) array [m²]: tributary area of each contact point of the faces between blocks.
 
     Half the distance to the neighbours along the face times the smaller thickness. Open contact points count too: a
     face has its whole length however it has turned.
@@ -177,7 +177,7 @@ def _vertex_edge_candidates(
 
     owner, position = expand_ranges(counts[b])
     edge, vertex = offsets[b][owner] + position, vertex[owner]
-    # Most pairs are far from each other: the distance comes first, and nothing else is worked out for them.
+    # The distance comes first, as most pairs are far from each other.
     length, width = shapes.edge_lengths, shapes.widths
     tangents = (vertices[following] - vertices) / length[:, None]
     normals = np.stack([tangents[:, 1], -tangents[:, 0]], axis=1)
@@ -235,7 +235,7 @@ def _inward(to_next: np.ndarray, to_previous: np.ndarray) -> np.ndarray:
 def _classified_ends(
     shapes: Outlines, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Drop corners past the end of their edge, and mark those that stand on the corner there."""
+    """Drop corners past the end of their edge, and find those on the corner there."""
     following = shapes.next_vertex
     start, stop = edge, following[edge]
     tangent = _unit(vertices[stop] - vertices[start])

@@ -1,4 +1,4 @@
-"""Shapes: what the mechanics ask of the blocks' geometry, in the plane or in space."""
+"""Shapes: geometry of the blocks, in the plane or in space."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from .contacts import Contacts
 
 
 class Shapes(Protocol):
-    """The shapes of all blocks: how large they are, and where they touch.
+    """The shapes of all blocks: their sizes, and their contact points.
 
-    The mechanics know the number of dimensions d from the shape of the arrays. They never look into
-    ``Contacts.features``, which say which corners, edges and faces meet: only the geometry that found them does.
+    The number of dimensions d follows from the shape of the arrays. ``Contacts.features``, the corners, edges and faces
+    that meet, have a meaning for the shapes that found them only.
     """
 
     @property

@@ -45,8 +45,8 @@ def measured_points(
     Notes
     -----
     A corner inside a face has the normal of the face. On the boundary of a face its normal is half-way between that of
-    the face and that of the edges that cross there, so that a corner that comes in from outside turns by the same
-    angle twice and not at once. A corner on a corner, and edges that are nearly parallel, have the normal half-way
+    the face and that of the edges that cross there, so that the normal of a corner that enters the face changes in two
+    equal steps. A corner on a corner, and edges that are nearly parallel, have the normal half-way
     between the two faces. An edge across an edge has the normal to both.
 
     The gap is the distance along the normal of two material points. Tangents ride on the face of ``block_b``: swung
@@ -122,7 +122,7 @@ def find_points(
     Parameters
     ----------
     parts : ConvexParts
-        Those of one block do not touch each other, and faces inside it touch nothing.
+        Those of one block and the faces inside it have no contact points.
     vertices : (n_vertices, 3) array [m]
         Current corners of all parts.
     reach : float [m]
@@ -183,6 +183,7 @@ def find_points(
         strip = corners.widths < 0.5 * np.minimum(solids.face_widths[face_i], solids.face_widths[face_j])[corners.owner]
         np.maximum.at(largest, joint[pair], np.bincount(corners.owner, corners.areas, minlength=len(pair)))
         sliver = _slivers(parts, face_i, face_j, corners, largest[joint[pair]])
+        # What overlaps on a strip at a large gap slides past before it would touch.
         slides_past = strip & (lowest[corners.owner] > STEEPEST_LANDING * corners.widths)
         # Edges that cross behind a plane that separates their parts do not touch.
         owner = pair[corners.owner]
@@ -278,6 +279,7 @@ def _crossed_edges(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Edges that separate two parts better than any of their faces: one point for a pair."""
     apart, own, other = edge_separations(solids, faces, vertices, pairs.i, pairs.j)
+    # By more than rounding, in widths.
     k = np.flatnonzero((apart > pairs.apart + 1e-4 * pairs.width) & (apart <= reach))
     own, other = own[k], other[k]
     a, b = vertices[solids.corners[own]], vertices[solids.corners[other]]

@@ -1,4 +1,4 @@
-"""Overlaps in space: which blocks share volume, and how deep."""
+"""Overlaps in space: pairs of blocks and their depths."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def overlap_depths_in_space(
     i, j : (n_pairs,) int arrays
         Blocks, the lower number first.
     depth : (n_pairs,) array [m]
-        How far the deepest two parts of them have to be moved to come out of each other.
+        Smallest movement that separates their deepest two parts.
 
     Notes
     -----

@@ -30,7 +30,7 @@ class Controls:
     step_tolerance : float
         Relative error of the reaction that the steps of the path are chosen for.
     local_loss : float
-        Share of the weight up to which blocks that leave for good are let go, and the path goes on without them.
+        Share of the weight of fallen blocks up to which the path goes on without them.
     compliance_factor : float
         Times the compliance of the joints across and along, of the path of Coulomb friction.
     imperfection_factor : float

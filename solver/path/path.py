@@ -397,6 +397,7 @@ class Path:
         if self.model.live is not None:
             return None
         weights = self.model.assembly.masses * self.model.assembly.free * GRAVITY
+        # The others may have begun to move.
         leaving = self.fall.movements(state.place, end) > 0.1
         fell_at = np.where(leaving, state.place.s, state.fell_at if len(state.fell_at) else np.nan)
         if not leaving.any() or weights[~np.isnan(fell_at)].sum() > self.local_loss * weights.sum():

@@ -148,6 +148,7 @@ class Stepper:
         joint_area = np.bincount(joint, contacts.areas, len(pairs))[joint]
         share = np.divide(contacts.areas, joint_area, out=np.full(n, 0.5), where=joint_area > 0.0)
         of_joint = factor * np.array([COMPLIANCE] + [SHEAR_COMPLIANCE] * (d - 1))
+        # Points of tiny tributary areas keep a finite compliance.
         return of_joint / np.clip(share, 0.05, 1.0)[:, None]
 
     def transferred(self, place: Place, contacts: Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -228,6 +229,7 @@ class Stepper:
         """
         model, assembly, driver, free = self.model, self.model.assembly, self.driver, self.free
         scales, n_dof = model.lengths, len(model.lengths)
+        # A step in time is solved to a small part of such a movement.
         s, size = (place.s, 1e-3) if in_time else (place.s + length, length / self.unit)
         supports = driver.supports(s)
         start = self.contacts(place.pose) if candidates is None else candidates
@@ -272,6 +274,7 @@ class Stepper:
             pose = self._with_supports(moved(place.pose, full), supports)
             predicted = problem.gap + rows.relative(solution.motion)[:, 0]
             contacts = measure_contacts(assembly, moved_vertices(assembly, pose), start)
+            # In block weights.
             gap, carries = contacts.gaps / model.length, forces[:, 0] > 1e-3
             slides = (np.linalg.norm(forces[:, 1:], axis=1) >= SLIDES * bound)[carries].any()
             exact = EXACT_SLIDING if slides else EXACT

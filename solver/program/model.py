@@ -1,4 +1,4 @@
-"""The model: what stays the same over all increments, the units of the programs, and what they share."""
+"""The model: blocks, joints and loads of all increments, in the units of the programs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from solver.kinematics import dimension_of, unit_lengths
 
 @dataclass(frozen=True)
 class Model:
-    """What stays the same over all increments.
+    """Blocks, joints and loads, which are the same in all increments.
 
     Attributes
     ----------
@@ -25,12 +25,11 @@ class Model:
     force : float [N]
         Block size and mean load of a free block: the program is written in these units.
     reach : float [m]
-        Largest gap of a contact point that is kept.
+        Largest gap of a contact point.
     live : (n_blocks, n_dof) array [N, N·m], optional
-        Where given, loads whose multiplier is an unknown of every program: it takes the value that lets the program
-        do its work.
+        Loads whose multiplier is an unknown of every program.
     fallen : (n_blocks,) bool array, optional
-        Blocks that are out of the structure: nothing loads or touches them.
+        Blocks that have left the structure, without loads and contact points.
     compliance, imperfection : float
         Times those of :mod:`solver.tolerances`.
     """
@@ -62,7 +61,7 @@ class Model:
 
     @property
     def lengths(self) -> np.ndarray:
-        """(n_dof,) array: divide movements by it, multiply moments' rows by it, to get to the units of the program."""
+        """(n_dof,) array [m or 1]: units of movements in the program."""
         return np.where(np.arange(self.n_dof) < self.dimension, self.length, 1.0)
 
     @property
@@ -72,7 +71,7 @@ class Model:
 
     @property
     def scaled_live(self) -> tuple[np.ndarray, float]:
-        """(n_blocks, n_dof) array: live load on the free blocks, its largest component 1; what it was divided by."""
+        """(n_blocks, n_dof) array: live load on the free blocks, its largest component 1; and that component."""
         free = self.assembly.free
         live = np.zeros((len(free), self.n_dof))
         if self.live is not None:

@@ -1,4 +1,4 @@
-"""Strength of the contact points of joints that are not dry: the area each stands for, cohesion, crushing."""
+"""Strength of the contact points of joints with cohesion or crushing, by their tributary areas."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def point_strength(
     interfaces : Interfaces
     contacts : Contacts
     around : Contacts
-        At the same geometry, with those that are open, to measure the faces by.
+        At the same geometry, with the open ones, which measure the faces.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Faces that turn in their own plane: torsion under a uniform pressure, in place of friction at their corners."""
+"""Torsion of faces under a uniform pressure, in place of friction at their corners."""
 
 from __future__ import annotations
 
@@ -15,14 +15,13 @@ from solver.kinematics import Pose
 #: Laws of torsion of the faces between blocks in space.
 POINTS, UNIFORM = TORSIONS = ("points", "uniform")
 
-#: Contact points of two blocks are of one face where their normals differ by less than this, and where they lie in one
-#: plane to this part of the block size.
+#: Difference of normals, and distance in block sizes, up to which contact points of two blocks are of one face.
 ONE_FACE = 1e-4
 
 
 @dataclass(frozen=True)
 class Faces:
-    """The faces that contact points in space belong to.
+    """The faces of contact points in space.
 
     Attributes
     ----------
@@ -31,7 +30,7 @@ class Faces:
         Centroids of the polygons that their points span.
     radii : (n_faces,) array [m]
         Mean distance of a polygon's points from its centroid: torsional strength over friction and normal force; of
-        two points a quarter of their distance, of one nothing.
+        two points a quarter of their distance, of one zero.
     """
 
     face: np.ndarray
@@ -120,7 +119,7 @@ def point_forces(contacts: Contacts, faces: Faces, forces: np.ndarray) -> np.nda
     shear = np.einsum("fi,fix->fx", totals[:, 1:3], frames[:, 1:])
     middle = np.stack([np.bincount(face, part) / count for part in contacts.points.T], axis=1)
     arms = contacts.points - middle[face]
-    # Shared by the points alike, which moves it from the centre of the face to the middle of its points.
+    # Equal shares move it from the centre of the face to the middle of its points.
     moved = np.einsum("fx,fx->f", np.cross(middle - faces.centres, shear), frames[:, 0])
     spread = np.bincount(face, (arms**2).sum(axis=1))
     torsion = np.divide(totals[:, 3] * faces.radii - moved, spread, out=np.zeros(len(count)), where=spread > 0.0)
@@ -141,11 +140,11 @@ def _faces(contacts: Contacts, length: float) -> np.ndarray:
         i, j = np.triu_indices(points, 1)
         one, other = members[:, i].ravel(), members[:, j].ravel()
         normal = contacts.frames[one, 0]
-        apart = np.abs(((contacts.points[one] - contacts.points[other]) * normal).sum(axis=1))
+        distance = np.abs(((contacts.points[one] - contacts.points[other]) * normal).sum(axis=1))
         # Either block may be the first of a contact point.
         sign = np.where(contacts.block_a[one] == contacts.block_a[other], 1.0, -1.0)
-        lean = np.linalg.norm(normal - sign[:, None] * contacts.frames[other, 0], axis=1)
-        alike = (apart <= ONE_FACE * length) & (lean <= ONE_FACE)
+        normal_difference = np.linalg.norm(normal - sign[:, None] * contacts.frames[other, 0], axis=1)
+        alike = (distance <= ONE_FACE * length) & (normal_difference <= ONE_FACE)
         links.append(np.stack([one[alike], other[alike]]))
     pairs = np.concatenate(links, axis=1)
     graph = sp.coo_array((np.ones(pairs.shape[1]), (pairs[0], pairs[1])), shape=(n, n))
@@ -158,8 +157,8 @@ def _measured(points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.nd
     if points.shape[1] < 3:
         return middle, np.linalg.norm(points[:, 0] - points[:, -1], axis=1) / 4.0
     flat = np.einsum("nkx,nix->nki", points - middle[:, None], frames[:, 1:])
-    turn = np.argsort(np.arctan2(flat[..., 1], flat[..., 0]), axis=1)
-    flat = np.take_along_axis(flat, turn[..., None], axis=1)
+    angular_order = np.argsort(np.arctan2(flat[..., 1], flat[..., 0]), axis=1)
+    flat = np.take_along_axis(flat, angular_order[..., None], axis=1)
     centre, area = _centroid(flat)
     flat = flat - centre[:, None]
     start, end = flat, np.roll(flat, -1, axis=1)

@@ -10,13 +10,13 @@ import scipy.sparse as sp
 from solver.programs.problem import Solution
 from solver.programs.solve import solve_between
 
-#: Cost of unbalanced force, in multipliers: far above that of any real mechanism.
+#: Cost of unbalanced force, in multipliers, above that of any mechanism.
 UNBALANCED_COST = 1e3
 
 
 @dataclass(frozen=True)
 class FlowSolution:
-    """What the program found, in its units.
+    """Solution of the program, in its units.
 
     Attributes
     ----------
@@ -51,13 +51,13 @@ def solve_without_dilatancy(
     matrix : (m, d n) sparse array
         Forces and moments on the free blocks from the d forces of each of n contact points.
     dead, live, tolerance : (m,) arrays
-        Loads, and what may stay out of balance, in the plane.
+        Loads, and largest unbalanced force, in the plane.
     bound, crushing, normal_cost : (n,) arrays
-        B and largest normal force of each contact point, and what a unit of normal force costs, in multipliers.
+        B and largest normal force of each contact point, and cost of a unit of normal force, in multipliers.
     normal : (n,) array
         N⁰.
     change_cost : (n,) array
-        Of a change of each normal force, in multipliers.
+        Cost of a change of each normal force, in multipliers.
 
     Notes
     -----

@@ -1,1 +1,1 @@
-"""Mathematical programs, linear ones and those with round friction cones: stated, solved, checked. Knows no masonry."""
+"""Mathematical programs, linear ones and those with round friction cones: stated, solved, checked."""

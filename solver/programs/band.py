@@ -184,7 +184,7 @@ class _Method:
         try:
             self.band.factorise(np.concatenate([weight, np.full(self.matrix.shape[0], 1e-16)]))
         except NoProgress:
-            # Blocks that take no part in the ray have nothing else on their diagonal.
+            # The diagonal of blocks that take no part in the ray is too small.
             return
         for _ in range(3):
             ray = np.maximum(ray - weight * (self.transposed @ self.band.solve(self.matrix @ ray)), 0.0)

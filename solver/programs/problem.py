@@ -16,7 +16,7 @@ class SolveError(RuntimeError):
 
 
 class Unbounded(Exception):
-    """The objective falls without limit, and a ray that we have checked proves it.
+    """The program has no minimum, as a checked ray proves.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class LinearProgram:
         )
 
     def raise_if_unbounded(self, ray: np.ndarray) -> None:
-        """Raise ``Unbounded`` where the ray, (n,), proves it by our own check, whatever its solver says."""
+        """Raise ``Unbounded`` where the ray, (n,), passes our own check."""
         x = np.maximum(ray, 0.0)
         size = float(np.abs(x).max(initial=0.0))
         if size == 0.0:
@@ -167,7 +167,7 @@ class ConicProgram:
         )
 
     def raise_if_unbounded(self, ray: np.ndarray) -> None:
-        """Raise ``Unbounded`` where the ray, (n,), proves it by our own check, whatever its solver says."""
+        """Raise ``Unbounded`` where the ray, (n,), passes our own check."""
         size = float(np.abs(ray).max(initial=0.0))
         if not (np.isfinite(size) and size > 0.0):
             return
@@ -175,7 +175,7 @@ class ConicProgram:
         residual, outside = np.abs(self.matrix @ x), self.outside(x)
         if max(float(residual.max(initial=0.0)), outside) > RAY_BALANCE:
             return
-        # It has to gain far more than what it is off by could cost.
+        # Its gain has to exceed the cost of its violation by far.
         violation = float(residual.sum()) + outside * len(self.friction)
         if self.cost @ x < -RAY_BALANCE - 10.0 * violation * float(np.abs(self.cost).max(initial=0.0)):
             raise Unbounded(x)
@@ -183,7 +183,7 @@ class ConicProgram:
 
 @dataclass(frozen=True)
 class Solution:
-    """A solution of a program together with the measures by which it proves itself.
+    """A solution of a program with the measures of its error.
 
     Attributes
     ----------
@@ -221,5 +221,5 @@ class Solution:
 
     @property
     def accepted(self) -> bool:
-        """Whether the solution passes our own check, whatever its solver says about it."""
+        """Whether the solution passes our own check."""
         return self.violation <= ACCEPTED_VIOLATION and self.gap <= ACCEPTED_GAP

@@ -1,4 +1,4 @@
-"""Increment: one equilibrium on the path or one frame of the fall, and what its contact points do."""
+"""Increment: one equilibrium of the path or one frame of the fall, and the states of its contact points."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Status(StrEnum):
 
 
 class ContactState(IntEnum):
-    """What a contact point does in an increment."""
+    """State of a contact point in an increment."""
 
     OPEN = 0
     STICKING = 1
@@ -51,12 +51,12 @@ def carries(forces: np.ndarray, fraction: float = SMALLEST_FORCE) -> np.ndarray:
 
 
 def used_up(forces: np.ndarray, friction: np.ndarray) -> np.ndarray:
-    """(n,) bool array: where the shear force is all that friction allows, from (n, d) forces and (n,) coefficients."""
+    """(n,) bool array: where the shear force reaches its friction bound, from (n, d) forces and (n,) coefficients."""
     return np.linalg.norm(forces[:, 1:], axis=1) >= friction * forces[:, 0] * (1.0 - USED_UP)
 
 
 def slides(slip: np.ndarray, opening: np.ndarray, friction: np.ndarray, slow: float) -> np.ndarray:
-    """(n,) bool array: which points move along their joint, and do not merely come apart.
+    """(n,) bool array: which points slide along their joint, and do not only open.
 
     Parameters
     ----------
@@ -72,13 +72,13 @@ def slides(slip: np.ndarray, opening: np.ndarray, friction: np.ndarray, slow: fl
 
 
 def at_rest(velocity: np.ndarray, slow: float) -> np.ndarray:
-    """Which velocities are none beside a slow one, in the same unit."""
+    """Which velocities are at most a slow one, in the same unit."""
     return np.abs(velocity) <= slow
 
 
 @dataclass(frozen=True)
 class State:
-    """The arrays of an increment: where its blocks are, what their joints carry, and how they move next.
+    """The arrays of an increment: pose, contact points, their forces, and the motion that follows.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class State:
     support_forces : (n_blocks, 3) array [N, N, N·m]
         Resultant of the structure on each support about its centroid; zero for free blocks.
     fell_at : (n_blocks,) array
-        Parameter at which blocks that have left for good were let go, nan for those that stand; empty where all stand.
+        Parameter at which blocks have fallen, nan for the others; empty where none have.
     """
 
     pose: Pose
@@ -110,7 +110,7 @@ class State:
 
 
 class StoredState(Protocol):
-    """A state that is kept elsewhere, in a file, and read whenever it is asked for."""
+    """A state that is stored in a file, and read on demand."""
 
     def read(self) -> State:
         """Read the state."""
@@ -118,7 +118,7 @@ class StoredState(Protocol):
 
 @dataclass(frozen=True)
 class Increment:
-    """One equilibrium on the path, or one frame of the fall after it: a few numbers, and a state.
+    """One equilibrium of the path, or one frame of the fall after it: numbers, and a state.
 
     Attributes
     ----------
@@ -144,13 +144,12 @@ class Increment:
     held : State or StoredState
         The arrays, in memory or in a file; :attr:`state` has them in any case.
     least, largest : float
-        Bounds of what is measured over all forces in equilibrium within friction at this pose; infinite where friction
-        sets none, nan where they were not worked out.
+        Bounds of the measured value over all forces in equilibrium within friction at this pose; infinite where there
+        is none, nan where they were not computed.
     notes : tuple of str
-        Events on the way to it that forces and poses do not show: blocks that fell and were caught.
+        Events since the increment before: jumps, and blocks that have fallen.
     checkpoint : optional
-        Where the loop that yields the increment goes on after it, a :class:`PathState`. A :class:`Response` keeps
-        none.
+        The :class:`PathState` from which the loop goes on; none in a :class:`Response`.
     """
 
     parameter: float
@@ -169,7 +168,7 @@ class Increment:
     checkpoint: Any = field(default=None, repr=False, compare=False)
 
     def __repr__(self) -> str:
-        """One line; the arrays of a wall fill screens."""
+        """One line, without arrays."""
         return (
             f"<Increment {self.status} at {self.parameter:g}, reaction {self.reaction:.6g}, "
             f"load multiplier {self.load_multiplier:.6g}>"
@@ -177,7 +176,7 @@ class Increment:
 
     @property
     def state(self) -> State:
-        """The arrays, read from their file where they are kept in one."""
+        """The arrays, read from their file where they are stored."""
         return self.held if isinstance(self.held, State) else self.held.read()
 
     def with_arrays(self, **arrays: Any) -> Increment:
@@ -192,7 +191,7 @@ class Increment:
 
     @property
     def settlement(self) -> float:
-        """The parameter, by the name it has in most analyses."""
+        """The parameter of most analyses."""
         return self.parameter
 
     @property
@@ -232,7 +231,7 @@ class Increment:
 
     @property
     def fallen(self) -> np.ndarray:
-        """(n_blocks,) bool array: blocks that have left for good, and are out of the structure."""
+        """(n_blocks,) bool array: blocks that have fallen, and are out of the structure."""
         # Read once: the arrays may be in a file.
         state = self.state
         return ~np.isnan(state.fell_at) if len(state.fell_at) else np.zeros(len(state.pose.positions), dtype=bool)

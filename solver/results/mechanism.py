@@ -1,4 +1,4 @@
-"""Mechanism: which blocks move together, and what happens at the joints between them."""
+"""Mechanism: macro-blocks, and the hinges and sliding joints between them."""
 
 from __future__ import annotations
 
@@ -13,21 +13,20 @@ from solver.tolerances import CLOSED, NOTICEABLE, TOGETHER
 
 from .increment import Increment, at_rest, carries, slides
 
-#: Joints that are named one by one in words; the others are counted.
+#: Joints that are named in words; the others are counted.
 NAMED = 8
 
 
 @dataclass(frozen=True)
 class Mechanism:
-    """How a structure moves in the motion that follows an increment.
+    """The mechanism in the motion that follows an increment.
 
-    Words, pictures, curves, tables and the report all count these hinges and sliding joints: joints, that is pairs of
-    blocks, not contact points, and only those that move noticeably beside the fastest block.
+    Hinges and sliding joints are pairs of blocks, not contact points, that move noticeably beside the fastest block.
 
     Attributes
     ----------
     parts : (n_blocks,) int array
-        Macro-block of each block, largest first; -1 for blocks that stand still.
+        Macro-block of each block, largest first; -1 for blocks at rest.
     motions : (n_parts, n_dof) array
         Velocity of the centroid of each macro-block and its angular velocity, in the scale of the increment.
     hinges, sliding : (n, 2) int arrays
@@ -65,7 +64,7 @@ class Mechanism:
 def rigid_parts(assembly: Assembly, increment: Increment) -> np.ndarray:
     """(n_blocks,) int array: the part each block moves with in the motion that follows an increment.
 
-    Part -1 stands still. The others are numbered from 0, the largest volume first.
+    Part -1 is at rest. The others are numbered from 0, the largest volume first.
     """
     contacts, n = increment.contacts, assembly.n_blocks
     d = contacts.points.shape[1]

@@ -1,4 +1,4 @@
-"""Quantities: what the increments of an analysis run over and what is measured along them."""
+"""Quantities: parameters and measured values of analyses."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Quantity:
     unit : str
         Of its numbers; empty for a number without unit.
     is_path : bool
-        Of a parameter: whether its increments follow one another. Otherwise each stands by itself, and the one with
+        Of a parameter: whether its increments follow one another. Otherwise they are independent, and the one with
         the smallest measured value governs.
     """
 
