@@ -10,8 +10,8 @@ Over the movement v of the free blocks at a linearised geometry, with the moveme
 
 D is the viscosity, V the velocity of the steps before (both are in ``load`` and ``viscosity``), c_n and c_t the
 compliance of the contact point, N⁰ and T⁰ the forces before, so that the next program takes the elastic deformation
-back. In a step B is given, so that the function is strictly convex and its minimum, forces and movement, unique. The same form
-with a bound that lags by a step: Castro et al., https://arxiv.org/abs/2312.03908, and Li et al. (2020),
+back. In a step B is given, so that the function is strictly convex and its minimum, forces and movement, unique. The
+same form with a bound that lags by a step: Castro et al., https://arxiv.org/abs/2312.03908, and Li et al. (2020),
 https://doi.org/10.1145/3386569.3392425.
 """
 
