@@ -62,17 +62,17 @@ def surface_pressure(
     size = float(np.hypot(*np.asarray(direction, dtype=float)))
     if size == 0.0:
         raise ValueError("pressure direction is [0, 0]; give the direction in which it pushes")
-    pushed = np.asarray(direction, dtype=float) / size
-    across = np.array([-pushed[1], pushed[0]])
+    push = np.asarray(direction, dtype=float) / size
+    across = np.array([-push[1], push[0]])
     chosen = np.zeros(assembly.n_blocks, dtype=bool)
     chosen[assembly.free if blocks is None else blocks] = True
-    strips, depth, block = _first_met(assembly, pushed, across)
-    middle = (strips[:-1] + strips[1:]) / 2.0
-    met = np.isfinite(depth)
-    met[met] = chosen[block[met]]
-    points = middle[met, None] * across + depth[met, None] * pushed
-    owner = block[met]
-    forces = (pressure * np.diff(strips)[met] * assembly.thickness[owner])[:, None] * pushed
+    strips, depth, block = _first_met(assembly, push, across)
+    centre = (strips[:-1] + strips[1:]) / 2.0
+    loaded = np.isfinite(depth)
+    loaded[loaded] = chosen[block[loaded]]
+    points = centre[loaded, None] * across + depth[loaded, None] * push
+    owner = block[loaded]
+    forces = (pressure * np.diff(strips)[loaded] * assembly.thickness[owner])[:, None] * push
     arms = points - assembly.centroids[owner]
     load = np.zeros((assembly.n_blocks, 3))
     np.add.at(load, owner, np.column_stack([forces, arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]]))
@@ -117,7 +117,7 @@ def load_on_top(assembly: Assembly, x: float, force: Sequence[float] = (0.0, -1.
     return point_load(assembly, owner, force, point=(x, top))
 
 
-def _first_met(assembly: Assembly, pushed: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _first_met(assembly: Assembly, push: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Divide the structure into strips along a direction, between all corners, and find what each meets first.
 
     Returns
@@ -134,14 +134,14 @@ def _first_met(assembly: Assembly, pushed: np.ndarray, across: np.ndarray) -> tu
     strips = np.unique(np.concatenate([a, b]))
     # Narrower ones are rounding of the drawing.
     strips = strips[np.append(True, np.diff(strips) > 1e-12 * (strips[-1] - strips[0]))]
-    middle = (strips[:-1] + strips[1:]) / 2.0
+    centre = (strips[:-1] + strips[1:]) / 2.0
     low, high = np.minimum(a, b), np.maximum(a, b)
-    depth, block = np.full(len(middle), np.inf), np.full(len(middle), -1)
-    first, last = np.searchsorted(middle, low), np.searchsorted(middle, high)
+    depth, block = np.full(len(centre), np.inf), np.full(len(centre), -1)
+    first, last = np.searchsorted(centre, low), np.searchsorted(centre, high)
     for edge in np.flatnonzero(last > first).tolist():
         under = slice(int(first[edge]), int(last[edge]))
-        part = (middle[under] - a[edge]) / (b[edge] - a[edge])
-        at = start[edge] @ pushed + part * float((stop[edge] - start[edge]) @ pushed)
+        part = (centre[under] - a[edge]) / (b[edge] - a[edge])
+        at = start[edge] @ push + part * float((stop[edge] - start[edge]) @ push)
         nearer = at < depth[under]
         depth[under] = np.where(nearer, at, depth[under])
         block[under] = np.where(nearer, assembly.block_of_vertex[edge], block[under])

@@ -47,10 +47,10 @@ class EquilibriumChecks:
         gap : float
             Of contact points that may carry, in block sizes.
         """
-        contacts, friction = self._contacts_at(place)
         if self.model.live is not None:
-            bounds = self._bounds(place, contacts, friction, gap)
+            bounds = self.bounds(place, gap)
             return bounds.in_equilibrium and bounds.high > 0.0
+        contacts, friction = self._contacts_at(place)
         self.stepper.programs += 1
         return in_equilibrium(self.model, place.pose, contacts, friction, gap)
 
@@ -101,14 +101,14 @@ class EquilibriumChecks:
             Of the path; not used under a live load.
         """
         contacts, friction = self._contacts_at(place)
-        bounds = self._bounds(place, contacts, friction, gap)
-        wanted = place.multiplier if self.model.live is not None else reaction
+        bounds = self.bounds(place, gap)
+        target = place.multiplier if self.model.live is not None else reaction
         if not bounds.in_equilibrium:
             # The forces of the program that comes nearest to equilibrium.
             nearest = bounds.high if self.model.live is not None else self.reaction(place, contacts, bounds.forces)
             return EquilibriumCheck(place, contacts, friction, bounds.forces, nearest, bounds)
-        low, high = (value if np.isfinite(value) else wanted for value in (bounds.low, bounds.high))
-        measured = float(np.clip(wanted, low, max(low, high)))
+        low, high = (value if np.isfinite(value) else target for value in (bounds.low, bounds.high))
+        measured = float(np.clip(target, low, max(low, high)))
         determined = high - low <= 1e-6 * max(abs(low), abs(high))
         try:
             forces = self._forces_with(place, measured, determined, gap)
@@ -149,11 +149,8 @@ class EquilibriumChecks:
 
     def bounds(self, place: Place, gap: float = COMPUTED_GAP) -> EquilibriumBounds:
         """Bounds of the reaction or multiplier in equilibrium at a place."""
-        return self._bounds(place, *self._contacts_at(place), gap)
-
-    def _bounds(self, place: Place, contacts: Contacts, friction: np.ndarray, gap: float) -> EquilibriumBounds:
         rate = None if self.model.live is not None else self.driver.rate(place.s)
-        bounds = admissible(self.model, place.pose, contacts, friction, rate, gap=gap)
+        bounds = admissible(self.model, place.pose, *self._contacts_at(place), rate, gap=gap)
         self.stepper.programs += bounds.programs
         return bounds
 

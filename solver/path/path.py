@@ -81,7 +81,7 @@ class Path:
 
     def _remove_blocks(self, fell_at: np.ndarray) -> None:
         """Follow the structure without blocks that have left; (n_blocks,) array as in ``PathState.fell_at``."""
-        self.model = self.full_model if not len(fell_at) else self.full_model.without(~np.isnan(fell_at))
+        self.model = self.full_model if not len(fell_at) else self.full_model.remaining(~np.isnan(fell_at))
         self.stepper = Stepper(self.model, self.driver)
         self.checks = EquilibriumChecks(self.stepper)
         self.reports = Reports(self.stepper, self.number, fell_at)
@@ -98,12 +98,12 @@ class Path:
             self._remove_blocks(fell_at)
         else:
             place = Place.unloaded(start)
-            rest = self._at_rest(place)
-            if rest is None:
+            resting = self._at_rest(place)
+            if resting is None:
                 # Joints that the drawing leaves open close.
                 closed = self.fall.relaxed(place, JUMP)
-                rest = None if closed is None else self._at_rest(replace(closed, contacts=None, velocity=None))
-            place = rest or place
+                resting = None if closed is None else self._at_rest(replace(closed, contacts=None, velocity=None))
+            place = resting or place
         return PathState(self.number, start, place, FIRST_STEP * self.stepper.unit, history=(place,), fell_at=fell_at)
 
     def _at_rest(self, place: Place) -> Place | None:
@@ -147,33 +147,22 @@ class Path:
             state, outcome = self.advance(self.state, self._next_stop(self.state.place.s))
             self.state = state
             if outcome is Outcome.REACHED:
-                yield from self._reached(state)
+                yield from self._report_reached(state)
                 continue
             if outcome is Outcome.LOCKED:
                 # Forces grew from the last report on, and friction bounds with them.
                 return Ending(Status.LOCKED, self.reports.locked(self.wedged))
             if outcome is Outcome.FAILED:
-                yield from self._unreported(state)
+                yield from self._report_last(state)
                 return Ending(Status.SOLVER_FAILED, self.reports.no_step(self.failure))
             beyond = self._place_beyond(state)
             end, at_rest = self.fall.relax(beyond)
-            next_state = (
-                self._continue_from(state, replace(end, velocity=None)) if at_rest else self._remove_fallen(state, end)
-            )
-            if next_state is None:
-                yield from self._unreported(state)
-                check, multiplier_beyond = self._check(state.place), None
-                if self.model.live is not None:
-                    first, bounds = (
-                        self.checks.bounds(Place.unloaded(state.start)),
-                        self.checks.bounds(beyond, CLOSING_GAP),
-                    )
-                    vanishing = state.place.multiplier <= 0.05 * first.high
-                    multiplier_beyond = (
-                        bounds.high if vanishing and bounds.in_equilibrium and bounds.high <= 0.0 else None
-                    )
-                return (yield from self.fall.collapse(check, beyond, state.upper_bound, multiplier_beyond))
-            self.state = next_state
+            continued = self._continue_from(state, end) if at_rest else self._remove_fallen(state, end)
+            if continued is None:
+                yield from self._report_last(state)
+                check, multiplier = self._check(state.place), self._multiplier_beyond(state, beyond)
+                return (yield from self.fall.collapse(check, beyond, state.upper_bound, multiplier))
+            self.state = continued
         return self.reports.reached()
 
     def _report_start(self, state: PathState) -> Generator[Increment, None, Ending | None]:
@@ -182,7 +171,7 @@ class Path:
         Raises
         ------
         ValueError
-            Where the multiplier has to turn around for the parameter to grow.
+            Where the multiplier has to change its sign for the parameter to grow.
         """
         place, model = state.place, self.model
         check = self._check(place)
@@ -193,9 +182,8 @@ class Path:
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, no_equilibrium(model.assembly, motion))
         if model.live is not None and not 0.0 < bounds.high < np.inf:
             if bounds.high > 0.0:
-                return Ending(
-                    Status.LOCKED, "at a control displacement of 0 m no live load of this pattern moves the structure"
-                )
+                message = "at a control displacement of 0 m no live load of this pattern moves the structure"
+                return Ending(Status.LOCKED, message)
             yield self.reports.falling_increment(place, np.zeros_like(model.load), place.s)
             return Ending(Status.NO_INITIAL_EQUILIBRIUM, "no live load of this pattern is carried")
         if model.live is not None:
@@ -209,18 +197,18 @@ class Path:
         """Parameter at which the joints' compliance is used up."""
         return min(1e-3 * self.stepper.unit, self._next_stop(0.0))
 
-    def _reached(self, state: PathState) -> Iterator[Increment]:
+    def _report_reached(self, state: PathState) -> Iterator[Increment]:
         """Report the parameter that was reached, or go back where no equilibrium is near."""
         place = state.place
-        rest = place if self._in_equilibrium(place) else self.fall.relaxed(place)
-        if rest is None:
+        resting = place if self._in_equilibrium(place) else self.fall.relaxed(place)
+        if resting is None:
             self.state = self._go_back(state, place.s)
             return
         ended = place.s >= self.driver.limit * (1.0 - 1e-12)
-        if self.fall.movements(place, rest).max() > JUMP:
-            state = self._continue_from(state, rest)
-        self.state = state = replace(state, history=(replace(rest, works=place.works),), ended=ended)
-        yield self._report(state, self._check(rest, self._reaction(place)))
+        if self.fall.movements(place, resting).max() > JUMP:
+            state = self._continue_from(state, resting)
+        self.state = state = replace(state, history=(replace(resting, works=place.works),), ended=ended)
+        yield self._report(state, self._check(resting, self._reaction(place)))
 
     def _report(self, state: PathState, check: EquilibriumCheck) -> Increment:
         """The increment of an equilibrium, with the state as its checkpoint."""
@@ -228,7 +216,7 @@ class Path:
         self.reported = state.place.s
         return replace(increment, checkpoint=state)
 
-    def _unreported(self, state: PathState) -> Iterator[Increment]:
+    def _report_last(self, state: PathState) -> Iterator[Increment]:
         """The increment at the last equilibrium of the path, unless it has been reported."""
         if state.place.s > self.reported:
             velocity = state.place.velocity
@@ -266,7 +254,7 @@ class Path:
         try:
             new, motion, error = self.stepper.step(place, length, viscosity=REFINED if refining else 1.0)
         except NotSolved as failure:
-            return self._unsolved(state, length, str(failure))
+            return self._shorten(state, length, str(failure))
         if self._may_be_wedged(new, error):
             if self._supports_locked(place):
                 self.wedged = new
@@ -290,7 +278,7 @@ class Path:
             state = replace(state, upper_bound=np.inf, refined=False, refine_until=until)
         return state, None
 
-    def _unsolved(self, state: PathState, length: float, failure: str) -> tuple[PathState, Outcome | None]:
+    def _shorten(self, state: PathState, length: float, failure: str) -> tuple[PathState, Outcome | None]:
         """Shorten a step that was not solved, or end where it is the shortest."""
         if length / 3.0 >= SHORTEST_STEP * self.stepper.unit:
             return replace(state, step=length / 3.0), None
@@ -378,19 +366,13 @@ class Path:
     def _in_equilibrium(self, place: Place) -> bool:
         return self.checks.in_equilibrium(place, COMPUTED_GAP)
 
-    def _continue_from(self, state: PathState, rest: Place) -> PathState:
+    def _continue_from(self, state: PathState, resting: Place) -> PathState:
         """Continue from the place where blocks came to rest."""
-        if self.fall.movements(state.place, rest).max() > JUMP:
-            self.reports.notes.append(Note(rest.s, self.reports.jump(state.place.pose, rest.pose)))
-        place = replace(rest, velocity=None, works=state.place.works)
-        return replace(
-            state,
-            place=place,
-            step=FIRST_STEP * self.stepper.unit,
-            upper_bound=np.inf,
-            refined=False,
-            history=(place,),
-        )
+        if self.fall.movements(state.place, resting).max() > JUMP:
+            self.reports.notes.append(Note(resting.s, self.reports.jump(state.place.pose, resting.pose)))
+        place = replace(resting, velocity=None, works=state.place.works)
+        step = FIRST_STEP * self.stepper.unit
+        return replace(state, place=place, step=step, upper_bound=np.inf, refined=False, history=(place,))
 
     def _remove_fallen(self, state: PathState, end: Place) -> PathState | None:
         """Continue without the blocks that have fallen; None where none have, too many, or the others fall, too."""
@@ -412,18 +394,15 @@ class Path:
             np.where(fallen, end.pose.positions, state.place.pose.positions),
             np.where(fallen, end.pose.rotations, state.place.pose.rotations),
         )
-        without = replace(state, place=replace(state.place, pose=pose, velocity=None), fell_at=fell_at)
-        at_rest = self._in_equilibrium(without.place)
-        end = without.place
+        remaining = replace(state, place=replace(state.place, pose=pose, velocity=None), fell_at=fell_at)
+        end, at_rest = remaining.place, self._in_equilibrium(remaining.place)
         if not at_rest:
             end, at_rest = self.fall.relax(end)
-        next_state = (
-            self._continue_from(without, replace(end, velocity=None)) if at_rest else self._remove_fallen(without, end)
-        )
-        if next_state is None:
+        continued = self._continue_from(remaining, end) if at_rest else self._remove_fallen(remaining, end)
+        if continued is None:
             self._remove_blocks(before)
             self.reports.notes = notes
-        return next_state
+        return continued
 
     def _place_beyond(self, state: PathState) -> Place:
         """A place beyond the last equilibrium, at the upper bound or as near to it as a step is solved."""
@@ -434,6 +413,15 @@ class Path:
             except NotSolved:
                 length /= 4.0
         return state.place
+
+    def _multiplier_beyond(self, state: PathState, beyond: Place) -> float | None:
+        """Multiplier at the place beyond, at or below zero; None where equilibrium itself is lost, not the capacity."""
+        if self.model.live is None:
+            return None
+        first, bounds = self.checks.bounds(Place.unloaded(state.start)), self.checks.bounds(beyond, CLOSING_GAP)
+        # One that is large in the bracket before does not vanish within it.
+        vanishes = state.place.multiplier <= 0.05 * first.high
+        return bounds.high if vanishes and bounds.in_equilibrium and bounds.high <= 0.0 else None
 
     def _reaction(self, place: Place) -> float:
         """Reaction of the forces of a place [N or N·m]."""

@@ -126,10 +126,10 @@ class Reports:
         """Message that names the blocks of a jump, and how far they moved."""
         assembly = self.model.assembly
         far = np.linalg.norm(moved_vertices(assembly, end) - moved_vertices(assembly, start), axis=1)
-        way = np.zeros(assembly.n_blocks)
-        np.maximum.at(way, assembly.block_of_vertex, np.where(assembly.free[assembly.block_of_vertex], far, 0.0))
-        fell = np.flatnonzero(way > 0.1 * way.max())
-        return f"{self._named(fell)} moved by up to {way.max():.2g} m at once to the next equilibrium"
+        distance = np.zeros(assembly.n_blocks)
+        np.maximum.at(distance, assembly.block_of_vertex, np.where(assembly.free[assembly.block_of_vertex], far, 0.0))
+        far_blocks = np.flatnonzero(distance > 0.1 * distance.max())
+        return f"{self._named(far_blocks)} moved by up to {distance.max():.2g} m at once to the next equilibrium"
 
     def loss(self, fallen: np.ndarray, weight: float, share: float) -> str:
         """Message that names the blocks that have fallen."""

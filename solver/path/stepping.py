@@ -163,10 +163,8 @@ class Stepper:
             touches = np.where(contacts.gaps < LARGEST_PENETRATION * self.model.length, 1.0, -1.0)
             return np.zeros((n, d)), touches[:, None] * np.eye(d)[0], np.zeros(n), np.ones(n, dtype=bool)
         number, same = matched_contacts(contacts, before)
-        forces, followed = (
-            np.where(same[:, None], place.forces[number], 0.0),
-            np.where(same, place.followed[number], 0.0),
-        )
+        forces = np.where(same[:, None], place.forces[number], 0.0)
+        followed = np.where(same, place.followed[number], 0.0)
         trial = np.where(same[:, None], place.trial[number], -np.eye(d)[0])
         _, kept = matched_contacts(before, contacts)
         vanished = np.flatnonzero(~kept & ((place.forces[:, 0] > 0.0) | (place.followed > 0.0)))
@@ -356,14 +354,14 @@ class Stepper:
             Where that corner was behind the edge already, or the step had its contact point.
         """
         end = self.contacts(pose)
-        earlier, known = np.zeros(len(end)), np.zeros(len(end), dtype=bool)
+        earlier, is_stepped = np.zeros(len(end)), np.zeros(len(end), dtype=bool)
         if len(end) and len(stepped):
-            number, known = matched_contacts(end, stepped)
-            earlier = np.where(known, np.minimum(stepped.gaps[number], 0.0), 0.0)
+            number, is_stepped = matched_contacts(end, stepped)
+            earlier = np.where(is_stepped, np.minimum(stepped.gaps[number], 0.0), 0.0)
         deepest = -LARGEST_PENETRATION * self.model.length
         deep = end.gaps - earlier < deepest
         found = measure_contacts(self.model.assembly, moved_vertices(self.model.assembly, before), end[deep])
-        if known[deep].any() or (found.gaps < deepest).any():
+        if is_stepped[deep].any() or (found.gaps < deepest).any():
             raise Penetration(movement_size)
         return found
 
