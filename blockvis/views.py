@@ -1,4 +1,4 @@
-"""What ``solver`` offers of pictures, datasets and films with its results, made here: its ``solver.views.Views``."""
+"""What results offer of pictures, datasets and films, made here: the views that the solver finds by its entry point."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class Path:
 
     def _remove_blocks(self, fell_at: np.ndarray) -> None:
         """Follow the structure without blocks that have left; (n_blocks,) array as in ``PathState.fell_at``."""
-        self.model = self.full_model if not len(fell_at) else self.full_model.remaining(~np.isnan(fell_at))
+        self.model = self.full_model if not len(fell_at) else self.full_model.without(~np.isnan(fell_at))
         self.stepper = Stepper(self.model, self.driver)
         self.checks = EquilibriumChecks(self.stepper)
         self.reports = Reports(self.stepper, self.number, fell_at)
