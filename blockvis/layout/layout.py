@@ -158,25 +158,17 @@ class Layout:
 def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> Layout:
     """Make a layout of an assembly, with its blocks as drawn or as displaced in a pose."""
     vertices = assembly.vertices if pose is None else solver.moved_vertices(assembly, pose)
-    in_space = isinstance(assembly.shapes, solver.Polyhedra)
-    return Layout(
-        blocks=_solids_of(assembly.polyhedra, vertices)
-        if in_space
-        else tuple(np.split(vertices, assembly.offsets[1:-1])),
-        names=assembly.names,
-        roles=tuple(map(str, assembly.roles)),
-        materials=assembly.materials,
-        thickness=None if in_space else assembly.thickness,
-        density=assembly.density,
-    )
-
-
-def _solids_of(shapes: solver.Polyhedra, vertices: np.ndarray) -> tuple[Solid, ...]:
-    faces: list[list[list[int]]] = [[] for _ in range(len(shapes))]
-    rings = np.split(shapes.corners, shapes.face_offsets[1:-1])
-    for block, ring in zip(shapes.block_of_face.tolist(), rings, strict=True):
-        faces[block].append((ring - shapes.offsets[block]).tolist())
-    return tuple(zip(np.split(vertices, shapes.offsets[1:-1]), faces, strict=True))
+    shared: dict[str, Any] = {
+        "names": assembly.names,
+        "roles": tuple(map(str, assembly.roles)),
+        "materials": assembly.materials,
+        "density": assembly.density,
+    }
+    if isinstance(assembly.shapes, solver.Polyhedra):
+        shapes = assembly.shapes
+        corners = np.split(vertices, shapes.offsets[1:-1])
+        return Layout(blocks=tuple((own, shapes.surface(i)[1]) for i, own in enumerate(corners)), **shared)
+    return Layout(blocks=tuple(np.split(vertices, assembly.offsets[1:-1])), thickness=assembly.thickness, **shared)
 
 
 def standing(layout: Layout, thickness: float) -> Layout:
