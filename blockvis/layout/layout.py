@@ -13,6 +13,7 @@ import solver
 
 from .left_out import LeftOut
 from .notes import CHANGED, Note
+from .outlines import ring_area
 from .solids import Solid, extruded, volume
 
 #: A block in the plane: (n, 2) corners in order [m], the first not repeated.
@@ -108,6 +109,13 @@ class Layout:
     def volumes(self) -> np.ndarray:
         """(n_blocks,) array [m³]: of blocks in space."""
         return np.array([volume(*solid) for solid in self.solids])
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """(n_blocks,) array [m]: edge of the square, in space of the cube, as large as each block."""
+        if self.dimension == 3:
+            return np.cbrt(self.volumes)
+        return np.sqrt([abs(ring_area(ring)) for ring in self.outlines])
 
     def corners(self, block: int) -> np.ndarray:
         """(n, d) array [m]: the corners of a block."""

@@ -75,14 +75,13 @@ def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] =
         asked = "all that it draws is left out as asked (ignore, only)"
         counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
         raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}")
-    sizes = np.sqrt([abs(ring_area(ring)) for ring in layout.outlines])
-    return noted(layout, sizes)
+    return noted(layout)
 
 
-def noted(layout: Layout, sizes: np.ndarray) -> Layout:
-    """Note what is left out, and what makes the unit doubtful: blocks of these sizes [m]."""
+def noted(layout: Layout) -> Layout:
+    """Note what is left out, and the doubt that the sizes of the blocks cast on the unit."""
     notes = [*layout.notes, *in_words(layout.left_out)]
-    doubted = doubt(layout.unit, float(np.median(sizes)))
+    doubted = doubt(layout.unit, float(np.median(layout.sizes)))
     return replace(layout, notes=(*notes, Note(UNIT, doubted)) if doubted else tuple(notes))
 
 
