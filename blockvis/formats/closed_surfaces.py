@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from blockvis.layout.linked import linked
 from blockvis.layout.surfaces import same_points, turned_faces
 
 from .bodies import Body, fans
@@ -25,13 +26,9 @@ class OpenSurface(ValueError):
 
 def components(rings: Sequence[np.ndarray], n_points: int) -> np.ndarray:
     """(n_cells,) int array: number of the connected piece of each cell; shared points connect cells."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     first = np.concatenate([ring for ring in rings])
     second = np.concatenate([np.full(len(ring), ring[0]) for ring in rings])
-    graph = coo_matrix((np.ones(len(first)), (first, second)), shape=(n_points, n_points))
-    piece = connected_components(graph, directed=False)[1]
+    piece = linked(first, second, n_points)
     return np.unique(piece[[ring[0] for ring in rings]], return_inverse=True)[1]
 
 
@@ -116,9 +113,6 @@ def _touching_bodies(points: np.ndarray, faces: np.ndarray) -> np.ndarray | None
     Faces are seen counter-clockwise from outside. Around an edge of several bodies, the face with the inside of its
     body behind it, counter-clockwise, goes with the next that has the inside before it.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     if _volumes(points, faces).sum() < 0.0:
         faces = faces[:, ::-1]
     start, end = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
@@ -151,8 +145,7 @@ def _touching_bodies(points: np.ndarray, faces: np.ndarray) -> np.ndarray | None
         if not (~forward[k][::2]).all() or not forward[k][1::2].all():
             return None
         partner[k[::2]], partner[k[1::2]] = k[1::2], k[::2]
-    links = coo_matrix((np.ones(len(edge)), (owner, owner[partner])), shape=(len(faces), len(faces)))
-    piece = np.asarray(connected_components(links, directed=False)[1])
+    piece = linked(owner, owner[partner], len(faces))
     return piece if (np.bincount(piece, _volumes(points, faces)) > 0.0).all() else None
 
 

@@ -16,7 +16,7 @@ from blockvis.formats import FORMATS, Format
 from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of, standing
-from blockvis.layout.outlines import ring_area, without_collinear
+from blockvis.layout.outlines import without_collinear
 from blockvis.layout.selection import noted, sorted_out
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
@@ -90,7 +90,7 @@ def read_layout(
     layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
     layout = replace(layout, source=str(path))
     if layout.dimension == 3:
-        return _in_metres(layout, unit)
+        return noted(_in_metres(layout, unit))
     if layout.n_blocks == 0 and not layout.left_out:
         raise ValueError(f"'{path}' draws no block; draw each block as one closed outline or meshed surface")
     for i, ring in enumerate(layout.outlines):
@@ -100,19 +100,7 @@ def read_layout(
                 f"'{path}': block '{layout.names[i]}' has a corner at {bad.tolist()}; "
                 "coordinates must be finite numbers: repair the file"
             )
-    sizes = np.sqrt([abs(ring_area(ring)) for ring in layout.outlines])
-    chosen, note = chosen_unit(unit, layout.unit, sizes)
-    factor = metres_per(chosen)
-    outlines = tuple(without_collinear(ring * factor) for ring in layout.outlines)
-    layout = replace(
-        layout,
-        blocks=outlines,
-        thickness=None if layout.thickness is None else layout.thickness * factor,
-        unit=chosen,
-        notes=layout.notes + ((note,) if note else ()),
-        left_out=tuple(item.mapped(factor) for item in layout.left_out),
-    )
-    _check_coordinates(layout.source, max((float(np.abs(ring).max()) for ring in layout.outlines), default=0.0))
+    layout = _in_metres(layout, unit)
     layout = sorted_out(layout, ignore, only)
     for name, ring in zip(layout.names, layout.outlines, strict=True):
         if len(ring) > MOST_CORNERS:
@@ -146,26 +134,26 @@ def _apart(content: Layout | Bodies, path: Path) -> Layout | Bodies:
 
 
 def _in_metres(layout: Layout, unit: str | None) -> Layout:
-    """Choose the unit of a layout in space, and check its coordinates."""
-    chosen, note = chosen_unit(unit, layout.unit, np.cbrt(layout.volumes))
+    """Choose the unit of a layout, and check its coordinates."""
+    chosen, note = chosen_unit(unit, layout.unit, layout.sizes)
     factor = metres_per(chosen)
     layout = replace(
         layout,
-        blocks=tuple((points * factor, faces) for points, faces in layout.solids),
+        blocks=tuple((points * factor, faces) for points, faces in layout.solids)
+        if layout.dimension == 3
+        else tuple(without_collinear(ring * factor) for ring in layout.outlines),
+        thickness=None if layout.thickness is None else layout.thickness * factor,
         unit=chosen,
         notes=layout.notes + ((note,) if note else ()),
         left_out=tuple(item.mapped(factor) for item in layout.left_out),
     )
-    _check_coordinates(layout.source, float(np.abs(layout.points).max()))
-    return noted(layout, np.cbrt(layout.volumes))
-
-
-def _check_coordinates(source: str, largest: float) -> None:
+    largest = float(np.abs(layout.points).max(initial=0.0))
     if largest > LARGEST_COORDINATE:
         raise ValueError(
-            f"'{source}' has a coordinate of {largest:.3g} m; corners must lie within {LARGEST_COORDINATE:.0e} m of "
-            "the origin: check the unit or repair the file"
+            f"'{layout.source}' has a coordinate of {largest:.3g} m; corners must lie within "
+            f"{LARGEST_COORDINATE:.0e} m of the origin: check the unit or repair the file"
         )
+    return layout
 
 
 def write_layout(layout: Layout, path: str | Path) -> None:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from blockvis.layout.linked import linked
+
 from .bodies import Body
 
 #: Faces of a cell by its corners, in the numbering that gmsh, VTK and meshio share.
@@ -93,16 +95,12 @@ def bodies_of_cells(
 
 def _pieces(faces: np.ndarray, cell_of_face: np.ndarray, owner: np.ndarray) -> np.ndarray:
     """(n_cells,) int array: number of the piece of each cell, those of one owner one after another."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     order = np.lexsort(faces.T[::-1])
     same = (faces[order][1:] == faces[order][:-1]).all(axis=1)
     one, other = cell_of_face[order][:-1][same], cell_of_face[order][1:][same]
     kept = owner[one] == owner[other]
     one, other = one[kept], other[kept]
-    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(len(owner), len(owner)))
-    piece = connected_components(graph, directed=False)[1]
+    piece = linked(one, other, len(owner))
     return np.unique(np.column_stack([owner, piece]), axis=0, return_inverse=True)[1].ravel()
 
 

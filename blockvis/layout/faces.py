@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .linked import linked
 from .solids import Solid, cross, off_planes, planes_of, triangles_of, volume, width_of
 from .surfaces import cleaned
 
@@ -174,9 +175,6 @@ def _towards(point: np.ndarray, planes: np.ndarray, some: np.ndarray, held: np.n
 
 def _regions(points: np.ndarray, triangles: np.ndarray, near: float) -> list[np.ndarray]:
     """Group the triangles of a body by the planes in which they lie: numbers of the triangles of each face."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     corners = points[triangles]
     normal = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     double = np.linalg.norm(normal, axis=1)
@@ -189,9 +187,7 @@ def _regions(points: np.ndarray, triangles: np.ndarray, near: float) -> list[np.
     along = np.einsum("ij,ij->i", normal[one], normal[other]) >= SAME_FACE
     # Polygons with re-entrant corners that were cut in fans have triangles that lie the other way round.
     same = (apart <= near) & (along | sliver[small] | (apart <= ROUNDING * longest[large]))
-    n = len(triangles)
-    graph = coo_matrix((np.ones(int(same.sum())), (one[same], other[same])), shape=(n, n))
-    label = connected_components(graph, directed=False)[1]
+    label = linked(one[same], other[same], len(triangles))
     found = []
     for region in np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label))[:-1]):
         if len(region) == 1 or _warp(points, triangles[region]) <= near:

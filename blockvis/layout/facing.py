@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .faces import ROUNDING, flattened
+from .linked import linked
 from .solids import Solid, area_vectors, planes_of, volume, width_of
 from .surfaces import cleaned
 
@@ -233,12 +234,7 @@ def _gap(faces: _Faces, a: int, b: int, near: float) -> tuple[float] | None:
 
 def _groups(faces: _Faces, one: np.ndarray, other: np.ndarray, near: float) -> list[tuple[list[int], np.ndarray]]:
     """Group the faces that share a plane, and the side of it on which the block of each lies: 1 or -1."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    n = len(faces.planes)
-    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(n, n))
-    label = connected_components(graph, directed=False)[1]
+    label = linked(one, other, len(faces.planes))
     groups = []
     for members in np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label))[:-1]):
         if len(members) > 1:

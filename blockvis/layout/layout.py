@@ -13,6 +13,7 @@ import solver
 
 from .left_out import LeftOut
 from .notes import CHANGED, Note
+from .outlines import ring_area
 from .solids import Solid, extruded, volume
 
 #: A block in the plane: (n, 2) corners in order [m], the first not repeated.
@@ -109,6 +110,13 @@ class Layout:
         """(n_blocks,) array [m³]: of blocks in space."""
         return np.array([volume(*solid) for solid in self.solids])
 
+    @property
+    def sizes(self) -> np.ndarray:
+        """(n_blocks,) array [m]: edge of the square, in space of the cube, as large as each block."""
+        if self.dimension == 3:
+            return np.cbrt(self.volumes)
+        return np.sqrt([abs(ring_area(ring)) for ring in self.outlines])
+
     def corners(self, block: int) -> np.ndarray:
         """(n, d) array [m]: the corners of a block."""
         shape = self.blocks[block]
@@ -158,25 +166,17 @@ class Layout:
 def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> Layout:
     """Make a layout of an assembly, with its blocks as drawn or as displaced in a pose."""
     vertices = assembly.vertices if pose is None else solver.moved_vertices(assembly, pose)
-    in_space = isinstance(assembly.shapes, solver.Polyhedra)
-    return Layout(
-        blocks=_solids_of(assembly.polyhedra, vertices)
-        if in_space
-        else tuple(np.split(vertices, assembly.offsets[1:-1])),
-        names=assembly.names,
-        roles=tuple(map(str, assembly.roles)),
-        materials=assembly.materials,
-        thickness=None if in_space else assembly.thickness,
-        density=assembly.density,
-    )
-
-
-def _solids_of(shapes: solver.Polyhedra, vertices: np.ndarray) -> tuple[Solid, ...]:
-    faces: list[list[list[int]]] = [[] for _ in range(len(shapes))]
-    rings = np.split(shapes.corners, shapes.face_offsets[1:-1])
-    for block, ring in zip(shapes.block_of_face.tolist(), rings, strict=True):
-        faces[block].append((ring - shapes.offsets[block]).tolist())
-    return tuple(zip(np.split(vertices, shapes.offsets[1:-1]), faces, strict=True))
+    shared: dict[str, Any] = {
+        "names": assembly.names,
+        "roles": tuple(map(str, assembly.roles)),
+        "materials": assembly.materials,
+        "density": assembly.density,
+    }
+    if isinstance(assembly.shapes, solver.Polyhedra):
+        shapes = assembly.shapes
+        corners = np.split(vertices, shapes.offsets[1:-1])
+        return Layout(blocks=tuple((own, shapes.surface(i)[1]) for i, own in enumerate(corners)), **shared)
+    return Layout(blocks=tuple(np.split(vertices, assembly.offsets[1:-1])), thickness=assembly.thickness, **shared)
 
 
 def standing(layout: Layout, thickness: float) -> Layout:

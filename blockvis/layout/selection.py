@@ -13,6 +13,7 @@ from blockvis.text import by_similarity
 
 from .layout import Layout
 from .left_out import LeftOut, in_words, matches
+from .linked import linked
 from .notes import LEFT_OUT, UNIT, Note
 from .outlines import ring_area, ring_width
 from .units import doubt
@@ -74,14 +75,13 @@ def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] =
         asked = "all that it draws is left out as asked (ignore, only)"
         counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
         raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}")
-    sizes = np.sqrt([abs(ring_area(ring)) for ring in layout.outlines])
-    return noted(layout, sizes)
+    return noted(layout)
 
 
-def noted(layout: Layout, sizes: np.ndarray) -> Layout:
-    """Note what is left out, and what makes the unit doubtful: blocks of these sizes [m]."""
+def noted(layout: Layout) -> Layout:
+    """Note what is left out, and the doubt that the sizes of the blocks cast on the unit."""
     notes = [*layout.notes, *in_words(layout.left_out)]
-    doubted = doubt(layout.unit, float(np.median(sizes)))
+    doubted = doubt(layout.unit, float(np.median(layout.sizes)))
     return replace(layout, notes=(*notes, Note(UNIT, doubted)) if doubted else tuple(notes))
 
 
@@ -226,8 +226,6 @@ def _around_others(layout: Layout) -> dict[int, LeftOut]:
 def _title_cells(layout: Layout, shapes: Any, frames: list[int]) -> dict[int, LeftOut]:
     """Upright rectangles that hang together, reach the frame of a sheet and are not the main part of the drawing."""
     import shapely
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
 
     others = np.array([i for i in range(len(shapes)) if i not in frames])
     if not frames or len(others) == 0:
@@ -236,7 +234,7 @@ def _title_cells(layout: Layout, shapes: Any, frames: list[int]) -> dict[int, Le
     near = 2e-3 * frame.length / 4.0
     apart = max(near, 0.5 * float(np.sqrt(np.median(shapely.area(shapes[others])))))
     a, b = shapely.STRtree(shapes[others]).query(shapes[others], "dwithin", apart)
-    piece = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(len(others),) * 2), directed=False)[1]
+    piece = linked(a, b, len(others))
     area = np.bincount(piece, shapely.area(shapes[others]))
     main = int(np.argmax(area))
     if (piece == main).sum() < 0.5 * len(others):

@@ -10,6 +10,7 @@ import numpy as np
 import solver
 
 from .joints.trimming import with_corners_on_edges
+from .linked import linked
 
 #: Outlines of more corners than this in the mean are finer than needed: every corner at a joint is a contact.
 FINE = 24
@@ -84,8 +85,6 @@ def _shared_corners(outlines: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np
 
     Neighbours share an edge only between corners that both have.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     every = np.concatenate(outlines)
@@ -94,8 +93,7 @@ def _shared_corners(outlines: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np
     rings = [with_corners_on_edges(ring, every, index, same) for ring in outlines]
     corners = np.concatenate(rings)
     a, b = cKDTree(corners).query_pairs(2.0 * same, output_type="ndarray").reshape(-1, 2).T
-    graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(corners),) * 2)
-    group = connected_components(graph, directed=False)[1]
+    group = linked(a, b, len(corners))
     first = np.unique(group, return_index=True)[1]
     around = []
     for ids in np.split(group, np.cumsum([len(ring) for ring in rings])[:-1]):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .linked import linked
 from .solids import Solid, outward
 
 #: Corners of a block nearer to each other than this fraction of its diagonal are one: files of triangles repeat them,
@@ -29,7 +30,7 @@ def cleaned(points: np.ndarray, faces: list[list[int]]) -> Solid:
     --------
     >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> cleaned(corners, [[0, 1, 2], [0, 1, 3], [1, 3, 2], [0, 2, 3]])[1]
-    [[2, 1, 0], [0, 1, 3], [1, 2, 3], [3, 2, 0]]
+    [[2, 1, 0], [0, 1, 3], [2, 3, 1], [3, 2, 0]]
     """
     same = same_points(points, WELDED * float(np.linalg.norm(np.ptp(points, axis=0)))).tolist()
     rings = [_without_repeats([same[corner] for corner in face]) for face in faces]
@@ -57,8 +58,6 @@ def _without_repeats(face: list[int]) -> list[int]:
 
 def same_points(points: np.ndarray, near: float) -> np.ndarray:
     """(n,) int array: the point that stands for each, the same for those nearer to each other than ``near``."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     # Exact copies first: a million of them would make a million squared pairs.
@@ -66,8 +65,7 @@ def same_points(points: np.ndarray, near: float) -> np.ndarray:
     pairs = cKDTree(unique).query_pairs(near, output_type="ndarray")
     if len(pairs) == 0:
         return np.asarray(index[inverse.ravel()])
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(unique), len(unique)))
-    label = connected_components(graph, directed=False)[1]
+    label = linked(pairs[:, 0], pairs[:, 1], len(unique))
     return np.asarray(index[np.unique(label, return_index=True)[1]][label][inverse.ravel()])
 
 
@@ -88,14 +86,10 @@ def turned_faces(edges: np.ndarray, edge: np.ndarray, face: np.ndarray) -> np.nd
     Each face is there twice, as it is and turned round, and goes with the one of each neighbour that fits: of a surface
     that encloses something there are two sets, and the one with its first face as it is is taken.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     m = int(face[-1]) + 1
     first, second = edge.argsort(kind="stable").reshape(-1, 2).T
     forward = edges[:, 0] < edges[:, 1]
     fits = forward[first] != forward[second]
     one, other = face[first], face[second]
-    rows, columns = np.append(one, one + m), np.append(other + m * ~fits, other + m * fits)
-    label = connected_components(coo_matrix((np.ones(2 * len(one)), (rows, columns)), shape=(2 * m, 2 * m)))[1]
+    label = linked(np.append(one, one + m), np.append(other + m * ~fits, other + m * fits), 2 * m)
     return np.asarray(label[:m] > label[m:])

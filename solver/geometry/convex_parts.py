@@ -118,18 +118,17 @@ def convex_parts(solids: Solids) -> ConvexParts:
         n_faces, n_corners = len(solids.block_of_face), len(solids.vertices)
         inner, made = np.zeros(n_faces, dtype=bool), np.zeros(n_corners, dtype=bool)
         return ConvexParts(solids, np.arange(len(solids)), none.astype(np.int64), none, inner, np.arange(n_faces), made)
-    vertices, faces, sources, weights, block_of_part, inner_faces, made_corners = [], [], [], [], [], [], []
+    surfaces, sources, weights, block_of_part, inner_faces, made_corners = [], [], [], [], [], []
     is_bent = np.zeros(len(solids), dtype=bool)
     is_bent[bent] = True
     for block in range(len(solids)):
-        own, loops = surface_of(solids, block)
+        own, loops = solids.surface(block)
         start = int(solids.offsets[block])
         frame = _spread_corners(own)
         parts = _parts_of(solids, block, own, loops) if is_bent[block] else [(own, loops, [False] * len(loops))]
         for corners, around, inside in parts:
             inner_faces += inside
-            vertices.append(corners)
-            faces.append(around)
+            surfaces.append((corners, around))
             block_of_part.append(block)
             far = ON_CORNER * float(np.linalg.norm(np.ptp(own, axis=0)))
             made_corners.append(
@@ -145,7 +144,7 @@ def convex_parts(solids: Solids) -> ConvexParts:
                 number = start + np.arange(len(corners))
                 sources.append(np.tile(number[:, None], (1, 4)))
                 weights.append(np.tile([1.0, 0.0, 0.0, 0.0], (len(corners), 1)))
-    cut = joined(vertices, faces)
+    cut = Solids.of_surfaces(surfaces)
     return ConvexParts(
         cut,
         np.array(block_of_part),
@@ -168,29 +167,6 @@ def _planes(parts: Solids, block_of_part: np.ndarray, is_bent: np.ndarray, width
             off = np.einsum("fi,gfi->gf", faces.normals[k], faces.middles[k][:, None] - faces.middles[k])
             plane[k] = k[(same & (np.abs(off) <= 2.0 * DRAWN_GAP * widths[block[k[0]]])).argmax(axis=1)]
     return plane
-
-
-def surface_of(solids: Solids, block: int) -> tuple[np.ndarray, list[list[int]]]:
-    """Corners (n, 3) [m] of one solid, and their numbers around each of its faces."""
-    start, stop = solids.offsets[block : block + 2]
-    ends = solids.face_offsets[solids.faces_of_block[block] : solids.faces_of_block[block + 1] + 1]
-    loops = np.split(solids.corners[ends[0] : ends[-1]] - start, ends[1:-1] - ends[0])
-    return solids.vertices[start:stop], [loop.tolist() for loop in loops]
-
-
-def joined(vertices: list[np.ndarray], faces: list[list[list[int]]]) -> Solids:
-    """Put surfaces into flat arrays, one solid after another."""
-    offsets = np.concatenate([[0], np.cumsum([len(own) for own in vertices])])
-    sizes = [len(face) for loops in faces for face in loops]
-    counts = [sum(map(len, loops)) for loops in faces]
-    corners = np.array([corner for loops in faces for face in loops for corner in face], dtype=np.int64)
-    return Solids(
-        vertices=np.concatenate(vertices),
-        offsets=offsets,
-        corners=corners + np.repeat(offsets[:-1], counts),
-        face_offsets=np.concatenate([[0], np.cumsum(sizes)]),
-        block_of_face=np.repeat(np.arange(len(faces)), [len(loops) for loops in faces]),
-    )
 
 
 def _out_of_faces(solids: Solids) -> np.ndarray:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -77,6 +79,28 @@ class Solids:
     corners: np.ndarray
     face_offsets: np.ndarray
     block_of_face: np.ndarray
+
+    @classmethod
+    def of_surfaces(cls, surfaces: Sequence[tuple[np.ndarray, list[list[int]]]]) -> Self:
+        """Put surfaces, corners (n, 3) [m] and their numbers around each face, into flat arrays one after another."""
+        offsets = np.concatenate([[0], np.cumsum([len(vertices) for vertices, _ in surfaces])])
+        sizes = [len(face) for _, faces in surfaces for face in faces]
+        counts = [sum(map(len, faces)) for _, faces in surfaces]
+        corners = np.array([corner for _, faces in surfaces for face in faces for corner in face], dtype=np.int64)
+        return cls(
+            vertices=np.concatenate([vertices for vertices, _ in surfaces]),
+            offsets=offsets,
+            corners=corners + np.repeat(offsets[:-1], counts),
+            face_offsets=np.concatenate([[0], np.cumsum(sizes)]),
+            block_of_face=np.repeat(np.arange(len(surfaces)), [len(faces) for _, faces in surfaces]),
+        )
+
+    def surface(self, block: int) -> tuple[np.ndarray, list[list[int]]]:
+        """Corners (n, 3) [m] of one solid, and their numbers around each of its faces."""
+        start, stop = self.offsets[block : block + 2]
+        ends = self.face_offsets[self.faces_of_block[block] : self.faces_of_block[block + 1] + 1]
+        loops = np.split(self.corners[ends[0] : ends[-1]] - start, ends[1:-1] - ends[0])
+        return self.vertices[start:stop], [loop.tolist() for loop in loops]
 
     def __len__(self) -> int:
         """Count the solids."""

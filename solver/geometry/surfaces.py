@@ -43,7 +43,7 @@ def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
         block, a surface that crosses itself.
     """
     surfaces = [_checked(solid, name) for solid, name in zip(solids, names, strict=True)]
-    joined = _joined(surfaces)
+    joined = Polyhedra.of_surfaces(surfaces)
     for block in _blocks_of_open_edges(joined):
         _refuse_open(*surfaces[block], names[block])
     _refuse_pieces(joined, names)
@@ -58,14 +58,14 @@ def polyhedra_of(solids: Sequence[Surface], names: Sequence[str]) -> Polyhedra:
         vertices, faces = surfaces[block]
         surfaces[block] = vertices, [face[::-1] for face in faces]
     if inside_out:
-        joined = _joined(surfaces)
+        joined = Polyhedra.of_surfaces(surfaces)
     _refuse_warped(joined, names)
     flatness = DRAWN_GAP * joined.widths
     in_an_edge = np.flatnonzero(np.bincount(joined.corners) == 2)
     split = np.union1d(joined.block_of_face[_coplanar_faces(joined, flatness)], joined.block_of_vertex[in_an_edge])
     for block in split.tolist():
         surfaces[block] = merged_faces(surfaces[block], float(flatness[block]))
-    shapes = _joined(surfaces) if len(split) else joined
+    shapes = Polyhedra.of_surfaces(surfaces) if len(split) else joined
     try:
         _ = shapes.parts
     except NoParts as error:
@@ -104,20 +104,6 @@ def _checked(solid: Surface, name: str) -> tuple[np.ndarray, list[list[int]]]:
         if len(face) < 3:
             raise ValueError(f"block '{name}': face {k} has {len(face)} corners; a face needs at least three")
     return renumbered(vertices, faces)
-
-
-def _joined(surfaces: Sequence[tuple[np.ndarray, list[list[int]]]]) -> Polyhedra:
-    offsets = np.concatenate([[0], np.cumsum([len(vertices) for vertices, _ in surfaces])])
-    sizes = [len(face) for _, faces in surfaces for face in faces]
-    counts = [sum(map(len, faces)) for _, faces in surfaces]
-    corners = np.array([corner for _, faces in surfaces for face in faces for corner in face], dtype=np.int64)
-    return Polyhedra(
-        vertices=np.concatenate([vertices for vertices, _ in surfaces]),
-        offsets=offsets,
-        corners=corners + np.repeat(offsets[:-1], counts),
-        face_offsets=np.concatenate([[0], np.cumsum(sizes)]),
-        block_of_face=np.repeat(np.arange(len(surfaces)), [len(faces) for _, faces in surfaces]),
-    )
 
 
 def _blocks_of_open_edges(solids: Solids) -> list[int]:

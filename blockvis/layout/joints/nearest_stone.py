@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.left_out import LeftOut
+from blockvis.layout.linked import linked
 
 #: Points along the outlines are this fraction of the joint thickness apart.
 SPACING = 0.2
@@ -284,8 +285,6 @@ def _without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.nda
         Corners that stay.
     """
     import shapely
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
 
     corners, which = np.unique(np.concatenate(rings), axis=0, return_inverse=True)
     around = np.split(which.ravel(), np.cumsum([len(ring) for ring in rings])[:-1])
@@ -296,8 +295,7 @@ def _without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.nda
     # Where shrinking would fold an outline, less of it is done.
     for _ in range(4):
         a, b = ends[length < limit].T
-        graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(corners),) * 2)
-        group = connected_components(graph, directed=False)[1]
+        group = linked(a, b, len(corners))
         count = np.bincount(group)
         place = np.stack([np.bincount(group, corners[:, axis]) / count for axis in (0, 1)], axis=1)
         for k, corner in enumerate(corners):

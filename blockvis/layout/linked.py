@@ -1,0 +1,20 @@
+"""What hangs together: the groups that links between numbered things make."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def linked(one: np.ndarray, other: np.ndarray, n: int) -> np.ndarray:
+    """(n,) int array: the group of each of ``n`` things, of which pairs are linked; numbered by their first members.
+
+    Examples
+    --------
+    >>> linked(np.array([0, 3]), np.array([2, 1]), 5)
+    array([0, 1, 0, 1, 2], dtype=int32)
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(n, n))
+    return np.asarray(connected_components(graph, directed=False)[1])
