@@ -44,6 +44,11 @@ class Swing:
     moves: bool
     motion: np.ndarray
 
+    @property
+    def n_parts(self) -> int:
+        """Number of parts that move as one."""
+        return int(self.parts.max(initial=-1)) + 1
+
 
 def swing_of(response: solver.Response) -> Swing:
     """Find the mechanism that follows the last equilibrium, or the state that governs.
@@ -101,7 +106,7 @@ def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing)
         As :func:`blockvis.pictures.palette.block_colours` gives it.
     swing : Swing
     """
-    if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
+    if swing.n_parts <= MOST_PARTS:
         return palette.part_colours(fill, swing.parts)
     travel = np.linalg.norm(swing.displaced.positions - swing.increment.pose.positions, axis=1)
     tints = palette.displacement_colours(0.75 * travel / travel[assembly.free].max())

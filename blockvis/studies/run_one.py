@@ -15,8 +15,8 @@ import numpy as np
 import solver
 from blockvis.cases.build import case_assembly, case_interfaces, case_loads, case_settlements
 from blockvis.cases.case import Case, case_of
-from blockvis.pictures.annotations import settlement_arrows
-from blockvis.pictures.solid_marks import settlement_arrows_in_space
+from blockvis.pictures.frame import Frame
+from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import least_reaction, loss_in
 from blockvis.results.swinging import swing_factors
@@ -224,10 +224,10 @@ def _shape(
     vertices = solver.moved_vertices(assembly, moved)
     if assembly.dimension == 2:
         low, high = at_rest[free].min(axis=0) - 0.15 * size, at_rest[free].max(axis=0) + 0.15 * size
-        _, places, directions = settlement_arrows(assembly, settlement, falling.pose, low, high)
+        _, places, directions = settlement_arrows(assembly, settlement, falling.pose, Frame(low, high))
         offsets, block = assembly.offsets, np.arange(assembly.n_blocks)
     else:
-        _, *arrows = settlement_arrows_in_space(assembly, settlement, falling.pose)
+        _, *arrows = settlement_arrows(assembly, settlement, falling.pose)
         places, directions = (VIEW.projected(ends) for ends in arrows)
         corners, offsets, block = _seen_faces(assembly, vertices)
         vertices, at_rest = (VIEW.projected(points[corners]) for points in (vertices, at_rest))
