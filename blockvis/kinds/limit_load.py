@@ -17,6 +17,7 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import NOT_NEGATIVE, NUMBERS, Key, one_of
 from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
+from blockvis.results.swinging import swing_factors, swung_increment
 from blockvis.text import force_text
 
 from .kind import (
@@ -490,21 +491,6 @@ def _limit_ending(limit: solver.LimitLoad) -> solver.Ending:
 
 def _swinging(assembly: solver.Assembly, state: solver.Increment) -> Iterator[solver.Increment]:
     """Pseudo-motion: the mechanism of a limit state, followed to first order, out of scale."""
-    block, free = assembly.block_of_vertex, assembly.free
-    corners = solver.moved_vertices(assembly, state.pose)
-    velocity = solver.point_velocities(corners, block, state.pose, state.velocity)
-    fastest = float(np.hypot.reduce(velocity, axis=1)[free[block]].max(initial=0.0))
-    if fastest == 0.0:
-        return
-    reach = SWING * float(np.ptp(corners[free[block]], axis=0).max())
-    contacts = state.contacts
-    for part in np.linspace(0.0, 1.0, SWINGING_FRAMES + 1)[1:]:
-        pose = solver.swung(state.pose, state.velocity * (part * reach / fastest))
-        points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, state.pose, pose)
-        yield replace(
-            state.with_arrays(pose=pose, contacts=replace(contacts, points=points)),
-            status=solver.Status.FALLING,
-            programs=0,
-            seconds=0.0,
-            checkpoint=None,
-        )
+    factors = swing_factors(assembly, state, SWING, np.linspace(0.0, 1.0, SWINGING_FRAMES + 1)[1:])
+    if factors.any():
+        yield from (swung_increment(state, state.velocity * factor) for factor in factors)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import TYPE_CHECKING
@@ -17,18 +17,20 @@ from blockvis.results.joints import faces_at, initial_joints
 from blockvis.text import force_text, rounded_length
 
 from . import palette
-from .annotations import (
+from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, matters
+from .flat_scene import FlatScene
+from .frame import ColourBar, Frame, Key, Sheet, framed, write_labels
+from .live_load import LiveLoads
+from .marks import (
     SMALLEST_RESULTANT,
+    joint_forces,
     length_per_force,
     marks_of,
-    part_outlines,
-    resultants,
     settlement_arrows,
+    thrust_line,
 )
-from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, matters
-from .flat_scene import Scene, magnified
-from .frame import ColourBar, Key, Sheet, framed, write_labels
-from .live_load import LiveLoads
+from .scene import OF_STATICS, Scene
+from .solid_view import View, chosen_view
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 
 if TYPE_CHECKING:
@@ -37,23 +39,24 @@ if TYPE_CHECKING:
 #: Above this many blocks, resultants and hinges clutter the picture.
 FEW_BLOCKS = 300
 
-#: Joints open by less than this fraction of the block size are drawn half as wide.
-FINE_CRACK = 0.01
-
-#: Joints open by more than this fraction need no line: the middle of a wide crack may lie on a third block.
-WIDE_CRACK = 0.2
-
-#: Layers that a fall in time has not.
-OF_STATICS = (
-    *("crack", "crack edge", "sliding", "hinge", "hinge top", "force", "force line", "ground"),
-    *("arrow rim", "arrow top", "live rim", "live top"),
-)
-
 #: Most crack lines whose width is written, and the least part of the widest that is worth a word.
 MOST_WIDTHS, LEAST_WIDTH = 6, 0.05
 
 #: The scale of the forces is taken from this many increments.
 FORCES_OF = 100
+
+#: Blocks in space are so transparent where forces are drawn inside them.
+GLASS = 0.35
+
+#: Length of the arrows at the supports, as a part of the larger side of the picture, in the plane and in space.
+ARROW, ARROW_IN_SPACE = 0.055, 0.09
+
+#: Arrows of a mechanism of many parts stand apart by this fraction of the picture, in the plane and in space.
+CELL, CELL_IN_SPACE = 0.07, 0.09
+
+#: Supports in space are shown whole where the picture is no larger for it than this many times the blocks: part of a
+#: slab that ends just outside looks like a mistake.
+WHOLE = 1.75
 
 
 @dataclass(frozen=True)
@@ -67,8 +70,8 @@ class Look:
     colour_by : {"material", "mechanism", "displacement"}
         By "mechanism" the parts that move as one after the last equilibrium are tinted.
     forces : {"auto", "thrust", "points", "none"}
-        Resultant of each joint, forces at the contact points, or neither; "auto" draws the resultants of structures
-        with up to ``FEW_BLOCKS`` blocks.
+        Resultant of each joint, forces at the contact points, or neither; "auto" draws the resultants of structures in
+        the plane with up to ``FEW_BLOCKS`` blocks. In space the blocks are then drawn as of glass.
     joints : bool
         Mark open and sliding joints and hinges.
     """
@@ -100,6 +103,8 @@ class _Seen:
         Numbers of the increments whose forces set the scale.
     largest : float [m]
         Displacement of any free block.
+    widest : float [m]
+        Opening of any crack that does not gape.
     cracks, sliding, hinges : bool
         Whether there are any anywhere.
     largest_force : float [N]
@@ -109,6 +114,7 @@ class _Seen:
 
     sampled: frozenset[int]
     largest: float = 0.0
+    widest: float = 0.0
     cracks: bool = False
     sliding: bool = False
     hinges: bool = False
@@ -146,18 +152,19 @@ class Drawer:
         extra: tuple[solver.Pose, ...] = (),
         fall: Fall | None = None,
     ) -> None:
-        automatic = look.forces == "auto"
-        if automatic:
-            few = response.assembly.n_blocks <= FEW_BLOCKS
-            look = replace(look, forces="thrust" if few else "none")
-        self._forces_hidden = automatic and look.forces == "none"
-        self.response, self.look, self.increments, self.fall = response, look, increments, fall
         assembly = self.assembly = response.assembly
+        self._flat = assembly.dimension == 2
+        few = self._flat and assembly.n_blocks <= FEW_BLOCKS
+        self._forces_hidden = look.forces == "auto" and self._flat and not few
+        self.look = look = replace(look, forces="thrust" if few else "none") if look.forces == "auto" else look
+        self.response, self.increments, self.fall = response, increments, fall
         self.joints = initial_joints(assembly)
-        self._swing = swing_of(response) if look.colour_by == "mechanism" else None
+        # The view of blocks in space is chosen by their mechanism.
+        self._swing = swing_of(response) if look.colour_by == "mechanism" or not self._flat else None
+        self._view = None if self._swing is None or self._flat else _view_of(response, self._swing)
         self._seen = _Seen(sampled=sampled([k for k, i in enumerate(increments) if matters(i, response)]))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
-        frame = framed(assembly, chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
+        frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest
         bar = ColourBar(self.largest) if look.colour_by == "displacement" else None
         beside = round(0.36 * size[0]) if curve else 0
@@ -169,19 +176,52 @@ class Drawer:
 
             self.panel = CurvePanel(response, size_of(self.sheet.beside), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
-        frame = frame.holding(self.live.tails)
-        fill = palette.block_colours(assembly.materials, assembly.free)
-        self.fill = fill
+        self._arrow = ARROW_IN_SPACE * float(frame.size.max())
+        frame = frame.holding(self._projected(np.concatenate([self.live.tails, *self._arrow_tips(extra)])))
+        self.fill = palette.block_colours(assembly.materials, assembly.free)
+        if not self._flat:
+            self.fill[assembly.moving] = palette.MOVING
+        self.scene = self._scene(frame)
+        if self._flat:
+            self._arrow = ARROW * float(self.scene.frame.size.max())
         self._loses = bool(response.losses)
-        self.tints: np.ndarray | None = None
-        self.scene = Scene(assembly, frame, self.sheet.inside_size, fill)
         self.force_scale, self.force_shown = self._force_scale()
-        self._show_start()
-        if fall is not None:
-            self._show_ground(fall.ground)
-        if self._swing is not None and self._swing.moves:
-            self.tints = mechanism_colours(self.assembly, self.fill, self._swing)
+        self.tints: np.ndarray | None = None
+        if look.colour_by == "mechanism" and self._swing is not None and self._swing.moves:
+            self.tints = mechanism_colours(assembly, self.fill, self._swing)
+        #: Where the blocks are drawn while a mechanism is shown.
+        self._drawn_at: solver.Pose | None = None
         self._keys: list[Key] | None = None
+
+    def _framed(self, poses: Iterable[solver.Pose]) -> Frame:
+        if self._view is None:
+            return framed(self.assembly, poses)
+        return framed(self.assembly, poses, margin=0.05, supports=0.3, axes=self._view.axes[:2], whole=WHOLE)
+
+    def _scene(self, frame: Frame) -> Scene:
+        """Set up what draws blocks in the plane, or in space."""
+        if self._view is None:
+            scene = FlatScene(self.assembly, frame, self.sheet.inside_size, self.fill)
+            scene.show_start()
+            if self.fall is not None:
+                scene.show_ground(self.fall.ground)
+            return scene
+        # VTK takes seconds to import, and pictures in the plane need none.
+        from .solid_scene import SolidScene
+
+        opacity = 1.0 if self.look.forces == "none" else GLASS
+        return SolidScene(self.assembly, self._view, frame, self.sheet.inside_size, self.fill, opacity=opacity)
+
+    def _projected(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2) array [m]: places in the picture of points (n, d) [m]."""
+        return points if self._view is None else self._view.projected(points)
+
+    def _arrow_tips(self, extra: tuple[solver.Pose, ...]) -> Iterator[np.ndarray]:
+        """Yield where the arrows at supports in space end: at first and last, and at the extra poses."""
+        if not self._flat:
+            first, last = (self.increments[k] for k in (0, -1))
+            for increment, pose in ((first, first.pose), (last, last.pose), *((last, pose) for pose in extra)):
+                yield self._settlement_arrows(increment, pose)[1]
 
     def _surveyed(self) -> Iterator[solver.Pose]:
         """Yield the poses as shown, and note what must be the same in all pictures.
@@ -193,11 +233,12 @@ class Drawer:
             seen.largest = max(seen.largest, largest_displacement(self.assembly, increment))
             if look.joints:
                 found = marks_of(self.assembly, self.joints, self._shown(increment), increment.pose)
-                seen.cracks |= len(found.cracks) + len(found.faces) > 0
+                seen.widest = max(seen.widest, float(found.openings[~found.gapes].max(initial=0.0)))
+                seen.cracks |= len(found.cracks) > 0
                 seen.sliding |= len(found.sliding) > 0
                 seen.hinges |= len(found.hinges) > 0
             if look.forces != "none" and matters(increment, self.response):
-                sizes = np.hypot(*joint_forces(increment, look.forces)[1].T)
+                sizes = np.linalg.norm(joint_forces(increment, look.forces)[1], axis=1)
                 seen.largest_force = max(seen.largest_force, float(sizes.max(initial=0.0)))
                 if number in seen.sampled:
                     seen.forces.append(sizes)
@@ -229,28 +270,29 @@ class Drawer:
         blocks_only : bool
             Leave out what statics knows: joints, forces, what stands on what, and where supports go.
         widths : bool
-            Write the largest width of the widest crack lines beside them [mm].
+            Write the largest width of the widest crack lines beside them [mm]; in space the legend has the scale of
+            their colours.
         """
         increment = increment if pose is not None else self._shown(increment)
         true = increment.pose if pose is None else pose
-        shown = magnified(self.assembly, true, self.look.magnification)
+        shown = self._drawn_at or magnified(self.assembly, true, self.look.magnification)
         at = increment.with_arrays(pose=true, contacts=contacts_at(increment, true)) if pose is not None else increment
         self.scene.pose(shown, self._block_colours(true, increment.fallen))
-        hinges = np.zeros((0, 2))
+        dots = np.zeros((0, self.assembly.dimension))
         if blocks_only:
             self.scene.clear(*OF_STATICS)
         else:
-            hinges = self._draw_joints(at, shown)
+            dots = self._draw_joints(at, shown)
             self._draw_forces(at, shown)
-            self._draw_ground(shown)
-            self._draw_settlement_arrow(at, shown)
+            self._draw_bearings(shown)
+            self._draw_settlement(at, shown)
             self._draw_live_load(increment, shown)
         falling = increment.status == solver.Status.FALLING
         failed = self.response.stop == solver.Status.SOLVER_FAILED
         head, detail = caption_of(self.response, increment, self.look.magnification)
         picture = self.scene.image()
-        if widths and self.look.joints and not falling:
-            self._write_widths(picture, at, shown, hinges)
+        if widths and self.look.joints and not falling and self._flat:
+            self._write_widths(picture, at, shown, dots)
         return self.sheet.composed(
             picture,
             title=title or head,
@@ -274,65 +316,80 @@ class Drawer:
         )
 
     def show_motion(self, swing: Swing) -> None:
-        """Show by tints, outlines and arrows where a mechanism takes the parts that move as one.
+        """Show by tints, edges and arrows how the parts of a mechanism move.
 
-        Of more than ``MOST_PARTS`` parts the speed is tinted instead, and arrows stand on a grid.
+        In the plane the blocks stay where they stand, and outlines are where it takes them; in space it is the other
+        way round. Of more than ``MOST_PARTS`` parts the speed is tinted instead, and arrows stand on a grid.
 
         Parameters
         ----------
         swing : Swing
         """
-        assembly, scene, pose, displaced, parts = (
-            self.assembly, self.scene, swing.increment.pose, swing.displaced, swing.parts,
-        )  # fmt: skip
-        n = int(parts.max(initial=-1)) + 1
-        if n <= MOST_PARTS:
-            outlines = part_outlines(assembly, solver.moved_vertices(assembly, displaced), parts)
-            scene.lines("motion outline", outlines, palette.SETTLEMENT, self.scene.size[1] / 600.0)
-            chosen = [np.flatnonzero(parts == part) for part in range(n)]
-        else:
-            cell = np.floor(pose.positions / (0.07 * scene.frame.size.max())).astype(np.int64)
-            moves = np.flatnonzero(parts >= 0)
-            _, first = np.unique(cell[moves], axis=0, return_index=True)
-            chosen = [moves[[k]] for k in first]
-        self.tints = mechanism_colours(self.assembly, self.fill, swing)
-        scene.pose(pose, self.tints)
-        tails, tips = np.zeros((len(chosen), 2)), np.zeros((len(chosen), 2))
+        pose, volumes = swing.increment.pose, self.assembly.shapes.volumes
+        chosen = self._blocks_with_arrows(swing)
+        tails, tips = np.zeros((2, len(chosen), self.assembly.dimension))
         for k, blocks in enumerate(chosen):
-            weight = assembly.areas[blocks] / assembly.areas[blocks].sum()
+            weight = volumes[blocks] / volumes[blocks].sum()
             tails[k] = weight @ pose.positions[blocks]
-            tips[k] = solver.carried(tails[[k]], blocks[:1], pose, displaced)[0]
-        self._arrows("motion", tails, tips, 0.6)
+            tips[k] = solver.carried(tails[[k]], blocks[:1], pose, swing.displaced)[0]
+        self.tints = mechanism_colours(self.assembly, self.fill, swing)
+        self._drawn_at = self.scene.show_motion(swing, tails, tips)
+
+    def _blocks_with_arrows(self, swing: Swing) -> list[np.ndarray]:
+        """List the blocks that each arrow of a mechanism stands for: a part, or one of those in a cell of a grid."""
+        if swing.n_parts <= MOST_PARTS:
+            return [np.flatnonzero(swing.parts == part) for part in range(swing.n_parts)]
+        positions = swing.increment.pose.positions
+        moves = np.flatnonzero(swing.parts >= 0)
+        if self._view is not None:
+            # Of the blocks behind each other the first is seen.
+            moves = moves[np.argsort(-self._view.depth(positions[moves]), kind="stable")]
+        width = (CELL if self._flat else CELL_IN_SPACE) * self.scene.frame.size.max()
+        cell = np.floor(self._projected(positions) / width).astype(np.int64)
+        _, first = np.unique(cell[moves], axis=0, return_index=True)
+        return [moves[[k]] for k in first]
 
     def keys(self) -> list[Key]:
         """Return what is marked in any of the increments, each with its place in the legends of all pictures."""
         if self._keys is None:
-            keys = self._keys_of_tints()
-            if self.look.joints:
-                seen = self._seen
-                keys += [Key("area", "open joint", palette.OPEN, layers=("crack", "crack edge"))] if seen.cracks else []
-                marked = [
-                    *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if seen.sliding else []),
-                    *([Key("dot", "hinge", palette.HINGE, layers=("hinge",))] if seen.hinges else []),
-                ]
-                # They would hide the cracks: in a wall of many blocks nearly every brick turns or slides a little.
-                hidden = " and ".join(f"{key.text}s" for key in marked[::-1])
-                keys += marked if not self.many else [Key("", f"{hidden} not shown", palette.FAINT)] if hidden else []
-            if self.force_shown > 0:
-                text = ("compression " if self.look.forces == "thrust" else "contact force ") + force_text(
-                    self.force_shown
-                )
-                length = self.force_shown * self.force_scale / self.scene.pixel
-                keys.append(Key("bar", text, palette.FORCE, length, ("force",)))
-            if self._forces_hidden:
-                keys.append(Key("", "forces not shown", palette.FAINT))
+            keys = self._keys_of_tints() + self._keys_of_joints() + self._keys_of_forces()
+            if not self._flat and self.assembly.moving.any():
+                keys.append(Key("area", "moving support", palette.MOVING))
             if self.live.largest > 0.0:
                 keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
-            motion = "motion outline", "motion top"
-            if self.scene.holds(*motion):
-                keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT, layers=motion))
-            self._keys = keys
+            if self._drawn_at is not None:
+                layers = ("motion outline", "motion top")
+                keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT, layers=layers))
+            # In space every picture has the whole legend.
+            self._keys = keys if self._flat else [replace(key, layers=()) for key in keys]
         return self._keys
+
+    def _keys_of_joints(self) -> list[Key]:
+        seen, keys = self._seen, []
+        if seen.cracks:
+            widest = f", darkest at {_opening_text(seen.widest)}" if seen.widest > 0.0 and not self._flat else ""
+            keys.append(Key("area", f"open joint{widest}", palette.OPEN, layers=("crack", "crack edge")))
+        marked = [
+            *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if seen.sliding else []),
+            *([Key("dot" if self._flat else "line", "hinge", palette.HINGE, layers=("hinge",))] if seen.hinges else []),
+        ]
+        if not self.many:
+            return keys + marked
+        # They would hide the cracks: in a wall of many blocks nearly every brick turns or slides a little.
+        hidden = " and ".join(f"{key.text}s" for key in marked[::-1])
+        return keys + ([Key("", f"{hidden} not shown", palette.FAINT)] if hidden else [])
+
+    def _keys_of_forces(self) -> list[Key]:
+        if self._forces_hidden:
+            return [Key("", "forces not shown", palette.FAINT)]
+        if self.force_scale == 0.0:
+            return []
+        text = "compression" if self.look.forces == "thrust" else "contact force"
+        if not self._flat:
+            # Lengths in space are foreshortened: no bar is their scale.
+            return [Key("line", f"{text} up to {force_text(self._seen.largest_force)}", palette.FORCE)]
+        length = self.force_shown * self.force_scale / self.scene.pixel
+        return [Key("bar", f"{text} {force_text(self.force_shown)}", palette.FORCE, length, ("force",))]
 
     def _keys_drawn(self, increment: solver.Increment) -> list[Key]:
         """Return the legend of the picture that the scene holds; what was left out is told where statics has it."""
@@ -345,12 +402,11 @@ class Drawer:
 
     def _keys_of_tints(self) -> list[Key]:
         """Return what the legend says of the colours of the blocks."""
-        if self._swing is None or not self._swing.moves:
+        if self._swing is None or self.tints is None:
             return []
-        together = int(self._swing.parts.max(initial=-1)) + 1 <= MOST_PARTS
-        red, green, blue = palette.PARTS[0] if together else palette.RAMP[5]
-        words = "parts of the last mechanism" if together else "faster in the last mechanism"
-        return [Key("area", words, (int(red), int(green), int(blue)))]
+        together = self._swing.n_parts <= MOST_PARTS
+        colour = palette.rgb(palette.PARTS[0] if together else palette.RAMP[5])
+        return [Key("area", "parts of the last mechanism" if together else "faster in the last mechanism", colour)]
 
     @property
     def many(self) -> bool:
@@ -371,33 +427,24 @@ class Drawer:
     def _standing_colours(self, pose: solver.Pose) -> np.ndarray | None:
         if self.look.colour_by != "displacement":
             return self.tints
-        moved = pose.displacements(self.assembly)[:, :2]
-        colours = palette.displacement_colours(np.hypot(*moved.T) / (self.largest or 1.0))
+        moved = np.linalg.norm(pose.positions - self.assembly.centroids, axis=1)
+        colours = palette.displacement_colours(moved / (self.largest or 1.0))
         return np.where(self.assembly.free[:, None], colours, self.fill)
 
     def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> np.ndarray:
-        """Draw open and sliding joints and hinges; returns where the dots of the hinges are, (n, 2) [m]."""
+        """Draw open and sliding joints and hinges; returns where hinges are drawn, (n, d) [m]."""
         if not self.look.joints:
-            return np.zeros((0, 2))
-        scene, thin = self.scene, self.scene.size[1] / 1080.0
+            return np.zeros((0, self.assembly.dimension))
         found = marks_of(self.assembly, self.joints, increment, shown)
-        scene.polygons("crack", found.cracks, palette.OPEN)
-        middle = (found.cracks[:, [0, 1]] + found.cracks[:, [3, 2]]) / 2.0 if len(found.cracks) else found.cracks
-        width = found.openings / self.assembly.block_size
-        fine, wide = width < FINE_CRACK, width * self.look.magnification > WIDE_CRACK
-        scene.lines("crack edge", middle[~fine & ~wide], palette.OPEN, self._line(2.2 * thin))
-        scene.lines("crack edge/faces", found.faces, palette.OPEN, self._line(3.0 * thin))
-        scene.lines("crack edge/fine", middle[fine], palette.OPEN, self._line(1.1 * thin))
+        self.scene.cracks(found, self.look.magnification, self._seen.widest)
         if self.many:
-            return np.zeros((0, 2))
-        scene.lines("sliding", found.sliding, palette.SLIDING, self._line(5.0 * thin))
-        radius = float(np.clip(0.09 * self.assembly.block_size / scene.pixel, 3.0 * thin, 11.0 * thin))
-        scene.discs("hinge/rim", found.hinges, radius * 1.35, palette.PAPER)
-        scene.discs("hinge top", found.hinges, radius, palette.HINGE)
-        return found.hinges
+            return np.zeros((0, self.assembly.dimension))
+        self.scene.sliding(found)
+        self.scene.hinges(found)
+        return found.hinges[:, 0]
 
     def _write_widths(
-        self, picture: Image.Image, increment: solver.Increment, shown: solver.Pose, hinges: np.ndarray
+        self, picture: Image.Image, increment: solver.Increment, shown: solver.Pose, dots: np.ndarray
     ) -> None:
         """Write the widths of the widest crack lines of an increment beside them, where there is room."""
         cracks = cracks_of(self.assembly, increment.pose, self.joints, increment.fallen)[: 2 * MOST_WIDTHS]
@@ -406,32 +453,25 @@ class Drawer:
         widest = [int(crack.joints[0]) for crack in cracks]
         places = self.scene.at_pixel((on_a + on_b)[widest].mean(axis=1) / 2.0)
         words = [f"{1e3 * crack.width:.3g} mm" for crack in cracks]
-        write_labels(picture, places, words, self.sheet.text, MOST_WIDTHS, self.scene.at_pixel(hinges))
-
-    def _line(self, pixels: float) -> float:
-        return max(pixels, 1.2)
+        write_labels(picture, places, words, self.sheet.text, MOST_WIDTHS, self.scene.at_pixel(dots))
 
     def _draw_forces(self, increment: solver.Increment, shown: solver.Pose) -> None:
-        if self.look.forces == "none" or self.force_shown == 0:
+        if self.force_scale == 0.0:
             return
-        scene = self.scene
         if increment.status == solver.Status.FALLING:
             # Without equilibrium the forces have no meaning.
-            scene.clear("force", "force line")
+            self.scene.clear("force", "force line")
             return
         points, forces, blocks = joint_forces(increment, self.look.forces)
-        size = np.hypot(*forces.T)
+        size = np.linalg.norm(forces, axis=1)
         kept = size > SMALLEST_RESULTANT * size.max(initial=0.0)
-        points, forces, blocks, size = points[kept], forces[kept], blocks[kept], size[kept]
+        points, forces, blocks = points[kept], forces[kept], blocks[kept]
         points = solver.carried_between(points, blocks[:, 0], blocks[:, 1], increment.pose, shown)
-        unit = forces / size[:, None]
-        half = unit * (0.5 * self.force_scale * size)[:, None]
-        thick = 0.5 * max(2.0, scene.size[1] / 320.0) * scene.pixel
-        side = np.stack([-unit[:, 1], unit[:, 0]], axis=1) * thick
-        bars = [points - half - side, points + half - side, points + half + side, points - half + side]
-        scene.polygons("force", np.stack(bars, axis=1), palette.FORCE)
+        half = 0.5 * self.force_scale * forces
+        line = np.zeros((0, 2, self.assembly.dimension))
         if self.look.forces == "thrust":
-            scene.lines("force line", thrust_line(points, blocks, self.assembly), palette.FORCE, scene.size[1] / 500.0)
+            line = thrust_line(points, blocks, self.assembly)
+        self.scene.forces(np.stack([points - half, points + half], axis=1), line)
 
     def _force_scale(self) -> tuple[float, float]:
         """Length per force [m/N] and the force of the legend [N]; 0 where none is drawn."""
@@ -444,27 +484,10 @@ class Drawer:
         scale = length_per_force(drawn, largest, 1.3 * self.assembly.block_size, extent)
         return scale, rounded_length(min(largest, 0.12 * extent / scale))
 
-    def _show_start(self) -> None:
-        """Draw the first position of the moving supports, behind everything."""
-        moving = self.assembly.moving[self.assembly.block_of_vertex]
-        start = _edges(self.assembly, self.assembly.vertices)[moving]
-        self.scene.lines("ghost", start, palette.GHOST, self.scene.size[1] / 800.0)
-
-    def _show_ground(self, height: float) -> None:
-        """Draw the ground line over the whole width, hatched below, behind everything."""
-        frame, tick = self.scene.frame, self.scene.size[1] / 60.0 * self.scene.pixel
-        (left, _), (right, _) = frame.low, frame.high
-        self.scene.lines(
-            "earth", np.array([[[left, height], [right, height]]]), palette.HATCH, max(1.2, self.scene.size[1] / 400.0)
-        )
-        x = np.arange(left, right + tick, tick)
-        ticks = np.stack(
-            [np.stack([x, x - tick], axis=1), np.broadcast_to([height, height - tick], (len(x), 2))], axis=2
-        )
-        self.scene.lines("earth/hatch", ticks, palette.HATCH, max(0.7, self.scene.size[1] / 1000.0))
-
-    def _draw_ground(self, shown: solver.Pose) -> None:
-        """Draw a heavy line where supports carry the structure."""
+    def _draw_bearings(self, shown: solver.Pose) -> None:
+        """Draw where supports carry the structure in the plane."""
+        if not self._flat:
+            return
         joints, free = self.joints, self.assembly.free
         drawn = solver.Pose.initial(self.assembly)
         lines = []
@@ -472,86 +495,47 @@ class Drawer:
             on = ~free[block] & free[other]
             ends = [solver.carried(joints.ends[on, k], block[on], drawn, shown) for k in (0, 1)]
             lines.append(np.stack(ends, axis=1))
-        self.scene.lines("ground", np.concatenate(lines), palette.INK, max(1.2, self.scene.size[1] / 320.0))
+        self.scene.bearings(np.concatenate(lines))
 
     def _draw_live_load(self, increment: solver.Increment, shown: solver.Pose) -> None:
         """Draw the live load times its multiplier as arrows to scale that end where it acts."""
         if self.live.largest > 0.0:
-            self._arrows("live", *self.live.arrows(increment, shown), 0.55, palette.LIVE)
+            self.scene.arrows("live", *self.live.arrows(increment, shown), palette.LIVE)
 
-    def _draw_settlement_arrow(self, increment: solver.Increment, shown: solver.Pose) -> None:
-        assembly, scene = self.assembly, self.scene
-        if not self.response.settlements:
-            return
-        phase = self.response.settlements[min(increment.phase, len(self.response.settlements) - 1)]
-        _, places, directions = settlement_arrows(assembly, phase, shown, scene.frame.low, scene.frame.high)
-        half = 0.0275 * float(scene.frame.size.max()) * directions[directions.any(axis=1)]
-        places = places[directions.any(axis=1)]
-        self._arrows("arrow", places - half, places + half, 1.0)
+    def _draw_settlement(self, increment: solver.Increment, shown: solver.Pose) -> None:
+        if self.response.settlements:
+            seen = self.scene.frame if self._flat else None
+            self.scene.arrows("arrow", *self._settlement_arrows(increment, shown, seen), palette.SETTLEMENT)
 
-    def _arrows(
-        self,
-        layer: str,
-        tails: np.ndarray,
-        tips: np.ndarray,
-        weight: float,
-        fill: tuple[int, int, int] = palette.SETTLEMENT,
-    ) -> None:
-        scene = self.scene
-        thick = weight * scene.size[1] / 110.0 * scene.pixel
-        for name, grown, colour in (("rim", 1.0, palette.PAPER), ("top", 0.0, fill)):
-            shafts, heads = arrow_shapes(tails, tips, thick, grown * weight * scene.size[1] / 360.0 * scene.pixel)
-            scene.polygons(f"{layer} {name}/shaft", shafts, colour)
-            scene.polygons(f"{layer} {name}/head", heads, colour)
+    def _settlement_arrows(
+        self, increment: solver.Increment, shown: solver.Pose, seen: Frame | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Tails and tips (n, d) [m] of the arrows at supports: in the plane on them, in space out of them."""
+        phases = self.response.settlements
+        if not phases:
+            return np.zeros((0, self.assembly.dimension)), np.zeros((0, self.assembly.dimension))
+        phase = phases[min(increment.phase, len(phases) - 1)]
+        _, places, directions = settlement_arrows(self.assembly, phase, shown, seen)
+        half = 0.5 * self._arrow * directions
+        return (places - half, places + half) if self._flat else (places, places + 2.0 * half)
+
+
+def _view_of(response: solver.Response, swing: Swing) -> View:
+    return chosen_view(response, swing.displaced.positions - swing.increment.pose.positions)
+
+
+def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:
+    """Multiply the displacements and rotations of a pose since the layout."""
+    if magnification == 1.0:
+        return pose
+    start = assembly.centroids
+    return solver.Pose(start + magnification * (pose.positions - start), magnification * pose.rotations)
 
 
 def sampled(numbers: list[int]) -> frozenset[int]:
     """Up to ``FORCES_OF`` of the numbers, evenly chosen."""
     chosen = np.linspace(0, len(numbers) - 1, min(len(numbers), FORCES_OF)).round().astype(int)
     return frozenset(numbers[k] for k in chosen)
-
-
-def arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: float) -> tuple[np.ndarray, np.ndarray]:
-    """Shafts (n, 4, 2) and heads (n, 3, 2) of arrows, a margin ``grown`` larger all around [m]."""
-    along = tips - tails
-    length = np.hypot(*along.T)
-    kept = length > 1.2 * thick
-    tails, tips, along, length = tails[kept], tips[kept], along[kept], length[kept]
-    unit = along / length[:, None]
-    side = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
-    head = np.minimum(2.6 * thick, 0.6 * length)[:, None]
-    neck = tips - head * unit
-    half = thick / 2.0 + grown
-    start = tails - grown * unit
-    shafts = np.stack([start - half * side, neck - half * side, neck + half * side, start + half * side], axis=1)
-    wing = 0.55 * head + 1.6 * grown
-    back, tip = neck - grown * unit, tips + 2.0 * grown * unit
-    heads = np.stack([back - wing * side, tip, back + wing * side], axis=1)
-    return shafts, heads
-
-
-def joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find points (n, d) [m], forces (n, d) [N] and blocks (n, 2) of the resultants, or by "points" of all contacts."""
-    if kind == "thrust":
-        return resultants(increment)
-    contacts = increment.contacts
-    carrying = increment.forces[:, 0] > 0.0
-    force = np.einsum("ki,kij->kj", increment.forces, contacts.frames)
-    blocks = np.stack([contacts.block_a, contacts.block_b], axis=1)
-    return contacts.points[carrying], force[carrying], blocks[carrying]
-
-
-def thrust_line(points: np.ndarray, blocks: np.ndarray, assembly: solver.Assembly) -> np.ndarray:
-    """(n, 2, d) array [m]: the line from joint to joint, where every block has two at most: an arch, a column."""
-    owner = np.concatenate([blocks[:, 0], blocks[:, 1]])
-    which = np.concatenate([np.arange(len(blocks))] * 2)
-    counts = np.bincount(owner, minlength=assembly.n_blocks)
-    if counts[assembly.free].max(initial=0) > 2:
-        return np.zeros((0, 2, points.shape[1]))
-    order = np.argsort(owner, kind="stable")
-    owner, which = owner[order], which[order]
-    pairs = (owner[1:] == owner[:-1]) & assembly.free[owner[1:]]
-    return np.stack([points[which[:-1][pairs]], points[which[1:][pairs]]], axis=1)
 
 
 def contacts_at(increment: solver.Increment, pose: solver.Pose) -> solver.Contacts:
@@ -567,8 +551,8 @@ def largest_displacement(assembly: solver.Assembly, increment: solver.Increment)
     return float(np.linalg.norm(moved, axis=1)[assembly.free[assembly.block_of_vertex]].max(initial=0.0))
 
 
-def _edges(assembly: solver.Assembly, corners: np.ndarray) -> np.ndarray:
-    return np.stack([corners, corners[assembly.next_vertex]], axis=1)
+def _opening_text(length: float) -> str:
+    return f"{1e3 * length:.2g} mm" if length < 0.0995 else f"{length:.2g} m"
 
 
 def size_of(box: tuple[int, int, int, int]) -> tuple[int, int]:

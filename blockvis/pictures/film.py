@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from PIL import Image
@@ -14,10 +14,6 @@ import solver
 
 from .captions import matters
 from .drawer import Drawer
-
-if TYPE_CHECKING:
-    # VTK takes seconds to import, and pictures in the plane need none.
-    from .solid_drawer import SolidDrawer
 
 #: Seconds for which the last equilibrium and the end of the film are held.
 PAUSE, END = 0.6, 0.8
@@ -29,7 +25,7 @@ Draw: TypeAlias = Callable[[], Image.Image]
 
 
 def film_of(
-    drawer: Drawer | SolidDrawer, fps: float, seconds: float, progress: Callable[[int, int], None] | None = None
+    drawer: Drawer, fps: float, seconds: float, progress: Callable[[int, int], None] | None = None
 ) -> tuple[list[int], Iterator[Image.Image]]:
     """Plan a film: even motion along the path, a pause, then the fall.
 
@@ -37,7 +33,7 @@ def film_of(
 
     Parameters
     ----------
-    drawer : Drawer or SolidDrawer
+    drawer : Drawer
     fps : float
         Frames per second.
     seconds : float [s]
@@ -73,7 +69,7 @@ def film_of(
     return holds, pictures()
 
 
-def _distinct(drawer: Drawer | SolidDrawer, path: list[solver.Increment], most: int) -> int:
+def _distinct(drawer: Drawer, path: list[solver.Increment], most: int) -> int:
     """How many pictures of the path differ: one for each pixel of the way of the block that goes farthest."""
     if len(path) == 1 or solver.path_parameters(path)[-1] <= solver.path_parameters(path)[0]:
         return 1
@@ -87,7 +83,7 @@ def _distinct(drawer: Drawer | SolidDrawer, path: list[solver.Increment], most: 
     return int(np.clip(np.ceil(pixels), min(len(path), most), most))
 
 
-def _falling(drawer: Drawer | SolidDrawer, fps: float) -> list[tuple[Draw, int]]:
+def _falling(drawer: Drawer, fps: float) -> list[tuple[Draw, int]]:
     """List what draws each picture of the fall, and for how many frames it stands: till something moves again."""
     draws: list[Draw] = []
     poses: Iterator[solver.Pose]

@@ -16,6 +16,8 @@ import solver
 from . import palette
 from .frame import Frame
 from .hatching import hatch_lines
+from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes, part_outlines
+from .swing import MOST_PARTS, Swing
 
 #: The layers, back to front.
 ORDER = (
@@ -27,19 +29,15 @@ ORDER = (
 #: A picture is drawn in bands of at most so many pixels, so that its size does not decide how much memory that takes.
 BAND = 2_000_000
 
+#: Thickness of arrows by their layer, and the least width of a line [pixels].
+WEIGHTS = {"arrow": 1.0, "motion": 0.6, "live": 0.55}
+THINNEST = 1.2
+
 Colour = tuple[int, int, int]
 
 
-def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:
-    """Multiply the displacements and rotations of a pose since the layout."""
-    if magnification == 1.0:
-        return pose
-    start = assembly.centroids
-    return solver.Pose(start + magnification * (pose.positions - start), magnification * pose.rotations)
-
-
-class Scene:
-    """Blocks and their marks, drawn frame after frame.
+class FlatScene:
+    """Blocks of the plane and their marks, drawn frame after frame; see :class:`blockvis.pictures.scene.Scene`.
 
     Parameters
     ----------
@@ -117,6 +115,78 @@ class Scene:
         rim = radius * self.pixel * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         self.polygons(layer, centres[:, None, :] + rim[None, :, :], colour)
 
+    def cracks(self, found: Marks, magnification: float, widest: float) -> None:
+        """Fill what lies between faces, and draw a line where that would be too thin to see."""
+        narrow, thin = ~found.gapes, self._thin
+        self.polygons("crack", found.cracks[narrow], palette.OPEN)
+        middle = found.middles[narrow]
+        width = found.openings[narrow].max(axis=1, initial=0.0) / self.assembly.block_size
+        fine, wide = width < FINE_CRACK, width * magnification > WIDE_CRACK
+        self.lines("crack edge", middle[~fine & ~wide], palette.OPEN, max(2.2 * thin, THINNEST))
+        self.lines("crack edge/faces", found.gaping_faces, palette.OPEN, max(3.0 * thin, THINNEST))
+        self.lines("crack edge/fine", middle[fine], palette.OPEN, max(1.1 * thin, THINNEST))
+
+    def sliding(self, found: Marks) -> None:
+        """Draw lines along sliding joints."""
+        self.lines("sliding", found.sliding, palette.SLIDING, max(5.0 * self._thin, THINNEST))
+
+    def hinges(self, found: Marks) -> None:
+        """Draw dots with a rim of paper."""
+        places, thin = found.hinges[:, 0], self._thin
+        radius = float(np.clip(0.09 * self.assembly.block_size / self.pixel, 3.0 * thin, 11.0 * thin))
+        self.discs("hinge/rim", places, radius * 1.35, palette.PAPER)
+        self.discs("hinge top", places, radius, palette.HINGE)
+
+    def forces(self, ends: np.ndarray, line: np.ndarray) -> None:
+        """Draw bars, and the line of thrust."""
+        along = ends[:, 1] - ends[:, 0]
+        unit = along / np.hypot(*along.T)[:, None]
+        thick = 0.5 * max(2.0, self.size[1] / 320.0) * self.pixel
+        side = np.stack([-unit[:, 1], unit[:, 0]], axis=1) * thick
+        bars = [ends[:, 0] - side, ends[:, 1] - side, ends[:, 1] + side, ends[:, 0] + side]
+        self.polygons("force", np.stack(bars, axis=1), palette.FORCE)
+        self.lines("force line", line, palette.FORCE, self.size[1] / 500.0)
+
+    def bearings(self, ends: np.ndarray) -> None:
+        """Draw a heavy line where supports carry the structure."""
+        self.lines("ground", ends, palette.INK, max(1.2, self.size[1] / 320.0))
+
+    def arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: Colour) -> None:
+        """Draw arrows with a rim of paper from tails (n, 2) [m] to tips (n, 2) [m]."""
+        weight = WEIGHTS[layer]
+        thick = weight * self.size[1] / 110.0 * self.pixel
+        for name, grown, fill in (("rim", 1.0, palette.PAPER), ("top", 0.0, colour)):
+            shafts, heads = arrow_shapes(tails, tips, thick, grown * weight * self.size[1] / 360.0 * self.pixel)
+            self.polygons(f"{layer} {name}/shaft", shafts, fill)
+            self.polygons(f"{layer} {name}/head", heads, fill)
+
+    def show_motion(self, swing: Swing, tails: np.ndarray, tips: np.ndarray) -> solver.Pose:
+        """Draw the parts of a mechanism as outlines where it takes them; the blocks stay where they are."""
+        if swing.n_parts <= MOST_PARTS:
+            corners = solver.moved_vertices(self.assembly, swing.displaced)
+            outlines = part_outlines(self.assembly, corners, swing.parts)
+            self.lines("motion outline", outlines, palette.SETTLEMENT, self.size[1] / 600.0)
+        self.arrows("motion", tails, tips, palette.SETTLEMENT)
+        return swing.increment.pose
+
+    def show_start(self) -> None:
+        """Draw the first position of the moving supports, behind everything."""
+        assembly = self.assembly
+        edges = np.stack([assembly.vertices, assembly.vertices[assembly.next_vertex]], axis=1)
+        moving = assembly.moving[assembly.block_of_vertex]
+        self.lines("ghost", edges[moving], palette.GHOST, self.size[1] / 800.0)
+
+    def show_ground(self, height: float) -> None:
+        """Draw the ground of a fall over the whole width, hatched below, behind everything."""
+        tick = self.size[1] / 60.0 * self.pixel
+        (left, _), (right, _) = self.frame.low, self.frame.high
+        ends = np.array([[[left, height], [right, height]]])
+        self.lines("earth", ends, palette.HATCH, max(1.2, self.size[1] / 400.0))
+        x = np.arange(left, right + tick, tick)
+        level = np.broadcast_to([height, height - tick], (len(x), 2))
+        ticks = np.stack([np.stack([x, x - tick], axis=1), level], axis=2)
+        self.lines("earth/hatch", ticks, palette.HATCH, max(0.7, self.size[1] / 1000.0))
+
     def clear(self, *layers: str) -> None:
         """Remove layers, parts of them (after a "/") included."""
         for name in self.layers:
@@ -182,6 +252,11 @@ class Scene:
             _Layer((int(r), int(g), int(b)), corners[owner == k], codes[owner == k])
             for k, (r, g, b) in enumerate(colours)
         ]
+
+    @property
+    def _thin(self) -> float:
+        """Pixels; one where the picture is 1080 high."""
+        return self.size[1] / 1080.0
 
     def _outline_width(self) -> float:
         """Pixels; thinner where the blocks are small, so that a façade does not turn dark."""

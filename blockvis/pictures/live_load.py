@@ -10,14 +10,17 @@ import numpy as np
 import solver
 from blockvis.text import force_text
 
+from .marks import MOST_ARROWS, evenly, leaving
+
 #: Loads below this fraction of the largest are rounding.
 ROUNDING = 1e-5
 
 #: Length of the longest arrow, as a fraction of the picture.
 LENGTH = 0.11
 
-#: More arrows than this are drawn as resultants, a grid cell each, of this fraction of the picture.
-MOST_ARROWS, CELL = 24, 0.12
+#: More arrows than ``MOST_ARROWS`` are drawn in the plane as resultants, a grid cell each, of this fraction of the
+#: picture. In space these would lie inside the structure, and evenly chosen ones stand for all.
+CELL = 0.12
 
 
 @dataclass(frozen=True)
@@ -26,9 +29,9 @@ class LiveLoad:
 
     Attributes
     ----------
-    points : (n, 2) array [m]
+    points : (n, d) array [m]
         Where they act, at ``pose``.
-    forces : (n, 2) array [N]
+    forces : (n, d) array [N]
     blocks : (n,) int array
         The block each acts on, or one of those whose resultant it is.
     pose : solver.Pose
@@ -40,22 +43,14 @@ class LiveLoad:
     blocks: np.ndarray
     pose: solver.Pose
 
-    @classmethod
-    def none(cls) -> LiveLoad:
-        """No load."""
-        nowhere = solver.Pose(np.zeros((0, 2)), np.zeros((0, 1)))
-        return cls(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, dtype=int), nowhere)
-
     def carried(self, pose: solver.Pose) -> np.ndarray:
-        """(n, 2) array [m]: where the points are when all blocks are at another pose."""
-        if len(self.points) == 0:
-            return self.points
+        """(n, d) array [m]: where the points are when all blocks are at another pose."""
         return solver.carried(self.points, np.arange(len(self.blocks)), self.pose, _of(self.blocks, pose))
 
     @property
     def largest(self) -> float:
         """Size of the largest force [N]."""
-        return float(np.hypot(*self.forces.T).max(initial=0.0))
+        return float(np.linalg.norm(self.forces, axis=1).max(initial=0.0))
 
 
 def live_load_of(response: solver.Response, increment: solver.Increment, extent: float) -> LiveLoad:
@@ -75,20 +70,23 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     """
     standing = increment.status == solver.Status.EQUILIBRIUM or bool(response.limits)
     finite = np.isfinite(increment.load_multiplier) and increment.load_multiplier != 0.0
-    if not (standing and finite):
-        return LiveLoad.none()
     assembly, pose = response.assembly, increment.pose
+    if not (standing and finite):
+        nowhere = np.zeros((0, assembly.dimension))
+        return LiveLoad(nowhere, nowhere, np.zeros(0, dtype=int), _of(np.zeros(0, dtype=int), pose))
     live = -(solver.block_forces(increment.contacts, pose, increment.forces) + response.loads.dead)
     live[~assembly.free] = 0.0
-    size = np.hypot(*live[:, :2].T)
+    forces = live[:, : assembly.dimension]
+    size = np.linalg.norm(forces, axis=1)
     blocks = np.flatnonzero(size > ROUNDING * np.abs(live).max(initial=0.0))
-    if len(blocks) == 0:
-        return LiveLoad.none()
-    points = np.array([_entry(assembly, pose, int(block), live[block]) for block in blocks])
-    forces = live[blocks, :2]
+    if assembly.dimension == 3:
+        blocks = evenly(blocks, MOST_ARROWS)
+        points = leaving(assembly, pose, blocks, -forces[blocks] / size[blocks, None])
+    else:
+        points = np.array([_entry(assembly, pose, int(block), live[block]) for block in blocks]).reshape(-1, 2)
     if len(blocks) > MOST_ARROWS:
-        return _gathered(points, forces, blocks, pose, CELL * extent)
-    return LiveLoad(points, forces, blocks, _of(blocks, pose))
+        return _gathered(points, forces[blocks], blocks, pose, CELL * extent)
+    return LiveLoad(points, forces[blocks], blocks, _of(blocks, pose))
 
 
 class LiveLoads:
@@ -104,6 +102,7 @@ class LiveLoads:
     """
 
     def __init__(self, response: solver.Response, increments: Iterable[solver.Increment], extent: float) -> None:
+        self._dimension = response.assembly.dimension
         self._swinging = bool(response.limits) and response.collapse is None
         self._loads: dict[tuple[int, float], LiveLoad] = {}
         if response.measured == solver.LOAD_MULTIPLIER:
@@ -123,25 +122,27 @@ class LiveLoads:
 
     @property
     def words(self) -> str:
-        """Entry of the legend."""
+        """Entry of the legend; lengths in space are foreshortened and have no scale."""
+        if self._dimension == 3:
+            return "live load · α"
         scale = " (not to scale)" if self._places else f", longest arrow {force_text(self.largest)}"
         return f"live load · α{scale}"
 
     @property
     def tails(self) -> np.ndarray:
-        """(n, 2) array [m]: where the arrows of all increments begin, at their poses."""
+        """(n, d) array [m]: where the arrows of all increments begin, at their poses."""
         tails = [load.points - load.forces * self._scale for load in self._loads.values()]
-        return np.concatenate([np.zeros((0, 2)), *tails])
+        return np.concatenate([np.zeros((0, self._dimension)), *tails])
 
     def arrows(self, increment: solver.Increment, pose: solver.Pose) -> tuple[np.ndarray, np.ndarray]:
-        """Tails and tips (n, 2) [m] of one of the increments, its blocks at a pose; none in a fall.
+        """Tails and tips (n, d) [m] of one of the increments, its blocks at a pose; none in a fall.
 
         Parameters
         ----------
         increment : solver.Increment
         pose : solver.Pose
         """
-        nothing = np.zeros((0, 2))
+        nothing = np.zeros((0, self._dimension))
         if self.largest == 0.0 or (increment.status == solver.Status.FALLING and not self._swinging):
             return nothing, nothing
         load = self._loads[_place(increment)]

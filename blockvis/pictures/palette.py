@@ -119,6 +119,11 @@ def _on_ramp(ramp: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     return np.rint(ramp[below] * (1.0 - rest) + ramp[below + 1] * rest).astype(np.uint8)
 
 
+def rgb(colour: np.ndarray) -> tuple[int, int, int]:
+    """Give a colour of an array, (3,), as integers."""
+    return int(colour[0]), int(colour[1]), int(colour[2])
+
+
 def hexadecimal(colour: tuple[int, int, int]) -> str:
     """Write a colour as CSS and matplotlib do.
 

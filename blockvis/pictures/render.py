@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from PIL import Image
@@ -19,9 +18,6 @@ from .drawer import Drawer, Look
 from .film import film_of
 from .swing import MOST_PARTS, shown_increments, swing_of
 from .video import write_film
-
-if TYPE_CHECKING:
-    from .solid_drawer import SolidDrawer
 
 STILL_SIZE = (1920, 1080)
 FILM_SIZE = (1280, 720)
@@ -69,7 +65,7 @@ def draw_still(
     _check_response(response)
     chosen = response.increments[increment] if isinstance(increment, int) else increment
     look = Look(magnification, colour_by, forces, joints)
-    return _save(_drawer(response, look, size, (chosen,), curve=curve, finer=1).picture(chosen, widths=True), path)
+    return _save(Drawer(response, look, size, (chosen,), curve=curve).picture(chosen, widths=True), path)
 
 
 def draw_mechanism(
@@ -94,7 +90,7 @@ def draw_mechanism(
     response = response.response if isinstance(response, solver.LimitLoad) else response
     _check_response(response)
     swing = swing_of(response)
-    drawer = _drawer(response, Look(forces="none"), size, (swing.increment,), extra=(swing.displaced,), finer=1)
+    drawer = Drawer(response, Look(forces="none"), size, (swing.increment,), extra=(swing.displaced,))
     if swing.moves:
         drawer.show_motion(swing)
     note = _mechanism_note(response, swing.parts)
@@ -151,27 +147,9 @@ def animate(
     elif fall is None:
         fall = fall_of(response)
     shown = shown_increments(response) if fall is None else response.path
-    drawer = _drawer(response, look, size, shown, curve=curve, fall=fall)
+    drawer = Drawer(response, look, size, shown, curve=curve, fall=fall)
     holds, pictures = film_of(drawer, fps, seconds, progress)
     return write_film(pictures, path, size=size, fps=fps, holds=holds)
-
-
-def _drawer(
-    response: solver.Response,
-    look: Look,
-    size: tuple[int, int],
-    increments: tuple[solver.Increment, ...],
-    *,
-    fall: Fall | None = None,
-    finer: int = 1,
-    **options: Any,
-) -> Drawer | SolidDrawer:
-    """Set up what draws blocks in the plane, or in space, there ``finer`` by so many times and averaged."""
-    if response.assembly.dimension == 2:
-        return Drawer(response, look, size, increments, fall=fall, **options)
-    from .solid_drawer import SolidDrawer
-
-    return SolidDrawer(response, look, size, increments, finer=finer, **options)
 
 
 def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:

@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
+from matplotlib.backends.backend_agg import RendererAgg
+from matplotlib.path import Path
+from matplotlib.transforms import Affine2D
 from PIL import Image
 from vtkmodules.vtkCommonCore import vtkLogger
 
@@ -15,8 +18,10 @@ import solver
 
 from . import palette
 from .frame import Frame
+from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes
 from .solid_view import View
 from .surface import sharp_edges, triangles_of
+from .swing import Swing
 
 #: How much of the light comes from all sides, and from the lamp above the left shoulder.
 AMBIENT, DIFFUSE = 0.58, 0.50
@@ -33,6 +38,9 @@ SAME_DEPTH = 0.005
 #: Layers by how far in front of what lies at the same place they are drawn; what is in front of all hides nothing.
 IN_FRONT_OF_ALL = 1_000_000.0
 
+#: The arrows of a mechanism are longer than the way it is drawn by, to be seen on the blocks.
+LONGER = 1.6
+
 
 def _unit_arrow() -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) and triangles (m, 3) of an arrow from the origin along x, of length 1."""
@@ -45,7 +53,7 @@ _ARROW = _unit_arrow()
 
 
 class SolidScene:
-    """Blocks in space and their marks, drawn frame after frame.
+    """Blocks in space and their marks, drawn frame after frame; see :class:`blockvis.pictures.scene.Scene`.
 
     Parameters
     ----------
@@ -57,8 +65,6 @@ class SolidScene:
         Width and height of the pictures in pixels.
     block_fill : (n_blocks, 3) uint8 array
         Colours of the blocks.
-    finer : int
-        Pixels are drawn so many times finer along each side and averaged.
     opacity : float
         Of the blocks.
     """
@@ -71,15 +77,15 @@ class SolidScene:
         size: tuple[int, int],
         block_fill: np.ndarray,
         *,
-        finer: int = 1,
         opacity: float = 1.0,
     ) -> None:
-        self.assembly, self.view, self.size, self.finer = assembly, view, size, finer
+        self.assembly, self.view, self.size = assembly, view, size
         self.frame = frame.fitted(*size)
         #: Size of a pixel in the world [m].
         self.pixel = float(self.frame.size[0]) / size[0]
-        self._plotter = _plotter((size[0] * finer, size[1] * finer))
+        self._plotter = _plotter(size)
         self._layers: dict[str, Any] = {}
+        self._overlay: list[tuple[tuple[int, int, int], np.ndarray]] = []
         self._look_at()
         triangles, self._block = triangles_of(assembly.polyhedra)
         self._surface = pv.PolyData.from_regular_faces(np.array(assembly.vertices), triangles)
@@ -169,26 +175,66 @@ class SolidScene:
             faces = np.insert(np.arange(len(points)), np.cumsum(counts) - counts, counts)
             self._add(layer, pv.PolyData(points, faces=faces), colour, forward=forward, lit=lit, opacity=opacity)
 
-    def arrows(
-        self,
-        layer: str,
-        tails: np.ndarray,
-        directions: np.ndarray,
-        lengths: np.ndarray | float,
-        colour: tuple[int, int, int] = palette.SETTLEMENT,
-    ) -> None:
-        """Draw solid arrows from tails (n, 3) [m] along directions (n, 3), in one layer, instead of those before."""
+    def cracks(self, found: Marks, magnification: float, widest: float) -> None:
+        """Fill what lies between faces, and draw a line where that would be too thin to see."""
+        size, thin = self.assembly.block_size, self._thin
+        colours = palette.crack_colours(found.openings / (widest or 1.0))
+        narrow = ~found.gapes
+        self.polygons("crack", found.cracks[narrow], colours[:, [0, 1, 1, 0]][narrow].reshape(-1, 3))
+        width = found.openings.max(axis=1, initial=0.0) / size
+        fine, wide = width < FINE_CRACK, width * magnification > WIDE_CRACK
+        line, middle = narrow & ~wide, found.middles
+        self.lines("crack line", middle[line & ~fine], colours[line & ~fine], max(2.2 * thin, 1.2), forward=2.0)
+        self.lines("crack line/fine", middle[line & fine], colours[line & fine], max(1.4 * thin, 1.0), forward=2.0)
+        both = np.tile(colours[found.gapes], (2, 1, 1))
+        self.lines("crack line/faces", found.gaping_faces, both, max(2.4 * thin, 1.2), forward=2.0)
+
+    def sliding(self, found: Marks) -> None:
+        """Draw lines around the faces that slide, and what of them is seen."""
+        self.lines("sliding", found.sliding, palette.SLIDING, max(4.0 * self._thin, 1.6), forward=3.0)
+        pale = palette.rgb(0.6 * np.asarray(palette.SLIDING) + 102.0)
+        self.polygons("exposed", found.exposed, pale, forward=0.5)
+
+    def hinges(self, found: Marks) -> None:
+        """Draw the lines about which hinges turn, dashed where blocks hide them."""
+        width = max(7.0 * self._thin, 2.4)
+        self.lines("hinge rim", found.hinges, palette.PAPER, 1.8 * width, forward=4.0)
+        self.lines("hinge", found.hinges, palette.HINGE, width, forward=5.0)
+        dashes = _dashed(found.hinges, 12.0 * max(self._thin, 0.6) * self.pixel)
+        self.lines("hidden hinge", dashes, palette.HINGE, 0.22 * width, forward=IN_FRONT_OF_ALL)
+
+    def forces(self, ends: np.ndarray, line: np.ndarray) -> None:
+        """Draw bars and the line of thrust in front of all: they lie inside the blocks."""
+        width = max(2.5, self.size[1] / 240.0)
+        self.lines("force", ends, palette.FORCE, width, forward=IN_FRONT_OF_ALL)
+        self.lines("force line", line, palette.FORCE, 0.6 * width, forward=IN_FRONT_OF_ALL)
+
+    def bearings(self, ends: np.ndarray) -> None:
+        """Draw nothing: the blocks show it."""
+
+    def arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
+        """Draw solid arrows from tails (n, 3) [m] to tips (n, 3) [m]."""
         self.clear(layer)
         if len(tails):
             points, faces = _ARROW
+            long = np.linalg.norm(tips - tails, axis=1)[:, None]
+            directions = (tips - tails) / long
             across = np.cross(directions, np.where(np.abs(directions[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
             across /= np.linalg.norm(across, axis=1)[:, None]
             turns = np.stack([directions, across, np.cross(directions, across)], axis=1)
-            long = np.broadcast_to(lengths, len(tails))[:, None, None]
-            placed = tails[:, None] + long * np.einsum("pi,nij->npj", points, turns)
+            placed = tails[:, None] + long[:, None] * np.einsum("pi,nij->npj", points, turns)
             every = faces[None] + len(points) * np.arange(len(tails))[:, None, None]
             mesh = pv.PolyData.from_regular_faces(placed.reshape(-1, 3), every.reshape(-1, 3))
             self._add(layer, mesh, colour, lit=True)
+
+    def show_motion(self, swing: Swing, tails: np.ndarray, tips: np.ndarray) -> solver.Pose:
+        """Draw the edges of where the parts of a mechanism were; the blocks go where it takes them."""
+        edges = solver.moved_vertices(self.assembly, swing.increment.pose)[self.edges]
+        moving = (swing.parts >= 0)[self.assembly.block_of_vertex[self.edges[:, 0]]]
+        self.lines("before", edges[moving], palette.GHOST, self.size[1] / 900.0)
+        tips = tips + (LONGER - 1.0) * (tips - tails)
+        self._overlay = _rimmed_arrows(self.at_pixel(tails), self.at_pixel(tips), self.size[1] / 130.0)
+        return swing.displaced
 
     def clear(self, *layers: str) -> None:
         """Remove layers."""
@@ -201,12 +247,16 @@ class SolidScene:
         """Names of the layers."""
         return tuple(self._layers)
 
+    def holds(self, *layers: str) -> bool:
+        """Whether anything is drawn in one of the layers."""
+        return any(layer in self._layers for layer in layers)
+
     def image(self) -> Image.Image:
         """Draw the picture."""
         with _quiet():
             self._plotter.render()
             pixels = self._plotter.screenshot(return_img=True)
-        return Image.fromarray(np.ascontiguousarray(pixels[..., :3])).reduce(self.finer)
+        return _painted(Image.fromarray(np.ascontiguousarray(pixels[..., :3])), self._overlay)
 
     def at_pixel(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array: pixel (column, row) of points (n, 3) [m]."""
@@ -216,7 +266,7 @@ class SolidScene:
     def sees(self, points: np.ndarray) -> np.ndarray:
         """(n,) bool array: which points (n, 3) [m] on the blocks nothing hides in the last picture."""
         depth = np.nan_to_num(np.asarray(self._plotter.get_image_depth(reset_camera_clipping_range=False)), nan=-np.inf)
-        column, row = np.floor(self.at_pixel(points) * self.finer).astype(int).T
+        column, row = np.floor(self.at_pixel(points)).astype(int).T
         inside = (column >= 0) & (row >= 0) & (column < depth.shape[1]) & (row < depth.shape[0])
         found = np.full(len(points), -np.inf)
         found[inside] = depth[row[inside], column[inside]]
@@ -227,6 +277,11 @@ class SolidScene:
     def close(self) -> None:
         """Give the memory of the graphics card back."""
         self._plotter.close()
+
+    @property
+    def _thin(self) -> float:
+        """Pixels; one where the picture is 1080 high."""
+        return self.size[1] / 1080.0
 
     def _look_at(self) -> None:
         axes, camera = self.view.axes, self._plotter.camera
@@ -257,7 +312,7 @@ class SolidScene:
             mesh.point_data["colour"] = np.asarray(colour, dtype=np.uint8).reshape(-1, 3)
             look = {"scalars": "colour", "rgb": True, "show_scalar_bar": False}
         actor = self._plotter.add_mesh(
-            mesh, **look, line_width=width * self.finer, opacity=opacity, lighting=lit, ambient=AMBIENT,
+            mesh, **look, line_width=width, opacity=opacity, lighting=lit, ambient=AMBIENT,
             diffuse=DIFFUSE, reset_camera=False, render=False,
         )  # fmt: skip
         drawn_forward(actor, forward)
@@ -302,3 +357,38 @@ def _quiet() -> Iterator[None]:
         yield
     finally:
         vtkLogger.SetStderrVerbosity(before)
+
+
+def _dashed(ends: np.ndarray, length: float) -> np.ndarray:
+    """(m, 2, 3) array [m]: dashes of a length [m], with gaps as long, along lines (n, 2, 3)."""
+    along = ends[:, 1] - ends[:, 0]
+    counts = np.maximum(1, np.round(np.linalg.norm(along, axis=1) / (2.0 * length))).astype(int)
+    line = np.repeat(np.arange(len(ends)), counts)
+    place = np.arange(len(line)) - np.repeat(np.cumsum(counts) - counts, counts)
+    # Half a gap at either end.
+    shares = (place[:, None] + np.array([0.25, 0.75])) / counts[line][:, None]
+    return ends[line, :1] + shares[:, :, None] * along[line][:, None]
+
+
+def _rimmed_arrows(tails: np.ndarray, tips: np.ndarray, thick: float) -> list[tuple[tuple[int, int, int], np.ndarray]]:
+    """Polygons of arrows from tails (n, 2) to tips (n, 2) [pixels] with a white rim, back to front."""
+    shapes: list[tuple[tuple[int, int, int], np.ndarray]] = []
+    for grown, colour in ((0.35 * thick, palette.PAPER), (0.0, palette.SETTLEMENT)):
+        shapes += [(colour, polygon) for kind in arrow_shapes(tails, tips, thick, grown) for polygon in kind]
+    return shapes
+
+
+def _painted(picture: Image.Image, shapes: list[tuple[tuple[int, int, int], np.ndarray]]) -> Image.Image:
+    """Paint polygons, (k, 2) pixels each, over a picture, with exact edges."""
+    if not shapes:
+        return picture
+    renderer = RendererAgg(*picture.size, 72.0)
+    pixels = np.asarray(renderer.buffer_rgba())
+    pixels[...] = np.asarray(picture.convert("RGBA"))
+    upright = Affine2D().scale(1.0, -1.0).translate(0.0, picture.size[1])
+    for colour, polygon in shapes:
+        pen = renderer.new_gc()
+        pen.set_linewidth(0.0)
+        pen.set_snap(False)
+        renderer.draw_path(pen, Path(polygon), upright, tuple(c / 255.0 for c in colour))
+    return Image.fromarray(pixels[..., :3].copy())

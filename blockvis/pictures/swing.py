@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 import solver
+from blockvis.results.swinging import corner_speeds, swung_increment
 
 from . import palette
 from .frame import framed
@@ -43,6 +44,11 @@ class Swing:
     moves: bool
     motion: np.ndarray
 
+    @property
+    def n_parts(self) -> int:
+        """Number of parts that move as one."""
+        return int(self.parts.max(initial=-1)) + 1
+
 
 def swing_of(response: solver.Response) -> Swing:
     """Find the mechanism that follows the last equilibrium, or the state that governs.
@@ -56,7 +62,7 @@ def swing_of(response: solver.Response) -> Swing:
     motion = last.velocity if response.collapse is None else response.collapse.mechanism
     last = solver.with_motion(last, motion)
     assembly = response.assembly
-    speeds = _speeds(assembly, last.pose, motion)
+    speeds = corner_speeds(assembly, last.pose, motion)
     fastest = float(speeds.max(initial=0.0))
     if response.collapse is None and fastest > 0.0:
         # Without collapse a single loose brick may be the fastest: it would make the motion of the whole invisible.
@@ -86,14 +92,8 @@ def shown_increments(response: solver.Response) -> tuple[solver.Increment, ...]:
     swing = swing_of(response)
     if not swing.moves:
         return response.increments
-    last, contacts = swing.increment, swing.increment.contacts
-    frames = []
-    for k in range(1, SWING_FRAMES + 1):
-        pose = solver.swung(last.pose, SWING_REACH * (k / SWING_FRAMES) ** 2 * swing.motion)
-        points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, last.pose, pose)
-        frame = replace(last, status=solver.Status.FALLING, checkpoint=None)
-        frames.append(frame.with_arrays(pose=pose, contacts=replace(contacts, points=points)))
-    return (*path, *frames)
+    reaches = (SWING_REACH * (k / SWING_FRAMES) ** 2 for k in range(1, SWING_FRAMES + 1))
+    return (*path, *(swung_increment(swing.increment, reach * swing.motion) for reach in reaches))
 
 
 def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing) -> np.ndarray:
@@ -106,20 +106,11 @@ def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing)
         As :func:`blockvis.pictures.palette.block_colours` gives it.
     swing : Swing
     """
-    if int(swing.parts.max(initial=-1)) + 1 <= MOST_PARTS:
+    if swing.n_parts <= MOST_PARTS:
         return palette.part_colours(fill, swing.parts)
     travel = np.linalg.norm(swing.displaced.positions - swing.increment.pose.positions, axis=1)
     tints = palette.displacement_colours(0.75 * travel / travel[assembly.free].max())
     return np.where(assembly.free[:, None], tints, fill)
-
-
-def _speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
-    """(n_blocks,) array: speed of the fastest corner of each free block, zero for supports."""
-    block = assembly.block_of_vertex
-    velocity = solver.point_velocities(solver.moved_vertices(assembly, pose), block, pose, motion)
-    speeds = np.zeros(assembly.n_blocks)
-    np.maximum.at(speeds, block, np.linalg.norm(velocity, axis=1))
-    return np.where(assembly.free, speeds, 0.0)
 
 
 def _exceeded_by(share: float, speeds: np.ndarray, volumes: np.ndarray) -> float:

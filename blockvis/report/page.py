@@ -20,15 +20,6 @@ import solver
 from blockvis.dynamics.fall import CAPTION, Fall, falling_increment
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures import palette
-from blockvis.pictures.annotations import (
-    SMALLEST_RESULTANT,
-    STEEPEST,
-    WIDEST,
-    joint_marks,
-    length_per_force,
-    resultants,
-    settlement_arrows,
-)
 from blockvis.pictures.captions import (
     FALL_BADGE,
     badge_of,
@@ -45,6 +36,16 @@ from blockvis.pictures.captions import (
 )
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
+from blockvis.pictures.marks import (
+    SMALLEST_RESULTANT,
+    STEEPEST,
+    WIDEST,
+    hinge_ends,
+    length_per_force,
+    resultants,
+    settlement_arrows,
+    sliding_lines,
+)
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.results.about import about, counts_text, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
@@ -326,12 +327,11 @@ def _arrows(response: solver.Response, frame: Frame, origin: np.ndarray) -> list
     initial = solver.Pose.initial(response.assembly)
     phases = []
     for settlement in response.settlements:
-        found = settlement_arrows(response.assembly, settlement, initial, frame.low, frame.high)
+        found = settlement_arrows(response.assembly, settlement, initial, frame)
         phases.append(
             [
                 [int(block), *np.round(place - origin, 5).tolist(), *np.round(direction, 5).tolist()]
                 for block, place, direction in zip(*found, strict=True)
-                if direction.any()
             ]
         )
     return phases
@@ -414,8 +414,10 @@ class _Tables:
             self.vectors.append(rounded(forces[kept], FORCE_FINENESS * largest))
             self.sizes.append(size[kept])
             self.pairs.append(pairs[kept].astype(np.int32))
-            hinges, sliding = joint_marks(assembly, increment)
-            ends = np.concatenate([np.repeat(hinges[:, None], 2, axis=1), sliding])
+            mechanism, contacts = solver.mechanism_of(assembly, increment), increment.contacts
+            hinges = contacts.points[hinge_ends(assembly, increment, mechanism)]
+            sliding = sliding_lines(assembly, contacts, mechanism.sliding_points, contacts.points)
+            ends = np.concatenate([hinges, sliding])
             self.mark_places.append(rounded(ends - origin, unit).reshape(-1, 4))
             self.mark_kinds.append(np.repeat([1, 2], [len(hinges), len(sliding)]))
 

@@ -9,9 +9,14 @@ import numpy as np
 
 import solver
 from blockvis.pictures import palette
-from blockvis.pictures.annotations import SMALLEST_RESULTANT, length_per_force, resultants
 from blockvis.pictures.frame import Frame, framed
-from blockvis.pictures.solid_marks import hinge_lines, settlement_arrows_in_space
+from blockvis.pictures.marks import (
+    SMALLEST_RESULTANT,
+    hinge_ends,
+    length_per_force,
+    resultants,
+    settlement_arrows,
+)
 from blockvis.pictures.solid_view import chosen_view
 from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import Swing
@@ -106,9 +111,7 @@ def _arrows(response: solver.Response, origin: np.ndarray) -> list[list[list[flo
     return [
         [
             [int(block), *np.round(place - origin, 5).tolist(), *np.round(direction, 5).tolist()]
-            for block, place, direction in zip(
-                *settlement_arrows_in_space(response.assembly, settlement, initial), strict=True
-            )
+            for block, place, direction in zip(*settlement_arrows(response.assembly, settlement, initial), strict=True)
         ]
         for settlement in response.settlements
     ]
@@ -190,7 +193,7 @@ def _marks(
 ) -> tuple[np.ndarray, np.ndarray]:
     """List ends (n, 2, 3) [m] of hinges and sliding joints, and (n, 2): 1 and -1, or 2 and the number of the joint."""
     mechanism, points = solver.mechanism_of(assembly, increment), increment.contacts.points
-    lines = points[hinge_lines(assembly, increment, mechanism)]
+    lines = points[hinge_ends(assembly, increment, mechanism)]
     pairs = {pair: k for k, pair in enumerate(zip(joints.block_a.tolist(), joints.block_b.tolist(), strict=True))}
     numbers = [pairs.get((a, b), -1) for a, b in mechanism.sliding.tolist()]
     nowhere = np.broadcast_to(points[:1], (len(numbers), 2, 3)) if numbers else np.zeros((0, 2, 3))

@@ -16,10 +16,11 @@ import solver
 from blockvis.case_files.read import case_of
 from blockvis.cases.build import case_assembly
 from blockvis.cases.contents import Case
-from blockvis.pictures.annotations import settlement_arrows
-from blockvis.pictures.solid_marks import settlement_arrows_in_space
+from blockvis.pictures.frame import Frame
+from blockvis.pictures.marks import settlement_arrows
 from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import least_reaction, loss_in
+from blockvis.results.swinging import swing_factors
 from blockvis.runs.plan import planned
 
 from .study_file import run_values
@@ -216,16 +217,15 @@ def _shape(
     free = assembly.free[assembly.block_of_vertex]
     at_rest = solver.moved_vertices(assembly, falling.pose)
     size = float(np.ptp(at_rest[free], axis=0).max())
-    step = solver.moved_vertices(assembly, solver.swung(falling.pose, falling.velocity * 1e-6)) - at_rest
-    fastest = float(np.linalg.norm(step[free], axis=1).max()) / 1e-6
-    moved = solver.swung(falling.pose, falling.velocity * (SWING * size / fastest if fastest > 0.0 else 0.0))
+    (factor,) = swing_factors(assembly, falling, SWING, np.ones(1))
+    moved = solver.swung(falling.pose, falling.velocity * factor)
     vertices = solver.moved_vertices(assembly, moved)
     if assembly.dimension == 2:
         low, high = at_rest[free].min(axis=0) - 0.15 * size, at_rest[free].max(axis=0) + 0.15 * size
-        _, places, directions = settlement_arrows(assembly, settlement, falling.pose, low, high)
+        _, places, directions = settlement_arrows(assembly, settlement, falling.pose, Frame(low, high))
         offsets, block = assembly.offsets, np.arange(assembly.n_blocks)
     else:
-        _, *arrows = settlement_arrows_in_space(assembly, settlement, falling.pose)
+        _, *arrows = settlement_arrows(assembly, settlement, falling.pose)
         places, directions = (VIEW.projected(ends) for ends in arrows)
         corners, offsets, block = _seen_faces(assembly, vertices)
         vertices, at_rest = (VIEW.projected(points[corners]) for points in (vertices, at_rest))

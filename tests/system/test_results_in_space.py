@@ -21,11 +21,10 @@ import blockvis
 import solver
 from blockvis.cli import main
 from blockvis.pictures import palette
-from blockvis.pictures.drawer import Look
+from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.frame import framed
+from blockvis.pictures.marks import marks_of
 from blockvis.pictures.render import animate, draw_mechanism
-from blockvis.pictures.solid_drawer import SolidDrawer
-from blockvis.pictures.solid_marks import solid_marks
 from blockvis.pictures.solid_view import View, chosen_view
 from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import swing_of
@@ -236,7 +235,7 @@ def test_what_is_where():
     """Hinge, crack, moving support and paper stand at their places, in their colours."""
     response = vault_response()
     assembly, last = response.assembly, response.path[-1]
-    drawer = SolidDrawer(response, Look(), (1280, 720), (last,))
+    drawer = Drawer(response, Look(), (1280, 720), (last,))
     picture = np.asarray(drawer.picture(last)).astype(int)
     left, top = drawer.sheet.inside[:2]
 
@@ -244,7 +243,7 @@ def test_what_is_where():
         x, y = drawer.scene.at_pixel(np.array([point]))[0].round().astype(int)
         return picture[top + y, left + x]
 
-    found = solid_marks(assembly, drawer.joints, last, last.pose)
+    found = marks_of(assembly, drawer.joints, last, last.pose)
     crown = found.hinges[found.hinges[:, 0, 2].argmax()]
     for share in (0.3, 0.5, 0.7):
         assert alike(colour_at(crown[0] + share * (crown[1] - crown[0])), palette.HINGE, 30)
@@ -267,7 +266,7 @@ def test_what_is_where():
 
 def test_nothing_leaves_the_picture_and_all_frames_look_the_same_way(tmp_path):
     response = vault_response()
-    drawer = SolidDrawer(response, Look(colour_by="mechanism"), SMALL, response.increments)
+    drawer = Drawer(response, Look(colour_by="mechanism"), SMALL, response.increments)
     low, high = np.zeros(2), np.array(drawer.scene.size)
     for increment in response.increments:
         corners = solver.moved_vertices(response.assembly, increment.pose)

@@ -16,7 +16,7 @@ import blockvis
 import solver
 from blockvis import generators
 from blockvis.kinds.kinds import KINDS
-from blockvis.pictures import annotations
+from blockvis.pictures import marks
 from blockvis.pictures.curves import events_of
 from blockvis.pictures.swing import swing_of
 from blockvis.report.page import report_html, summary_rows
@@ -74,7 +74,7 @@ def test_every_increment_has_one_count(name, tmp_path):
     for increment, (hinges, sliding) in zip(response.increments, expected, strict=True):
         words = str(solver.mechanism_of(response.assembly, increment))
         assert in_words(words) == (hinges, sliding)
-        marked = annotations.marks_of(response.assembly, joints, increment, increment.pose)
+        marked = marks.marks_of(response.assembly, joints, increment, increment.pose)
         assert (len(marked.hinges), len(marked.sliding)) == (hinges, sliding)
 
     path = expected[: len(response.path)]

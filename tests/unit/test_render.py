@@ -14,9 +14,9 @@ from structures import BENT, arch_response, parted, wall
 
 import solver
 from blockvis.pictures import flat_scene, palette
-from blockvis.pictures.drawer import Drawer, Look
+from blockvis.pictures.drawer import Drawer, Look, magnified
 from blockvis.pictures.film import film_of
-from blockvis.pictures.flat_scene import Scene, magnified
+from blockvis.pictures.flat_scene import FlatScene
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.render import animate, draw_mechanism, draw_still
 from blockvis.pictures.swing import swing_of
@@ -62,7 +62,7 @@ def test_bent_blocks_are_filled_without_triangle_lines():
     assembly = solver.Assembly.from_outlines(list(BENT.values()))
     frame = Frame(np.array([-1.0, -1.0]), np.array([15.0, 4.0]))
     fill = np.full((3, 3), 200, dtype=np.uint8)
-    scene = Scene(assembly, frame, (800, 250), fill)
+    scene = FlatScene(assembly, frame, (800, 250), fill)
     picture = np.asarray(scene.image()).astype(int)
 
     def row(points):

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from structures import BENT, arch_response, dropped_brick, parted, wall
 
 import solver
-from blockvis.pictures import annotations as marks
-from blockvis.pictures.annotations import part_outlines
+from blockvis.pictures import marks
 from blockvis.pictures.hatching import hatch_lines
 from blockvis.results.joints import initial_joints
 from blockvis.text import rounded_length
@@ -25,7 +24,8 @@ def stacked(shift=(0.0, 0.0), turn=0.0):
 
 
 def all_cracks(assembly, pose):
-    return marks._cracks(assembly, initial_joints(assembly), pose, pose, np.zeros(assembly.n_blocks, dtype=bool))
+    fallen = np.zeros(assembly.n_blocks, dtype=bool)
+    return marks.cracks_between(assembly, initial_joints(assembly), pose, pose, fallen)
 
 
 def cracks(assembly, pose):
@@ -77,15 +77,13 @@ def test_of_a_wedge_that_gapes_only_the_faces_are_marked():
         c, s = np.cos(turn), np.sin(turn)
         # Rocked about the lower left corner.
         assembly, pose = stacked(shift=(0.5 * c - 0.5 * s - 0.5, 0.5 * s + 0.5 * c - 0.5), turn=turn)
-        filled, _, faces = marks._cracks(
-            assembly, initial_joints(assembly), pose, pose, np.zeros(assembly.n_blocks, dtype=bool)
-        )
-        return len(filled), faces
+        found, _, gapes = all_cracks(assembly, pose)
+        return np.count_nonzero(~gapes), found[gapes]
 
     assert marked(0.3)[0] == 1
-    count, faces = marked(0.8)
+    count, gaping = marked(0.8)
     assert count == 0
-    ends = faces.reshape(-1, 2)
+    ends = gaping.reshape(-1, 2)
     assert np.hypot(*(ends - [0.0, 1.0]).T).min() < 1e-9
     assert np.hypot(*(ends - [np.cos(0.8), 1.0 + np.sin(0.8)]).T).min() < 1e-9
 
@@ -103,9 +101,7 @@ def four_blocks(apart):
 @given(st.floats(0.01, 0.2))
 def test_the_pocket_where_four_cracks_meet_is_air(apart):
     assembly, pose = four_blocks(apart)
-    found, openings, _ = marks._cracks(
-        assembly, initial_joints(assembly), pose, pose, np.zeros(assembly.n_blocks, dtype=bool)
-    )
+    found, openings, _ = all_cracks(assembly, pose)
     assert len(found) == 4
     np.testing.assert_allclose(openings, 2.0 * apart, rtol=1e-9)
     covered = shapely.union_all([shapely.Polygon(crack) for crack in found])
@@ -178,9 +174,9 @@ def test_parts_swing_as_one_body():
     falling = solver.with_motion(response.path[-1], response.collapse.mechanism)
     parts = solver.rigid_parts(response.assembly, falling)
     displaced = solver.swung(falling.pose, 0.1 * response.collapse.mechanism)
-    outlines = part_outlines(response.assembly, solver.moved_vertices(response.assembly, displaced), parts)
+    outlines = marks.part_outlines(response.assembly, solver.moved_vertices(response.assembly, displaced), parts)
     length = np.hypot(*(outlines[:, 1] - outlines[:, 0]).T).sum()
-    before = part_outlines(response.assembly, solver.moved_vertices(response.assembly, falling.pose), parts)
+    before = marks.part_outlines(response.assembly, solver.moved_vertices(response.assembly, falling.pose), parts)
     np.testing.assert_allclose(length, np.hypot(*(before[:, 1] - before[:, 0]).T).sum(), rtol=1e-2)
 
 

@@ -1,0 +1,437 @@
+"""What a picture marks on blocks of the plane or of space: cracks, hinges, forces, arrows. Geometry, no rendering."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+import solver
+from blockvis.results.cracks import SMALLEST_OPENING
+from blockvis.results.joint_faces import TOUCHING, InitialJoints
+from blockvis.results.joints import carried_faces
+
+from .frame import Frame
+
+#: What lies between faces is a crack until they are apart by this many block sizes, or by their own extent: then the
+#: blocks have parted, and it is air. Of faces that are turned against each other by more than this angle [rad] only the
+#: edges have the colour of a crack: the wedge between them is open to the room.
+WIDEST, STEEPEST = 0.5, 0.5
+
+#: A sliding joint is marked over this length at least, in block sizes; no further than the thinner block is thick, or
+#: the mark of a brick beside a large stone would lie outside both.
+SHORTEST = 0.3
+
+#: Resultants below this fraction of the largest are not drawn.
+SMALLEST_RESULTANT = 2e-3
+
+#: Blocks of one part are grown by this fraction of the block size, merged and shrunk back: between faces that touch,
+#: the last digit leaves slivers otherwise.
+SLIVER = 1e-3
+
+#: Joints open by less than this fraction of the block size are drawn half as wide.
+FINE_CRACK = 0.01
+
+#: Joints open by more than this fraction need no line: the middle of a wide crack may lie on a third block.
+WIDE_CRACK = 0.2
+
+#: Contact points turn about a hinge where they open slower than this part of the turning times the block size.
+ON_HINGE = 0.05
+
+#: Arrows of at most so many supports or blocks in space; of more, evenly chosen ones stand for all. In the plane, where
+#: supports lie side by side, the one in the middle does.
+MOST_ARROWS, MOST_IN_PLANE = 24, 4
+
+
+def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """(n, 2, 2) array [m]: edges of the outline around each part, its blocks merged.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    corners : (n_vertices, 2) array [m]
+    parts : (n_blocks,) int array
+        As ``solver.rigid_parts`` gives them.
+    """
+    edges = [np.zeros((0, 2, 2))]
+    margin = SLIVER * assembly.block_size
+    for part in range(int(parts.max(initial=-1)) + 1):
+        blocks = np.flatnonzero(parts == part)
+        outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in blocks]
+        merged = shapely.union_all(shapely.buffer(outlines, margin, join_style="mitre"))
+        merged = shapely.buffer(merged, -margin, join_style="mitre").simplify(0.1 * margin)
+        for polygon in shapely.get_parts(merged):
+            for ring in shapely.get_rings(polygon):
+                points = shapely.get_coordinates(ring)
+                edges.append(np.stack([points[:-1], points[1:]], axis=1))
+    return np.concatenate(edges)
+
+
+@dataclass(frozen=True)
+class Marks:
+    """What is marked at one pose.
+
+    Attributes
+    ----------
+    cracks : (n, 4, d) array [m]
+        Quadrilateral between the two faces of each open joint, in space between the edges of the faces, where they are
+        open: along the one on block a, then back along block b.
+    openings : (n, 2) array [m]
+        Distance of the faces at both ends of each, unmagnified.
+    gapes : (n,) bool array
+        Which are open so wide that there is air between the faces, which alone are marked.
+    sliding : (n, 2, d) array [m]
+        Ends of each sliding joint, in space of the edges around it.
+    exposed : list of (k, 3) arrays [m]
+        Faces in space that slide, of both blocks.
+    hinges : (n, 2, d) array [m]
+        Ends of the line about which each hinge turns; the same twice for a point, as in the plane.
+    """
+
+    cracks: np.ndarray
+    openings: np.ndarray
+    gapes: np.ndarray
+    sliding: np.ndarray
+    exposed: list[np.ndarray]
+    hinges: np.ndarray
+
+    @property
+    def middles(self) -> np.ndarray:
+        """(n, 2, d) array [m]: the line midway between the two faces of each crack."""
+        return np.asarray((self.cracks[:, [0, 1]] + self.cracks[:, [3, 2]]) / 2.0)
+
+    @property
+    def gaping_faces(self) -> np.ndarray:
+        """(m, 2, d) array [m]: the edges on block a, then those on block b, of what gapes."""
+        wide = self.cracks[self.gapes]
+        return np.concatenate([wide[:, [0, 1]], wide[:, [3, 2]]])
+
+
+def marks_of(
+    assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment, shown: solver.Pose
+) -> Marks:
+    """Cracks, sliding joints and hinges of an increment, on blocks shown at a pose.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    joints : InitialJoints
+    increment : solver.Increment
+        Its mechanism has the hinges and sliding joints.
+    shown : solver.Pose
+        Where the blocks are drawn: the increment's own pose, a magnified one, or a later one.
+    """
+    contacts, mechanism = increment.contacts, solver.mechanism_of(assembly, increment)
+    points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
+    hinges = points[hinge_ends(assembly, increment, mechanism)]
+    cracks = cracks_between(assembly, joints, increment.pose, shown, increment.fallen)
+    if assembly.dimension == 2:
+        return Marks(*cracks, sliding_lines(assembly, contacts, mechanism.sliding_points, points), [], hinges)
+    return Marks(*cracks, *_sliding_faces(assembly, joints, mechanism, shown), hinges)
+
+
+def cracks_between(
+    assembly: solver.Assembly, joints: InitialJoints, pose: solver.Pose, shown: solver.Pose, fallen: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cracks, their openings and which of them gape, as :class:`Marks` has them.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    joints : InitialJoints
+    pose : solver.Pose
+        At which the joints are open or not.
+    shown : solver.Pose
+        At which they are drawn.
+    fallen : (n_blocks,) bool array
+        Blocks that have left for good, whose joints are no cracks.
+    """
+    size, least, rings = assembly.block_size, SMALLEST_OPENING * assembly.block_size, joints.rings
+    now, drawn = carried_faces(assembly, joints, pose), carried_faces(assembly, joints, shown)
+    turn = np.linalg.norm(pose.rotations[joints.block_a] - pose.rotations[joints.block_b], axis=1)
+    extent = joints.sizes ** (1.0 / (assembly.dimension - 1))
+    # Faces in space that have slid far over each other still have a crack between them.
+    apart = now.gaps if assembly.dimension == 3 else np.linalg.norm(now.on_a - now.on_b, axis=1)
+    nearest = -rings.largest(-apart)
+    parted = nearest >= np.minimum(extent, WIDEST * size)
+    # A line in the plane has one edge, a polygon in space as many as corners.
+    start = rings.offsets[:-1] if assembly.dimension == 2 else np.arange(len(rings.points))
+    end, joint = rings.following[start], rings.ring[start]
+    gaps = np.stack([now.gaps[start], now.gaps[end]], axis=1)
+    is_open = (gaps.max(axis=1) > least) & ~(fallen[joints.block_a] | fallen[joints.block_b])[joint]
+    if assembly.dimension == 2:
+        is_open &= ~parted[joint]
+    start, end, gaps, joint = start[is_open], end[is_open], gaps[is_open], joint[is_open]
+    shares = np.zeros(len(joint)), np.ones(len(joint))
+    if assembly.dimension == 3:
+        # The faces are plane: the gap grows evenly along an edge, and the crack ends where it is small.
+        cut = (least - gaps[:, 0]) / np.where(gaps[:, 0] == gaps[:, 1], 1.0, gaps[:, 1] - gaps[:, 0])
+        shares = np.where(gaps[:, 0] < least, cut, 0.0), np.where(gaps[:, 1] < least, cut, 1.0)
+    first, last = (
+        [of[start] + part[:, None] * (of[end] - of[start]) for of in (drawn.on_a, drawn.on_b)] for part in shares
+    )
+    openings = np.stack([gaps[:, 0] + part * (gaps[:, 1] - gaps[:, 0]) for part in shares], axis=1)
+    gapes = turn[joint] > STEEPEST
+    if assembly.dimension == 3:
+        gapes |= parted[joint]
+    return np.stack([first[0], last[0], last[1], first[1]], axis=1), openings, gapes
+
+
+def resultants(increment: solver.Increment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Resultant of the contact forces of each pair of blocks.
+
+    Returns
+    -------
+    points : (n, d) array [m]
+        Where the resultant crosses the joint, at the increment's pose.
+    forces : (n, d) array [N]
+        On ``blocks[:, 0]``.
+    blocks : (n, 2) int array
+    """
+    contacts, carrying = increment.contacts, increment.forces[:, 0] > 0.0
+    sense = np.where(contacts.block_a > contacts.block_b, -1.0, 1.0)
+    force = np.einsum("ki,kij->kj", increment.forces, contacts.frames) * sense[:, None]
+    pairs, which = contacts[carrying].joints()
+    forces, points = np.zeros((2, len(pairs), contacts.points.shape[1]))
+    normal = increment.forces[carrying, 0]
+    np.add.at(forces, which, force[carrying])
+    np.add.at(points, which, normal[:, None] * contacts.points[carrying])
+    weight = np.bincount(which, weights=normal, minlength=len(pairs))
+    return points / weight[:, None], forces, pairs
+
+
+def joint_forces(increment: solver.Increment, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find points (n, d) [m], forces (n, d) [N] and blocks (n, 2) of the resultants, or by "points" of all contacts."""
+    if kind == "thrust":
+        return resultants(increment)
+    contacts = increment.contacts
+    carrying = increment.forces[:, 0] > 0.0
+    force = np.einsum("ki,kij->kj", increment.forces, contacts.frames)
+    blocks = np.stack([contacts.block_a, contacts.block_b], axis=1)
+    return contacts.points[carrying], force[carrying], blocks[carrying]
+
+
+def thrust_line(points: np.ndarray, blocks: np.ndarray, assembly: solver.Assembly) -> np.ndarray:
+    """(n, 2, d) array [m]: the line from joint to joint, where every block has two at most: an arch, a column."""
+    owner = np.concatenate([blocks[:, 0], blocks[:, 1]])
+    which = np.concatenate([np.arange(len(blocks))] * 2)
+    counts = np.bincount(owner, minlength=assembly.n_blocks)
+    if counts[assembly.free].max(initial=0) > 2:
+        return np.zeros((0, 2, points.shape[1]))
+    order = np.argsort(owner, kind="stable")
+    owner, which = owner[order], which[order]
+    pairs = (owner[1:] == owner[:-1]) & assembly.free[owner[1:]]
+    return np.stack([points[which[:-1][pairs]], points[which[1:][pairs]]], axis=1)
+
+
+def length_per_force(sizes: np.ndarray, largest: float, usual_length: float, extent: float) -> float:
+    """Length per force [m/N] of resultants in a picture.
+
+    Most are drawn up to the usual length: by the 0.9 quantile, not the largest, or one corner that carries everything
+    would make all others too short to see. None is longer than 0.12 of the picture.
+
+    Parameters
+    ----------
+    sizes : (n,) array [N]
+        Of the resultants that are drawn.
+    largest : float [N]
+    usual_length : float [m]
+    extent : float [m]
+        Of the picture.
+    """
+    usual = float(np.quantile(sizes, 0.9)) if len(sizes) else largest
+    return min(max(usual_length, 0.015 * extent) / usual, 0.12 * extent / largest)
+
+
+def hinge_ends(assembly: solver.Assembly, increment: solver.Increment, mechanism: solver.Mechanism) -> np.ndarray:
+    """(n, 2) int array: of each hinge the two contact points farthest from each other that do not open.
+
+    In the plane it is one, twice.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    increment : solver.Increment
+    mechanism : solver.Mechanism
+    """
+    contacts = increment.contacts
+    if assembly.dimension == 2:
+        return np.stack([mechanism.hinge_points, mechanism.hinge_points], axis=1)
+    pairs, joint = contacts.joints()
+    count = assembly.n_blocks
+    known = pairs[:, 0] * count + pairs[:, 1]
+    spins = increment.velocity[:, 3:]
+    turning = np.linalg.norm(spins[contacts.block_a] - spins[contacts.block_b], axis=1) * assembly.block_size
+    stays = np.abs(increment.displacements[:, 0]) <= ON_HINGE * turning
+    stays &= contacts.gaps <= TOUCHING * assembly.block_size
+    ends = np.zeros((len(mechanism.hinges), 2), dtype=int)
+    for k, ((a, b), point) in enumerate(zip(mechanism.hinges, mechanism.hinge_points, strict=True)):
+        here = np.flatnonzero(stays & (joint == np.searchsorted(known, a * count + b)))
+        here = np.union1d(here, [point])
+        places = contacts.points[here]
+        apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+        ends[k] = here[list(np.unravel_index(int(apart.argmax()), apart.shape))]
+    return ends
+
+
+def _sliding_faces(
+    assembly: solver.Assembly, joints: InitialJoints, mechanism: solver.Mechanism, shown: solver.Pose
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Edges (n, 2, 3) around the faces that slide, and the faces themselves, of both blocks."""
+    count = 1 + int(max(joints.block_b.max(initial=0), mechanism.sliding.max(initial=0)))
+    slides = np.isin(joints.block_a * count + joints.block_b, mechanism.sliding[:, 0] * count + mechanism.sliding[:, 1])
+    rings, faces = joints.rings, carried_faces(assembly, joints, shown)
+    chosen = np.flatnonzero(slides[rings.ring])
+    middle = (faces.on_a + faces.on_b) / 2.0
+    edges = np.stack([middle[chosen], middle[rings.following[chosen]]], axis=1)
+    exposed = [
+        side[rings.offsets[k] : rings.offsets[k + 1]]
+        for k in np.flatnonzero(slides).tolist()
+        for side in (faces.on_a, faces.on_b)
+    ]
+    return edges, exposed
+
+
+def settlement_arrows(
+    assembly: solver.Assembly, settlement: solver.Settlement, pose: solver.Pose, seen: Frame | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find where arrows show how supports move in a settlement.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    settlement : solver.Settlement
+    pose : solver.Pose
+    seen : Frame, optional
+        What a picture in the plane shows.
+
+    Returns
+    -------
+    blocks : (n,) int array
+        The supports; one or a few of many stand for all.
+    places : (n, d) array [m]
+        In the plane inside the part of each that is seen, in space where the arrow leaves the support.
+    directions : (n, d) array
+        Unit vectors; a support that turns about its place has no arrow.
+    """
+    blocks = np.flatnonzero(settlement.taking_part(assembly))
+    rate = settlement.rate(assembly, solver.Pose.initial(assembly), 0.0)
+    if assembly.dimension == 2:
+        blocks, places = _seen_places(assembly, blocks, pose, seen)
+    else:
+        places = pose.positions[blocks]
+    speeds = solver.point_velocities(places, blocks, pose, rate)
+    sizes = np.linalg.norm(speeds, axis=1)
+    moves = evenly(np.flatnonzero(sizes > 0.0), MOST_ARROWS)
+    blocks, directions = blocks[moves], speeds[moves] / sizes[moves, None]
+    places = places[moves] if assembly.dimension == 2 else leaving(assembly, pose, blocks, directions)
+    return blocks, places, directions
+
+
+def _seen_places(
+    assembly: solver.Assembly, blocks: np.ndarray, pose: solver.Pose, seen: Frame | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Blocks of the plane that are seen, of many the one in the middle, and places (n, 2) [m] inside what is seen."""
+    corners = solver.moved_vertices(assembly, pose)
+    outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in blocks]
+    shown = outlines if seen is None else shapely.intersection(outlines, shapely.box(*seen.low, *seen.high))
+    rows = [k for k, outline in enumerate(shown) if not outline.is_empty]
+    if len(rows) > MOST_IN_PLANE:
+        rows = [rows[len(rows) // 2]]
+    places = np.zeros((len(rows), 2))
+    for row, k in enumerate(rows):
+        # A bent support may have its centroid outside.
+        inside = shown[k].centroid if shown[k].contains(shown[k].centroid) else shown[k].point_on_surface()
+        places[row] = inside.coords[0]
+    return blocks[rows], places
+
+
+def evenly(numbers: np.ndarray, most: int) -> np.ndarray:
+    """(m,) array: at most so many of some numbers (n,), evenly chosen."""
+    if len(numbers) <= most:
+        return numbers
+    return np.asarray(numbers[np.linspace(0, len(numbers) - 1, most).round().astype(int)])
+
+
+def leaving(assembly: solver.Assembly, pose: solver.Pose, blocks: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """(n, 3) array [m]: as far from the centroids of blocks along directions (n, 3) as their corners lie."""
+    corners, offsets = solver.moved_vertices(assembly, pose), assembly.polyhedra.offsets
+    places = pose.positions[blocks].copy()
+    for k, block in enumerate(blocks.tolist()):
+        reach = (corners[offsets[block] : offsets[block + 1]] - places[k]) @ directions[k]
+        places[k] += max(float(reach.max()), 0.0) * directions[k]
+    return places
+
+
+def sliding_lines(
+    assembly: solver.Assembly, contacts: solver.Contacts, k: np.ndarray, points: np.ndarray
+) -> np.ndarray:
+    """(n, 2, 2) array [m]: ends of the part of each sliding joint in the plane that slides.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    contacts : solver.Contacts
+    k : (k,) int array
+        Numbers of the contact points that slide.
+    points : (n_contacts, 2) array [m]
+        Where the contact points are drawn.
+    """
+    if len(k) == 0:
+        return np.zeros((0, 2, 2))
+    pairs, which = contacts[k].joints()
+    n = len(pairs)
+    first = np.zeros(n, dtype=int)
+    first[which[::-1]] = k[::-1]
+    tangent = contacts.frames[first, 1]
+    place = ((points[k] - points[first][which]) * tangent[which]).sum(axis=1)
+    lowest, highest = np.zeros(n), np.zeros(n)
+    np.minimum.at(lowest, which, place)
+    np.maximum.at(highest, which, place)
+    # A joint that slides on one point only still needs a length to be seen, towards the others that it touches at.
+    least = np.minimum(SHORTEST * assembly.block_size, assembly.widths[pairs].min(axis=1))
+    short = np.maximum(least - (highest - lowest), 0.0)
+    face_low, face_high = _extents(contacts, points, pairs, points[first], tangent)
+    alone = face_high - face_low < short
+    lowest = np.where(alone, lowest - short / 2.0, np.maximum(lowest - short, np.minimum(face_low, lowest)))
+    highest = np.where(alone, highest + short / 2.0, np.minimum(highest + short, np.maximum(face_high, highest)))
+    base = points[first]
+    return np.stack([base + lowest[:, None] * tangent, base + highest[:, None] * tangent], axis=1)
+
+
+def _extents(
+    contacts: solver.Contacts, points: np.ndarray, pairs: np.ndarray, base: np.ndarray, tangent: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest place, (n,) [m], of all contact points of pairs of blocks along their tangents."""
+    every, which = contacts.joints()
+    count = int(every.max(initial=0)) + 1
+    row = np.searchsorted(every[:, 0] * count + every[:, 1], pairs[:, 0] * count + pairs[:, 1])
+    number = np.full(len(every), -1)
+    number[row] = np.arange(len(pairs))
+    k = number[which]
+    here = k >= 0
+    place = ((points[here] - base[k[here]]) * tangent[k[here]]).sum(axis=1)
+    low, high = np.full(len(pairs), np.inf), np.full(len(pairs), -np.inf)
+    np.minimum.at(low, k[here], place)
+    np.maximum.at(high, k[here], place)
+    return low, high
+
+
+def arrow_shapes(tails: np.ndarray, tips: np.ndarray, thick: float, grown: float) -> tuple[np.ndarray, np.ndarray]:
+    """Shafts (n, 4, 2) and heads (n, 3, 2) of arrows, a margin ``grown`` larger all around [m]."""
+    along = tips - tails
+    length = np.hypot(*along.T)
+    kept = length > 1.2 * thick
+    tails, tips, along, length = tails[kept], tips[kept], along[kept], length[kept]
+    unit = along / length[:, None]
+    side = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+    head = np.minimum(2.6 * thick, 0.6 * length)[:, None]
+    neck = tips - head * unit
+    half = thick / 2.0 + grown
+    start = tails - grown * unit
+    shafts = np.stack([start - half * side, neck - half * side, neck + half * side, start + half * side], axis=1)
+    wing = 0.55 * head + 1.6 * grown
+    back, tip = neck - grown * unit, tips + 2.0 * grown * unit
+    heads = np.stack([back - wing * side, tip, back + wing * side], axis=1)
+    return shafts, heads

@@ -1,0 +1,61 @@
+"""Pseudo-motion: blocks that swing out of a state with the motion that follows it, to first order, out of scale."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+import solver
+
+
+def corner_speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
+    """(n_blocks,) array: speed of the fastest corner of each free block, zero for supports.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    pose : solver.Pose
+    motion : (n_blocks, n_dof) array
+    """
+    block = assembly.block_of_vertex
+    velocity = solver.point_velocities(solver.moved_vertices(assembly, pose), block, pose, motion)
+    speeds = np.zeros(assembly.n_blocks)
+    np.maximum.at(speeds, block, np.hypot.reduce(velocity, axis=1))
+    return np.where(assembly.free, speeds, 0.0)
+
+
+def swing_factors(
+    assembly: solver.Assembly, increment: solver.Increment, reach: float, shares: np.ndarray
+) -> np.ndarray:
+    """(n,) array: factors on the motion that follows with which the fastest corner goes these shares of a reach.
+
+    Zero where nothing moves.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    increment : solver.Increment
+    reach : float
+        In extents of the free blocks.
+    shares : (n,) array
+    """
+    fastest = float(corner_speeds(assembly, increment.pose, increment.velocity).max(initial=0.0))
+    if fastest == 0.0:
+        return np.zeros(len(shares))
+    corners = solver.moved_vertices(assembly, increment.pose)[assembly.free[assembly.block_of_vertex]]
+    return np.asarray(shares * (reach * float(np.ptp(corners, axis=0).max())) / fastest)
+
+
+def swung_increment(increment: solver.Increment, motion: np.ndarray) -> solver.Increment:
+    """Give a frame of pseudo-motion: the blocks of a state after a motion, with its contact points carried along.
+
+    Parameters
+    ----------
+    increment : solver.Increment
+    motion : (n_blocks, n_dof) array
+    """
+    contacts, pose = increment.contacts, solver.swung(increment.pose, motion)
+    points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
+    moved = increment.with_arrays(pose=pose, contacts=replace(contacts, points=points))
+    return replace(moved, status=solver.Status.FALLING, programs=0, seconds=0.0, checkpoint=None)
