@@ -249,7 +249,7 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
     if imperfections:
         values["imperfections"] = [*imperfections, *_as_list(values.get("imperfections", []))]
     method = head.get("method", "latin hypercube")
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         hint = nearest(str(method), list(METHODS))
         raise ValueError(f"{where}[study] method is {method!r}{hint}; choose from {', '.join(METHODS)}")
     seconds = head.get("seconds")
