@@ -1,20 +1,22 @@
-"""Every key of the case file, in the order of its tables; a test holds them against the code that reads them."""
+"""Every key of the case file, in the order of its tables; :mod:`blockvis.case_files.read` reads by them."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
 
 import solver
 from blockvis.cases.build import DENSITY, THICKNESS
 from blockvis.cases.distributions import KINDS as DISTRIBUTIONS
-from blockvis.cases.explain_settings import DIRECTIONS, ExplainSettings
+from blockvis.cases.explain_settings import EXPLAIN
 from blockvis.cases.imperfections import IMPERFECTIONS
 from blockvis.cases.key import (
     FRACTION,
     NOT_NEGATIVE,
     NUMBER,
-    NUMBERS,
     OUTLINE,
     PAIR,
     POSITIVE,
@@ -22,7 +24,6 @@ from blockvis.cases.key import (
     TEXT,
     TEXTS,
     TRIPLE,
-    TRUE_OR_FALSE,
     VECTOR,
     Key,
     Section,
@@ -30,6 +31,8 @@ from blockvis.cases.key import (
     one_of,
     whole,
 )
+from blockvis.cases.profiles import read_profile
+from blockvis.cases.toml_table import Table, shortened
 from blockvis.generators import LAYOUTS
 from blockvis.kinds.kinds import KINDS
 from blockvis.layout.joints.close import WAYS
@@ -39,7 +42,6 @@ from blockvis.results.folder import VIDEO_SUFFIXES
 
 _FRICTION = solver.InterfaceLaw.friction_coefficient
 _CONTROLS = solver.Controls()
-_EXPLAIN = ExplainSettings()
 
 #: More increments or frames than this are taken for a typing error.
 MOST_STEPS = 1_000_000
@@ -54,6 +56,75 @@ def _in_any_letters(words: tuple[str, ...]) -> str:
         return "[cCçÇ]" if letter == "c" else f"[{letter}{letter.upper()}]"
 
     return "|".join("".join(map(accepted, word)) for word in words)
+
+
+def _thickness_or_auto(table: Table, key: Key) -> float | str | None:
+    if table.take(key.name) == "auto":
+        return "auto"
+    value: float | None = table.number(key.name)
+    if value is not None and value < 0.0:
+        raise table.error(key.name, f'is {value:g}; give a thickness in m of at least 0, or "auto"')
+    return value
+
+
+def _film(table: Table, key: Key) -> str | bool | None:
+    value = table.take(key.name)
+    if value is False or value is None:
+        return value
+    name: str = table.text(key.name)
+    if not Path(name).name == name or "\\" in name or not name.lower().endswith(VIDEO_SUFFIXES):
+        raise table.error(
+            key.name,
+            f"is {shortened(name)}; give a name ending in {', '.join(VIDEO_SUFFIXES)}, without a folder: "
+            "it is written into the results folder",
+        )
+    return name
+
+
+def _dimension(table: Table, key: Key) -> int | str | None:
+    value: int | str | None = table.take(key.name)
+    if value is not None and (isinstance(value, bool) or value not in (2, 3, "auto")):
+        raise table.error(key.name, f'is {shortened(value)}; give 2, 3 or "auto"')
+    return value
+
+
+def _moment(table: Table, key: Key) -> float | tuple[float, float, float] | None:
+    kind = TRIPLE if isinstance(table.take(key.name), list | tuple) else NUMBER
+    found: float | tuple[float, float, float] | None = kind.read(table, key)
+    return found
+
+
+def _direction_of_pressure(table: Table, key: Key) -> tuple[float, ...] | None:
+    given: tuple[float, ...] | None = table.vector(key.name)
+    if given is not None and len(given) != 2:
+        raise table.error(key.name, "has three numbers; pressure is of blocks in the plane: in space give force")
+    return given
+
+
+def _two_names(table: Table, key: Key) -> tuple[str, str]:
+    pair = table.take(key.name)
+    if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(name, str) for name in pair)):
+        raise table.error(key.name, f'is {pair!r}; name two materials ["stone", "brick"]')
+    return pair[0], pair[1]
+
+
+def _places(table: Table, key: Key) -> tuple[float, ...] | None:
+    given = table.numbers(key.name)
+    if given is None:
+        return None
+    if len(given) != 3 or given[2] != int(given[2]) or given[2] < 2 or given[0] >= given[1]:
+        raise table.error(key.name, f"is {list(given)}; give [first x, last x, number of places], at least 2 places")
+    return tuple(np.linspace(given[0], given[1], int(given[2])).tolist())
+
+
+def _support_names(table: Table, key: Key) -> tuple[str, ...] | None:
+    given = table.take(key.name)
+    if given is None:
+        return None
+    names = tuple([given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else [None])
+    if not all(isinstance(name, str) for name in names):
+        raise table.error(key.name, f"is {shortened(given)}; give names of supports in quotes")
+    return names
 
 
 _PROFILE = ValueKind(
@@ -75,29 +146,41 @@ _PROFILE = ValueKind(
         },
         "additionalProperties": False,
     },
+    lambda table, _: read_profile(table),
 )  # fmt: skip
-_GROUPS = ValueKind(
-    "list of names, or of lists of names",
-    {"anyOf": [{"type": "string"}, {"type": "array", "items": TEXTS.schema}]},
-)
 _LAYOUT = ValueKind(
     "text",
     {"anyOf": [{"enum": list(LAYOUTS)}, {"type": "string", "pattern": f"^({_in_any_letters(tuple(LAYOUTS))})$"}]},
+    TEXT.read,
 )
-_UNIT = ValueKind("text", {"anyOf": [{"enum": list(UNITS)}, {"type": "string"}]})
-_THICKNESS_OR_AUTO = ValueKind('number of at least 0, or "auto"', {"anyOf": [NOT_NEGATIVE.schema, {"const": "auto"}]})
+_UNIT = ValueKind("text", {"anyOf": [{"enum": list(UNITS)}, {"type": "string"}]}, TEXT.read)
+_THICKNESS_OR_AUTO = ValueKind(
+    'number of at least 0, or "auto"',
+    {"anyOf": [NOT_NEGATIVE.schema, {"const": "auto"}]},
+    _thickness_or_auto,
+)
 _endings = "|".join("".join(f"[{c}{c.upper()}]" if c.isalpha() else re.escape(c) for c in s) for s in VIDEO_SUFFIXES)
 _FILM = ValueKind(
     f"name of a file ending in {', '.join(VIDEO_SUFFIXES)}, or false",
     {"anyOf": [{"type": "string", "pattern": rf"^[^/\\]*({_endings})$"}, {"const": False}]},
+    _film,
 )
-_DIMENSION = ValueKind('2, 3 or "auto"', {"anyOf": [{"enum": [2, 3]}, {"const": "auto"}]})
-_MOMENT = ValueKind("number, in space three", {"anyOf": [NUMBER.schema, TRIPLE.schema]})
-_TWO_NAMES = ValueKind("two texts", {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2})
+_DIMENSION = ValueKind('2, 3 or "auto"', {"anyOf": [{"enum": [2, 3]}, {"const": "auto"}]}, _dimension)
+_MOMENT = ValueKind("number, in space three", {"anyOf": [NUMBER.schema, TRIPLE.schema]}, _moment)
+_TWO_NAMES = ValueKind(
+    "two texts", {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}, _two_names
+)
 _PLACES = ValueKind(
     "three numbers: from, to, number of places",
     {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
+    _places,
 )
+_LEVELS = replace(PAIR, read=lambda table, key: table.pair(key.name, words="[bottom, top]"))
+# Of the kinds that there are when a case is read.
+_KIND = replace(one_of(tuple(KINDS)), read=lambda table, key: table.text(key.name, among=tuple(KINDS)))
+_TABLE = ValueKind("table", {"type": "object"}, lambda table, key: table.table(key.name).values)
+_PUSHES = replace(PAIR, read=_direction_of_pressure)
+_SUPPORT_NAMES = replace(TEXTS, read=_support_names)
 
 _NEEDED, _UNLIMITED = "required where the distribution has it", "; normal and lognormal have none"
 
@@ -161,7 +244,7 @@ GEOMETRY = Section(
         Key("layout", _LAYOUT, "Name of a parametric layout", "segmental arch", otherwise="file is given instead"),
         Key(
             "parameters",
-            ValueKind("table", {"type": "object"}),
+            _TABLE,
             "Parameters of the layout, see [geometry.parameters]",
             {"span": 4.0},
             otherwise="each parameter at its default",
@@ -177,7 +260,7 @@ GEOMETRY = Section(
         Key("only", TEXTS, "Layers, groups, materials and names, or patterns of them, beside which all is left out",
             ["stones"], default=()),
         Key("thickness", POSITIVE, "Thickness out of plane of blocks for which the file has none", 0.25, "m",
-            THICKNESS),
+            THICKNESS, elsewhere=True),
         Key("joint_thickness", _THICKNESS_OR_AUTO,
             'Gaps between facing edges up to this width are closed; "auto" measures them', "auto", "m", 0.0),
         Key("closing", one_of(WAYS),
@@ -215,7 +298,7 @@ SUPPORTS = Section(
             default=solver.FIXED),
         Key("outline", OUTLINE, "Corners in order; in space those of its plan",
             [[-0.5, -0.3], [4.0, -0.3], [4.0, 0.0], [-0.5, 0.0]], "m", required=True),
-        Key("levels", PAIR, "In space, z of its bottom and top", [-0.3, 0.0], "m", otherwise="required in space"),
+        Key("levels", _LEVELS, "In space, z of its bottom and top", [-0.3, 0.0], "m", otherwise="required in space"),
         Key("material", TEXT, "Material, for [[interfaces]]", "rock", otherwise="none"),
     ),
     several=True,
@@ -226,7 +309,7 @@ MATERIAL = Section(
     "Blocks and joints for which nothing else is said",
     (
         Key("density", POSITIVE, "Density of blocks for which the file has none; of every block of a parametric layout",
-            2000.0, "kg/m³", DENSITY),
+            2000.0, "kg/m³", DENSITY, elsewhere=True),
         Key("friction_coefficient", NOT_NEGATIVE, "Coefficient of friction, the tangent of the angle of friction",
             0.6, default=_FRICTION),
         *_strength(),
@@ -292,14 +375,14 @@ SETTLEMENT = Section(
         Key("tolerance", POSITIVE, "Width of the bracket of the collapse; of a rotation alone in rad", 1e-4, "m",
             otherwise="a hundredth of the increment"),
         Key("step_tolerance", FRACTION, "Relative error of the reaction that steps aim for; the smallest of several "
-            "holds", 0.002, default=_CONTROLS.step_tolerance),
+            "holds", 0.002, default=_CONTROLS.step_tolerance, elsewhere=True),
         Key("local_loss", SHARE, "Share of the weight up to which blocks that leave for good are let go and the path "
-            "goes on without them; 0 ends it at the first", 0.0, default=_CONTROLS.local_loss),
+            "goes on without them; 0 ends it at the first", 0.0, default=_CONTROLS.local_loss, elsewhere=True),
         Key("profile", _PROFILE, "How far each support goes, in proportion: a Gaussian trough or heave along x, points "
             "of a table, or one vector and rotation per support; s is the largest displacement of a support's centroid",
             {"kind": "gaussian", "centre": 1.5, "inflection": 0.8}, "m", otherwise="all go as far"),
-        Key("blocks", TEXTS, "Names of the moving supports that take part; the others stand still", ["ground right"],
-            otherwise="all moving supports"),
+        Key("blocks", _SUPPORT_NAMES, "Names of the moving supports that take part; the others stand still",
+            ["ground right"], otherwise="all moving supports"),
     ),
     several=True,
 )  # fmt: skip
@@ -320,7 +403,7 @@ LOADS = Section(
             "N·m", 0.0),
         Key("pressure", NUMBER, "Pressure on the first faces in the way of direction, or on an edge", 1000.0, "Pa",
             otherwise="none"),
-        Key("direction", PAIR, "Direction in which the pressure pushes", [1.0, 0.0], default=(0.0, -1.0)),
+        Key("direction", _PUSHES, "Direction in which the pressure pushes", [1.0, 0.0], default=(0.0, -1.0)),
         Key("edge", whole(1), "Number of the edge into which the pressure pushes, counter-clockwise from the first "
             "corner", 2, otherwise="the faces in the way of direction"),
         Key("positions", _PLACES,
@@ -329,22 +412,24 @@ LOADS = Section(
     several=True,
 )  # fmt: skip
 
+#: Keys of [analysis] that are those of no kind of analysis.
+ANALYSIS_KEYS = (
+    Key("kind", _KIND,
+        "Settlement: until equilibrium is lost; limit load: the multiplier of the live loads at failure; pushover: "
+        "the multiplier over a control displacement", "limit load", default=next(iter(KINDS))),
+    Key("increments", one_of(solver.INCREMENTS),
+        'How increments are found: "coulomb", the path that friction without lift leaves, or "linear program", one '
+        "per increment (Portioli and Cascini, 2017), of settlements only", "coulomb",
+        default="coulomb"),
+    Key("falling_frames", whole(0, MOST_STEPS), "Frames of the mechanism after collapse", 20,
+        otherwise=f"{_CONTROLS.frames(2)} in the plane, {_CONTROLS.frames(3)} in space"),
+)  # fmt: skip
+
 ANALYSIS = Section(
     "analysis",
     "What is asked for, and how increments are found",
-    (
-        Key("kind", one_of(tuple(KINDS)),
-            "Settlement: until equilibrium is lost; limit load: the multiplier of the live loads at failure; pushover: "
-            "the multiplier over a control displacement", "limit load", default=next(iter(KINDS))),
-        *(key for kind in KINDS.values() for key in kind.keys),
-        Key("increments", one_of(solver.INCREMENTS),
-            'How increments are found: "coulomb", the path that friction without lift leaves, or "linear program", one '
-            "per increment (Portioli and Cascini, 2017), of settlements only", "coulomb",
-            default="coulomb"),
-        Key("falling_frames", whole(0, MOST_STEPS), "Frames of the mechanism after collapse", 20,
-            otherwise=f"{_CONTROLS.frames(2)} in the plane, {_CONTROLS.frames(3)} in space"),
-    ),
-)  # fmt: skip
+    (ANALYSIS_KEYS[0], *(key for kind in KINDS.values() for key in kind.keys), *ANALYSIS_KEYS[1:]),
+)
 
 OUTPUT = Section(
     "output",
@@ -353,35 +438,6 @@ OUTPUT = Section(
          default="collapse.mp4"),
      Key("vtu", one_of(("moved", "undeformed")), "Where the points of the VTU files are: where the blocks have moved "
          "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved")),
-)  # fmt: skip
-
-EXPLAIN = Section(
-    "explain",
-    "What blockvis explain looks for; every key has a default",
-    (
-        Key("supports", _GROUPS, "Supports that may have moved, or groups that moved as one",
-            ["pier", ["left", "right"]],
-            otherwise="each support of the drawing"),
-        Key("directions", ValueKind("list of texts", {"type": "array", "items": {"enum": list(DIRECTIONS)}}),
-            "Ways in which they may have moved", ["down", "rotation"], default=_EXPLAIN.directions),
-        Key("trough", TRUE_OR_FALSE, "Whether troughs and slopes of the ground are candidates", True,
-            otherwise="where the structure stands on three places or more"),
-        Key("centres", NUMBERS, "Places x at which a trough may be deepest", [1.0, 2.0], "m",
-            otherwise="five over the width of the structure"),
-        Key("inflections", NUMBERS, "Distances from there to where a trough may be steepest", [0.5, 1.0], "m",
-            otherwise="a sixth and a third of the width"),
-        Key("friction", PAIR, "Range of the friction coefficient of [material]; others follow in proportion",
-            [0.4, 0.7],
-            otherwise="from 0.8 to 1.25 times that of the case"),
-        Key("limit", POSITIVE, "Largest displacement of a support", 0.1, "m",
-            otherwise="25 times the widest crack, or three times the largest displacement"),
-        Key("model_uncertainty", POSITIVE, "Standard deviation of computed widths, as a fraction of those seen", 0.3,
-            default=_EXPLAIN.model_uncertainty),
-        Key("place_uncertainty", NOT_NEGATIVE, "Within which a crack at x, y may be another joint of the model",
-            0.1, "m",
-            otherwise="half the block size"),
-        Key("outliers", POSITIVE, "Probability that an observation has another cause", 0.1, default=_EXPLAIN.outliers),
-    ),
 )  # fmt: skip
 
 #: Every table of the case file with its keys.

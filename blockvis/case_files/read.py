@@ -8,25 +8,21 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import solver
 from blockvis import generators
 from blockvis.cases.contents import Case
 from blockvis.cases.explain_settings import read_explain
 from blockvis.cases.imperfections import Imperfection, read_imperfection
+from blockvis.cases.key import read_keys
 from blockvis.cases.loads import LoadCase
-from blockvis.cases.profiles import Profile, read_profile
-from blockvis.cases.toml_table import Table, is_number, shortened, toml_value
+from blockvis.cases.profiles import Profile
+from blockvis.cases.toml_table import Table, shortened, toml_value
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats import FORMATS
 from blockvis.kinds.kinds import KINDS
-from blockvis.layout.joints.close import WAYS
-from blockvis.layout.views import VIEWS
-from blockvis.results.folder import VIDEO_SUFFIXES
 from blockvis.text import files_like
 
-from .case_keys import MOST_STEPS
+from . import case_keys as keys
 
 
 def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
@@ -124,114 +120,61 @@ def parsed_toml(text: str, source: Path) -> dict[str, Any]:
 def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     """Make a case of the values of a parsed TOML text; paths in it are relative to the folder of ``source``."""
     top = Table(values, "", source)
-    geometry = top.table("geometry")
-    file, layout, parameters, unit = _drawn(geometry)
-    view, ignore, only = _chosen(geometry, file)
-    dimension = geometry.take("dimension", "auto")
-    if isinstance(dimension, bool) or dimension not in (2, 3, "auto"):
-        raise geometry.error("dimension", f'is {shortened(dimension)}; give 2, 3 or "auto"')
-    joint = geometry.take("joint_thickness", 0.0)
-    if joint != "auto":
-        joint = geometry.number("joint_thickness", 0.0)
-        if joint < 0.0:
-            raise geometry.error("joint_thickness", f'is {joint:g}; give a thickness in m of at least 0, or "auto"')
+    geometry = _geometry(top.table("geometry"))
     roles = top.table("roles").values
     for name, role in roles.items():
         if role not in solver.ROLES:
             raise ValueError(f'{source}: [roles] "{name}" is {shortened(role)}; a role is {", ".join(solver.ROLES)}')
-    material = top.table("material")
     materials = top.table("materials")
-    densities = {}
-    for name in materials.values:
-        one = materials.table(name)
-        densities[name] = one.number("density", positive=True)
-        one.finish()
+    phases = [keys.SETTLEMENT.read(table) for table in top.tables("settlement")]
+    motions = [_settlement(table, one) for table, one in zip(top.tables("settlement"), phases, strict=True)]
     analysis = top.table("analysis")
-    motions = [_settlement(entry) for entry in top.tables("settlement")]
-    kind = KINDS[analysis.text("kind", next(iter(KINDS)), among=tuple(KINDS))]
+    asked = read_keys(keys.ANALYSIS_KEYS, analysis)
     # Every kind reads its keys: one that is given to another kind is named, not ignored.
-    settings = {name: known.read(top, analysis) for name, known in KINDS.items()}
-    output = top.table("output")
-    animation = output.take("animation", "collapse.mp4")
-    if animation is not False:
-        animation = output.text("animation", "collapse.mp4")
-        if not Path(animation).name == animation or "\\" in animation or not animation.lower().endswith(VIDEO_SUFFIXES):
-            raise output.error(
-                "animation",
-                f"is {shortened(animation)}; give a name ending in {', '.join(VIDEO_SUFFIXES)}, without a folder: "
-                "it is written into the results folder",
-            )
+    settings = {name: kind.read(top, analysis) for name, kind in KINDS.items()}
+    analysis.finish()
+    output = keys.OUTPUT.read(top.table("output"))
     case = Case(
         source=source,
         text=text,
-        file=None if file is None else source.parent / file,
-        layout=layout,
-        parameters=dict(parameters),
-        unit=unit,
-        view=view,
-        dimension=dimension,
-        ignore=ignore,
-        only=only,
-        thickness=geometry.number("thickness", positive=True),
-        joint_thickness=joint,
-        outline_tolerance=_tolerance(geometry),
-        closing=geometry.text("closing", "auto", among=WAYS),
-        overlap_tolerance=geometry.number("overlap_tolerance", positive=True),
+        **geometry | {"file": None if geometry["file"] is None else source.parent / geometry["file"]},
         roles=dict(roles),
-        supports=tuple(_support(entry) for entry in top.tables("supports")),
-        density=material.number("density", positive=True),
-        densities=densities,
-        friction_coefficient=_friction(material),
-        **_strength(material),
-        interfaces=dict(_interface(entry) for entry in top.tables("interfaces")),
+        supports=tuple(_support(table) for table in top.tables("supports")),
+        **_law(keys.MATERIAL.read(top.table("material"))),
+        densities={name: keys.MATERIALS.read(materials.table(name))["density"] for name in materials.values},
+        interfaces=dict(_interface(table) for table in top.tables("interfaces")),
         imperfections=_imperfections(top),
         settlements=tuple(settlement for settlement, _ in motions),
         profiles=tuple(profile for _, profile in motions),
-        loads=tuple(_load(entry) for entry in top.tables("loads")),
-        analysis=kind.name,
-        settings=settings[kind.name],
-        controls=_controls(top, analysis, geometry.number("overlap_tolerance", positive=True)),
+        loads=tuple(_load(table) for table in top.tables("loads")),
+        analysis=asked["kind"],
+        settings=settings[asked["kind"]],
+        controls=_controls(asked, phases, top.table("control"), geometry["overlap_tolerance"]),
         explain=read_explain(top.table("explain")),
-        animation=animation or None,
-        vtu=output.text("vtu", "moved", among=("moved", "undeformed")),
+        animation=output["animation"] or None,
+        vtu=output["vtu"],
     )
-    for table in (geometry, material, analysis, output, top):
-        table.finish()
+    top.finish()
     return _checked(case, settings)
 
 
-def _tolerance(geometry: Table) -> float | None:
-    """Tolerance of outlines [m]: 0 keeps every corner; None where the case does not say."""
-    value = geometry.number("outline_tolerance")
-    if value is not None and value < 0.0:
-        raise geometry.error("outline_tolerance", f"is {value:g}; give a length in m of at least 0")
-    return None if value is None else float(value)
-
-
-def _drawn(geometry: Table) -> tuple[str | None, str | None, Mapping[str, Any], str | None]:
-    """File or layout, with the parameters of the one and the unit of the other."""
-    file, layout, unit = (geometry.text(key) for key in ("file", "layout", "unit"))
-    parameters = geometry.table("parameters").values
+def _geometry(table: Table) -> dict[str, Any]:
+    """Read [geometry]: a file, and what is chosen of it, or a layout and its parameters."""
+    values = keys.GEOMETRY.read(table)
+    file, layout = values["file"], values["layout"]
     if (file is None) == (layout is None):
         problem = "is missing; name the layout file" if file is None else "and layout are both given; give one of them"
-        raise geometry.error("file", problem + f", or a layout: {', '.join(generators.LAYOUTS)}" * (file is None))
-    if file is not None and parameters:
-        raise geometry.error("parameters", "belong to a layout, not to a file")
-    if layout is not None and unit not in (None, "m"):
-        raise geometry.error(
-            "unit", f"is {shortened(unit)}, but is of a file's lengths; a layout is in m: leave it out"
+        raise table.error("file", problem + f", or a layout: {', '.join(generators.LAYOUTS)}" * (file is None))
+    if file is not None and values["parameters"]:
+        raise table.error("parameters", "belong to a layout, not to a file")
+    if layout is not None and values["unit"] not in (None, "m"):
+        raise table.error(
+            "unit", f"is {shortened(values['unit'])}, but is of a file's lengths; a layout is in m: leave it out"
         )
-    return file, layout, parameters, unit
-
-
-def _chosen(geometry: Table, file: str | None) -> tuple[str | None, tuple[str, ...], tuple[str, ...]]:
-    """Read what is chosen of a file: view, ignore and only."""
-    view = geometry.text("view", among=tuple(VIEWS))
-    ignore, only = geometry.texts("ignore"), geometry.texts("only")
-    for key, value in (("view", view), ("ignore", ignore), ("only", only)):
-        if file is None and value:
-            raise geometry.error(key, "belongs to a file, not to a layout")
-    return view, ignore, only
+    for key in ("view", "ignore", "only"):
+        if file is None and values[key]:
+            raise table.error(key, "belongs to a file, not to a layout")
+    return values | {"parameters": dict(values["parameters"])}
 
 
 def _checked(case: Case, settings: Mapping[str, Any]) -> Case:
@@ -254,52 +197,22 @@ def _checked(case: Case, settings: Mapping[str, Any]) -> Case:
     return KINDS[case.analysis].checked(case)
 
 
-def _friction(table: Table, default: float | None = solver.InterfaceLaw.friction_coefficient) -> float:
-    value = table.number("friction_coefficient", default)
-    if value is None:
-        raise table.error("friction_coefficient", "is missing")
-    if value < 0.0:
-        raise table.error("friction_coefficient", f"is {value:g}; it must be at least 0")
-    return float(value)
+def _law(values: dict[str, Any]) -> dict[str, Any]:
+    """Take the compressive strength that is not given for infinite."""
+    strength = values["compressive_strength"]
+    return values | {"compressive_strength": math.inf if strength is None else strength}
 
 
 def _support(table: Table) -> Mapping[str, Any]:
-    support = {
-        "name": table.text("name", "support"),
-        "role": table.text("role", solver.FIXED, among=(solver.FIXED, solver.MOVING)),
-        "outline": table.take("outline"),
-    }
-    levels = table.pair("levels", words="[bottom, top]")
-    if levels is not None:
-        support["levels"] = list(levels)
-    if not isinstance(support["outline"], list) or len(support["outline"]) < 3:
-        raise table.error("outline", f"is {shortened(support['outline'])}; give at least three corners [[x, y], ...]")
-    for corner in support["outline"]:
-        if not isinstance(corner, (list, tuple)) or len(corner) != 2 or not all(map(is_number, corner)):
-            raise table.error("outline", f"has the corner {shortened(corner)}; give two numbers [x, y]")
-    material = table.text("material")
-    if material is not None:
-        support["material"] = material
-    table.finish()
-    return support
-
-
-def _strength(table: Table) -> dict[str, float]:
-    """Cohesion and compressive strength [Pa]; without a key no cohesion, and infinite strength."""
-    cohesion = table.number("cohesion", 0.0)
-    if cohesion < 0.0:
-        raise table.error("cohesion", f"is {cohesion:g}; give a stress in Pa of at least 0")
-    strength = table.number("compressive_strength", positive=True)
-    return {"cohesion": cohesion, "compressive_strength": math.inf if strength is None else strength}
+    values = keys.SUPPORTS.read(table)
+    if values["levels"] is not None:
+        values["levels"] = list(values["levels"])
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def _interface(table: Table) -> tuple[tuple[str, str], solver.InterfaceLaw]:
-    pair = table.take("materials")
-    if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(name, str) for name in pair)):
-        raise table.error("materials", f'is {pair!r}; name two materials ["stone", "brick"]')
-    law = solver.InterfaceLaw(_friction(table, None), **_strength(table))
-    table.finish()
-    return (pair[0], pair[1]), law
+    values = _law(keys.INTERFACES.read(table))
+    return values.pop("materials"), solver.InterfaceLaw(**values)
 
 
 def _imperfections(top: Table) -> tuple[Imperfection, ...]:
@@ -312,33 +225,18 @@ def _imperfections(top: Table) -> tuple[Imperfection, ...]:
     return tuple(found.values())
 
 
-def _settlement(table: Table) -> tuple[solver.Settlement, Profile | None]:
-    """Read a settlement, and its profile along x, of which only the assembly can make motions of supports."""
-    blocks = table.take("blocks")
-    if blocks is not None:
-        blocks = tuple([blocks] if isinstance(blocks, str) else blocks if isinstance(blocks, (list, tuple)) else [None])
-        if not all(isinstance(name, str) for name in blocks):
-            raise table.error("blocks", f"is {shortened(table.values['blocks'])}; give names of supports in quotes")
-    keys = {
-        "direction": table.vector("direction"),
-        "rotation_centre": table.vector("rotation_centre"),
-        "rotation_axis": table.triple("rotation_axis"),
-        "rotation": table.number("rotation"),
-        "radial_from": table.pair("radial_from"),
-        "increment": table.number("increment", 0.01, positive=True),
-        "limit": table.number("limit", 1.0, positive=True),
-        "tolerance": table.number("tolerance", positive=True),
-    }
-    # Read with the controls.
-    table.take("step_tolerance")
-    table.take("local_loss")
-    profile = read_profile(table)
-    table.finish()
-    if keys["limit"] / keys["increment"] > MOST_STEPS:
+def _settlement(table: Table, values: Mapping[str, Any]) -> tuple[solver.Settlement, Profile | None]:
+    """Make a settlement, and its profile along x, of which only the assembly can make motions of supports."""
+    profile, motion = values["profile"], dict(values)
+    # Of the controls; and what is given in one of two ways.
+    for key in ("step_tolerance", "local_loss", "profile", "blocks"):
+        del motion[key]
+    steps = motion["limit"] / motion["increment"]
+    if steps > keys.MOST_STEPS:
         raise table.error(
             "increment",
-            f"is {keys['increment']:g}: {keys['limit'] / keys['increment']:.3g} of them make the limit of "
-            f"{keys['limit']:g}; at most {MOST_STEPS} do",
+            f"is {motion['increment']:g}: {steps:.3g} of them make the limit of {motion['limit']:g}; at most "
+            f"{keys.MOST_STEPS} do",
         )
     if profile is not None:
         taken = ["rotation_centre", "rotation", *(("direction", "blocks") if isinstance(profile, dict) else ())]
@@ -346,39 +244,20 @@ def _settlement(table: Table) -> tuple[solver.Settlement, Profile | None]:
             if table.values.get(key) is not None:
                 raise table.error(key, "does not go with this profile, which says how each support moves")
     if isinstance(profile, Profile):
-        keys["direction"] = keys["direction"] or (0.0, -1.0)
-    if keys["rotation"] is None:
-        keys["rotation"] = 1.0 if keys["rotation_centre"] is not None else 0.0
+        motion["direction"] = motion["direction"] or (0.0, -1.0)
+    if motion["rotation"] is None:
+        motion["rotation"] = 1.0 if motion["rotation_centre"] is not None else 0.0
     try:
         if isinstance(profile, dict):
-            return solver.Settlement(**keys, profile=profile), None
-        return solver.Settlement(**keys, blocks=blocks), profile
+            return solver.Settlement(**motion, profile=profile), None
+        return solver.Settlement(**motion, blocks=values["blocks"]), profile
     except ValueError as error:
         raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 
 
-def _pressure_direction(table: Table) -> tuple[float, float]:
-    given = table.vector("direction", (0.0, -1.0))
-    if len(given) != 2:
-        raise table.error("direction", "has three numbers; pressure is of blocks in the plane: in space give force")
-    return given[0], given[1]
-
-
 def _load(table: Table) -> LoadCase:
-    given = set(table.values)
-    load = LoadCase(
-        kind=table.text("kind", "dead", among=("dead", "live")),
-        blocks=table.text("blocks", "*"),
-        weight_fraction=table.vector("weight_fraction"),
-        force=table.vector("force", (0.0, 0.0)),
-        point=table.vector("point"),
-        moment=_moment(table),
-        pressure=table.number("pressure"),
-        direction=_pressure_direction(table),
-        edge=table.whole("edge", 1),
-        positions=_positions(table),
-    )
-    table.finish()
+    given, values = set(table.values), keys.LOADS.read(table)
+    load = LoadCase(**values | {"positions": values["positions"] or ()})
     if load.direction == (0.0, 0.0):
         raise table.error("direction", "is [0, 0]; give the direction in which the pressure pushes")
     for key in ("direction", "edge"):
@@ -397,36 +276,19 @@ def _load(table: Table) -> LoadCase:
     return load
 
 
-def _moment(table: Table) -> float | tuple[float, float, float]:
-    """Read a moment: a number, in space three."""
-    if isinstance(table.values.get("moment"), list | tuple):
-        found: tuple[float, float, float] = table.triple("moment")
-        return found
-    moment: float = table.number("moment", 0.0)
-    return moment
-
-
-def _positions(table: Table) -> tuple[float, ...]:
-    given = table.numbers("positions")
-    if given is None:
-        return ()
-    if len(given) != 3 or given[2] != int(given[2]) or given[2] < 2 or given[0] >= given[1]:
-        raise table.error("positions", f"is {list(given)}; give [first x, last x, number of places], at least 2 places")
-    return tuple(np.linspace(given[0], given[1], int(given[2])).tolist())
-
-
-def _controls(top: Table, analysis: Table, overlap_tolerance: float | None) -> solver.Controls:
-    frames = analysis.number("falling_frames")
-    if frames is not None and not (frames == int(frames) and 0 <= frames <= MOST_STEPS):
-        raise analysis.error("falling_frames", f"is {frames:g}; give a whole number from 0 to {MOST_STEPS}")
-    # What drives a path says how exact its steps are to be; a case has one path.
-    tables = (*top.tables("settlement"), top.table("control"))
-    tolerances = [table.fraction("step_tolerance") for table in tables]
-    losses = [table.share("local_loss") for table in top.tables("settlement")]
+def _controls(
+    asked: Mapping[str, Any],
+    phases: Sequence[Mapping[str, Any]],
+    control: Table,
+    overlap_tolerance: float | None,
+) -> solver.Controls:
+    """Make the controls; what drives a path says how exact its steps are to be, and a case has one path."""
+    tolerances = [one["step_tolerance"] for one in phases] + [control.fraction("step_tolerance")]
+    losses = [one["local_loss"] for one in phases]
     return solver.Controls(
-        increments=analysis.text("increments", "coulomb", among=solver.INCREMENTS),
+        increments=asked["increments"],
         overlap_tolerance=overlap_tolerance,
-        falling_frames=None if frames is None else int(frames),
+        falling_frames=asked["falling_frames"],
         step_tolerance=min((t for t in tolerances if t is not None), default=solver.Controls.step_tolerance),
         local_loss=min((loss for loss in losses if loss is not None), default=solver.Controls.local_loss),
     )

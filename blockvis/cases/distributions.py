@@ -137,7 +137,7 @@ def read_distribution(
     """
     values = dict(values)
     kind = values.pop("distribution", None)
-    if kind not in KINDS:
+    if not isinstance(kind, str) or kind not in KINDS:
         hint = nearest(kind, list(KINDS)) if isinstance(kind, str) else ""
         problem = f"distribution is {kind!r}{hint}" if kind is not None else "names no distribution"
         raise ValueError(f"{where}: {problem}; choose from {', '.join(KINDS)}")

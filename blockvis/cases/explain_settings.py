@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+from .key import FRACTION, NOT_NEGATIVE, NUMBERS, PAIR, POSITIVE, TEXTS, TRUE_OR_FALSE, Key, Section, ValueKind
 from .toml_table import Table, shortened
 
 #: Directions in which a support may have moved, as the case file names them.
@@ -48,49 +50,75 @@ class ExplainSettings:
     outliers: float = 0.05
 
 
-def read_explain(table: Table) -> ExplainSettings:
-    """Read the table [explain]."""
-    default = ExplainSettings()
-    directions = table.take("directions", list(default.directions))
-    directions = [directions] if isinstance(directions, str) else directions
-    if not isinstance(directions, list) or not directions or not all(word in DIRECTIONS for word in directions):
-        raise table.error("directions", f"is {shortened(directions)}; choose from {', '.join(DIRECTIONS)}")
-    trough = table.take("trough")
-    if trough not in (None, True, False):
-        raise table.error("trough", f"is {shortened(trough)}; give true or false")
-    inflections = table.numbers("inflections") or ()
-    if any(value <= 0.0 for value in inflections):
-        raise table.error("inflections", f"is {list(inflections)}; give lengths above 0, in m")
-    friction = table.pair("friction")
-    if friction is not None and not 0.0 <= friction[0] <= friction[1]:
-        raise table.error("friction", f"is {list(friction)}; give the smallest and the largest coefficient")
-    found = ExplainSettings(
-        supports=_groups(table),
-        directions=tuple(directions),
-        trough=trough,
-        centres=table.numbers("centres") or (),
-        inflections=inflections,
-        friction=friction,
-        limit=table.number("limit", positive=True),
-        model_uncertainty=table.number("model_uncertainty", default.model_uncertainty, positive=True),
-        place_uncertainty=table.number("place_uncertainty"),
-        outliers=table.number("outliers", default.outliers),
-    )
-    if found.place_uncertainty is not None and found.place_uncertainty < 0.0:
-        raise table.error("place_uncertainty", f"is {found.place_uncertainty:g}; give a length of at least 0, in m")
-    if not 0.0 < found.outliers < 1.0:
-        raise table.error("outliers", f"is {found.outliers:g}; give a probability above 0 and below 1")
-    table.finish()
-    return found
+_EXPLAIN = ExplainSettings()
 
 
-def _groups(table: Table) -> tuple[tuple[str, ...], ...]:
-    given = table.take("supports")
+def _directions(table: Table, key: Key) -> tuple[str, ...] | None:
+    given = table.take(key.name)
+    words = [given] if isinstance(given, str) else given
+    if words is None:
+        return None
+    if not isinstance(words, list) or not words or not all(word in DIRECTIONS for word in words):
+        raise table.error(key.name, f"is {shortened(words)}; choose from {', '.join(DIRECTIONS)}")
+    return tuple(words)
+
+
+def _groups(table: Table, key: Key) -> tuple[tuple[str, ...], ...]:
+    given = table.take(key.name)
     entries = [given] if isinstance(given, str) else [] if given is None else given
     groups = []
     for entry in entries if isinstance(entries, list | tuple) else [None]:
         names = [entry] if isinstance(entry, str) else entry
         if not isinstance(names, list | tuple) or not names or not all(isinstance(name, str) for name in names):
-            raise table.error("supports", f'is {shortened(given)}; give names, ["left", ["middle", "right"]]')
+            raise table.error(key.name, f'is {shortened(given)}; give names, ["left", ["middle", "right"]]')
         groups.append(tuple(names))
     return tuple(groups)
+
+
+_GROUPS = ValueKind(
+    "list of names, or of lists of names",
+    {"anyOf": [{"type": "string"}, {"type": "array", "items": TEXTS.schema}]},
+    _groups,
+)
+
+EXPLAIN = Section(
+    "explain",
+    "What blockvis explain looks for; every key has a default",
+    (
+        Key("supports", _GROUPS, "Supports that may have moved, or groups that moved as one",
+            ["pier", ["left", "right"]],
+            otherwise="each support of the drawing"),
+        Key("directions", ValueKind("list of texts", {"type": "array", "items": {"enum": list(DIRECTIONS)}},
+            _directions),
+            "Ways in which they may have moved", ["down", "rotation"], default=_EXPLAIN.directions),
+        Key("trough", TRUE_OR_FALSE, "Whether troughs and slopes of the ground are candidates", True,
+            otherwise="where the structure stands on three places or more"),
+        Key("centres", NUMBERS, "Places x at which a trough may be deepest", [1.0, 2.0], "m",
+            otherwise="five over the width of the structure"),
+        Key("inflections", NUMBERS, "Distances from there to where a trough may be steepest", [0.5, 1.0], "m",
+            otherwise="a sixth and a third of the width"),
+        Key("friction", PAIR, "Range of the friction coefficient of [material]; others follow in proportion",
+            [0.4, 0.7],
+            otherwise="from 0.8 to 1.25 times that of the case"),
+        Key("limit", POSITIVE, "Largest displacement of a support", 0.1, "m",
+            otherwise="25 times the widest crack, or three times the largest displacement"),
+        Key("model_uncertainty", POSITIVE, "Standard deviation of computed widths, as a fraction of those seen", 0.3,
+            default=_EXPLAIN.model_uncertainty),
+        Key("place_uncertainty", NOT_NEGATIVE, "Within which a crack at x, y may be another joint of the model",
+            0.1, "m",
+            otherwise="half the block size"),
+        Key("outliers", FRACTION, "Probability that an observation has another cause", 0.1, default=_EXPLAIN.outliers),
+    ),
+)  # fmt: skip
+
+
+def read_explain(table: Table) -> ExplainSettings:
+    """Read the table [explain]."""
+    values: dict[str, Any] = EXPLAIN.read(table)
+    inflections, friction = values["inflections"], values["friction"]
+    if any(value <= 0.0 for value in inflections or ()):
+        raise table.error("inflections", f"is {list(inflections)}; give lengths above 0, in m")
+    if friction is not None and not 0.0 <= friction[0] <= friction[1]:
+        raise table.error("friction", f"is {list(friction)}; give the smallest and the largest coefficient")
+    # What is not given is as the class has it.
+    return ExplainSettings(**{key: value for key, value in values.items() if value is not None})

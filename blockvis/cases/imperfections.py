@@ -83,7 +83,7 @@ def read_imperfection(values: Mapping[str, Any], where: str) -> Imperfection:
     """
     values = dict(values)
     kind, seed = values.pop("kind", None), values.pop("seed", 0)
-    if kind not in IMPERFECTIONS:
+    if not isinstance(kind, str) or kind not in IMPERFECTIONS:
         hint = nearest(kind, list(IMPERFECTIONS)) if isinstance(kind, str) else ""
         raise ValueError(f"{where} kind is {kind!r}{hint}; choose from {', '.join(IMPERFECTIONS)}")
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:

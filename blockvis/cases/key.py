@@ -1,15 +1,21 @@
 """What a key of a TOML file is: its kind of value, unit, default, meaning and an example.
 
-The tables of keys are made of these: :data:`blockvis.case_files.case_keys.SECTIONS`, the keys of a kind of analysis in
-:attr:`blockvis.kinds.kind.AnalysisKind.keys`, and :data:`blockvis.studies.study_keys.SECTIONS`. The JSON schema, the
-reference pages and the comments of new case files are written from them.
+Whatever is known of a key is said once: files are read by it, and the JSON schema, the reference pages and the comments
+of new case files are written from it. The tables of keys are :data:`blockvis.case_files.case_keys.SECTIONS`, those of a
+kind of analysis in :attr:`blockvis.kinds.kind.AnalysisKind.keys`, and :data:`blockvis.studies.study_keys.SECTIONS`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+
+from .toml_table import Table, is_number, shortened
+
+
+def _as_it_is(table: Table, key: Key) -> Any:
+    return table.take(key.name)
 
 
 @dataclass(frozen=True)
@@ -22,42 +28,102 @@ class ValueKind:
         For people.
     schema : mapping
         For programs, as JSON schema has it.
+    read : function of Table and Key
+        Reads and checks the value; None where the key is missing.
     """
 
     words: str
     schema: Mapping[str, Any]
+    read: Callable[[Table, Key], Any] = _as_it_is
 
 
 def _list_of(item: Mapping[str, Any], least: int = 0, most: int | None = None) -> dict[str, Any]:
     return {"type": "array", "items": item, "minItems": least} | ({} if most is None else {"maxItems": most})
 
 
-NUMBER = ValueKind("number", {"type": "number"})
-POSITIVE = ValueKind("number above 0", {"type": "number", "exclusiveMinimum": 0})
-FRACTION = ValueKind("number above 0 and below 1", {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1})
-SHARE = ValueKind("number from 0 to 1", {"type": "number", "minimum": 0, "maximum": 1})
-NOT_NEGATIVE = ValueKind("number of at least 0", {"type": "number", "minimum": 0})
-TRUE_OR_FALSE = ValueKind("true or false", {"type": "boolean"})
-TEXT = ValueKind("text", {"type": "string"})
-TEXTS = ValueKind(
-    "text, or list of texts", {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
+#: Quantities that cannot be negative, by their unit.
+_QUANTITIES = {"m": "a length in m", "Pa": "a stress in Pa"}
+
+
+def read_not_negative(table: Table, key: Key) -> float | None:
+    """Read a number of at least 0."""
+    value: float | None = table.number(key.name)
+    if value is not None and value < 0.0:
+        raise table.error(key.name, f"is {value:g}; give {_QUANTITIES.get(key.unit, 'a number')} of at least 0")
+    return value
+
+
+def _true_or_false(table: Table, key: Key) -> bool | None:
+    return None if table.take(key.name) is None else table.boolean(key.name)
+
+
+def _texts(table: Table, key: Key) -> tuple[str, ...] | None:
+    return None if table.take(key.name) is None else table.texts(key.name)
+
+
+def _outline(table: Table, key: Key) -> list[Any]:
+    corners = table.take(key.name)
+    if not isinstance(corners, list) or len(corners) < 3:
+        raise table.error(key.name, f"is {shortened(corners)}; give at least three corners [[x, y], ...]")
+    for corner in corners:
+        if not isinstance(corner, (list, tuple)) or len(corner) != 2 or not all(map(is_number, corner)):
+            raise table.error(key.name, f"has the corner {shortened(corner)}; give two numbers [x, y]")
+    return corners
+
+
+NUMBER = ValueKind("number", {"type": "number"}, lambda table, key: table.number(key.name))
+POSITIVE = ValueKind(
+    "number above 0",
+    {"type": "number", "exclusiveMinimum": 0},
+    lambda table, key: table.number(key.name, positive=True),
 )
-PAIR = ValueKind("two numbers", _list_of({"type": "number"}, 2, 2))
-VECTOR = ValueKind("two numbers, in space three", _list_of({"type": "number"}, 2, 3))
-TRIPLE = ValueKind("three numbers", _list_of({"type": "number"}, 3, 3))
-NUMBERS = ValueKind("list of numbers", _list_of({"type": "number"}, 1))
-OUTLINE = ValueKind("list of at least three corners", _list_of(_list_of({"type": "number"}, 2, 2), 3))
+FRACTION = ValueKind(
+    "number above 0 and below 1",
+    {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1},
+    lambda table, key: table.fraction(key.name),
+)
+SHARE = ValueKind(
+    "number from 0 to 1",
+    {"type": "number", "minimum": 0, "maximum": 1},
+    lambda table, key: table.share(key.name),
+)
+NOT_NEGATIVE = ValueKind("number of at least 0", {"type": "number", "minimum": 0}, read_not_negative)
+TRUE_OR_FALSE = ValueKind("true or false", {"type": "boolean"}, _true_or_false)
+TEXT = ValueKind("text", {"type": "string"}, lambda table, key: table.text(key.name))
+TEXTS = ValueKind(
+    "text, or list of texts",
+    {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]},
+    _texts,
+)
+PAIR = ValueKind("two numbers", _list_of({"type": "number"}, 2, 2), lambda table, key: table.pair(key.name))
+VECTOR = ValueKind(
+    "two numbers, in space three",
+    _list_of({"type": "number"}, 2, 3),
+    lambda table, key: table.vector(key.name),
+)
+TRIPLE = ValueKind("three numbers", _list_of({"type": "number"}, 3, 3), lambda table, key: table.triple(key.name))
+NUMBERS = ValueKind("list of numbers", _list_of({"type": "number"}, 1), lambda table, key: table.numbers(key.name))
+OUTLINE = ValueKind("list of at least three corners", _list_of(_list_of({"type": "number"}, 2, 2), 3), _outline)
 
 
 def whole(least: int, most: int | None = None) -> ValueKind:
     """Make the kind of whole numbers of at least ``least``, and at most ``most``."""
+
+    def read(table: Table, key: Key) -> int | None:
+        if most is None:
+            return table.whole(key.name, least)
+        value = table.number(key.name)
+        if value is not None and not (value == int(value) and least <= value <= most):
+            raise table.error(key.name, f"is {value:g}; give a whole number from {least} to {most}")
+        return None if value is None else int(value)
+
     limit = {} if most is None else {"maximum": most}
-    return ValueKind(f"whole number of at least {least}", {"type": "integer", "minimum": least} | limit)
+    return ValueKind(f"whole number of at least {least}", {"type": "integer", "minimum": least} | limit, read)
 
 
 def one_of(choices: Sequence[str]) -> ValueKind:
     """Make the kind of texts that are one of ``choices``."""
-    return ValueKind("text", {"enum": list(choices)})
+    return ValueKind("text", {"enum": list(choices)}, lambda table, key: table.text(key.name, among=tuple(choices)))
 
 
 @dataclass(frozen=True)
@@ -80,6 +146,11 @@ class Key:
         What holds where the key is missing, in words, if that is no value.
     required : bool
         Whether the key must be there.
+    elsewhere : bool
+        Whether the value may stand elsewhere, as in the layout file: a missing key is read as None, and the default
+        holds where nothing says otherwise.
+    remedy : str
+        What to do where a required key is missing.
     """
 
     name: str
@@ -90,6 +161,15 @@ class Key:
     default: Any = None
     otherwise: str = ""
     required: bool = False
+    elsewhere: bool = False
+    remedy: str = ""
+
+    def read(self, table: Table) -> Any:
+        """Read and check its value; where it is missing the default, or None where it may stand elsewhere."""
+        value = self.kind.read(table, self)
+        if value is None and self.required:
+            raise table.error(self.name, f"is missing{f'; {self.remedy}' if self.remedy else ''}")
+        return self.default if value is None and not self.elsewhere else value
 
     @property
     def choices(self) -> tuple[str, ...]:
@@ -133,3 +213,14 @@ class Section:
     def key(self, name: str) -> Key:
         """Find the key of this name."""
         return next(key for key in self.keys if key.name == name)
+
+    def read(self, table: Table) -> dict[str, Any]:
+        """Read and check the values of its keys, each at its default where it is missing; refuse other keys."""
+        values = read_keys(self.keys, table)
+        table.finish()
+        return values
+
+
+def read_keys(keys: Iterable[Key], table: Table) -> dict[str, Any]:
+    """Read and check the values of keys, each at its default where it is missing."""
+    return {key.name: key.read(table) for key in keys}

@@ -14,7 +14,7 @@ from typing import Any
 
 import solver
 from blockvis.cases.contents import Case
-from blockvis.cases.key import Key, Section
+from blockvis.cases.key import Key, Section, read_keys
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import loss_of, mechanism_text
 
@@ -159,7 +159,7 @@ class AnalysisKind(ABC):
         """
 
     def read(self, top: Table, analysis: Table) -> Any:
-        """Read the keys of this kind from the case file; the same keys give values that compare equal.
+        """Read the keys of this kind from the case file: by name, by default; the same keys give equal values.
 
         Parameters
         ----------
@@ -168,7 +168,7 @@ class AnalysisKind(ABC):
         analysis : Table
             Its [analysis].
         """
-        return None
+        return read_keys(self.keys, analysis)
 
     def refuse(self, settings: Any, case: Case) -> None:
         """Raise ValueError where a case of another kind gives keys of this one.

@@ -108,13 +108,7 @@ class LimitLoadKind(AnalysisKind):
 
     def read(self, top: Table, analysis: Table) -> LimitLoadSettings:
         """Read the keys ``flow``, ``torsion``, ``capacity_at`` and ``displacement``."""
-        flow = analysis.text("flow", "associative", among=FLOWS)
-        torsion = analysis.text("torsion", "points", among=TORSIONS)
-        capacity_at = analysis.numbers("capacity_at")
-        displacement = analysis.number("displacement")
-        if displacement is not None and displacement < 0.0:
-            raise analysis.error("displacement", f"is {displacement:g}; give a length in m of at least 0")
-        return LimitLoadSettings(flow, capacity_at, displacement, torsion)
+        return LimitLoadSettings(**super().read(top, analysis))
 
     def refuse(self, settings: LimitLoadSettings, case: Case) -> None:
         """Refuse keys of limit loads."""

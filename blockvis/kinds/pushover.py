@@ -32,7 +32,8 @@ CONTROL = Section(
     "control",
     "The displacement that grows in a pushover",
     (
-        Key("block", TEXT, "Name of the free block whose displacement grows", "brick 6-4", required=True),
+        Key("block", TEXT, "Name of the free block whose displacement grows", "brick 6-4", required=True,
+            remedy="name the block whose displacement grows"),
         Key("direction", VECTOR, "Direction in which the displacement counts; its length does not count", [1.0, 0.0],
             otherwise="along x"),
         Key("point", VECTOR, "Point of the block, in the drawing", [1.0, 2.0], "m", otherwise="its centroid"),
@@ -41,7 +42,7 @@ CONTROL = Section(
         Key("tolerance", POSITIVE, "Width of the bracket of the displacement at which it is lost", 1e-4, "m",
             otherwise="a hundredth of the increment"),
         Key("step_tolerance", FRACTION, "Relative error of the multiplier that steps aim for; a smaller one of "
-            "[settlement] holds over it", 0.002, default=solver.Controls.step_tolerance),
+            "[settlement] holds over it", 0.002, default=solver.Controls.step_tolerance, elsewhere=True),
     ),
 )  # fmt: skip
 
@@ -60,21 +61,11 @@ class PushoverKind(AnalysisKind):
         table = top.table("control")
         if not table.values:
             return None
-        keys = {
-            "direction": table.vector("direction"),
-            "point": table.vector("point"),
-            "increment": table.number("increment", 0.01, positive=True),
-            "limit": table.number("limit", 1.0, positive=True),
-            "tolerance": table.number("tolerance", positive=True),
-        }
-        block = table.text("block")
-        # Read with the controls.
-        table.take("step_tolerance")
-        table.finish()
-        if block is None:
-            raise table.error("block", "is missing; name the block whose displacement grows")
+        values = CONTROL.read(table)
+        # It belongs to the controls.
+        del values["step_tolerance"]
         try:
-            return solver.ControlDisplacement(block, **keys)
+            return solver.ControlDisplacement(**values)
         except ValueError as error:
             raise ValueError(f"{table.source}: [{table.where}] {error}") from None
 

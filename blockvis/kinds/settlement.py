@@ -40,7 +40,7 @@ class SettlementKind(AnalysisKind):
 
     def read(self, top: Table, analysis: Table) -> bool:
         """Read the key ``range``."""
-        return analysis.boolean("range")
+        return bool(super().read(top, analysis)["range"])
 
     def refuse(self, settings: bool, case: Case) -> None:
         """Refuse a range of what follows no settlement."""

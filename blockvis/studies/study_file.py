@@ -17,13 +17,14 @@ from blockvis.case_files.read import case_of, read_case
 from blockvis.cases.build import case_assembly
 from blockvis.cases.distributions import Distribution, read_distribution
 from blockvis.cases.imperfections import read_imperfection
-from blockvis.cases.toml_table import is_number
+from blockvis.cases.key import read_keys
+from blockvis.cases.toml_table import Table, is_number
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats.files import checksum_of_files
 from blockvis.kinds.kinds import KINDS
-from blockvis.text import nearest, refuse_unknown
+from blockvis.text import refuse_unknown
 
-from .sampling import METHODS, Design, designed
+from .sampling import Design, designed
 from .study_keys import COMMON_KEYS, LIST_KEYS, SECTIONS, STUDY
 
 #: Columns of the table besides the parameters.
@@ -241,20 +242,15 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
     if not isinstance(head, Mapping):
         raise ValueError(f"{where}[study] is missing; name the case and the number of runs there")
     refuse_unknown(head, [key.name for key in STUDY.keys], f"{where}[study]")
-    values, case_source = _base_case(head.get("case"), source)
+    asked = read_keys(STUDY.keys, Table(head, "study", source))
+    values, case_source = _base_case(asked["case"], source)
     parameters = _parameters(given.get("parameters", {}), where)
     imperfections = _imperfections(given.get("imperfections", []), where)
     if not parameters and not imperfections:
         raise ValueError(f"{where}nothing is varied; give [parameters] or [[imperfections]]")
     if imperfections:
         values["imperfections"] = [*imperfections, *_as_list(values.get("imperfections", []))]
-    method = head.get("method", "latin hypercube")
-    if method not in METHODS:
-        hint = nearest(str(method), list(METHODS))
-        raise ValueError(f"{where}[study] method is {method!r}{hint}; choose from {', '.join(METHODS)}")
-    seconds = head.get("seconds")
-    if seconds is not None and not (is_number(seconds) and seconds > 0):
-        raise ValueError(f"{where}[study] seconds is {seconds!r}; give a positive number, the longest time of one run")
+    method = asked["method"]
     if method == "grid" and "runs" in head:
         raise ValueError(
             f"{where}[study] runs is given, but a grid has as many as its values make; give repeats instead"
@@ -268,11 +264,11 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
         n_seeded=len(imperfections),
         parameters=parameters,
         method=method,
-        runs=_whole(head, "runs", 64, 1, where),
-        repeats=_whole(head, "repeats", 1, 1, where),
-        seed=_whole(head, "seed", 1, 0, where),
-        seconds=None if seconds is None else float(seconds),
-        keep=tuple(_as_list(head.get("keep", []))),
+        runs=asked["runs"],
+        repeats=asked["repeats"],
+        seed=asked["seed"],
+        seconds=asked["seconds"],
+        keep=tuple(_as_list(asked["keep"])),
     )
     _check(study, where)
     return study
@@ -411,13 +407,6 @@ def _imperfections(given: Any, where: str) -> list[dict[str, Any]]:
 
 def _as_list(given: Any) -> list[Any]:
     return list(given) if isinstance(given, (list, tuple)) else [given]
-
-
-def _whole(table: Mapping[str, Any], key: str, default: int, least: int, where: str) -> int:
-    value = table.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise ValueError(f"{where}[study] {key} is {value!r}; give a whole number of at least {least}")
-    return value
 
 
 def _sorted(part: Any) -> Any:

@@ -14,7 +14,8 @@ STUDY = Section(
     "The case and its runs",
     (
         Key("case", ValueKind("name of a case file, or a table with its keys", {"type": ["string", "object"]}),
-            "Base case, relative to the study file", "../semicircular_arch.toml", required=True),
+            "Base case, relative to the study file", "../semicircular_arch.toml", required=True,
+            remedy="name a case file, relative to the study file"),
         Key("method", one_of(METHODS), 'How values are chosen; "saltelli" is for Sobol\' indices', "sobol",
             default="latin hypercube"),
         Key("runs", whole(1), "Number of runs; of saltelli the size of its two samples; a grid has as many as its "

@@ -225,6 +225,16 @@ increment = 0.03
 )
 
 
+def test_a_mechanism_that_moves_upright_in_space_swings(tmp_path):
+    text = '[geometry]\nlayout = "column"\ndimension = 3\n[analysis]\nkind = "limit load"\n'
+    lifted = '[[loads]]\nkind = "live"\nweight_fraction = [0.0, 0.0, 1.0]\n'
+    response, summary = solved(text + lifted, tmp_path)
+    assert summary["limit_load_multiplier"] == pytest.approx(1.0)
+    rising = np.array([i.pose.positions[response.assembly.free, 2].max() for i in response.increments])
+    assert len(rising) > 2
+    assert (np.diff(rising) > 0.0).all()
+
+
 def test_pushover_of_a_block_follows_the_closed_form(tmp_path, capsys):
     folder, summary = ran(PUSHED + "[output]\nanimation = false\n", tmp_path, drawn=True)
     rows = table(folder / "response.csv")

@@ -10,7 +10,6 @@ import solver
 from blockvis.case_files import case_keys
 from blockvis.case_files.read import case_of
 from blockvis.cases import imperfections
-from blockvis.cases.toml_table import Table
 from blockvis.kinds.kinds import KINDS
 from blockvis.studies import study_keys
 from blockvis.studies.study_file import read_study
@@ -34,56 +33,25 @@ EVERY_TABLE: dict[str, Any] = {
     "output": {},
 }
 
-#: Keys that a table takes as tables of their own.
-TABLES = {"parameters", "roles", "materials"}
-
-
-@pytest.fixture(scope="module")
-def read() -> dict[str, dict[str, tuple[Any, tuple[str, ...]]]]:
-    """Every key that the reader asks a table for, with its default and choices."""
-    found: dict[str, dict[str, tuple[Any, tuple[str, ...]]]] = {}
-    take, text = Table.take, Table.text
-
-    def taken(table: Table, key: str, default: Any = None) -> Any:
-        keys = found.setdefault(table.where, {})
-        keys[key] = (default, keys.get(key, (None, ()))[1])
-        return take(table, key, default)
-
-    def texted(table: Table, key: str, default: str | None = None, *, among: tuple[str, ...] = ()) -> Any:
-        value = text(table, key, default, among=among)
-        found[table.where][key] = (default, tuple(among))
-        return value
-
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Table, "take", taken)
-        patched.setattr(Table, "text", texted)
-        case_of(EVERY_TABLE, Path("case.toml"))
-    return {where.replace(".brick", ".*"): keys for where, keys in found.items()}
-
-
 SECTIONS = {section.name: section for section in case_keys.SECTIONS}
-READ_AS_TABLE = sorted(name for name, s in SECTIONS.items() if s.keys and name != "imperfections")
 
 
-def test_the_tables_are_those_of_the_reader(read):
-    assert {name.partition(".")[0] for name in SECTIONS} == set(read[""])
-    assert set(EVERY_TABLE) == set(read[""]), "EVERY_TABLE lacks a table"
+def test_every_table_is_read():
+    assert {name.partition(".")[0] for name in SECTIONS} == set(EVERY_TABLE)
+    case_of(EVERY_TABLE, Path("case.toml"))
 
 
-@pytest.mark.parametrize("name", READ_AS_TABLE)
-def test_the_keys_of_a_table_are_those_of_the_reader(read, name):
-    assert {key.name for key in SECTIONS[name].keys} == set(read[name])
+KEYS = [(name, key) for name, section in SECTIONS.items() for key in section.keys]
 
 
-@pytest.mark.parametrize("name", READ_AS_TABLE)
-def test_defaults_and_choices_are_those_of_the_reader(read, name):
-    for key in SECTIONS[name].keys:
-        default, choices = read[name][key.name]
-        if default is not None and key.name not in TABLES:
-            assert tuple(default) == key.default if isinstance(default, list) else default == key.default, key.name
-        if choices:
-            assert key.choices == choices, key.name
-        assert key.required or key.default is not None or key.otherwise, f"{key.name}: say what holds without it"
+@pytest.mark.parametrize(("name", "key"), KEYS, ids=[f"{name}.{key.name}" for name, key in KEYS])
+def test_every_key_is_read_and_checked(name, key):
+    top, _, inner = name.partition(".")
+    table = EVERY_TABLE[top][0] if isinstance(EVERY_TABLE[top], list) else EVERY_TABLE[top]
+    wrong = {"brick": {key.name: [[]]}} if inner == "*" else table | {key.name: [[]]}
+    with pytest.raises(ValueError, match=key.name):
+        case_of(EVERY_TABLE | {top: wrong}, Path("case.toml"))
+    assert key.required or key.default is not None or key.otherwise, f"{key.name}: say what holds without it"
 
 
 def test_the_other_choices_are_those_of_the_code():
