@@ -147,22 +147,22 @@ class Path:
             state, outcome = self.advance(self.state, self._next_stop(self.state.place.s))
             self.state = state
             if outcome is Outcome.REACHED:
-                yield from self._reached(state)
+                yield from self._report_reached(state)
                 continue
             if outcome is Outcome.LOCKED:
                 # Forces grew from the last report on, and friction bounds with them.
                 return Ending(Status.LOCKED, self.reports.locked(self.wedged))
             if outcome is Outcome.FAILED:
-                yield from self._unreported(state)
+                yield from self._report_last(state)
                 return Ending(Status.SOLVER_FAILED, self.reports.no_step(self.failure))
             beyond = self._place_beyond(state)
             end, at_rest = self.fall.relax(beyond)
-            next_state = self._continue_from(state, end) if at_rest else self._remove_fallen(state, end)
-            if next_state is None:
-                yield from self._unreported(state)
+            continued = self._continue_from(state, end) if at_rest else self._remove_fallen(state, end)
+            if continued is None:
+                yield from self._report_last(state)
                 check, multiplier = self._check(state.place), self._multiplier_beyond(state, beyond)
                 return (yield from self.fall.collapse(check, beyond, state.upper_bound, multiplier))
-            self.state = next_state
+            self.state = continued
         return self.reports.reached()
 
     def _report_start(self, state: PathState) -> Generator[Increment, None, Ending | None]:
@@ -197,7 +197,7 @@ class Path:
         """Parameter at which the joints' compliance is used up."""
         return min(1e-3 * self.stepper.unit, self._next_stop(0.0))
 
-    def _reached(self, state: PathState) -> Iterator[Increment]:
+    def _report_reached(self, state: PathState) -> Iterator[Increment]:
         """Report the parameter that was reached, or go back where no equilibrium is near."""
         place = state.place
         resting = place if self._in_equilibrium(place) else self.fall.relaxed(place)
@@ -216,7 +216,7 @@ class Path:
         self.reported = state.place.s
         return replace(increment, checkpoint=state)
 
-    def _unreported(self, state: PathState) -> Iterator[Increment]:
+    def _report_last(self, state: PathState) -> Iterator[Increment]:
         """The increment at the last equilibrium of the path, unless it has been reported."""
         if state.place.s > self.reported:
             velocity = state.place.velocity
@@ -254,7 +254,7 @@ class Path:
         try:
             new, motion, error = self.stepper.step(place, length, viscosity=REFINED if refining else 1.0)
         except NotSolved as failure:
-            return self._unsolved(state, length, str(failure))
+            return self._shorten(state, length, str(failure))
         if self._may_be_wedged(new, error):
             if self._supports_locked(place):
                 self.wedged = new
@@ -278,7 +278,7 @@ class Path:
             state = replace(state, upper_bound=np.inf, refined=False, refine_until=until)
         return state, None
 
-    def _unsolved(self, state: PathState, length: float, failure: str) -> tuple[PathState, Outcome | None]:
+    def _shorten(self, state: PathState, length: float, failure: str) -> tuple[PathState, Outcome | None]:
         """Shorten a step that was not solved, or end where it is the shortest."""
         if length / 3.0 >= SHORTEST_STEP * self.stepper.unit:
             return replace(state, step=length / 3.0), None
@@ -394,15 +394,15 @@ class Path:
             np.where(fallen, end.pose.positions, state.place.pose.positions),
             np.where(fallen, end.pose.rotations, state.place.pose.rotations),
         )
-        without = replace(state, place=replace(state.place, pose=pose, velocity=None), fell_at=fell_at)
-        end, at_rest = without.place, self._in_equilibrium(without.place)
+        remaining = replace(state, place=replace(state.place, pose=pose, velocity=None), fell_at=fell_at)
+        end, at_rest = remaining.place, self._in_equilibrium(remaining.place)
         if not at_rest:
             end, at_rest = self.fall.relax(end)
-        next_state = self._continue_from(without, end) if at_rest else self._remove_fallen(without, end)
-        if next_state is None:
+        continued = self._continue_from(remaining, end) if at_rest else self._remove_fallen(remaining, end)
+        if continued is None:
             self._remove_blocks(before)
             self.reports.notes = notes
-        return next_state
+        return continued
 
     def _place_beyond(self, state: PathState) -> Place:
         """A place beyond the last equilibrium, at the upper bound or as near to it as a step is solved."""

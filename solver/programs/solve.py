@@ -49,8 +49,9 @@ def solve_lp(program: LinearProgram, routes: tuple[str, ...] | None = None, *, v
     if routes is None:
         routes = ("crossover", "simplex") if vertex and rows <= CROSSOVER_ROWS else LADDER
         routes = ("simplex", "hipo") if rows <= SIMPLEX_ROWS else routes
-    runs = {route: partial(run_band, program) if route == BAND else partial(run_highs, program, route)
-            for route in routes}  # fmt: skip
+    runs = {route: partial(run_highs, program, route) for route in routes}
+    if BAND in runs:
+        runs[BAND] = partial(run_band, program)
     return _first_accepted(runs, f"linear program with {rows} rows and {columns} columns")
 
 
