@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import generators
+from blockvis import generators, save_layout, write_layout
 from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly, case_loads
 from blockvis.cli import main
-from blockvis.formats.read import save_layout, write_layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.layout import layout_of
 from blockvis.layout.solid_layout import SolidLayout
