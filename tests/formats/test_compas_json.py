@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from blockvis import read, read_layout
 from blockvis.cli import main
-from blockvis.formats.read import read, read_layout
 
 FACES = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
 

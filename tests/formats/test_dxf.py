@@ -7,7 +7,7 @@ import ezdxf
 import numpy as np
 import pytest
 
-from blockvis.formats.read import read, read_layout
+from blockvis import read, read_layout
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 

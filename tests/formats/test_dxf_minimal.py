@@ -2,7 +2,7 @@
 
 import pytest
 
-from blockvis.formats.read import read_layout
+from blockvis import read_layout
 
 
 def _entity(kind, layer, *pairs):

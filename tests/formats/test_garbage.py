@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
+from blockvis import read, save_layout
 from blockvis.formats import FORMATS
-from blockvis.formats.read import read, save_layout
 
 READ = sorted(suffix for suffix, known in FORMATS.items() if known.reads)
 

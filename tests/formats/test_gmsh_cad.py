@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 
+from blockvis import read, read_layout
 from blockvis.formats import gmsh_cad
-from blockvis.formats.read import read, read_layout
 from blockvis.layout.outlines import ring_area
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is an extra", exc_type=(ImportError, OSError))

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blockvis.formats.read import read, read_layout
+from blockvis import read, read_layout
 
 ASSETS = Path(__file__).parents[2] / "assets"
 

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from blockvis.formats.read import read
+from blockvis import read
 
 RING = [[0, 0], [1, 0], [1, 1]]
 STAR = [[(1 + k % 2) * math.cos(k * math.pi / 1250), (1 + k % 2) * math.sin(k * math.pi / 1250)] for k in range(2500)]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import shapely
 
-from blockvis.formats.read import read, read_layout
+from blockvis import read, read_layout
 
 
 def dxf(tmp_path, draw):

@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 import pytest
 
-from blockvis.formats.read import read, read_layout
+from blockvis import read, read_layout
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0], [0.5, 0.5, 0]], dtype=float)
 

@@ -7,11 +7,10 @@ import pytest
 import trimesh
 
 import blockvis
-from blockvis.case_files.read import read_case
+from blockvis import read, read_case, read_layout
 from blockvis.cases.build import case_assembly
 from blockvis.cli import main
 from blockvis.formats.files import checksum_of_files, files_of
-from blockvis.formats.read import read, read_layout
 
 CASE = """
 [geometry]

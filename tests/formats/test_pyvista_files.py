@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from blockvis.formats.read import read, read_layout
+from blockvis import read, read_layout
 
 
 def quads(n=3):

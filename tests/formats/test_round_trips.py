@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import solver
+from blockvis import read, read_layout, save_layout
 from blockvis.formats import FORMATS
-from blockvis.formats.read import read, read_layout, save_layout
 
 #: All but single precision, which test_space_round_trips looks at.
 WRITTEN = sorted(suffix for suffix, known in FORMATS.items() if known.writes and suffix != ".glb")

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from blockvis import generators
+from blockvis import generators, read, read_layout
 from blockvis.formats.bodies import fans
-from blockvis.formats.read import read, read_layout
 from blockvis.layout.layout import layout_of
 
 move = trimesh.transformations.translation_matrix

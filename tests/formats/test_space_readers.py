@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import generators
-from blockvis.formats.read import inspect, read, read_layout
+from blockvis import generators, inspect, read, read_layout
 from blockvis.layout.layout import layout_of
 from blockvis.layout.solids import triangles_of
 

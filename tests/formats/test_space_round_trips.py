@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import generators
+from blockvis import generators, read, read_layout, save_layout, write_layout
 from blockvis.cli import main
-from blockvis.formats.read import read, read_layout, save_layout, write_layout
 
 #: What a file cannot say of a block.
 SILENT = {".stl": ("roles", "materials", "density")}

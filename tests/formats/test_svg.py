@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blockvis.formats.read import read, read_layout
+from blockvis import read, read_layout
 
 
 def saved(tmp_path, body, head='width="2000mm" height="1000mm" viewBox="0 0 2000 1000"'):

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from blockvis.case_files.read import read_case
+from blockvis import read, read_case, read_layout
 from blockvis.cases.build import case_assembly
 from blockvis.cli import main
-from blockvis.formats.read import read, read_layout
 
 
 def box(at, size):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from blockvis.formats.read import read, read_layout
+from blockvis import read, read_layout
 
 #: Corners of a cube in the numbering of gmsh, and the tetrahedra, wedges and pyramids that fill it.
 CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])

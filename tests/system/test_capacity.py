@@ -10,12 +10,12 @@ from structures import run_command
 
 import blockvis
 import solver
+from blockvis import draw_still
 from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly
 from blockvis.cli import _in_words, main
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.captions import parameter_label, state_text, value_label
-from blockvis.pictures.render import draw_still
 from blockvis.runs.plan import planned
 
 COLUMN = """

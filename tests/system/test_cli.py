@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 from structures import run_command
 
-from blockvis import cli, generators
-from blockvis.case_files.read import read_case
+from blockvis import cli, generators, read_case
 from blockvis.cli import main
 from blockvis.generators import LAYOUTS, parameters_of
 from blockvis.runs import progress

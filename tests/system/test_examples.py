@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import generators
-from blockvis.case_files.read import read_case
+from blockvis import generators, read_case
 from blockvis.cases.build import case_assembly, case_interfaces
 
 FACADE = Path(__file__).parents[2] / "examples" / "facade.toml"

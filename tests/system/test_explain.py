@@ -10,9 +10,8 @@ from PIL import Image
 
 import blockvis
 import solver
-from blockvis import cli, generators
+from blockvis import cli, generators, save_layout
 from blockvis.explanation.explain import read_explained
-from blockvis.formats.read import save_layout
 from blockvis.results.joints import end_openings, initial_joints
 
 #: The structure as the inverse assumes it; the real one has other friction, and twelve voussoirs.

@@ -11,9 +11,8 @@ from structures import equal_certificates
 
 import blockvis
 import solver
-from blockvis import generators
+from blockvis import draw_curve, generators
 from blockvis.case_files.read import parse_case
-from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of
 from blockvis.pictures.video import write_film

@@ -15,10 +15,10 @@ from structures import arch_response, parted, wall
 from test_capacity import ARCH, solved
 
 import solver
+from blockvis import show, write_report
 from blockvis.pictures import palette
 from blockvis.pictures.frame import framed
-from blockvis.report.notebook import show
-from blockvis.report.page import report_html, write_report
+from blockvis.report.page import report_html
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 

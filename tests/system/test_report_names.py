@@ -12,7 +12,8 @@ from structures import parted, wall
 from test_report import browser, visited
 
 import blockvis
-from blockvis.report.page import report_html, write_report
+from blockvis import write_report
+from blockvis.report.page import report_html
 
 #: What each payload does if it runs: the body is marked, whatever it is marked with.
 RUN = "document.body.dataset.broken=1"

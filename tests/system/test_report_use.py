@@ -17,10 +17,11 @@ from test_report import browser, visited
 
 import blockvis
 import solver
+from blockvis import write_report
 from blockvis.dynamics.fall import fall_of
 from blockvis.pictures import palette
 from blockvis.pictures.swing import swing_of
-from blockvis.report.page import report_html, write_report
+from blockvis.report.page import report_html
 from blockvis.results.joints import initial_joints, joint_states
 
 ASK = """<script>const wait = setInterval(async () => { if (!document.body.dataset.ready) return; clearInterval(wait);

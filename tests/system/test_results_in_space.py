@@ -19,16 +19,15 @@ from test_report import browser, visited
 
 import blockvis
 import solver
+from blockvis import animate, draw_mechanism, write_report
 from blockvis.cli import main
 from blockvis.pictures import palette
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.frame import framed
 from blockvis.pictures.marks import marks_of
-from blockvis.pictures.render import animate, draw_mechanism
 from blockvis.pictures.solid_view import View, chosen_view
 from blockvis.pictures.surface import sharp_edges, triangles_of
 from blockvis.pictures.swing import swing_of
-from blockvis.report.page import write_report
 from blockvis.results.datasets import block_dataset, contact_dataset, joint_dataset
 from blockvis.results.joints import initial_joints, joint_states
 from blockvis.system.vtk_files import write_vtu

@@ -13,9 +13,10 @@ from structures import run_command
 
 import blockvis
 import solver
+from blockvis import write_report
 from blockvis.case_files.read import parse_case
 from blockvis.cli import _say_error, _write_report
-from blockvis.report.page import add_error, write_report
+from blockvis.report.page import add_error
 from blockvis.runs import step_check
 from blockvis.runs.once_more import takes_steps, traced
 from blockvis.runs.step_check import StepCheck, StepChecking, compared, stored_check

@@ -7,7 +7,7 @@ import pytest
 
 import blockvis
 import solver
-from blockvis.formats.read import read, read_layout, save_layout
+from blockvis import read, read_layout, save_layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.layout import Layout, layout_of
 

@@ -7,11 +7,10 @@ import pytest
 from structures import run_command
 
 import solver
-from blockvis import generators
+from blockvis import generators, save_layout, write_layout
 from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly, case_loads
 from blockvis.cli import main
-from blockvis.formats.read import save_layout, write_layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.layout import Layout, layout_of
 from blockvis.layout.solids import box

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import solver
-from blockvis.formats.read import read_layout
+from blockvis import read_layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.joints.close import close_joints
 from blockvis.layout.joints.facing_edges import facing_edges, proposed_thickness

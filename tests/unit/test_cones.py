@@ -9,7 +9,8 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.programs.problem import ConicProgram, LinearProgram, SolveError, Unbounded
+import solver
+from solver.programs.problem import ConicProgram, LinearProgram, Unbounded
 from solver.programs.solve import solve_between, solve_cones, solve_lp
 
 
@@ -118,7 +119,7 @@ def test_a_failure_says_what_it_ended_with():
     """Nothing balances a pull."""
     given = ConicProgram(np.ones(3), sp.csc_array(np.array([[1.0, 0.0, 0.0]])), np.array([-1.0]), np.array([0.5]))
     with pytest.raises(
-        SolveError, match=re.escape("no solution of the conic program with 1 rows and 1 cones")
+        solver.SolveError, match=re.escape("no solution of the conic program with 1 rows and 1 cones")
     ) as error:
         solve_cones(given)
     assert "clarabel: no x balances the rows" in str(error.value)

@@ -10,10 +10,11 @@ from structures import arch_response, parted, wall
 
 import blockvis
 import solver
+from blockvis import draw_curve
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures import curves, palette
 from blockvis.pictures.captions import leaves_rest, parameter_text, state_text
-from blockvis.pictures.curves import CurvePanel, Event, draw_curve, events_of
+from blockvis.pictures.curves import CurvePanel, Event, events_of
 
 
 def test_png_has_a_curve_and_the_collapse(tmp_path):

@@ -8,21 +8,15 @@ from scipy.optimize import linprog
 
 import solver
 from solver.equilibrium import wrench_matrix
-from solver.geometry.contacts import Contacts, matched_contacts
-from solver.geometry.shapes import Shapes
+from solver.geometry.contacts import matched_contacts
 from solver.kinematics import (
-    Pose,
-    carried,
     composed_rotations,
     cross_rows,
     dimension_of,
-    motion_size,
     moved,
-    point_velocities,
     relative_velocities,
     rotation_count,
     rotation_matrices,
-    swung,
 )
 
 RANDOM = np.random.default_rng(7)
@@ -30,7 +24,7 @@ ROTATIONS = RANDOM.normal(size=(20, 3)) * np.geomspace(1e-9, 1.0, 20)[:, None]
 
 
 def poses(d, n=20):
-    return Pose(RANDOM.normal(size=(n, d)), RANDOM.normal(size=(n, rotation_count(d))))
+    return solver.Pose(RANDOM.normal(size=(n, d)), RANDOM.normal(size=(n, rotation_count(d))))
 
 
 def test_cross_rows_give_moments():
@@ -67,9 +61,9 @@ def test_composed_rotations_are_products_of_matrices():
 def test_velocities_are_the_limit_of_small_movements(d):
     pose, block = poses(d), np.arange(20)
     points, motion = RANDOM.normal(size=(20, d)), RANDOM.normal(size=(20, d + rotation_count(d)))
-    velocity = point_velocities(points, block, pose, motion)
-    for move in (moved, swung):
-        small = carried(points, block, pose, move(pose, 1e-7 * motion))
+    velocity = solver.point_velocities(points, block, pose, motion)
+    for move in (moved, solver.swung):
+        small = solver.carried(points, block, pose, move(pose, 1e-7 * motion))
         np.testing.assert_allclose((small - points) / 1e-7, velocity, atol=1e-5)
 
 
@@ -81,8 +75,8 @@ def test_swung_blocks_of_one_rigid_motion_stay_together(d):
     travel = RANDOM.normal(size=d) + np.einsum("nri,r->ni", rows, spin)
     motion = np.concatenate([travel, np.tile(spin, (2, 1))], axis=1)
     points = RANDOM.normal(size=(5, d))
-    after = swung(pose, motion)
-    on_each = [carried(points, np.full(5, k), pose, after) for k in (0, 1)]
+    after = solver.swung(pose, motion)
+    on_each = [solver.carried(points, np.full(5, k), pose, after) for k in (0, 1)]
     np.testing.assert_allclose(on_each[0], on_each[1], atol=1e-12)
 
 
@@ -90,7 +84,7 @@ def test_swung_blocks_of_one_rigid_motion_stay_together(d):
 def test_size_of_a_motion(d):
     motion = np.zeros((2, d + rotation_count(d)))
     motion[0, 0], motion[1, -1] = -0.3, 0.2
-    np.testing.assert_allclose(motion_size(motion, 2.0), [0.3, 0.4])
+    np.testing.assert_allclose(solver.motion_size(motion, 2.0), [0.3, 0.4])
     assert dimension_of(motion.shape[1]) == d
 
 
@@ -101,7 +95,7 @@ def block_on_a_plane(d, width, height):
     up = np.eye(d)[-1]
     tangents = np.eye(d)[:-1] * (-1.0 if d == 2 else 1.0)
     zero = np.zeros(n)
-    contacts = Contacts(
+    contacts = solver.Contacts(
         features=np.stack([zero, np.arange(n), zero, zero - 1], axis=1).astype(int),
         block_a=np.zeros(n, dtype=int),
         block_b=np.ones(n, dtype=int),
@@ -112,7 +106,7 @@ def block_on_a_plane(d, width, height):
         areas=zero,
     )
     middle = np.array([*[width / 2.0] * (d - 1), height / 2.0])
-    return contacts, Pose(np.stack([middle, -middle]), np.zeros((2, rotation_count(d))))
+    return contacts, solver.Pose(np.stack([middle, -middle]), np.zeros((2, rotation_count(d))))
 
 
 @pytest.mark.parametrize("d", [2, 3])
@@ -146,14 +140,14 @@ def test_contact_points_are_known_by_their_first_three_features():
     other = contacts.features.copy()
     other[:, 3] = 9
     other[0, 0] = 1
-    before = Contacts(other[::-1], *(getattr(contacts, name)[::-1] for name in list(contacts.__dict__)[1:]))
+    before = solver.Contacts(other[::-1], *(getattr(contacts, name)[::-1] for name in list(contacts.__dict__)[1:]))
     place, same = matched_contacts(contacts, before)
     assert same.tolist() == [False, True, True, True]
     assert place[1:].tolist() == [2, 1, 0]
 
 
 def test_polygons_have_what_shapes_ask_for():
-    shapes: Shapes = solver.Assembly.from_outlines([[(0, 0), (2, 0), (2, 1), (0, 1)]], thickness=0.5).shapes
+    shapes: solver.Shapes = solver.Assembly.from_outlines([[(0, 0), (2, 0), (2, 1), (0, 1)]], thickness=0.5).shapes
     assert shapes.volumes.tolist() == [1.0]
     assert shapes.centroids.tolist() == [[1.0, 0.5]]
     assert shapes.size(np.array([True])) == pytest.approx(np.sqrt(2.0))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import solver
+from blockvis import read_layout, write_layout
 from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly
-from blockvis.formats.read import read_layout, write_layout
 from blockvis.layout.layout import Layout
 from blockvis.layout.units import doubt
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import generators
-from blockvis.formats.read import read_layout, write_layout
+from blockvis import generators, read_layout, write_layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.facing import faced

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis.formats.read import inspect, save_layout
+from blockvis import inspect, save_layout
 from blockvis.pictures.inspection import draw_inspection
 
 FACADE = Path(__file__).resolve().parents[3] / "shared" / "data" / "facade" / "facade.dxf"

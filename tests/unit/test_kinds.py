@@ -15,12 +15,12 @@ import pytest
 
 import blockvis
 import solver
+from blockvis import draw_curve
 from blockvis.case_files.read import parse_case
 from blockvis.cli import _in_words
 from blockvis.kinds.kind import AnalysisKind, AnalysisRun, RunInput, Steps
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.captions import state_text
-from blockvis.pictures.curves import draw_curve
 from blockvis.report.page import report_html
 from blockvis.runs.progress import Progress
 

@@ -10,14 +10,13 @@ from PIL import Image
 from structures import arch_response, parted, wall
 
 import solver
-from blockvis import generators
+from blockvis import draw_mechanism, generators
 from blockvis.dynamics.fall import fall_of
 from blockvis.pictures import palette
 from blockvis.pictures.captions import FAILED_BADGE, FALL_BADGE
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of
 from blockvis.pictures.frame import Sheet, write_labels
-from blockvis.pictures.render import draw_mechanism
 from blockvis.studies import pictures
 from blockvis.studies.run_one import _shape
 

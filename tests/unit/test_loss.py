@@ -11,9 +11,9 @@ from structures import arch_response, dropped_brick
 
 import blockvis
 import solver
+from blockvis import draw_curve
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.captions import lost_text
-from blockvis.pictures.curves import draw_curve
 from blockvis.report.page import report_html
 from blockvis.results.about import LOCAL, loss_of
 from blockvis.results.datasets import block_dataset

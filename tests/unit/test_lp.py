@@ -7,9 +7,10 @@ import pytest
 import scipy.sparse as sp
 from scipy.optimize import linprog
 
+import solver
 from solver.programs import band, solve
 from solver.programs.highs import ROUTES, run_highs
-from solver.programs.problem import LinearProgram, SolveError, Unbounded
+from solver.programs.problem import LinearProgram, Unbounded
 from solver.programs.solve import LADDER, SIMPLEX_ROWS, solve_lp
 
 
@@ -112,7 +113,7 @@ def test_the_simplex_method_proves_by_a_ray_what_hipo_does_not(too_wide):
         cost=np.concatenate([np.full(5, -1.0), too_wide.cost]),
         matrix=sp.csc_array(sp.hstack([ray, too_wide.matrix])),
     )
-    with pytest.raises(SolveError):
+    with pytest.raises(solver.SolveError):
         solve_lp(program, LADDER[:-1])
     with pytest.raises(Unbounded):
         solve_lp(program)
@@ -129,7 +130,7 @@ def test_large_unknowns_at_small_entries_count():
 
 def test_infeasible_program_is_an_error_that_lists_the_routes():
     program = LinearProgram(np.ones(2), sp.csc_array(np.array([[1.0, 1.0]])), np.array([-2.0]), np.array([-1.0]))
-    with pytest.raises(SolveError, match="1 rows and 2 columns") as raised:
+    with pytest.raises(solver.SolveError, match="1 rows and 2 columns") as raised:
         solve_lp(program)
     assert "simplex:" in str(raised.value)
     assert "hipo:" in str(raised.value)
@@ -168,7 +169,7 @@ def test_another_route_is_taken_where_the_first_calls_a_wrong_solution_optimal(m
 def test_no_route_left_is_an_error_with_the_measures(monkeypatch):
     run = run_highs
     monkeypatch.setattr(solve, "run_highs", lambda program, route: wrong(program, route, run(program, route)[0]))
-    with pytest.raises(SolveError, match=r"simplex: Optimal, violation 1\.0e-01"):
+    with pytest.raises(solver.SolveError, match=r"simplex: Optimal, violation 1\.0e-01"):
         solve_lp(random_program(3))
 
 

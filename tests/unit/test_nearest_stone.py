@@ -5,12 +5,12 @@ import pytest
 import shapely
 
 import solver
+from blockvis import run_case
 from blockvis.layout.assemble import assemble
 from blockvis.layout.joints.close import close_joints, proposed
 from blockvis.layout.joints.facing_edges import proposed_thickness
 from blockvis.layout.joints.nearest_stone import share_out
 from blockvis.layout.layout import Layout
-from blockvis.runs.run import run_case
 
 WIDTH, HEIGHT = 1.6, 1.2
 

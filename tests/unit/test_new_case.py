@@ -11,9 +11,8 @@ import ezdxf
 import pytest
 from structures import run_command
 
-from blockvis import generators, read, save_layout
+from blockvis import generators, read, read_case, save_layout
 from blockvis.case_files.new_case import relative_to
-from blockvis.case_files.read import read_case
 from blockvis.cli import main
 
 ROOT = Path(__file__).parents[2]

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import generators
+from blockvis import generators, save_layout, write_layout
 from blockvis.explanation.observations import read_observations
-from blockvis.formats.read import save_layout, write_layout
 from blockvis.layout.layout import layout_of
 
 ARCH = generators.arch(voussoirs=6)

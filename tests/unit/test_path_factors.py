@@ -6,7 +6,6 @@ import pytest
 import solver
 from blockvis.generators import build
 from solver.analysis.settlement import model_of
-from solver.kinematics import Pose
 from solver.path.drivers import SupportMotion
 from solver.path.stepping import Stepper
 
@@ -14,7 +13,7 @@ from solver.path.stepping import Stepper
 def stepper(**factors):
     arch = build("arch", {"voussoirs": 6})
     model = model_of(arch, solver.self_weight(arch), solver.Interfaces(), solver.Controls(**factors))
-    start = Pose.initial(arch)
+    start = solver.Pose.initial(arch)
     driver = SupportMotion(arch, solver.Settlement(direction=(1, 0), increment=0.1, limit=0.2), start)
     return Stepper(model, driver), start
 

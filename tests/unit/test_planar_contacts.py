@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 import solver
-from solver.equilibrium import block_forces, wrench_matrix
+from solver.equilibrium import wrench_matrix
 from solver.geometry.planar_contacts import ON_CORNER
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -236,7 +236,7 @@ def test_wrench_matrix_gives_resultants():
     assembly, contacts = find(LAYOUTS["running bond"])
     forces = np.random.default_rng(4).normal(size=(len(contacts), 2))
     pose = solver.Pose.initial(assembly)
-    resultants = block_forces(contacts, pose, forces)
+    resultants = solver.block_forces(contacts, pose, forces)
     assert np.abs(resultants[:, :2].sum(axis=0)).max() < 1e-12
     moment = assembly.centroids[:, 0] * resultants[:, 1] - assembly.centroids[:, 1] * resultants[:, 0]
     assert abs((moment + resultants[:, 2]).sum()) < 1e-11

@@ -6,7 +6,7 @@ import pytest
 import solver
 from solver.geometry.contacts import matched_contacts
 from solver.geometry.spatial_contacts import ACROSS, ON_CORNER, ON_FACE
-from solver.kinematics import Pose, moved, moved_vertices, relative_velocities, rotation_matrices
+from solver.kinematics import moved, relative_velocities, rotation_matrices
 
 RANDOM = np.random.default_rng(3)
 
@@ -80,10 +80,10 @@ def test_gaps_and_slips_follow_the_motion_of_the_blocks(scene):
         contacts.frames @ contacts.frames.transpose(0, 2, 1), np.tile(np.eye(3), (len(contacts), 1, 1)), atol=1e-12
     )
     np.testing.assert_allclose(np.linalg.det(contacts.frames), 1.0)
-    pose = Pose.initial(assembly)
+    pose = solver.Pose.initial(assembly)
     for size in (1e-4, 1e-5):
         motion = RANDOM.normal(size=(2, 6)) * size
-        there = solver.measure_contacts(assembly, moved_vertices(assembly, moved(pose, motion)), contacts)
+        there = solver.measure_contacts(assembly, solver.moved_vertices(assembly, moved(pose, motion)), contacts)
         expected = relative_velocities(contacts, pose, motion)
         np.testing.assert_allclose(there.gaps - contacts.gaps, expected[:, 0], atol=60 * size**2)
         np.testing.assert_allclose(there.slip - contacts.slip, expected[:, 1:], atol=60 * size**2)
@@ -96,7 +96,7 @@ def test_points_are_recognised_after_a_small_motion(scene, kinds):
     assembly, contacts = points(SCENES[scene])
     assert set(contacts.features[:, 0]) == kinds
     motion = RANDOM.normal(size=(2, 6)) * 1e-3
-    vertices = moved_vertices(assembly, moved(Pose.initial(assembly), motion))
+    vertices = solver.moved_vertices(assembly, moved(solver.Pose.initial(assembly), motion))
     place, known = matched_contacts(solver.find_contacts(assembly, vertices, 0.1), contacts)
     assert known.all()
     np.testing.assert_array_equal(np.sort(place), np.arange(len(contacts)))

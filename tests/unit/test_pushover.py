@@ -7,7 +7,6 @@ import pytest
 import solver
 from blockvis import generators
 from solver import limit_load, pushover
-from solver.analysis.pushover import ControlDisplacement
 from solver.tolerances import SHEAR_COMPLIANCE
 
 pytestmark = pytest.mark.path
@@ -29,7 +28,7 @@ def sideways(assembly):
 @cache
 def arch(increment):
     assembly = generators.arch()
-    control = ControlDisplacement("voussoir 7", (1, 0), increment=increment, limit=0.5)
+    control = solver.ControlDisplacement("voussoir 7", (1, 0), increment=increment, limit=0.5)
     controls = solver.Controls(falling_frames=5)
     return pushover(assembly, control, loads=sideways(assembly), friction_coefficient=2.0, controls=controls)
 
@@ -93,7 +92,7 @@ def test_a_wall_that_rocks_does_not_depend_on_the_increment():
     wall = solver.Assembly.from_outlines(outlines, roles=["free"] * 14 + ["fixed"])
     curves = []
     for increment in (0.02, 0.01):
-        control = ControlDisplacement(wall.names[13], (1, 0), increment=increment, limit=0.1)
+        control = solver.ControlDisplacement(wall.names[13], (1, 0), increment=increment, limit=0.1)
         response = pushover(wall, control, loads=sideways(wall), friction_coefficient=5.0)
         multipliers = [i.load_multiplier for i in response.path]
         curves.append(np.interp([0.0, 0.03, 0.06, 0.1], response.settlement, multipliers))
@@ -103,7 +102,7 @@ def test_a_wall_that_rocks_does_not_depend_on_the_increment():
 
 def test_pushed_only_so_far_it_keeps_capacity():
     assembly = block()
-    control = ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.01, limit=0.095)
+    control = solver.ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.01, limit=0.095)
     seen = []
     response = pushover(assembly, control, loads=sideways(assembly), on_increment=seen.append)
     assert response.stop is solver.Status.LIMIT_REACHED
@@ -120,7 +119,7 @@ def test_pushed_only_so_far_it_keeps_capacity():
 
 def test_what_has_fallen_is_marked():
     assembly = block()
-    control = ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.05)
+    control = solver.ControlDisplacement("block", (1, 0), point=(0.2, 1.0), increment=0.05)
     controls = solver.Controls(falling_frames=7)
     response = pushover(assembly, control, loads=sideways(assembly), controls=controls)
     falling = [i for i in response.increments if i.status is solver.Status.FALLING]
@@ -134,24 +133,24 @@ def test_input_is_refused_with_a_remedy():
     assembly = block()
     loads = sideways(assembly)
     with pytest.raises(ValueError, match="does not move block 'block' along"):
-        pushover(assembly, ControlDisplacement("block", (-1, 0)), loads=loads)
+        pushover(assembly, solver.ControlDisplacement("block", (-1, 0)), loads=loads)
     with pytest.raises(ValueError, match="'ground' is a support; name a free block"):
-        pushover(assembly, ControlDisplacement("ground", (1, 0)), loads=loads)
+        pushover(assembly, solver.ControlDisplacement("ground", (1, 0)), loads=loads)
     with pytest.raises(ValueError, match="no block is named 'roof'"):
-        pushover(assembly, ControlDisplacement("roof", (1, 0)), loads=loads)
+        pushover(assembly, solver.ControlDisplacement("roof", (1, 0)), loads=loads)
     with pytest.raises(ValueError, match="no live load"):
-        pushover(assembly, ControlDisplacement("block", (1, 0)), loads=solver.self_weight(assembly))
+        pushover(assembly, solver.ControlDisplacement("block", (1, 0)), loads=solver.self_weight(assembly))
     with pytest.raises(ValueError, match=r"control direction is \[0, 0\]"):
-        ControlDisplacement("block", (0, 0))
+        solver.ControlDisplacement("block", (0, 0))
     with pytest.raises(ValueError, match="control increment is -1"):
-        ControlDisplacement("block", (1, 0), increment=-1.0)
+        solver.ControlDisplacement("block", (1, 0), increment=-1.0)
 
 
 def test_a_load_without_limit_is_no_collapse():
     assembly = block()
     live = solver.point_load(assembly, 0, (0.1, -1.0))
     loads = solver.Loads(solver.self_weight(assembly).dead, live)
-    response = pushover(assembly, ControlDisplacement("block", (1, 0)), loads=loads)
+    response = pushover(assembly, solver.ControlDisplacement("block", (1, 0)), loads=loads)
     assert response.stop is solver.Status.LOCKED
     assert response.collapse is None
     assert "no live load of this pattern" in response.message

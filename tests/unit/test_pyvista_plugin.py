@@ -5,8 +5,7 @@ import pytest
 import pyvista as pv
 
 import solver
-from blockvis import pyvista_plugin
-from blockvis.formats.read import read
+from blockvis import pyvista_plugin, read
 
 
 def polygons(outlines):

@@ -13,12 +13,12 @@ from PIL import Image
 from structures import BENT, arch_response, parted, wall
 
 import solver
+from blockvis import animate, draw_mechanism, draw_still
 from blockvis.pictures import flat_scene, palette
 from blockvis.pictures.drawer import Drawer, Look, magnified
 from blockvis.pictures.film import film_of
 from blockvis.pictures.flat_scene import FlatScene
 from blockvis.pictures.frame import Frame, framed
-from blockvis.pictures.render import animate, draw_mechanism, draw_still
 from blockvis.pictures.swing import swing_of
 
 SMALL = (640, 360)

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import solver
-from blockvis import generators
-from blockvis.case_files.read import read_case
+from blockvis import generators, read_case
 from blockvis.cases.build import case_assembly
 
 #: A national grid: coordinates of five thousand kilometres are rounded to a nanometre.

@@ -4,10 +4,10 @@ import ezdxf
 import numpy as np
 import pytest
 
-from blockvis.case_files.read import parse_case, read_case
+from blockvis import inspect, read, read_case, read_layout
+from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly
 from blockvis.cli import main
-from blockvis.formats.read import inspect, read, read_layout
 from blockvis.layout.layout import Layout
 from blockvis.layout.selection import without_debris, without_surroundings
 from blockvis.pictures.inspection import draw_inspection

@@ -11,7 +11,6 @@ from structures import equal_certificates
 
 import solver
 from blockvis import generators
-from solver.equilibrium import block_forces
 from solver.programs.highs import run_highs
 
 pytestmark = pytest.mark.path
@@ -337,7 +336,7 @@ def test_forces_are_in_equilibrium_and_in_their_cones(name):
     response = RESPONSES[name]()
     assembly, weight = response.assembly, response.total_weight
     for increment in response.path:
-        resultant = block_forces(increment.contacts, increment.pose, increment.forces) + response.loads.total()
+        resultant = solver.block_forces(increment.contacts, increment.pose, increment.forces) + response.loads.total()
         unbalanced = resultant[assembly.free] / (weight * np.array([1, 1, assembly.block_size]))
         assert np.abs(unbalanced).max() < 1e-8
         normal, shear = increment.forces.T

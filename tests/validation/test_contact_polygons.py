@@ -8,11 +8,10 @@ import shapely
 from scipy.spatial import ConvexHull, Voronoi, cKDTree
 
 import solver
-from blockvis import generators
-from blockvis.case_files.read import read_case
+from blockvis import generators, read_case
 from blockvis.cases.build import case_assembly
 from blockvis.layout.solids import extruded
-from solver.kinematics import Pose, moved, moved_vertices, rotation_matrices
+from solver.kinematics import moved, rotation_matrices
 
 #: Here coal 3.0.3 gives a polygon of half the area, whose corners are on no edge of the faces.
 LOST_BY_COAL = 4
@@ -128,7 +127,7 @@ def test_extruded_structures_have_the_points_of_the_plane(name, size):
     in_space[:, 0], in_space[:, 2], in_space[:, 4] = motion[:, 0], motion[:, 1], -motion[:, 2]
     reach = 0.05 * plane.block_size
     flat, solid = (
-        solver.find_contacts(one, moved_vertices(one, moved(Pose.initial(one), by)), reach)
+        solver.find_contacts(one, solver.moved_vertices(one, moved(solver.Pose.initial(one), by)), reach)
         for one, by in ((plane, motion), (space, in_space))
     )
     expected = rows(flat, True)

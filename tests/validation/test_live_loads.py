@@ -13,8 +13,6 @@ import pytest
 
 import solver
 from solver import limit_load, pushover
-from solver.analysis.pushover import ControlDisplacement
-from solver.results.response import LimitStatus
 
 pytestmark = pytest.mark.path
 
@@ -108,7 +106,7 @@ def test_the_other_direction_of_a_symmetric_wall(name):
 def test_without_dilatancy_a_wall_carries_no_more(name):
     assembly = wall(WALLS[name][0])
     limit = limit_load(assembly, loads=sideways(assembly), friction_coefficient=0.65, flow="non-associative")
-    assert limit.status is LimitStatus.FOUND
+    assert limit.status is solver.LimitStatus.FOUND
     assert 0.8 * WALLS[name][1] < limit.multiplier <= WALLS[name][1] + 1e-5
     normal, shear = limit.forces.T
     assert (np.abs(shear) <= 0.65 * normal + 1e-5 * normal.max()).all()
@@ -136,13 +134,13 @@ def test_a_block_that_just_fits_under_a_ceiling(width, friction, multiplier):
     assert sliding.multiplier == pytest.approx(multiplier, rel=1e-6)
     assert sliding.gap == pytest.approx(0.0, abs=1e-6)
     # What lifts as it slides is stuck between the two.
-    assert limit_load(assembly, loads=loads, friction_coefficient=friction).status is LimitStatus.UNBOUNDED
+    assert limit_load(assembly, loads=loads, friction_coefficient=friction).status is solver.LimitStatus.UNBOUNDED
 
 
 @pytest.mark.parametrize("n", [1, pytest.param(5, marks=pytest.mark.thorough)])
 def test_overturning_block_and_stack(n):
     assembly = stack(n)
-    control = ControlDisplacement(assembly.names[n - 1], (1, 0), point=(0.2, 1.0), increment=0.01, limit=0.5)
+    control = solver.ControlDisplacement(assembly.names[n - 1], (1, 0), point=(0.2, 1.0), increment=0.01, limit=0.5)
     response = pushover(assembly, control, loads=sideways(assembly), friction_coefficient=0.7)
     d = response.settlement
     multiplier = np.array([i.load_multiplier for i in response.path])
@@ -161,7 +159,7 @@ def test_overturning_block_and_stack(n):
 
 def test_a_sliding_block_keeps_its_multiplier_and_its_height():
     assembly = on_ground([[[0, 0], [1, 0], [1, 0.5], [0, 0.5]]], -1.0, 4.0)
-    control = ControlDisplacement(assembly.names[0], (1, 0), increment=0.05, limit=0.5)
+    control = solver.ControlDisplacement(assembly.names[0], (1, 0), increment=0.05, limit=0.5)
     response = pushover(assembly, control, loads=sideways(assembly), friction_coefficient=0.3)
     assert response.stop is solver.Status.LIMIT_REACHED
     assert response.settlement[-1] == pytest.approx(0.5, abs=1e-9)

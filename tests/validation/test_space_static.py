@@ -9,8 +9,6 @@ import pytest
 
 import solver
 from blockvis import generators
-from solver.interfaces import InterfaceLaw, Interfaces
-from solver.kinematics import Pose
 from solver.program.admissible import admissible
 from solver.program.model import Model
 from solver.tolerances import COMPUTED_GAP
@@ -72,9 +70,9 @@ def bounds(assembly, friction, rate=None, turned_by=0.0, azimuth=0.0):
     load = np.zeros((assembly.n_blocks, 6))
     load[:, :3] = (assembly.masses * solver.GRAVITY)[:, None] * down
     force, length = float(np.linalg.norm(load[free, :3], axis=1).mean()), assembly.block_size
-    model = Model(assembly, Interfaces(InterfaceLaw(friction)), load, length, force, length / 4.0)
+    model = Model(assembly, solver.Interfaces(solver.InterfaceLaw(friction)), load, length, force, length / 4.0)
     contacts = solver.find_contacts(assembly, assembly.vertices, COMPUTED_GAP * length)
-    return admissible(model, Pose.initial(assembly), contacts, np.full(len(contacts), friction), rate)
+    return admissible(model, solver.Pose.initial(assembly), contacts, np.full(len(contacts), friction), rate)
 
 
 PRISM = [[-0.5, -0.3], [0.5, -0.3], [0.5, 0.3], [-0.5, 0.3]]
@@ -271,10 +269,10 @@ def test_cohesion_and_crushing_of_a_face(flow):
     weight, area = assembly.masses[0] * solver.GRAVITY, 0.6
     dead = solver.self_weight(assembly).dead
     at_base = solver.point_load(assembly, 0, (0.6 * weight, 0.8 * weight, 0.0), point=(0.0, 0.0, 0.0))
-    sticky = Interfaces(InterfaceLaw(0.3, cohesion=0.2 * weight / area))
+    sticky = solver.Interfaces(solver.InterfaceLaw(0.3, cohesion=0.2 * weight / area))
     found = solver.limit_load(assembly, loads=solver.Loads(dead, at_base), interfaces=sticky, flow=flow)
     assert found.multiplier == pytest.approx(0.5, rel=EXACT)
-    brittle = Interfaces(InterfaceLaw(2.0, compressive_strength=1.5 * weight / area))
+    brittle = solver.Interfaces(solver.InterfaceLaw(2.0, compressive_strength=1.5 * weight / area))
     found = solver.limit_load(assembly, loads=solver.Loads(dead, push(assembly, 0.0)), interfaces=brittle, flow=flow)
     assert found.multiplier == pytest.approx(0.5 * (1.5 - 1.0), rel=EXACT)
 
