@@ -129,9 +129,9 @@ class Assembly(Shown):
         Parameters
         ----------
         solids : sequence of (vertices, faces)
-            Corners (n, 3) [m] of each block, and around each of its faces the numbers of the corners there, in either
-            sense. Corners at the same place become one, and neighbouring faces in one plane, triangles for example,
-            one face.
+            Corners (n, 3) [m] of each block, no two at one place, and around each of its faces the numbers of the
+            corners there, in the same sense seen from outside. Neighbouring faces in one plane, triangles for example,
+            become one face.
         names : sequence of str, optional
             Defaults to ``"block 0"``, ``"block 1"`` ...; a name used twice gets a number.
         roles : sequence of {"free", "fixed", "moving"}, optional
@@ -141,9 +141,9 @@ class Assembly(Shown):
         Raises
         ------
         ValueError
-            For a surface that is not closed, in several pieces or without volume, a face that is not plane to a
-            thousandth of the width of its block, coordinates that are not finite, an unknown role, or a density that is
-            not positive.
+            For a surface that is not closed, in several pieces or without volume, faces that run in different senses,
+            a face that is not plane to a thousandth of the width of its block, coordinates that are not finite, an
+            unknown role, or a density that is not positive.
 
         Examples
         --------
