@@ -178,9 +178,9 @@ class Drawer:
         self.live = LiveLoads(response, increments, float(frame.size.max()))
         self._arrow = ARROW_IN_SPACE * float(frame.size.max())
         frame = frame.holding(self._projected(np.concatenate([self.live.tails, *self._arrow_tips(extra)])))
-        self.fill = palette.block_colours(assembly.materials, assembly.free)
-        if not self._flat:
-            self.fill[assembly.moving] = palette.MOVING
+        # Supports in the plane are hatched, and an outline stays where those that move were.
+        flat_fill = palette.block_colours(assembly.materials, assembly.free)
+        self.fill = flat_fill if self._flat else palette.role_colours(assembly)
         self.scene = self._scene(frame)
         if self._flat:
             self._arrow = ARROW * float(self.scene.frame.size.max())

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+import solver
+
 PAPER = (255, 255, 255)
 INK = (38, 38, 38)
 FAINT = (120, 120, 120)
@@ -76,6 +78,13 @@ def block_colours(materials: tuple[str, ...], free: np.ndarray) -> np.ndarray:
     shade = 1.0 + SHADE * (2.0 * ((np.arange(len(materials)) * 0.6180339887) % 1.0) - 1.0)
     colours = np.where(free[:, None], colours * shade[:, None], SUPPORT)
     return np.clip(np.rint(colours), 0, 255).astype(np.uint8)
+
+
+def role_colours(assembly: solver.Assembly) -> np.ndarray:
+    """(n_blocks, 3) uint8 array: fills by material, fixed supports grey, moving ones in the colour of settlements."""
+    fill = block_colours(assembly.materials, assembly.free)
+    fill[assembly.moving] = MOVING
+    return fill
 
 
 def pale(fill: np.ndarray, blocks: np.ndarray) -> np.ndarray:

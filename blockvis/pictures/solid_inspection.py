@@ -46,14 +46,14 @@ def draw_solid_inspection(inspection: Inspection, path: str | Path) -> Path:
         roles=[inspection.roles[i] for i in kept],
         materials=[layout.materials[i] for i in kept],
     )
-    fill = role_colours(assembly)
+    fill = palette.role_colours(assembly)
     later = {first for first, _ in inspection.twins}
     twice = np.array([i in later for i in kept])
     fill[twice] = TWICE
     keys = [
         Key("area", f"{role}: {int(some.sum())}", colour)
         for role, some, colour in (
-            ("free", assembly.free & ~twice, _colour(palette.STONES[0])),
+            ("free", assembly.free & ~twice, palette.rgb(palette.STONES[0])),
             ("fixed", (assembly.roles == solver.FIXED) & ~twice, palette.SUPPORT),
             ("moving", assembly.moving & ~twice, palette.MOVING),
             ("drawn twice", twice, TWICE),
@@ -115,13 +115,6 @@ def blocks_picture(
     return sheet.composed(picture, title=title, detail=detail, keys=keys or [], pixel=scene.pixel)
 
 
-def role_colours(assembly: solver.Assembly) -> np.ndarray:
-    """(n_blocks, 3) uint8 array: fills by material, fixed supports grey, moving ones in the colour of settlements."""
-    fill = palette.block_colours(assembly.materials, assembly.free)
-    fill[assembly.moving] = palette.MOVING
-    return fill
-
-
 def seen_faces(scene: SolidScene) -> tuple[np.ndarray, np.ndarray]:
     """Find where the name of each block can stand: on the face that shows most of itself.
 
@@ -141,7 +134,3 @@ def seen_faces(scene: SolidScene) -> tuple[np.ndarray, np.ndarray]:
         room[block] = np.ptp(ring, axis=0)[0]
     room[(showing <= 0.0) | ~scene.sees(places)] = 0.0
     return places, room
-
-
-def _colour(colour: np.ndarray) -> tuple[int, int, int]:
-    return int(colour[0]), int(colour[1]), int(colour[2])

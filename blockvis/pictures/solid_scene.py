@@ -123,7 +123,6 @@ class SolidScene:
         width: float,
         *,
         forward: float = 2.0,
-        opacity: float = 1.0,
     ) -> None:
         """Draw lines, ends (n, 2, 3) [m], ``width`` pixels wide, in one layer, instead of those before.
 
@@ -137,13 +136,12 @@ class SolidScene:
             Pixels.
         forward : float
             How far they are in front of what lies at the same place.
-        opacity : float
         """
         points = np.asarray(ends, dtype=float).reshape(-1, 3)
         self.clear(layer)
         if len(points):
             mesh = pv.PolyData(points, lines=_line_cells(np.arange(len(points)).reshape(-1, 2)))
-            self._add(layer, mesh, colour, width=width, forward=forward, opacity=opacity)
+            self._add(layer, mesh, colour, width=width, forward=forward)
 
     def polygons(
         self,
@@ -152,8 +150,6 @@ class SolidScene:
         colour: tuple[int, int, int] | np.ndarray,
         *,
         forward: float = 0.0,
-        lit: bool = False,
-        opacity: float = 1.0,
     ) -> None:
         """Fill polygons, each (k, 3) [m], in one layer, instead of those before.
 
@@ -163,17 +159,15 @@ class SolidScene:
         polygons : sequence of (k, 3) arrays [m]
         colour : (int, int, int), or (n_points, 3) uint8 array
             Of all, or of each corner.
-        forward, opacity : float
+        forward : float
             As of :meth:`lines`.
-        lit : bool
-            Whether the lamp shines on them.
         """
         self.clear(layer)
         if len(polygons):
             counts = np.array([len(polygon) for polygon in polygons])
             points = np.concatenate(list(polygons))
             faces = np.insert(np.arange(len(points)), np.cumsum(counts) - counts, counts)
-            self._add(layer, pv.PolyData(points, faces=faces), colour, forward=forward, lit=lit, opacity=opacity)
+            self._add(layer, pv.PolyData(points, faces=faces), colour, forward=forward)
 
     def cracks(self, found: Marks, magnification: float, widest: float) -> None:
         """Fill what lies between faces, and draw a line where that would be too thin to see."""
@@ -305,14 +299,13 @@ class SolidScene:
         width: float = 1.0,
         forward: float = 0.0,
         lit: bool = False,
-        opacity: float = 1.0,
     ) -> None:
         look: dict[str, Any] = {"color": tuple(c / 255.0 for c in colour)} if isinstance(colour, tuple) else {}
         if not look:
             mesh.point_data["colour"] = np.asarray(colour, dtype=np.uint8).reshape(-1, 3)
             look = {"scalars": "colour", "rgb": True, "show_scalar_bar": False}
         actor = self._plotter.add_mesh(
-            mesh, **look, line_width=width, opacity=opacity, lighting=lit, ambient=AMBIENT,
+            mesh, **look, line_width=width, lighting=lit, ambient=AMBIENT,
             diffuse=DIFFUSE, reset_camera=False, render=False,
         )  # fmt: skip
         drawn_forward(actor, forward)

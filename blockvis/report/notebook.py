@@ -121,10 +121,10 @@ def assembly_html(assembly: solver.Assembly) -> str:
 
 def _drawn_in_space(assembly: solver.Assembly) -> str:
     """Draw blocks in space as PNG, at twice the pixels that it is shown with."""
-    from blockvis.pictures.solid_inspection import blocks_picture, role_colours
+    from blockvis.pictures.solid_inspection import blocks_picture
 
     buffer = io.BytesIO()
-    blocks_picture(assembly, (2 * WIDE, 2 * HIGH), role_colours(assembly)).save(buffer, "PNG")
+    blocks_picture(assembly, (2 * WIDE, 2 * HIGH), palette.role_colours(assembly)).save(buffer, "PNG")
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
     return f'<img alt="blocks" width="{WIDE}" src="data:image/png;base64,{data}">'
 

@@ -6,7 +6,6 @@ import html
 import json
 import math
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -34,27 +33,18 @@ from blockvis.pictures.captions import (
     state_text,
     value_label,
 )
-from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.live_load import LiveLoads
-from blockvis.pictures.marks import (
-    SMALLEST_RESULTANT,
-    STEEPEST,
-    WIDEST,
-    hinge_ends,
-    length_per_force,
-    resultants,
-    settlement_arrows,
-    sliding_lines,
-)
+from blockvis.pictures.marks import STEEPEST, WIDEST
 from blockvis.pictures.swing import MOST_PARTS, Swing, mechanism_colours, shown_increments, swing_of
 from blockvis.results.about import about, counts_text, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
 from blockvis.system.atomic_files import write_whole
-from blockvis.text import force_text, rounded_length
+from blockvis.text import force_text
 
-from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, hexadecimals, rounded
+from .frames import model_of_frames, surveyed
+from .packing import TURN_UNIT, deflated, hexadecimals, rounded
 from .space import model_in_space
 
 #: Stands in a report for how exact it is, until that is known.
@@ -286,31 +276,21 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
 
 
 def _model_in_plane(response: solver.Response, shown: list[solver.Increment], ground: float | None) -> dict[str, Any]:
-    """Pack what only blocks in the plane have: outlines, joints as lines, and what lies on them."""
+    """Pack what only blocks in the plane have: joints as lines, live loads, the ground of a fall."""
     assembly = response.assembly
-    frame, largest = _surveyed(assembly, shown)
+    joints = initial_joints(assembly)
+    frame, largest, _ = surveyed(assembly, joints, shown)
     live = LiveLoads(response, shown, float(frame.size.max()))
-    frame = frame.holding(live.tails)
-    # Coordinates far from the origin (UTM) would waste the digits.
-    origin = np.round(frame.low, 3)
-    unit = FINENESS * float(frame.size.max())
-    tables = _Tables(assembly, shown, origin, unit, largest)
-    force_length = tables.force_length(assembly.block_size, float(frame.size.max()))
-    shown_force = rounded_length(largest)
-    packed = _packed_geometry(assembly, origin, unit) | tables.packed() | _packed_live(live, shown, origin, unit)
-    return {
-        "unit": unit,
-        "origin": origin.tolist(),
-        "bounds": [*(frame.low - origin).tolist(), *(frame.high - origin).tolist()],
-        "largest_displacement": tables.largest_displacement,
-        "arrows": _arrows(response, frame, origin),
-        "has_forces": any(map(len, tables.sizes)),
+    model = model_of_frames(response, joints, shown, frame.holding(live.tails), largest)
+    origin, unit = np.array(model["origin"]), model["unit"]
+    own = {
+        "offsets": deflated(assembly.offsets, len(assembly.offsets)),
+        "joint_ends": deflated(rounded(joints.ends - origin, unit), len(joints)),
+    }
+    return model | {
         "live_words": live.words if live.largest > 0.0 else "",
         "ground": None if ground is None else float(ground - origin[1]),
-        "force_unit": FORCE_FINENESS * largest,
-        "force_length": force_length,
-        "force_scale": [shown_force, force_text(shown_force)],
-        "packed": packed,
+        "packed": model["packed"] | own | _packed_live(live, shown, origin, unit),
     }
 
 
@@ -322,21 +302,6 @@ def _tints_text(response: solver.Response, swing: Swing) -> str:
     return f"mechanism{whose}, darker where faster"
 
 
-def _arrows(response: solver.Response, frame: Frame, origin: np.ndarray) -> list[list[list[float]]]:
-    """Arrows of each phase of the settlement: support, place [m] and direction."""
-    initial = solver.Pose.initial(response.assembly)
-    phases = []
-    for settlement in response.settlements:
-        found = settlement_arrows(response.assembly, settlement, initial, frame)
-        phases.append(
-            [
-                [int(block), *np.round(place - origin, 5).tolist(), *np.round(direction, 5).tolist()]
-                for block, place, direction in zip(*found, strict=True)
-            ]
-        )
-    return phases
-
-
 def _thinned(increments: tuple[solver.Increment, ...], most: int) -> list[solver.Increment]:
     """All increments, or an even choice of at most so many, with the last equilibrium kept."""
     if len(increments) <= most:
@@ -344,101 +309,6 @@ def _thinned(increments: tuple[solver.Increment, ...], most: int) -> list[solver
     last = max((k for k, i in enumerate(increments) if i.status == solver.Status.EQUILIBRIUM), default=0)
     chosen = np.unique([*np.linspace(0, len(increments) - 1, most - 1).round().astype(int), last])
     return [increments[k] for k in chosen]
-
-
-def _surveyed(assembly: solver.Assembly, shown: list[solver.Increment]) -> tuple[Frame, float]:
-    """Frame that holds all poses, and the largest resultant of a joint in equilibrium [N], or 1."""
-    largest = 0.0
-
-    def poses() -> Iterator[solver.Pose]:
-        nonlocal largest
-        yield solver.Pose.initial(assembly)
-        for increment in shown:
-            yield increment.pose
-            if increment.status != solver.Status.FALLING:
-                largest = max(largest, float(np.hypot(*resultants(increment)[1].T).max(initial=0.0)))
-
-    frame = framed(assembly, poses())
-    return frame, largest or 1.0
-
-
-def _packed_geometry(assembly: solver.Assembly, origin: np.ndarray, unit: float) -> dict[str, Any]:
-    joints = initial_joints(assembly)
-    n = len(joints.block_a)
-    return {
-        "vertices": deflated(rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
-        "offsets": deflated(assembly.offsets, len(assembly.offsets)),
-        "centroids": deflated(rounded(assembly.centroids - origin, unit), assembly.n_blocks),
-        "joint_blocks": deflated(np.stack([joints.block_a, joints.block_b], axis=1), n),
-        "joint_ends": deflated(rounded(joints.ends - origin, unit), n),
-    }
-
-
-class _Tables:
-    """What changes from frame to frame, as integers: motion, resultants of the joints, hinges (1), sliding joints (2).
-
-    A hinge has its place twice, a sliding joint both its ends. Each resultant names its two blocks.
-
-    Parameters
-    ----------
-    assembly : solver.Assembly
-    shown : list of solver.Increment
-        Gone through once.
-    origin : (2,) array [m]
-    unit : float [m]
-    largest : float [N]
-        Resultant; a part of it is the unit of force.
-    """
-
-    def __init__(
-        self, assembly: solver.Assembly, shown: list[solver.Increment], origin: np.ndarray, unit: float, largest: float
-    ) -> None:
-        # The place of a force need not be finer than a pixel; more digits would only fill the file.
-        coarse = round(FORCE_FINENESS / FINENESS / 4.0)
-        self.n, self.largest = len(shown), largest
-        self.travel, self.turn = [], []
-        self.places, self.vectors, self.sizes, self.pairs = _empty(2), _empty(2), [np.zeros(0)], _empty(2)
-        self.mark_places, self.mark_kinds = _empty(4), [np.zeros(0, dtype=np.int32)]
-        self.largest_displacement = 0.0
-        for increment in shown:
-            moved = increment.pose.displacements(assembly)
-            if increment.status != solver.Status.FALLING:
-                far = float(np.hypot(*moved[assembly.free, :2].T).max(initial=0.0))
-                self.largest_displacement = max(self.largest_displacement, far)
-            self.travel.append(rounded(moved[:, :2], unit))
-            self.turn.append(rounded(moved[:, 2], TURN_UNIT))
-            points, forces, pairs = resultants(increment)
-            size = np.hypot(*forces.T) * (increment.status != solver.Status.FALLING)
-            kept = size > SMALLEST_RESULTANT * largest
-            self.places.append(rounded(points[kept] - origin, unit * coarse) * coarse)
-            self.vectors.append(rounded(forces[kept], FORCE_FINENESS * largest))
-            self.sizes.append(size[kept])
-            self.pairs.append(pairs[kept].astype(np.int32))
-            mechanism, contacts = solver.mechanism_of(assembly, increment), increment.contacts
-            hinges = contacts.points[hinge_ends(assembly, increment, mechanism)]
-            sliding = sliding_lines(assembly, contacts, mechanism.sliding_points, contacts.points)
-            ends = np.concatenate([hinges, sliding])
-            self.mark_places.append(rounded(ends - origin, unit).reshape(-1, 4))
-            self.mark_kinds.append(np.repeat([1, 2], [len(hinges), len(sliding)]))
-
-    def force_length(self, block_size: float, extent: float) -> float:
-        """Length per force [m/N]."""
-        return length_per_force(np.concatenate(self.sizes), self.largest, 1.5 * block_size, extent)
-
-    def packed(self) -> dict[str, Any]:
-        """As the page unpacks them."""
-        forces, found = (np.cumsum([len(k) for k in rows]).tolist() for rows in (self.sizes, self.mark_kinds))
-        return {
-            "travel": deflated(np.stack(self.travel), self.n),
-            "turn": deflated(np.stack(self.turn), self.n),
-            "force_first": deflated(forces, len(forces)),
-            "force_place": deflated(np.concatenate(self.places), forces[-1]),
-            "force_vector": deflated(np.concatenate(self.vectors), forces[-1]),
-            "force_blocks": deflated(np.concatenate(self.pairs), forces[-1]),
-            "mark_first": deflated(found, len(found)),
-            "mark_place": deflated(np.concatenate(self.mark_places), found[-1]),
-            "mark_kind": deflated(np.concatenate(self.mark_kinds), found[-1]),
-        }
 
 
 def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndarray, unit: float) -> dict[str, Any]:
@@ -453,10 +323,6 @@ def _packed_live(live: LiveLoads, shown: list[solver.Increment], origin: np.ndar
         "live_tail": deflated(rounded(tails - origin, unit), first[-1]),
         "live_tip": deflated(rounded(tips - origin, unit), first[-1]),
     }
-
-
-def _empty(columns: int) -> list[np.ndarray]:
-    return [np.zeros((0, columns), dtype=np.int32)]
 
 
 def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, Any]]:

@@ -1,0 +1,208 @@
+"""What the page has of blocks of the plane and of space alike: how they move, frame after frame, and what is marked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.pictures.frame import Frame, framed
+from blockvis.pictures.marks import (
+    SMALLEST_RESULTANT,
+    hinge_ends,
+    length_per_force,
+    resultants,
+    settlement_arrows,
+    sliding_lines,
+)
+from blockvis.results.joint_faces import InitialJoints
+from blockvis.results.joints import carried_faces
+from blockvis.text import force_text, rounded_length
+
+from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, rounded
+
+
+def surveyed(
+    assembly: solver.Assembly, joints: InitialJoints, shown: list[solver.Increment]
+) -> tuple[Frame, float, float]:
+    """Frame that holds all poses, the largest resultant of a joint in equilibrium [N] or 1, and the widest crack [m].
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    joints : InitialJoints
+    shown : list of solver.Increment
+        Gone through once.
+    """
+    largest = widest = 0.0
+
+    def poses() -> Iterator[solver.Pose]:
+        nonlocal largest, widest
+        yield solver.Pose.initial(assembly)
+        for increment in shown:
+            yield increment.pose
+            if increment.status != solver.Status.FALLING:
+                sizes = np.linalg.norm(resultants(increment)[1], axis=1)
+                largest = max(largest, float(sizes.max(initial=0.0)))
+                widest = max(widest, float(carried_faces(assembly, joints, increment.pose).gaps.max(initial=0.0)))
+
+    if assembly.dimension == 2:
+        frame = framed(assembly, poses())
+    else:
+        frame = framed(assembly, poses(), margin=0.0, supports=0.25)
+    return frame, largest or 1.0, widest
+
+
+def model_of_frames(
+    response: solver.Response, joints: InitialJoints, shown: list[solver.Increment], frame: Frame, largest: float
+) -> dict[str, Any]:
+    """Pack what moves, and the scales of all frames.
+
+    Parameters
+    ----------
+    response : solver.Response
+    joints : InitialJoints
+    shown : list of solver.Increment
+        What the page shows, frame after frame.
+    frame : Frame
+        In which all of it lies.
+    largest : float [N]
+        Resultant of a joint.
+    """
+    assembly = response.assembly
+    # Coordinates far from the origin (UTM) would waste the digits.
+    origin, extent = np.round(frame.low, 3), float(frame.size.max())
+    unit = FINENESS * extent
+    tables = FrameTables(assembly, joints, shown, origin, unit, largest)
+    sizes = np.concatenate(tables.sizes)
+    shown_force = rounded_length(largest)
+    return {
+        "unit": unit,
+        "origin": origin.tolist(),
+        "bounds": [*(frame.low - origin).tolist(), *(frame.high - origin).tolist()],
+        "largest_displacement": tables.largest_displacement,
+        "arrows": _arrows(response, frame, origin),
+        "has_forces": bool(len(sizes)),
+        "live_words": "",
+        "ground": None,
+        "force_unit": FORCE_FINENESS * largest,
+        "force_length": length_per_force(sizes, largest, 1.5 * assembly.block_size, extent),
+        "force_scale": [shown_force, force_text(shown_force)],
+        "packed": {
+            "vertices": deflated(rounded(assembly.vertices - origin, unit), len(assembly.vertices)),
+            "centroids": deflated(rounded(assembly.centroids - origin, unit), assembly.n_blocks),
+            "joint_blocks": deflated(np.stack([joints.block_a, joints.block_b], axis=1), len(joints)),
+            **tables.packed(),
+        },
+    }
+
+
+def _arrows(response: solver.Response, frame: Frame, origin: np.ndarray) -> list[list[list[float]]]:
+    """Arrows of each phase of the settlement: support, place [m] and direction."""
+    assembly = response.assembly
+    seen = frame if assembly.dimension == 2 else None
+    initial = solver.Pose.initial(assembly)
+    return [
+        [
+            [int(block), *np.round(place - origin, 5).tolist(), *np.round(direction, 5).tolist()]
+            for block, place, direction in zip(*settlement_arrows(assembly, settlement, initial, seen), strict=True)
+        ]
+        for settlement in response.settlements
+    ]
+
+
+class FrameTables:
+    """What changes from frame to frame, as integers: motion, resultants of the joints, hinges (1), sliding joints (2).
+
+    A hinge has the ends of its line, in the plane its place twice; a sliding joint has its ends in the plane, and in
+    space its number. Each resultant names its two blocks.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    joints : InitialJoints
+    shown : list of solver.Increment
+        Gone through once.
+    origin : (d,) array [m]
+    unit : float [m]
+    largest : float [N]
+        Resultant; a part of it is the unit of force.
+    """
+
+    def __init__(
+        self,
+        assembly: solver.Assembly,
+        joints: InitialJoints,
+        shown: list[solver.Increment],
+        origin: np.ndarray,
+        unit: float,
+        largest: float,
+    ) -> None:
+        # The place of a force need not be finer than a pixel; more digits would only fill the file.
+        coarse = round(FORCE_FINENESS / FINENESS / 4.0)
+        d = assembly.dimension
+        self._n, self._in_space = len(shown), d == 3
+        self._travel, self._turn = [], []
+        self._places, self._vectors, self._pairs = (_nothing(n) for n in (d, d, 2))
+        self.sizes = [np.zeros(0)]
+        self._mark_places, self._marks = _nothing(2 * d), _nothing(2)
+        self.largest_displacement = 0.0
+        for increment in shown:
+            moved = increment.pose.displacements(assembly)
+            falling = increment.status == solver.Status.FALLING
+            if not falling:
+                far = float(np.linalg.norm(moved[assembly.free, :d], axis=1).max(initial=0.0))
+                self.largest_displacement = max(self.largest_displacement, far)
+            self._travel.append(rounded(moved[:, :d], unit))
+            self._turn.append(rounded(moved[:, d:], TURN_UNIT))
+            points, forces, pairs = resultants(increment)
+            size = np.linalg.norm(forces, axis=1) * (not falling)
+            kept = size > SMALLEST_RESULTANT * largest
+            self._places.append(rounded(points[kept] - origin, unit * coarse) * coarse)
+            self._vectors.append(rounded(forces[kept], FORCE_FINENESS * largest))
+            self.sizes.append(size[kept])
+            self._pairs.append(pairs[kept].astype(np.int32))
+            places, marks = _marks(assembly, joints, increment)
+            self._mark_places.append(rounded(places - origin, unit).reshape(-1, 2 * d))
+            self._marks.append(marks)
+
+    def packed(self) -> dict[str, Any]:
+        """As the page unpacks them."""
+        forces, found = (np.cumsum([len(k) for k in rows]).tolist() for rows in (self.sizes, self._marks))
+        marks = np.concatenate(self._marks)
+        return {
+            "travel": deflated(np.stack(self._travel), self._n),
+            "turn": deflated(np.stack(self._turn), self._n),
+            "force_first": deflated(forces, len(forces)),
+            "force_place": deflated(np.concatenate(self._places), forces[-1]),
+            "force_vector": deflated(np.concatenate(self._vectors), forces[-1]),
+            "force_blocks": deflated(np.concatenate(self._pairs), forces[-1]),
+            "mark_first": deflated(found, len(found)),
+            "mark_place": deflated(np.concatenate(self._mark_places), found[-1]),
+            "mark_kind": deflated(marks[:, 0], found[-1]),
+            **({"mark_joint": deflated(marks[:, 1], found[-1])} if self._in_space else {}),
+        }
+
+
+def _marks(
+    assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment
+) -> tuple[np.ndarray, np.ndarray]:
+    """List ends (n, 2, d) [m] of hinges and sliding joints, and (n, 2): 1 and -1, or 2 and in space the joint."""
+    mechanism, contacts = solver.mechanism_of(assembly, increment), increment.contacts
+    points = contacts.points
+    hinges = points[hinge_ends(assembly, increment, mechanism)]
+    if assembly.dimension == 2:
+        sliding = sliding_lines(assembly, contacts, mechanism.sliding_points, points)
+        numbers = [-1] * len(sliding)
+    else:
+        pairs = {pair: k for k, pair in enumerate(zip(joints.block_a.tolist(), joints.block_b.tolist(), strict=True))}
+        numbers = [pairs.get((a, b), -1) for a, b in mechanism.sliding.tolist()]
+        sliding = np.broadcast_to(points[:1], (len(numbers), 2, 3)) if numbers else np.zeros((0, 2, 3))
+    marks = [(1, -1)] * len(hinges) + [(2, number) for number in numbers]
+    return np.concatenate([hinges, sliding]), np.array(marks, dtype=np.int32).reshape(-1, 2)
+
+
+def _nothing(columns: int) -> list[np.ndarray]:
+    return [np.zeros((0, columns), dtype=np.int32)]
