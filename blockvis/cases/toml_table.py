@@ -64,31 +64,24 @@ class Table:
             raise self.error(key, f"is {value:g}; give a number from 0 to 1")
         return None if value is None else float(value)
 
-    def pair(self, key: str, default: tuple[float, float] | None = None, words: str = "[x, y]") -> Any:
+    def pair(self, key: str, words: str = "[x, y]") -> Any:
         """Read two finite numbers; ``words`` says in the error what they are."""
-        value = self.take(key, default)
-        if value is None:
-            return None
-        if not isinstance(value, (list, tuple)) or len(value) != 2 or not all(map(is_number, value)):
-            raise self.error(key, f"is {shortened(value)}; give two numbers {words}")
-        return float(value[0]), float(value[1])
+        return self._vector(key, (2,), f"two numbers {words}")
 
-    def vector(self, key: str, default: tuple[float, ...] | None = None) -> Any:
+    def vector(self, key: str) -> Any:
         """Read two finite numbers, or in space three."""
-        value = self.take(key, default)
-        if value is None:
-            return None
-        if not isinstance(value, (list, tuple)) or len(value) not in (2, 3) or not all(map(is_number, value)):
-            raise self.error(key, f"is {shortened(value)}; give two numbers [x, y], or in space three [x, y, z]")
-        return tuple(map(float, value))
+        return self._vector(key, (2, 3), "two numbers [x, y], or in space three [x, y, z]")
 
     def triple(self, key: str) -> Any:
         """Read three finite numbers."""
+        return self._vector(key, (3,), "three numbers [x, y, z]")
+
+    def _vector(self, key: str, lengths: Sequence[int], words: str) -> tuple[float, ...] | None:
         value = self.take(key)
         if value is None:
             return None
-        if not isinstance(value, (list, tuple)) or len(value) != 3 or not all(map(is_number, value)):
-            raise self.error(key, f"is {shortened(value)}; give three numbers [x, y, z]")
+        if not isinstance(value, (list, tuple)) or len(value) not in lengths or not all(map(is_number, value)):
+            raise self.error(key, f"is {shortened(value)}; give {words}")
         return tuple(map(float, value))
 
     def text(self, key: str, default: str | None = None, *, among: Sequence[str] = ()) -> Any:
