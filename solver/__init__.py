@@ -2,7 +2,7 @@
 
 Conventions, written once:
 
-- SI units: m, kg, s, N, rad. Two dimensions, x to the right, y up; thickness out of plane.
+- SI units: m, kg, s, N, rad. In the plane x to the right, y up, thickness out of plane; in space z up.
 - Compression is positive. A gap is positive when open. Moments and rotations are counter-clockwise.
 - The frame of a contact point: row 0 is the unit normal from ``block_b`` into ``block_a``, row 1 the tangent,
   a quarter turn counter-clockwise. Contact forces act on ``block_a``; on ``block_b`` with the opposite sign.

@@ -84,16 +84,16 @@ class State:
     ----------
     pose : Pose
     contacts : Contacts
-    forces : (n_contacts, 2) array [N]
+    forces : (n_contacts, d) array [N]
         Normal (compression positive) and shear force on ``block_a`` at each contact point.
-    displacements : (n_contacts, 2) array
+    displacements : (n_contacts, d) array
         Rates of opening and slip of each contact point in the increment that follows, per unit of the parameter: a
         number, or m/rad; in a fall per frame [m].
     friction : (n_contacts,) array
         Friction coefficient of each contact point.
-    velocity : (n_blocks, 3) array
+    velocity : (n_blocks, n_dof) array
         Movement of each block in the increment that follows, per unit of the parameter; in a fall, per frame.
-    support_forces : (n_blocks, 3) array [N, N, N·m]
+    support_forces : (n_blocks, n_dof) array [N, N·m]
         Resultant of the structure on each support about its centroid; zero for free blocks.
     fell_at : (n_blocks,) array
         Parameter at which blocks have fallen, nan for the others; empty where none have.
@@ -116,8 +116,47 @@ class StoredState(Protocol):
         """Read the state."""
 
 
+class HasState:
+    """What has arrays, in memory or in a file."""
+
+    held: State | StoredState | None
+
+    @property
+    def state(self) -> State:
+        """The arrays, read from their file where they are stored.
+
+        Raises
+        ------
+        ValueError
+            For a limit load that was kept without them.
+        """
+        if self.held is None:
+            raise ValueError("this limit load has only its numbers; its arrays are with the increment that reports it")
+        return self.held if isinstance(self.held, State) else self.held.read()
+
+    @property
+    def pose(self) -> Pose:
+        """Where the blocks are."""
+        return self.state.pose
+
+    @property
+    def contacts(self) -> Contacts:
+        """The contact points; of a limit load the closed ones."""
+        return self.state.contacts
+
+    @property
+    def forces(self) -> np.ndarray:
+        """(n_contacts, d) array [N]: normal (compression positive) and shear force on ``block_a``."""
+        return self.state.forces
+
+    @property
+    def friction(self) -> np.ndarray:
+        """(n_contacts,) array: friction coefficients."""
+        return self.state.friction
+
+
 @dataclass(frozen=True)
-class Increment:
+class Increment(HasState):
     """One equilibrium of the path, or one frame of the fall after it: numbers, and a state.
 
     Attributes
@@ -174,11 +213,6 @@ class Increment:
             f"load multiplier {self.load_multiplier:.6g}>"
         )
 
-    @property
-    def state(self) -> State:
-        """The arrays, read from their file where they are stored."""
-        return self.held if isinstance(self.held, State) else self.held.read()
-
     def with_arrays(self, **arrays: Any) -> Increment:
         """Replace some of the arrays; the others are in memory then.
 
@@ -195,38 +229,18 @@ class Increment:
         return self.parameter
 
     @property
-    def pose(self) -> Pose:
-        """Where the blocks are."""
-        return self.state.pose
-
-    @property
-    def contacts(self) -> Contacts:
-        """The contact points."""
-        return self.state.contacts
-
-    @property
-    def forces(self) -> np.ndarray:
-        """(n_contacts, 2) array [N]: normal and shear force on ``block_a``; see :class:`State`."""
-        return self.state.forces
-
-    @property
     def displacements(self) -> np.ndarray:
-        """(n_contacts, 2) array: opening and slip per unit of the parameter; see :class:`State`."""
+        """(n_contacts, d) array: opening and slip per unit of the parameter; see :class:`State`."""
         return self.state.displacements
 
     @property
-    def friction(self) -> np.ndarray:
-        """(n_contacts,) array: friction coefficients."""
-        return self.state.friction
-
-    @property
     def velocity(self) -> np.ndarray:
-        """(n_blocks, 3) array: movement of each block per unit of the parameter; see :class:`State`."""
+        """(n_blocks, n_dof) array: movement of each block per unit of the parameter; see :class:`State`."""
         return self.state.velocity
 
     @property
     def support_forces(self) -> np.ndarray:
-        """(n_blocks, 3) array [N, N, N·m]: resultant of the structure on each support; see :class:`State`."""
+        """(n_blocks, n_dof) array [N, N·m]: resultant of the structure on each support; see :class:`State`."""
         return self.state.support_forces
 
     @property

@@ -18,7 +18,7 @@ from solver.loads import GRAVITY, Loads, Settlement
 from solver.views import Shown, views
 
 from .certificate import Certificate
-from .increment import Increment, State, Status, StoredState
+from .increment import HasState, Increment, State, Status, StoredState
 from .quantities import LOAD_MULTIPLIER, LOAD_POSITION, REACTION, SETTLEMENT, Quantity
 
 
@@ -298,7 +298,7 @@ class LimitStatus(StrEnum):
 
 
 @dataclass(frozen=True)
-class LimitLoad(Shown):
+class LimitLoad(HasState, Shown):
     """The capacity of a structure under live loads at one geometry.
 
     Attributes
@@ -337,33 +337,6 @@ class LimitLoad(Shown):
     held: State | StoredState | None = field(default=None, repr=False, compare=False)
     torsion: str = "points"
     analysed: tuple[Assembly, Interfaces, Loads] | None = field(default=None, repr=False, compare=False)
-
-    @property
-    def state(self) -> State:
-        """The limit state, read from its file where it is kept in one."""
-        if self.held is None:
-            raise ValueError("this limit load has only its numbers; its arrays are with the increment that reports it")
-        return self.held if isinstance(self.held, State) else self.held.read()
-
-    @property
-    def pose(self) -> Pose:
-        """The geometry."""
-        return self.state.pose
-
-    @property
-    def contacts(self) -> Contacts:
-        """The closed contact points."""
-        return self.state.contacts
-
-    @property
-    def forces(self) -> np.ndarray:
-        """(n_contacts, d) array [N]: normal (compression positive) and shear force on ``block_a`` at the limit."""
-        return self.state.forces
-
-    @property
-    def friction(self) -> np.ndarray:
-        """(n_contacts,) array: friction coefficients."""
-        return self.state.friction
 
     @property
     def mechanism(self) -> np.ndarray:
