@@ -23,9 +23,6 @@ from .results.quantities import CONTROL_DISPLACEMENT, LOAD_MULTIPLIER, Quantity,
 from .results.response import Control, Envelope, LimitLoad, Response
 from .views import Shown
 
-#: Coefficient of friction that the functions of this module take where none is said; a structure takes none in silence.
-FRICTION_COEFFICIENT = 0.6
-
 
 @dataclass(frozen=True, init=False)
 class Structure(Shown):
@@ -307,7 +304,7 @@ def settle(
     assembly: Assembly,
     settlement: Settlement | Sequence[Settlement],
     *,
-    friction_coefficient: float = FRICTION_COEFFICIENT,
+    friction_coefficient: float = InterfaceLaw.friction_coefficient,
     interfaces: Interfaces | None = None,
     loads: Loads | None = None,
     controls: Controls | None = None,
@@ -317,7 +314,7 @@ def settle(
 
     The friction coefficient is of every interface, where ``interfaces`` are not given.
     """
-    structure = _structure(assembly, interfaces, loads, friction_coefficient)
+    structure = Structure(assembly, interfaces or Interfaces(InterfaceLaw(friction_coefficient)), loads)
     return structure.settle(settlement, controls=controls, on_increment=on_increment)
 
 
@@ -326,29 +323,25 @@ def pushover(
     control: ControlDisplacement,
     *,
     loads: Loads,
-    friction_coefficient: float = FRICTION_COEFFICIENT,
+    friction_coefficient: float = InterfaceLaw.friction_coefficient,
     interfaces: Interfaces | None = None,
     **options: Any,
 ) -> Response:
     """Follow blocks under growing displacement: :meth:`Structure.pushover`, with its options, in one call."""
-    return _structure(assembly, interfaces, loads, friction_coefficient).pushover(control, **options)
+    return Structure(assembly, interfaces or Interfaces(InterfaceLaw(friction_coefficient)), loads).pushover(
+        control, **options
+    )
 
 
 def limit_load(
     assembly: Assembly,
     *,
     loads: Loads,
-    friction_coefficient: float = FRICTION_COEFFICIENT,
+    friction_coefficient: float = InterfaceLaw.friction_coefficient,
     interfaces: Interfaces | None = None,
     **options: Any,
 ) -> LimitLoad:
     """Find the largest multiplier of live loads: :meth:`Structure.limit_load`, with its options, in one call."""
-    return _structure(assembly, interfaces, loads, friction_coefficient).limit_load(**options)
-
-
-def _structure(
-    assembly: Assembly, interfaces: Interfaces | None, loads: Loads | None, friction_coefficient: float
-) -> Structure:
-    if interfaces is not None:
-        return Structure(assembly, interfaces, loads)
-    return Structure(assembly, loads=loads, friction_coefficient=friction_coefficient)
+    return Structure(assembly, interfaces or Interfaces(InterfaceLaw(friction_coefficient)), loads).limit_load(
+        **options
+    )

@@ -29,6 +29,12 @@ TIME_STEPS = 200
 #: Movement of the blocks in the first frame of a fall, in block sizes: large against the compliance of the joints.
 MECHANISM = 1e-3
 
+#: Movement in a step in time above which it is repeated, shorter, and in which nothing has moved, in block sizes.
+LARGEST_MOVEMENT, NO_MOVEMENT = 0.03, 1e-7
+
+#: Acceleration, in units of g, and speed, in units of √(block size · g), of blocks that may be at rest.
+SLOW = 1e-3
+
 
 class Fall:
     """The motion of blocks from a place of the path that is not in equilibrium, with the supports fixed.
@@ -46,7 +52,9 @@ class Fall:
         self.stepper, self.checks, self.reports, self.n_frames = stepper, checks, reports, n_frames
         self.model, self.driver = stepper.model, stepper.driver
 
-    def time_steps(self, place: Place, largest: float = 0.03) -> Iterator[tuple[Place, np.ndarray, float, float]]:
+    def time_steps(
+        self, place: Place, largest: float = LARGEST_MOVEMENT
+    ) -> Iterator[tuple[Place, np.ndarray, float, float]]:
         """Steps in time from rest with the supports fixed.
 
         Parameters
@@ -79,7 +87,7 @@ class Fall:
             place = new
             yield place, motion, error.turn / time**2, moved / time
             # Each is twice as long as the one before: forces out of balance would have moved the blocks.
-            idle = idle + 1 if moved < 1e-7 else 0
+            idle = idle + 1 if moved < NO_MOVEMENT else 0
             if idle == 12:
                 return
             time = min(time * (2.0 if moved < largest / 3.0 else 1.0), 1e3)
@@ -95,7 +103,7 @@ class Fall:
         for end, _, acceleration, speed in self.time_steps(place):
             if self.movements(place, end).max() > farthest:
                 return end, False
-            if acceleration < 1e-3 and speed < 1e-3 and self.checks.in_equilibrium(end, COMPUTED_GAP):
+            if acceleration < SLOW and speed < SLOW and self.checks.in_equilibrium(end, COMPUTED_GAP):
                 return end, True
         return end, False
 

@@ -38,6 +38,24 @@ MOST_STEPS = 3000
 #: Penetration, in block sizes, at which blocks may be wedged.
 WEDGED = 1e-5
 
+#: Error of a step, in errors aimed for, at which it is refused.
+REFUSED = 4.0
+
+#: Speed of a block, in speeds of the supports, and movement in a step, in block sizes, at which equilibrium is checked.
+FAST, FAR = 3.0, 0.05
+
+#: Tolerances beyond a bound that has an equilibrium after all in which the viscosity stays reduced.
+ENCLOSED = 8.0
+
+#: Movement, in block sizes, of blocks that have fallen when the first one has moved farthest.
+FALLEN = 0.1
+
+#: Part of the first multiplier under which one may vanish within a bracket.
+VANISHING = 0.05
+
+#: Movement of the supports, in block sizes, in which the joints' compliance is used up.
+ONSET = 1e-3
+
 
 class Outcome(Enum):
     """How an advance towards a parameter ended."""
@@ -195,7 +213,7 @@ class Path:
 
     def _onset(self) -> float:
         """Parameter at which the joints' compliance is used up."""
-        return min(1e-3 * self.stepper.unit, self._next_stop(0.0))
+        return min(ONSET * self.stepper.unit, self._next_stop(0.0))
 
     def _report_reached(self, state: PathState) -> Iterator[Increment]:
         """Report the parameter that was reached, or go back where no equilibrium is near."""
@@ -262,7 +280,7 @@ class Path:
             if error.penetration > WEDGED and length > FIRST_STEP * unit:
                 return replace(state, step=length / 3.0), None
         measure = max(error.lag / self.largest_lag, error.turn / self.largest_turn)
-        if measure > 4.0 and length > FIRST_STEP * unit:
+        if measure > REFUSED and length > FIRST_STEP * unit:
             return replace(state, step=length * max(0.25, min(0.7, 1.0 / measure))), None
         if not self._is_on_path(new, error, length, refining):
             if not enclosing:
@@ -274,7 +292,7 @@ class Path:
         state = replace(state, place=new, step=self._next_step(state.step, length, measure), history=history)
         if s >= state.upper_bound:
             # The equilibrium at the bound may be one of reduced viscosity only.
-            until = s + 8.0 * self.driver.tolerance
+            until = s + ENCLOSED * self.driver.tolerance
             state = replace(state, upper_bound=np.inf, refined=False, refine_until=until)
         return state, None
 
@@ -315,8 +333,7 @@ class Path:
         """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""
         if self.model.live is not None and new.multiplier <= 0.0 and new.s > self._onset():
             return False
-        # Beside the supports, or in block sizes.
-        fast = error.moved > 3.0 * length / self.stepper.unit or error.moved > 0.05
+        fast = error.moved > FAST * length / self.stepper.unit or error.moved > FAR
         if not (fast or refining):
             return True
         if self.checks.in_equilibrium(new, self._closed_gap(refining)):
@@ -379,8 +396,7 @@ class Path:
         if self.model.live is not None:
             return None
         weights = self.model.assembly.masses * self.model.assembly.free * GRAVITY
-        # The others may have begun to move.
-        leaving = self.fall.movements(state.place, end) > 0.1
+        leaving = self.fall.movements(state.place, end) > FALLEN
         fell_at = np.where(leaving, state.place.s, state.fell_at if len(state.fell_at) else np.nan)
         if not leaving.any() or weights[~np.isnan(fell_at)].sum() > self.local_loss * weights.sum():
             return None
@@ -419,8 +435,7 @@ class Path:
         if self.model.live is None:
             return None
         first, bounds = self.checks.bounds(Place.unloaded(state.start)), self.checks.bounds(beyond, CLOSING_GAP)
-        # One that is large in the bracket before does not vanish within it.
-        vanishes = state.place.multiplier <= 0.05 * first.high
+        vanishes = state.place.multiplier <= VANISHING * first.high
         return bounds.high if vanishes and bounds.in_equilibrium and bounds.high <= 0.0 else None
 
     def _reaction(self, place: Place) -> float:

@@ -49,6 +49,9 @@ LARGEST_PENETRATION = 1e-4
 #: Part of its friction bound from which on a contact point slides.
 SLIDES = 0.99
 
+#: Gap, in block sizes, at which half of the friction of a contact point is lost in a step.
+OPEN = 1e-6
+
 #: Damping of steps in time, in units of mass · √(g / block size): critical for a block that rocks.
 DAMPING = 2.0
 
@@ -335,7 +338,7 @@ class Stepper:
         shear_force, normal = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0]
         sliding = ((shear_force >= SLIDES * bound) | (shear_force > friction * normal)) & ~is_new
         # In a joint that opens friction vanishes sooner.
-        share = np.maximum(share, gap / (gap + 1e-6))
+        share = np.maximum(share, gap / (gap + OPEN))
         # New contact points have the friction of their normal force at once.
         after = np.where(is_new, normal, followed + share * (normal - followed))
         return float((friction * np.abs(after - followed))[sliding].sum()) / self.weight, after
