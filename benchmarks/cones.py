@@ -18,6 +18,7 @@ import numpy as np
 
 import solver
 import solver.program.admissible as admissible
+from solver import mechanics
 from solver.interfaces import InterfaceLaw, Interfaces
 from solver.kinematics import Pose
 from solver.program.model import Model
@@ -56,7 +57,7 @@ def program_of(assembly: solver.Assembly) -> tuple[ConicProgram, int]:
     load, length = solver.self_weight(assembly).dead, assembly.block_size
     force = float(np.abs(load[assembly.free, 2]).mean())
     model = Model(assembly, Interfaces(InterfaceLaw(FRICTION)), load, length, force, length, length / 4.0)
-    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-6 * length)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-6 * length)
     sinks = np.zeros((assembly.n_blocks, 6))
     sinks[assembly.moving, 2] = -1.0
     stated: list[ConicProgram] = []

@@ -15,6 +15,7 @@ from itertools import pairwise
 from typing import Any
 
 import solver
+from solver import mechanics
 
 SIZES = (100, 1000, 5000)
 BRICK = 0.25, 0.12, 0.08  # m
@@ -60,9 +61,9 @@ def main() -> None:
         assembly = wall_of(size)
         built = time.process_time() - start
         vertices = assembly.vertices
-        contacts = solver.find_contacts(assembly, vertices, REACH)
-        find = seconds(lambda: solver.find_contacts(assembly, vertices, REACH))  # noqa: B023
-        measure = seconds(lambda: solver.measure_contacts(assembly, vertices, contacts))  # noqa: B023
+        contacts = mechanics.find_contacts(assembly, vertices, REACH)
+        find = seconds(lambda: mechanics.find_contacts(assembly, vertices, REACH))  # noqa: B023
+        measure = seconds(lambda: mechanics.measure_contacts(assembly, vertices, contacts))  # noqa: B023
         print(f"{assembly.n_blocks:8d} {len(contacts):8d} {built:8.3f} {find:8.3f} {measure:8.3f}")
 
 

@@ -31,6 +31,7 @@ import numpy as np
 from convergence_walls import DESCRIPTIONS, WALLS, Wall, random_walls
 
 import solver
+from solver import mechanics
 
 VARIANTS = ("tolerance", "increment", "description")
 
@@ -103,7 +104,7 @@ def told_by(wall: Wall, tolerance: float, seconds: float) -> Run:
         for number, s in enumerate(wall.told):
             at = abs(increment.settlement - s) < NEAR * wall.settlement.increment
             if at and increment.status == solver.Status.EQUILIBRIUM:
-                moved = solver.moved_vertices(assembly, increment.pose) - assembly.vertices
+                moved = mechanics.moved_vertices(assembly, increment.pose) - assembly.vertices
                 run.reactions[number] = increment.reaction
                 run.positions[number] = increment.pose.positions[order] * flip
                 run.ways[number] = float(np.linalg.norm(moved[of_support], axis=1).max())

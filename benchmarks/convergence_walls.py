@@ -21,6 +21,7 @@ from sliding_walls import outlines_of, redrawn, shuffled
 
 import solver
 from blockvis.generators import build
+from solver import mechanics
 
 #: Where reactions and positions are told, parts of the whole settlement, and the largest step of it.
 TOLD = (0.125, 0.25, 0.5, 0.75, 1.0)
@@ -124,11 +125,11 @@ def box(left: float, low: float, right: float, high: float) -> np.ndarray:
 
 def stones_on(outlines: Sequence[np.ndarray], footings: Sequence[np.ndarray], moving: int) -> solver.Assembly:
     """Free stones on footings, one of which moves: "footing 1" from the left."""
-    roles = [solver.MOVING if i == moving else solver.FIXED for i in range(len(footings))]
+    roles = [mechanics.MOVING if i == moving else mechanics.FIXED for i in range(len(footings))]
     return solver.Assembly.from_outlines(
         [*outlines, *footings],
         names=[*(f"stone {i + 1}" for i in range(len(outlines))), *(f"footing {i + 1}" for i in range(len(footings)))],
-        roles=[solver.FREE] * len(outlines) + roles,
+        roles=[mechanics.FREE] * len(outlines) + roles,
     )
 
 
@@ -363,7 +364,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Wall]] = {
 def stands(wall: Wall) -> bool:
     """Whether its drawing can be analysed and carries its weight and a thousandth more, by the static program."""
     assembly = wall.assembly
-    solver.check_settlement(assembly, [wall.settlement], solver.Controls())
+    mechanics.check_settlement(assembly, [wall.settlement], solver.Controls())
     live = solver.weight_fraction(assembly, DOWN, assembly.free)
     limit = solver.limit_load(
         assembly, loads=solver.Loads(wall.loads.dead, 1e-3 * live), friction_coefficient=wall.friction

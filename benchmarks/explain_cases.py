@@ -31,6 +31,7 @@ from blockvis.cases.profiles import Profile, cut_ground
 from blockvis.explanation.candidates import VECTORS, Candidate, differential, rotation_of, scaled_motions
 from blockvis.results.joints import end_openings, initial_joints
 from blockvis.text import as_toml
+from solver import mechanics
 
 #: Relative standard deviation of the observed widths.
 NOISE = 0.2
@@ -158,7 +159,7 @@ Rows = list[dict[str, Any]]
 def movement(structure: Structure, case: Case) -> tuple[solver.Assembly, Mapping[str, tuple[float, float, float]]]:
     """Build the real structure, with the supports that move, and their motions, the largest displacement 1."""
     assembly = generators.build(structure.layout, dict(structure.real))
-    assembly = assembly.with_roles(np.where(assembly.free, solver.FREE, solver.MOVING))
+    assembly = assembly.with_roles(np.where(assembly.free, mechanics.FREE, mechanics.MOVING))
     supports = np.flatnonzero(~assembly.free).tolist()
     motions = case.motion
     if isinstance(motions, Profile):
@@ -170,7 +171,7 @@ def movement(structure: Structure, case: Case) -> tuple[solver.Assembly, Mapping
         if isinstance(motions, tuple):
             motions = rotation_of(assembly, (motions[0],), motions[1])
         roles = assembly.roles.copy()
-        roles[[i for i in supports if assembly.names[i] not in motions]] = solver.FIXED
+        roles[[i for i in supports if assembly.names[i] not in motions]] = mechanics.FIXED
         assembly = assembly.with_roles(roles)
     return assembly, scaled_motions(Candidate(case.cause, motions))
 

@@ -17,6 +17,7 @@ from growth import INCREMENT, Clock, wall_of
 
 import blockvis
 import solver
+from solver import mechanics
 from solver.path import stepping
 
 ARCH = Path(__file__).parents[1] / "assets" / "semicircular_arch.msh"
@@ -46,7 +47,7 @@ def wall(increments: int, blocks: int) -> None:
     clock = Clock()
     stepping.minimise = clock.timed("programs", stepping.minimise)
     assembly = wall_of(blocks)
-    weight = solver.total_weight(assembly)
+    weight = mechanics.total_weight(assembly)
     last = [time.process_time(), 0.0, 0]
 
     def tell(increment: solver.Increment) -> None:

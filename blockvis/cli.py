@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import solver
+from solver import mechanics
 
 from .generators import LAYOUTS, help_text
 from .layout.views import VIEWS
@@ -719,7 +720,7 @@ def _in_words(response: solver.Response, folder: Path) -> str:
     if response.message and not kind.tells_message(response):
         lines.append(response.message)
     lines += kind.lines(response)
-    worst = solver.worst_of(i.certificate for i in response.path)
+    worst = mechanics.worst_of(i.certificate for i in response.path)
     if worst is not None:
         measures = {
             "equilibrium residual {:.1e} W": worst.equilibrium_residual,

@@ -12,75 +12,28 @@ Conventions, written once:
 This package opens no file, prints nothing and draws nothing; ``blockvis`` does.
 """
 
-from .analysis.increments import Increments
-from .analysis.pushover import pushover_increments
-from .analysis.settlement import check_settlement, settlement_increments
-from .assembly import FIXED, FREE, MOVING, ROLES, Assembly, find_contacts, measure_contacts
-from .equilibrium import block_forces
-from .geometry.contacts import Contacts
-from .geometry.outlines import overlap_depths
-from .geometry.planar_contacts import corners_and_edges, features_of
-from .geometry.polygons import Polygons
-from .geometry.polyhedra import Polyhedra
-from .geometry.shapes import Shapes
+from .assembly import Assembly
 from .interfaces import InterfaceLaw, Interfaces, JointScatter
-from .kinematics import Pose, carried, carried_between, motion_size, moved_vertices, point_velocities, swung, turned
+from .kinematics import Pose
 from .loads import GRAVITY, Loads, Settlement, point_load, self_weight, weight_fraction
-from .path.controls import INCREMENTS, Controls, Ending
+from .path.controls import Controls
 from .path.drivers import ControlDisplacement
-from .path.state import PathState
 from .programs.problem import SolveError
-from .results.certificate import Certificate, worst_of
-from .results.increment import ContactState, Increment, State, Status, StoredState
-from .results.mechanism import Mechanism, mechanism_of, rigid_parts, with_motion
-from .results.quantities import (
-    CONTROL_DISPLACEMENT,
-    LOAD_MULTIPLIER,
-    LOAD_POSITION,
-    REACTION,
-    SETTLEMENT,
-    Quantity,
-    reaction_to,
-    settlement_in,
-)
-from .results.response import (
-    Collapse,
-    Control,
-    Envelope,
-    LimitLoad,
-    LimitStatus,
-    LocalLoss,
-    Response,
-    path_parameters,
-    total_weight,
-)
+from .results.certificate import Certificate
+from .results.increment import Increment, Status
+from .results.response import Collapse, Envelope, LimitLoad, LimitStatus, LocalLoss, Response
 from .structure import Structure, limit_load, pushover, settle
 from .surface_loads import edge_pressure, load_on_top, surface_pressure
 
 __all__ = [
-    "CONTROL_DISPLACEMENT",
-    "FIXED",
-    "FREE",
     "GRAVITY",
-    "INCREMENTS",
-    "LOAD_MULTIPLIER",
-    "LOAD_POSITION",
-    "MOVING",
-    "REACTION",
-    "ROLES",
-    "SETTLEMENT",
     "Assembly",
     "Certificate",
     "Collapse",
-    "ContactState",
-    "Contacts",
-    "Control",
     "ControlDisplacement",
     "Controls",
-    "Ending",
     "Envelope",
     "Increment",
-    "Increments",
     "InterfaceLaw",
     "Interfaces",
     "JointScatter",
@@ -88,51 +41,19 @@ __all__ = [
     "LimitStatus",
     "Loads",
     "LocalLoss",
-    "Mechanism",
-    "PathState",
-    "Polygons",
-    "Polyhedra",
     "Pose",
-    "Quantity",
     "Response",
     "Settlement",
-    "Shapes",
     "SolveError",
-    "State",
     "Status",
-    "StoredState",
     "Structure",
-    "block_forces",
-    "carried",
-    "carried_between",
-    "check_settlement",
-    "corners_and_edges",
     "edge_pressure",
-    "features_of",
-    "find_contacts",
     "limit_load",
     "load_on_top",
-    "measure_contacts",
-    "mechanism_of",
-    "motion_size",
-    "moved_vertices",
-    "overlap_depths",
-    "path_parameters",
     "point_load",
-    "point_velocities",
     "pushover",
-    "pushover_increments",
-    "reaction_to",
-    "rigid_parts",
     "self_weight",
     "settle",
-    "settlement_in",
-    "settlement_increments",
     "surface_pressure",
-    "swung",
-    "total_weight",
-    "turned",
     "weight_fraction",
-    "with_motion",
-    "worst_of",
 ]

@@ -7,9 +7,6 @@ from functools import cache
 from importlib.metadata import entry_points
 from typing import Any, Protocol
 
-#: Entry points under which a package that draws offers its :class:`Views`.
-GROUP = "solver.views"
-
 
 class Views(Protocol):
     """What a package that draws offers."""
@@ -35,7 +32,7 @@ class Views(Protocol):
 
 @cache
 def _views() -> Views | None:
-    for entry in entry_points(group=GROUP):
+    for entry in entry_points(group="solver.views"):
         views: Views = entry.load()
         return views
     return None

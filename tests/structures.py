@@ -17,6 +17,7 @@ import numpy as np
 import solver
 from blockvis import generators
 from blockvis.cli import main
+from solver import mechanics
 
 #: Bent outlines that VTK would fill wrongly: an L, a U, a comb.
 BENT = {
@@ -104,7 +105,7 @@ def parted(assembly: solver.Assembly, path: int, fall: int, settlement: float = 
         positions[right | assembly.moving, 1] -= s
         positions[right] += max(0, k - path + 1) * np.array([0.02, -0.01])
         pose = solver.Pose(positions, np.zeros((assembly.n_blocks, 1)))
-        contacts = solver.find_contacts(assembly, solver.moved_vertices(assembly, pose), 0.002)
+        contacts = mechanics.find_contacts(assembly, mechanics.moved_vertices(assembly, pose), 0.002)
         normal = np.where(np.abs(contacts.gaps) < 1e-3, (edge[1] - contacts.points[:, 1] + 0.1) * 1e3, 0.0)
         normal *= random.random(len(normal))
         forces = np.stack([normal, 0.2 * normal * (random.random(len(normal)) - 0.5)], axis=1)
@@ -116,7 +117,7 @@ def parted(assembly: solver.Assembly, path: int, fall: int, settlement: float = 
                 phase=0,
                 load_multiplier=0.0,
                 reaction=2000.0 - 3000.0 * s,
-                held=solver.State(
+                held=mechanics.State(
                     pose=pose,
                     contacts=contacts,
                     forces=forces,

@@ -39,6 +39,7 @@ from blockvis.layout.joints.close import WAYS
 from blockvis.layout.units import UNITS
 from blockvis.layout.views import VIEWS
 from blockvis.results.folder import VIDEO_SUFFIXES
+from solver import mechanics
 
 _FRICTION = solver.InterfaceLaw.friction_coefficient
 _CONTROLS = solver.Controls()
@@ -285,7 +286,7 @@ PARAMETERS = Section(
 ROLES = Section(
     "roles",
     "Role of blocks by their name, group (layer) or material, or a pattern of them; it holds over what the file says",
-    names=one_of(solver.ROLES),
+    names=one_of(mechanics.ROLES),
     example={"left springer": "fixed", "right springer": "moving"},
 )
 
@@ -294,8 +295,8 @@ SUPPORTS = Section(
     "A support that the drawing does not contain",
     (
         Key("name", TEXT, "Name of the support", "ground left", default="support"),
-        Key("role", one_of((solver.FIXED, solver.MOVING)), "Whether the support stands or settles", "moving",
-            default=solver.FIXED),
+        Key("role", one_of((mechanics.FIXED, mechanics.MOVING)), "Whether the support stands or settles", "moving",
+            default=mechanics.FIXED),
         Key("outline", OUTLINE, "Corners in order; in space those of its plan",
             [[-0.5, -0.3], [4.0, -0.3], [4.0, 0.0], [-0.5, 0.0]], "m", required=True),
         Key("levels", _LEVELS, "In space, z of its bottom and top", [-0.3, 0.0], "m", otherwise="required in space"),
@@ -417,7 +418,7 @@ ANALYSIS_KEYS = (
     Key("kind", _KIND,
         "Settlement: until equilibrium is lost; limit load: the multiplier of the live loads at failure; pushover: "
         "the multiplier over a control displacement", "limit load", default=next(iter(KINDS))),
-    Key("increments", one_of(solver.INCREMENTS),
+    Key("increments", one_of(mechanics.INCREMENTS),
         'How increments are found: "coulomb", the path that friction without lift leaves, or "linear program", one '
         "per increment (Portioli and Cascini, 2017), of settlements only", "coulomb",
         default="coulomb"),

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-import solver
 from blockvis.case_files import case_keys
 from blockvis.cases.build import DENSITY
 from blockvis.cases.key import Key, Section
 from blockvis.layout.inspect import Inspection
 from blockvis.text import as_key, as_toml, rounded_length
+from solver import mechanics
 
 #: The first increment, and the limit, as fractions of the median block: steps pass over nothing that a block's movement
 #: changes, and most structures have fallen, or shown that they do not, when a support has moved by a block.
@@ -145,7 +145,7 @@ def relative_to(folder: Path, drawing: str | Path) -> str:
 
 def block_size(found: Inspection) -> float:
     """Find the distance across the median free block [m]."""
-    across = [float(np.linalg.norm(np.ptp(found.layout.corners(i), axis=0))) for i in _with_role(found, solver.FREE)]
+    across = [float(np.linalg.norm(np.ptp(found.layout.corners(i), axis=0))) for i in _with_role(found, mechanics.FREE)]
     return float(np.median(across)) if across else 1.0
 
 
@@ -156,12 +156,12 @@ def ground_of(found: Inspection) -> Ground:
     ----------
     found : Inspection
     """
-    fixed, moving = _with_role(found, solver.FIXED), _with_role(found, solver.MOVING)
+    fixed, moving = _with_role(found, mechanics.FIXED), _with_role(found, mechanics.MOVING)
     if moving:
         return Ground("The drawing says which blocks are supports, and which of them move.")
     if not fixed and (named := _named_supports(found)):
         last = max(named, key=lambda label: named[label])
-        roles = {label: solver.MOVING if label == last and len(named) > 1 else solver.FIXED for label in named}
+        roles = {label: mechanics.MOVING if label == last and len(named) > 1 else mechanics.FIXED for label in named}
         says = "The drawing says nothing of supports; these were taken by their names"
         return Ground(
             f"{says}, and the rightmost settles." if len(named) > 1 else f"{says}.", roles, settles=len(named) > 1
@@ -176,7 +176,7 @@ def ground_of(found: Inspection) -> Ground:
     if len(fixed) > 1 and names[right] and names.count(names[right]) == 1:
         return Ground(
             f"The drawing says which blocks are supports, but of none that it moves: here '{names[right]}' does.",
-            roles={names[right]: solver.MOVING},
+            roles={names[right]: mechanics.MOVING},
         )
     return Ground("The drawing has supports that stand, and none that moves.", settles=False)
 
@@ -227,8 +227,8 @@ def _two_halves(found: Inspection) -> tuple[Mapping[str, Any], ...]:
         return {"name": name, "role": role, "outline": corners}
 
     return (
-        half("ground left", solver.FIXED, left - depth, split),
-        half("ground right", solver.MOVING, split, right + depth),
+        half("ground left", mechanics.FIXED, left - depth, split),
+        half("ground right", mechanics.MOVING, split, right + depth),
     )
 
 
@@ -238,7 +238,7 @@ def _with_role(found: Inspection, role: str) -> list[int]:
 
 def _counted(found: Inspection) -> str:
     size = (found.high - found.low).tolist()
-    roles = [f"{len(_with_role(found, role))} {role}" for role in solver.ROLES if _with_role(found, role)]
+    roles = [f"{len(_with_role(found, role))} {role}" for role in mechanics.ROLES if _with_role(found, role)]
     deep = f"{size[1]:.4g} m deep, " if len(size) == 3 else ""
     where = " in space" if deep else ""
     return f"{len(found.kept)} blocks{where}, {', '.join(roles)}; {size[0]:.4g} m wide, {deep}{size[-1]:.4g} m high."
@@ -247,12 +247,12 @@ def _counted(found: Inspection) -> str:
 def _roles(found: Inspection, ground: Ground) -> str:
     section = case_keys.ROLES
     lines = [_comment(f"{section.meaning}. {ground.says}")]
-    as_drawn = [i for i in found.kept if found.roles[i] != solver.FREE and found.layout.names[i] not in ground.roles]
+    as_drawn = [i for i in found.kept if found.roles[i] != mechanics.FREE and found.layout.names[i] not in ground.roles]
     drawn = dict.fromkeys((found.layout.names[i], found.roles[i]) for i in as_drawn)
     said = [f"{as_key(name)} = {as_toml(role)}" for name, role in list(drawn)[:12]]
     if not said and not ground.roles:
         groups = sorted({word for word in found.layout.groups if word})
-        said = [f"{as_key(group)} = {as_toml(solver.FIXED)}" for group in groups[:12]]
+        said = [f"{as_key(group)} = {as_toml(mechanics.FIXED)}" for group in groups[:12]]
     lines += [section.header if ground.roles else f"# {section.header}"]
     lines += [f"{as_key(name)} = {as_toml(role)}" for name, role in ground.roles.items()]
     return "\n".join([*lines, *(f"# {line}" for line in said), ""])

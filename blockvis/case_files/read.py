@@ -21,6 +21,7 @@ from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats import FORMATS
 from blockvis.kinds.kinds import KINDS
 from blockvis.text import files_like
+from solver import mechanics
 
 from . import case_keys as keys
 
@@ -123,8 +124,8 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     geometry = _geometry(top.table("geometry"))
     roles = top.table("roles").values
     for name, role in roles.items():
-        if role not in solver.ROLES:
-            raise ValueError(f'{source}: [roles] "{name}" is {shortened(role)}; a role is {", ".join(solver.ROLES)}')
+        if role not in mechanics.ROLES:
+            raise ValueError(f'{source}: [roles] "{name}" is {shortened(role)}; a role is {", ".join(mechanics.ROLES)}')
     materials = top.table("materials")
     phases = [keys.SETTLEMENT.read(table) for table in top.tables("settlement")]
     motions = [_settlement(table, one) for table, one in zip(top.tables("settlement"), phases, strict=True)]

@@ -14,6 +14,7 @@ import shapely
 
 import solver
 from blockvis.text import nearest
+from solver import mechanics
 
 from .toml_table import Table, is_number, shortened
 
@@ -257,7 +258,7 @@ def cut_ground(
 
 def _cut(assembly: solver.Assembly, support: int) -> list[np.ndarray]:
     """Outlines of the pieces of a support, cut upright where a block on it begins or ends, from left to right."""
-    contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * TOUCHING * assembly.block_size)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 2.0 * TOUCHING * assembly.block_size)
     pair = np.stack([contacts.block_a, contacts.block_b], axis=1)
     near = (pair == support).any(axis=1) & (np.abs(contacts.gaps) <= TOUCHING * assembly.block_size)
     other, x = pair[near].sum(axis=1) - support, contacts.points[near, 0]

@@ -15,6 +15,7 @@ import numpy as np
 import solver
 from blockvis.layout.triangulation import cells_of_ring
 from blockvis.system.extras import is_installed
+from solver import mechanics
 
 if TYPE_CHECKING:
     import pymunk
@@ -150,7 +151,7 @@ def falling_increment(response: solver.Response, pose: solver.Pose) -> solver.In
 
 def _ground(assembly: solver.Assembly, pose: solver.Pose) -> float:
     """Height of the ground line [m]: of the lowest place on which something stands or may slide down to."""
-    corners, free = solver.moved_vertices(assembly, pose), assembly.free[assembly.block_of_vertex]
+    corners, free = mechanics.moved_vertices(assembly, pose), assembly.free[assembly.block_of_vertex]
     following = corners[assembly.next_vertex]
     # The outward normal of an edge points up where the edge runs to the left.
     upward = ~free & (corners[:, 0] - following[:, 0] > STEEP * np.abs(following[:, 1] - corners[:, 1]))

@@ -13,6 +13,7 @@ import solver
 from blockvis.cases.explain_settings import ExplainSettings
 from blockvis.cases.profiles import Profile, cut_ground
 from blockvis.text import nearest
+from solver import mechanics
 
 #: Unit vectors of directions of the case file.
 VECTORS = {"down": (0.0, -1.0), "up": (0.0, 1.0), "left": (-1.0, 0.0), "right": (1.0, 0.0)}
@@ -121,7 +122,7 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
     supports = np.flatnonzero(~assembly.free).tolist()
     if not supports:
         raise ValueError(f'{source}: no block is a support; give some the role "fixed" under [roles] or [[supports]]')
-    fixed = assembly.with_roles(np.where(assembly.free, solver.FREE, solver.FIXED))
+    fixed = assembly.with_roles(np.where(assembly.free, mechanics.FREE, mechanics.FIXED))
     whole = {assembly.names[i]: (assembly.names[i],) for i in supports}
     if settings.trough is False:
         return Ground(fixed, whole, troughs=False)
@@ -142,9 +143,9 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
     return Ground(cut, pieces, troughs=True, notes=tuple(str(warning.message) for warning in caught))
 
 
-def _touching(assembly: solver.Assembly) -> solver.Contacts:
+def _touching(assembly: solver.Assembly) -> mechanics.Contacts:
     """Find the contact points of the layout."""
-    return solver.find_contacts(assembly, assembly.vertices, TOUCHING * assembly.block_size)
+    return mechanics.find_contacts(assembly, assembly.vertices, TOUCHING * assembly.block_size)
 
 
 def _bearing(assembly: solver.Assembly, names: Sequence[str]) -> list[int]:

@@ -18,6 +18,7 @@ from blockvis.cases.contents import Case
 from blockvis.kinds.kind import needs_dry_joints
 from blockvis.kinds.kinds import KINDS
 from blockvis.runs.progress import StudyProgress
+from solver import mechanics
 
 from .candidates import (
     Candidate,
@@ -110,7 +111,7 @@ def explain(
                 "of it that is drawn in the plane, or follow each settlement that may be the cause with blockvis run"
             )
         needs_dry_joints(case)
-        solver.check_settlement(*_any_settlement(drawn), case.controls)
+        mechanics.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)
         ground = ground_of(drawn, case.explain, case.source)
     notes = [*(str(warning.message) for warning in caught), *ground.notes]
@@ -165,7 +166,7 @@ def read_explained(path: str | Path) -> Case:
 
 def _any_settlement(assembly: solver.Assembly) -> tuple[solver.Assembly, tuple[solver.Settlement, ...]]:
     """Make a settlement of every support, with which the blocks are checked."""
-    roles = np.where(assembly.free, solver.FREE, solver.MOVING)
+    roles = np.where(assembly.free, mechanics.FREE, mechanics.MOVING)
     return assembly.with_roles(roles), (solver.Settlement(direction=(0.0, -1.0)),) if not assembly.free.all() else ()
 
 

@@ -21,6 +21,7 @@ from blockvis.results.joints import initial_joints, opening_and_slip
 from blockvis.runs.progress import StudyProgress
 from blockvis.system.extras import require
 from blockvis.system.processes import cores
+from solver import mechanics
 
 from .observations import Observations
 
@@ -141,11 +142,11 @@ def reach_of(observations: Observations, limit: float | None) -> tuple[float, fl
 def lever_of(assembly: solver.Assembly, settlement: solver.Settlement) -> float:
     """Largest movement of a support where it carries something, per unit of the settlement [m or m/rad]."""
     reach = 2e-3 * assembly.block_size
-    contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * reach)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 2.0 * reach)
     pose = solver.Pose.initial(assembly)
     rate = settlement.rate(assembly, pose, 0.0)
     speeds = [
-        np.hypot.reduce(solver.point_velocities(contacts.points, block, pose, rate), axis=1)
+        np.hypot.reduce(mechanics.point_velocities(contacts.points, block, pose, rate), axis=1)
         for block in (contacts.block_a, contacts.block_b)
     ]
     return float(np.max(speeds)) or 1.0
@@ -171,7 +172,7 @@ def ordered(
         Largest displacement of a support, and opening of a joint at which the run may stop.
     """
     roles = assembly.roles.astype("<U6").copy()
-    roles[[assembly.index(name) for name in motions]] = solver.MOVING
+    roles[[assembly.index(name) for name in motions]] = mechanics.MOVING
     moving = assembly.with_roles(roles)
     lever = lever_of(moving, solver.Settlement(profile=motions))
     farthest = reach[0] / lever

@@ -21,6 +21,7 @@ from blockvis.results.cracks import SMALLEST_OPENING
 from blockvis.results.joints import faces_at
 from blockvis.system.atomic_files import whole_file
 from blockvis.text import rounded_length
+from solver import mechanics
 
 from .words import amount_text, percent, width_text
 
@@ -99,7 +100,7 @@ def _magnified(assembly: solver.Assembly, pose: solver.Pose, factor: float) -> s
 
 
 def _blocks(panel: Axes, assembly: solver.Assembly, pose: solver.Pose) -> None:
-    corners = solver.moved_vertices(assembly, pose)
+    corners = mechanics.moved_vertices(assembly, pose)
     outlines = np.split(corners, assembly.offsets[1:-1])
     fill = palette.block_colours(assembly.materials, assembly.free) / 255.0
     colours = [tuple(colour) for colour in fill.tolist()]
@@ -196,7 +197,7 @@ def _computed(
 
 def _tops(assembly: solver.Assembly, blocks: Sequence[int], pose: solver.Pose) -> np.ndarray:
     """(n, 2) array [m]: a little below the middle of the top of each support, where the picture shows it."""
-    corners = solver.moved_vertices(assembly, pose)
+    corners = mechanics.moved_vertices(assembly, pose)
     places = []
     for block in blocks:
         ring = corners[assembly.offsets[block] : assembly.offsets[block + 1]]

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-import solver
 from blockvis.layout.block_table import with_rows
 from blockvis.layout.faces import with_plane_faces
 from blockvis.layout.layout import Layout
@@ -19,6 +18,7 @@ from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import outlines_of_cells, rectangle
 from blockvis.layout.solids import volume
 from blockvis.layout.views import VIEWS, axis_across, view_along
+from solver import mechanics
 
 #: In a prism the sine of the angle between a face's normal and the axis, or the plane across it, is at most this.
 SQUARE = 1e-3
@@ -34,7 +34,12 @@ COVERS = 0.01
 LARGEST_SIZE = 1e50
 
 #: Roles by the word with which the name or group of a body may begin.
-ROLE_WORDS = {"fixed": solver.FIXED, "support": solver.FIXED, "supports": solver.FIXED, "moving": solver.MOVING}
+ROLE_WORDS = {
+    "fixed": mechanics.FIXED,
+    "support": mechanics.FIXED,
+    "supports": mechanics.FIXED,
+    "moving": mechanics.MOVING,
+}
 
 #: Bodies compared with all others at a time.
 AT_A_TIME = 20

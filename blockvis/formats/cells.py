@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-import solver
 from blockvis.layout.block_table import with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import UPRIGHT, kind_of
 from blockvis.layout.outlines import flattened, is_flat, outlines_of_cells
+from solver import mechanics
 
 from .bodies import Bodies, Body
 from .closed_surfaces import OpenSurface, bodies_of_surfaces, components
@@ -131,7 +131,7 @@ def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, An
         if isinstance(value, np.str_ | str | bytes | np.bytes_):
             word = value.decode("utf-8", "replace") if isinstance(value, bytes | np.bytes_) else str(value)
         elif key == "role" and np.ndim(value) == 0 and float(value) in (0.0, 1.0, 2.0):
-            word = solver.ROLES[int(value)]
+            word = mechanics.ROLES[int(value)]
         else:
             continue
         field = "role" if key == "role_name" else key

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-import solver
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import FLAT
+from solver import mechanics
 
 from .bodies import Bodies, fans
 from .cells import layout_of_cells
@@ -293,7 +293,7 @@ def _mesh(points: np.ndarray, faces: list[list[int]], data: dict[str, Any], name
     if context.group:
         row["group"] = context.group
     if support:
-        row["role"] = solver.FIXED
+        row["role"] = mechanics.FIXED
     # What our own writer says of a block, which COMPAS keeps and hands on.
     row |= {key: str(attributes[key]) for key in ("role", "material") if isinstance(attributes.get(key), str)}
     if context.material.get("name"):
@@ -312,7 +312,7 @@ def write(layout: Layout, path: Path) -> None:
     """Write the blocks of a layout in space as meshes of COMPAS 2: its ``json_load`` gives blocks and supports."""
     lists: dict[str, list[dict[str, Any]]] = {"blocks": [], "supports": []}
     for (points, faces), row in zip(layout.solids, rows_of(layout), strict=True):
-        support = row.get("role") in (solver.FIXED, solver.MOVING)
+        support = row.get("role") in (mechanics.FIXED, mechanics.MOVING)
         data = {
             "attributes": {**{key: value for key, value in row.items() if key != "name"}, "is_support": support},
             "default_vertex_attributes": {"x": 0.0, "y": 0.0, "z": 0.0},

@@ -18,13 +18,13 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-import solver
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import LARGEST_CHORD
 from blockvis.layout.units import UNITS, metres_per
+from solver import mechanics
 
 from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
@@ -241,7 +241,7 @@ def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], whe
 
 def _row(layer: str, name: str) -> dict[str, Any]:
     """Write the row of the block table of an outline that has none of its own."""
-    row: dict[str, Any] = {"group": layer, "material": "" if layer.lower() in solver.ROLES else layer}
+    row: dict[str, Any] = {"group": layer, "material": "" if layer.lower() in mechanics.ROLES else layer}
     return row | ({"name": name} if name else {})
 
 

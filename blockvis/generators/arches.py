@@ -9,6 +9,7 @@ import numpy as np
 
 import solver
 from blockvis.layout.outlines import without_collinear
+from solver import mechanics
 
 from .dimensions import MOST_VOUSSOIRS, above_zero, whole
 
@@ -305,7 +306,7 @@ def _on_springers(
     return solver.Assembly.from_outlines(
         outlines,
         names=[*(f"voussoir {i + 1}" for i in range(n)), "left springer", "right springer"],
-        roles=[solver.FREE] * n + [solver.FIXED, solver.MOVING],
+        roles=[mechanics.FREE] * n + [mechanics.FIXED, mechanics.MOVING],
         materials=["stone"] * n + ["ground"] * 2,
         density=density,
         thickness=depth,

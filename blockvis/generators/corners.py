@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import solver
 from blockvis.layout.solids import Solid, box
+from solver import mechanics
 
 from .dimensions import above_zero, at_least_zero, whole
 from .solids import assembled
@@ -60,8 +61,8 @@ def l_corner(
         stones += row.along_y(f"cross brick {course + 1}", beside)
     wide = GROUND * length
     grounds = [
-        ("ground", solver.FIXED, box((-wide, -wide, -height), (n * length + wide, width, 0.0))),
-        ("cross ground", solver.MOVING, box((-wide, width, -height), (width + wide, m * length + wide, 0.0))),
+        ("ground", mechanics.FIXED, box((-wide, -wide, -height), (n * length + wide, width, 0.0))),
+        ("cross ground", mechanics.MOVING, box((-wide, width, -height), (width + wide, m * length + wide, 0.0))),
     ]
     return assembled(stones, grounds, density=above_zero("density", density, "kg/m³"), material="brick")
 
@@ -118,10 +119,10 @@ def t_corner(
         stones += cross.along_y(f"cross brick {course + 1}", beside)
     wide = GROUND * length
     grounds = [
-        ("ground", solver.FIXED, box((-half - wide, -wide, -height), (half + wide, width, 0.0))),
+        ("ground", mechanics.FIXED, box((-half - wide, -wide, -height), (half + wide, width, 0.0))),
         (
             "cross ground",
-            solver.MOVING,
+            mechanics.MOVING,
             box((-width / 2.0 - wide, width, -height), (width / 2.0 + wide, far + wide, 0.0)),
         ),
     ]
@@ -193,8 +194,8 @@ def two_leaf_wall(
                 stones.append((f"back {course + 1}-{k + 1}", box((a, width + gap, low), (b, deep, high))))
     wide, middle = GROUND * length, width + gap / 2.0
     grounds = [
-        ("front ground", solver.FIXED, box((-wide, -wide, -height), (n * length + wide, middle, 0.0))),
-        ("back ground", solver.MOVING, box((-wide, middle, -height), (n * length + wide, deep + wide, 0.0))),
+        ("front ground", mechanics.FIXED, box((-wide, -wide, -height), (n * length + wide, middle, 0.0))),
+        ("back ground", mechanics.MOVING, box((-wide, middle, -height), (n * length + wide, deep + wide, 0.0))),
     ]
     return assembled(stones, grounds, density=above_zero("density", density, "kg/m³"), material="brick")
 

@@ -8,6 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.layout.solids import Solid, between
+from solver import mechanics
 
 from .dimensions import above_zero, whole
 from .solids import assembled
@@ -92,5 +93,5 @@ def dome(
         stones.append(("cap", between(ring(inner, rings), ring(outer, rings))))
     down = np.array([0.0, 0.0, -2.0 * thickness])
     bearings = [joint(inner - thickness / 2.0, outer + thickness / 2.0, 0, j) for j in range(n)]
-    springers = [(f"springer {j + 1}", solver.MOVING, between(q + down, q)) for j, q in enumerate(bearings)]
+    springers = [(f"springer {j + 1}", mechanics.MOVING, between(q + down, q)) for j, q in enumerate(bearings)]
     return assembled(stones, springers, density=density)

@@ -8,6 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.layout.outlines import rectangle, without_collinear
+from solver import mechanics
 
 from .arches import segmental_joints, voussoir_outlines
 from .dimensions import above_zero, whole
@@ -52,7 +53,7 @@ def column(
     return solver.Assembly.from_outlines(
         outlines,
         names=[*(f"block {i + 1}" for i in range(n)), "ground"],
-        roles=[solver.FREE] * n + [solver.MOVING],
+        roles=[mechanics.FREE] * n + [mechanics.MOVING],
         materials=["stone"] * n + ["ground"],
         density=density,
         thickness=depth,
@@ -266,7 +267,7 @@ def _on_two_feet(
     return solver.Assembly.from_outlines(
         [outline for _, outline in named],
         names=[name for name, _ in named],
-        roles=[solver.FREE] * n + [solver.FIXED, solver.MOVING],
+        roles=[mechanics.FREE] * n + [mechanics.FIXED, mechanics.MOVING],
         materials=["stone"] * n + ["ground"] * 2,
         density=density,
         thickness=depth,

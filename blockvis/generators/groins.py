@@ -9,6 +9,7 @@ import numpy as np
 
 import solver
 from blockvis.layout.solids import Solid, between, box, outward
+from solver import mechanics
 
 from .arches import segmental_joints
 from .dimensions import above_zero, whole
@@ -63,7 +64,7 @@ def cross_vault(
     stones = _crossing(arc, width, stone, bonded)
     corner = _corner(arc.bearing, width / 2.0)
     springers = [
-        (f"springer {quarter + 1}", solver.MOVING if quarter == 0 else solver.FIXED, _turned(corner, quarter))
+        (f"springer {quarter + 1}", mechanics.MOVING if quarter == 0 else mechanics.FIXED, _turned(corner, quarter))
         for quarter in range(4)
     ]
     return assembled(stones, springers, density=above_zero("density", density, "kg/m³"))
@@ -125,7 +126,7 @@ def church_bay(
             stones.append((f"pier {quarter + 1}-{k + 1}", _turned(drum, quarter)))
         wide = 0.2 * side
         foot = box((inner - wide, inner - wide, levels[0] - wide), (*[inner + side + wide] * 2, float(levels[0])))
-        role = solver.MOVING if quarter == 0 else solver.FIXED
+        role = mechanics.MOVING if quarter == 0 else mechanics.FIXED
         grounds.append((f"ground {quarter + 1}", role, _turned(foot, quarter)))
     return assembled(stones, grounds, density=above_zero("density", density, "kg/m³"))
 
@@ -214,7 +215,7 @@ def pavilion_vault(
     stones.append(("keystone", _square(arc.crown)))
     low, high = _mirrored(arc.bearing, -1.0), _mirrored(arc.bearing, 1.0)
     springers = [
-        (f"springer {side + 1}", solver.MOVING if side == 0 else solver.FIXED, _turned(between(low, high), side))
+        (f"springer {side + 1}", mechanics.MOVING if side == 0 else mechanics.FIXED, _turned(between(low, high), side))
         for side in range(4)
     ]
     return assembled(stones, springers, density=above_zero("density", density, "kg/m³"))

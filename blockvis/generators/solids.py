@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import solver
 from blockvis.layout.solids import Solid
+from solver import mechanics
 
 
 def assembled(
@@ -28,7 +29,7 @@ def assembled(
     return solver.Assembly.from_solids(
         [solid for _, solid in free] + [solid for _, _, solid in supports],
         names=[name for name, _ in free] + [name for name, _, _ in supports],
-        roles=[solver.FREE] * len(free) + [role for _, role, _ in supports],
+        roles=[mechanics.FREE] * len(free) + [role for _, role, _ in supports],
         materials=[material] * len(free) + ["ground"] * len(supports),
         density=density,
     )

@@ -12,6 +12,7 @@ import shapely
 
 import solver
 from blockvis.layout.outlines import rectangle
+from solver import mechanics
 
 from .bonds import BONDS, SHORTEST_BRICK
 from .bricks import LOWEST_BRICK, Bond, brick_outline, cut_bricks, lay_bricks
@@ -103,7 +104,7 @@ def wall(
             outlines.append(outline)
             names.append(f"voussoir {number}-{i}" if joints is not None else f"lintel {number}")
             materials.append("stone")
-    roles = [solver.FREE] * len(outlines)
+    roles = [mechanics.FREE] * len(outlines)
     for name, role, outline in _ground(width, bonded.brick_length, settling):
         outlines.append(outline)
         names.append(name)
@@ -354,7 +355,7 @@ def _ground(width: float, brick_length: float, settling: Sequence[float] | None)
     """Name, role and outline of the parts of the ground, from left to right; it extends a brick beyond the wall."""
     ends = [-brick_length, width + brick_length]
     if settling is None:
-        return [("ground", solver.FIXED, rectangle(ends[0], -brick_length, ends[1], 0.0))]
+        return [("ground", mechanics.FIXED, rectangle(ends[0], -brick_length, ends[1], 0.0))]
     first, last = pair("settling", settling)
     if first >= width or last <= 0.0:
         raise ValueError(f"settling is [{first:g}, {last:g}] m, beside the wall; choose a part of 0 to {width:g} m")
@@ -364,6 +365,6 @@ def _ground(width: float, brick_length: float, settling: Sequence[float] | None)
     parts = []
     for name, left, right in zip(names[len(stops) - 1], stops[:-1], stops[1:], strict=True):
         middle = (max(left, 0.0) + min(right, width)) / 2.0
-        role = solver.MOVING if first < middle < last else solver.FIXED
+        role = mechanics.MOVING if first < middle < last else mechanics.FIXED
         parts.append((name, role, rectangle(left, -brick_length, right, 0.0)))
     return parts

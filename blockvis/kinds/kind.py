@@ -17,9 +17,10 @@ from blockvis.cases.contents import Case
 from blockvis.cases.key import Key, Section, read_keys
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import loss_of, mechanism_text
+from solver import mechanics
 
-#: How a kind works its increments out, for :class:`solver.Increments`.
-Steps = Generator[solver.Increment, None, solver.Ending]
+#: How a kind works its increments out, for :class:`solver.mechanics.Increments`.
+Steps = Generator[solver.Increment, None, mechanics.Ending]
 
 
 @dataclass(frozen=True)
@@ -28,20 +29,20 @@ class Course:
 
     Attributes
     ----------
-    parameter, measured : solver.Quantity
+    parameter, measured : solver.mechanics.Quantity
     settlements : tuple of solver.Settlement
         Whose phases the parameter belongs to.
-    control : solver.Control, optional
+    control : solver.mechanics.Control, optional
         What drives the parameter where no settlement does.
     """
 
-    parameter: solver.Quantity
-    measured: solver.Quantity
+    parameter: mechanics.Quantity
+    measured: mechanics.Quantity
     settlements: tuple[solver.Settlement, ...] = ()
-    control: solver.Control | None = None
+    control: mechanics.Control | None = None
 
     @property
-    def drivers(self) -> tuple[solver.Control, ...]:
+    def drivers(self) -> tuple[mechanics.Control, ...]:
         """How far the parameter goes in each phase; empty where no limit is known."""
         return self.settlements if self.control is None else (self.control,)
 
@@ -54,9 +55,9 @@ class RunInput:
     assembly: solver.Assembly
     interfaces: solver.Interfaces
     loads: solver.Loads
-    listeners: list[Callable[[solver.PathState], None]] = field(default_factory=list)
+    listeners: list[Callable[[mechanics.PathState], None]] = field(default_factory=list)
 
-    def step(self, state: solver.PathState) -> None:
+    def step(self, state: mechanics.PathState) -> None:
         """Tell who listens where a step within an increment has led."""
         for listener in self.listeners:
             listener(state)
@@ -72,7 +73,7 @@ class AnalysisRun:
         Name of the kind.
     given : RunInput
     course : Course
-    steps : solver.Increments
+    steps : solver.mechanics.Increments
         None by default, for those that fill in the other fields as they go.
     limits : list of solver.LimitLoad
         Filled as the steps go, one per limit state.
@@ -81,7 +82,7 @@ class AnalysisRun:
     analysis: str
     given: RunInput
     course: Course
-    steps: solver.Increments = field(default_factory=lambda: without_increments())
+    steps: mechanics.Increments = field(default_factory=lambda: without_increments())
     limits: list[solver.LimitLoad] = field(default_factory=list)
 
     def recorded(self, increments: Sequence[solver.Increment]) -> None:
@@ -95,7 +96,7 @@ class AnalysisRun:
         if len(self.limits) == len(increments):
             self.limits[-1] = replace(self.limits[-1], held=increments[-1].held)
 
-    def response(self, increments: Sequence[solver.Increment], ending: solver.Ending) -> solver.Response:
+    def response(self, increments: Sequence[solver.Increment], ending: mechanics.Ending) -> solver.Response:
         """Make a response of the increments so far and how they ended."""
         return solver.Response(
             assembly=self.given.assembly,
@@ -121,7 +122,7 @@ class AnalysisKind(ABC):
     ----------
     name : str
         As ``[analysis] kind`` has it.
-    parameter, measured : solver.Quantity
+    parameter, measured : solver.mechanics.Quantity
     checkpoint : type
         Dataclass from which its increments go on; NoneType where they start again.
     in_studies : bool
@@ -133,8 +134,8 @@ class AnalysisKind(ABC):
     """
 
     name: str
-    parameter: solver.Quantity
-    measured: solver.Quantity
+    parameter: mechanics.Quantity
+    measured: mechanics.Quantity
     checkpoint: type[Any] = NoneType
     in_studies: bool = False
     keys: tuple[Key, ...] = ()
@@ -252,18 +253,18 @@ class AnalysisKind(ABC):
         return rows
 
 
-def _with_unit(value: float, quantity: solver.Quantity) -> str:
+def _with_unit(value: float, quantity: mechanics.Quantity) -> str:
     return f"{value:12.6g} {quantity.unit}".rstrip()
 
 
-def without_increments() -> solver.Increments:
+def without_increments() -> mechanics.Increments:
     """Make the increments of an analysis that has none: it is at its limit where it begins."""
 
     def steps() -> Steps:
-        return solver.Ending(solver.Status.LIMIT_REACHED)
+        return mechanics.Ending(solver.Status.LIMIT_REACHED)
         yield
 
-    return solver.Increments(steps())
+    return mechanics.Increments(steps())
 
 
 def needs_live_load(case: Case) -> None:

@@ -19,6 +19,7 @@ from blockvis.cases.loads import moving_loads
 from blockvis.cases.toml_table import Table
 from blockvis.results.swinging import swing_factors, swung_increment
 from blockvis.text import force_text
+from solver import mechanics
 
 from .kind import (
     AnalysisKind,
@@ -77,14 +78,14 @@ class LimitLoadCheckpoint:
     ----------
     limits : tuple of solver.LimitLoad
         Found so far, in the order of the increments that report them; numbers alone.
-    settlement : solver.PathState, optional
+    settlement : solver.mechanics.PathState, optional
         Where the settlement stands along which they are asked for.
     pose : solver.Pose, optional
         Where the settlement ended that comes before the places of a load.
     """
 
     limits: tuple[solver.LimitLoad, ...]
-    settlement: solver.PathState | None = None
+    settlement: mechanics.PathState | None = None
     pose: solver.Pose | None = None
 
 
@@ -92,8 +93,8 @@ class LimitLoadKind(AnalysisKind):
     """Limit loads: one as drawn, one at each settlement that is wanted, or one for each position of a load."""
 
     name = "limit load"
-    parameter = solver.LOAD_POSITION
-    measured = solver.LOAD_MULTIPLIER
+    parameter = mechanics.LOAD_POSITION
+    measured = mechanics.LOAD_MULTIPLIER
     checkpoint = LimitLoadCheckpoint
     keys = (
         Key("flow", one_of(FLOWS), "Whether sliding joints of a limit load dilate (associative) or not", FLOWS[1],
@@ -159,7 +160,7 @@ class LimitLoadKind(AnalysisKind):
             pairs = zip(resume.limits, found, strict=True)
             run.limits = [replace(limit, held=increment.held) for limit, increment in pairs]
         steps = _over_places(run, places, live, resume, found) if len(places) else _along_settlement(run, resume, found)
-        run.steps = solver.Increments(steps).begin()
+        run.steps = mechanics.Increments(steps).begin()
         return run
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
@@ -193,7 +194,7 @@ class LimitLoadKind(AnalysisKind):
             summary["limit_load_caveat"] = limit.caveat
         if chosen is not None and response.collapse is None:
             moves = chosen.velocity.any()
-            summary["mechanism"] = str(solver.mechanism_of(response.assembly, chosen)) if moves else None
+            summary["mechanism"] = str(mechanics.mechanism_of(response.assembly, chosen)) if moves else None
         if not response.parameter.is_path and len(response.limits) > 1:
             found = chosen is not None and np.isfinite(chosen.measured)
             summary["governing_position"] = chosen.parameter if chosen is not None and found else None
@@ -220,7 +221,7 @@ class LimitLoadKind(AnalysisKind):
         for limit, state in response.limit_states:
             place = [repr(float(state.parameter))]
             numbers = [repr(float(v)) for v in (limit.multiplier, *limit.bounds)]
-            words = str(solver.mechanism_of(response.assembly, state)) if limit.mechanism.any() else ""
+            words = str(mechanics.mechanism_of(response.assembly, state)) if limit.mechanism.any() else ""
             where = [str(state.phase), *place] if over_settlement else place
             table.writerow([*where, *numbers, str(limit.status), limit.flow, words])
         return {"capacity.csv" if over_settlement else "envelope.csv": rows.getvalue()}
@@ -418,7 +419,7 @@ def _read_for_multipliers(increment: solver.Increment) -> solver.Increment:
 
 
 def _checkpoint(
-    run: AnalysisRun, *, settlement: solver.PathState | None = None, pose: solver.Pose | None = None
+    run: AnalysisRun, *, settlement: mechanics.PathState | None = None, pose: solver.Pose | None = None
 ) -> LimitLoadCheckpoint:
     return LimitLoadCheckpoint(
         tuple(replace(limit, held=None, analysed=None) for limit in run.limits), settlement, pose
@@ -474,13 +475,13 @@ def _displacement(case: Case, assembly: solver.Assembly) -> float:
     return CLOSING * assembly.block_size if case.settings.displacement is None else case.settings.displacement
 
 
-def _limit_ending(limit: solver.LimitLoad) -> solver.Ending:
+def _limit_ending(limit: solver.LimitLoad) -> mechanics.Ending:
     stops = {
         solver.LimitStatus.UNBOUNDED: solver.Status.LIMIT_REACHED,
         solver.LimitStatus.NO_EQUILIBRIUM: solver.Status.NO_INITIAL_EQUILIBRIUM,
         solver.LimitStatus.NOT_CONVERGED: solver.Status.SOLVER_FAILED,
     }
-    return solver.Ending(stops.get(limit.status, solver.Status.COLLAPSED), str(limit))
+    return mechanics.Ending(stops.get(limit.status, solver.Status.COLLAPSED), str(limit))
 
 
 def _swinging(assembly: solver.Assembly, state: solver.Increment) -> Iterator[solver.Increment]:

@@ -15,6 +15,7 @@ from blockvis.cases.key import FRACTION, POSITIVE, TEXT, VECTOR, Key, Section
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import mechanism_text
 from blockvis.text import nearest
+from solver import mechanics
 
 from .kind import (
     AnalysisKind,
@@ -51,9 +52,9 @@ class PushoverKind(AnalysisKind):
     """The load multiplier over a control displacement, after settlements where there are any."""
 
     name = "pushover"
-    parameter = solver.CONTROL_DISPLACEMENT
-    measured = solver.LOAD_MULTIPLIER
-    checkpoint = solver.PathState
+    parameter = mechanics.CONTROL_DISPLACEMENT
+    measured = mechanics.LOAD_MULTIPLIER
+    checkpoint = mechanics.PathState
     sections = (CONTROL,)
 
     def read(self, top: Table, analysis: Table) -> solver.ControlDisplacement | None:
@@ -98,7 +99,7 @@ class PushoverKind(AnalysisKind):
         """Prepare the settlements of a case, of which only a fall is reported, and the pushover."""
         control = _checked_control(given.case, given.assembly)
         return AnalysisRun(
-            self.name, given, self.course(given.case), solver.Increments(_steps(given, control, resume)).begin()
+            self.name, given, self.course(given.case), mechanics.Increments(_steps(given, control, resume)).begin()
         )
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
@@ -175,7 +176,7 @@ def _checked_control(case: Case, assembly: solver.Assembly) -> solver.ControlDis
     return control
 
 
-def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.PathState | None) -> Steps:
+def _steps(given: RunInput, control: solver.ControlDisplacement, resume: mechanics.PathState | None) -> Steps:
     case = given.case
     pose = None
     # A pushover that has begun has its settlement behind it.
@@ -187,7 +188,7 @@ def _steps(given: RunInput, control: solver.ControlDisplacement, resume: solver.
     if steps.ending.stop is not solver.Status.LIMIT_REACHED:
         return not_reached(steps.ending, "nothing is left to push over")
     try:
-        pushed = solver.pushover_increments(
+        pushed = mechanics.pushover_increments(
             given.assembly,
             control,
             loads=given.loads,

@@ -15,11 +15,12 @@ from blockvis.cases.key import TRUE_OR_FALSE, Key
 from blockvis.cases.toml_table import Table
 from blockvis.results.about import least_reaction, loss_of, mechanism_text
 from blockvis.text import force_text
+from solver import mechanics
 
 from .kind import AnalysisKind, AnalysisRun, Course, RunInput, needs_dry_joints, without_increments
 
 #: The methods in words, as ``[analysis] increments`` has them.
-COULOMB, LINEAR_PROGRAM = solver.INCREMENTS
+COULOMB, LINEAR_PROGRAM = mechanics.INCREMENTS
 
 #: Difference of two reactions, in weights, of moments at a block's length, that is worth a line.
 NOTABLE = 1e-3
@@ -29,9 +30,9 @@ class SettlementKind(AnalysisKind):
     """Settlements, one after another, and the reaction of the supports."""
 
     name = "settlement"
-    parameter = solver.SETTLEMENT
-    measured = solver.REACTION
-    checkpoint = solver.PathState
+    parameter = mechanics.SETTLEMENT
+    measured = mechanics.REACTION
+    checkpoint = mechanics.PathState
     in_studies = True
     keys = (
         Key("range", TRUE_OR_FALSE, "Whether blockvis run follows a settlement again with friction, compliance of the "
@@ -173,7 +174,7 @@ def losses_of(response: solver.Response) -> list[str]:
 def settlement_course(settlements: tuple[solver.Settlement, ...]) -> Course:
     """Run over settlements and measure the reaction to them, in their unit."""
     unit = settlements[0].unit if settlements else "m"
-    return Course(solver.settlement_in(unit), solver.reaction_to(unit), settlements)
+    return Course(mechanics.settlement_in(unit), mechanics.reaction_to(unit), settlements)
 
 
 def stored_settlements(summary: Mapping[str, Any]) -> tuple[solver.Settlement, ...]:
@@ -204,21 +205,21 @@ def _method(response: solver.Response) -> str | None:
 
 
 def settlement_steps(
-    given: RunInput, resume: solver.PathState | None = None, *, whole: bool = False
-) -> solver.Increments:
+    given: RunInput, resume: mechanics.PathState | None = None, *, whole: bool = False
+) -> mechanics.Increments:
     """Follow the settlements of a case under the dead load alone; without settlements there are no increments.
 
     Parameters
     ----------
     given : RunInput
-    resume : solver.PathState, optional
+    resume : solver.mechanics.PathState, optional
     whole : bool
         Whether the first loss of a block ends it, because what comes after is asked of the whole structure.
     """
     case = given.case
     if not case.settlements:
         return without_increments()
-    return solver.settlement_increments(
+    return mechanics.settlement_increments(
         given.assembly,
         case.settlements,
         interfaces=given.interfaces,
@@ -229,16 +230,16 @@ def settlement_steps(
     )
 
 
-def not_reached(before: solver.Ending, what: str) -> solver.Ending:
+def not_reached(before: mechanics.Ending, what: str) -> mechanics.Ending:
     """Say how an analysis ends whose settlement did not reach its limit.
 
     Parameters
     ----------
-    before : solver.Ending
+    before : solver.mechanics.Ending
         Of the settlement.
     what : str
         What that means for the analysis.
     """
     if before.stop is solver.Status.COLLAPSED:
-        return solver.Ending(solver.Status.NO_INITIAL_EQUILIBRIUM, f"the settlement alone: {before.message}; {what}")
-    return solver.Ending(before.stop, f"during the settlement: {before.message}")
+        return mechanics.Ending(solver.Status.NO_INITIAL_EQUILIBRIUM, f"the settlement alone: {before.message}; {what}")
+    return mechanics.Ending(before.stop, f"during the settlement: {before.message}")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 import solver
+from solver import mechanics
 
 from .facing import faced, facing_tolerance
 from .inspect import inspected
@@ -156,7 +157,7 @@ def _with_supports(layout: Layout, supports: Sequence[Mapping[str, Any]]) -> Lay
             )
         outline = _outline_of(support, name)
         blocks.append(prism(outline, *_levels_of(support, name)) if in_space else outline)
-        roles.append(checked_role(str(support.get("role", solver.FIXED)), f"support '{name}'"))
+        roles.append(checked_role(str(support.get("role", mechanics.FIXED)), f"support '{name}'"))
     return layout.with_more(
         blocks,
         names=names,

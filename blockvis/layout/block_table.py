@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-import solver
+from solver import mechanics
 
 from .layout import Layout
 
@@ -60,8 +60,8 @@ def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
 
     roles = words("role", [""] * layout.n_blocks)
     for name, role in zip(words("name", layout.names), roles, strict=True):
-        if role and role not in solver.ROLES:
-            raise ValueError(f"block '{name}' has role '{role}' in the file; roles are {', '.join(solver.ROLES)}")
+        if role and role not in mechanics.ROLES:
+            raise ValueError(f"block '{name}' has role '{role}' in the file; roles are {', '.join(mechanics.ROLES)}")
     return replace(
         layout,
         thickness=numbers("thickness") if layout.dimension == 2 else None,
@@ -76,6 +76,6 @@ def with_rows(layout: Layout, rows: Sequence[Any]) -> Layout:
 def layers_of(layout: Layout, default: str) -> list[str]:
     """Name the layer of each block: its group, else its role as a support, else its material, else the default."""
     return [
-        group or (role if role in (solver.FIXED, solver.MOVING) else "") or material or default
+        group or (role if role in (mechanics.FIXED, mechanics.MOVING) else "") or material or default
         for group, role, material in zip(layout.groups, layout.roles, layout.materials, strict=True)
     ]

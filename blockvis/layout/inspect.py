@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import solver
+from solver import mechanics
 
 from .facing import Facing as FacedJoints
 from .facing import faced, facing_tolerance
@@ -163,7 +164,7 @@ def inspected(layout: Layout) -> Inspection:
     kept = np.array([i for i in range(layout.n_blocks) if i not in dropped])
     drawn = layout.chosen(kept)
     roles = tuple(roles_of(layout, {}))
-    free = np.array([roles[i] == solver.FREE for i in kept])
+    free = np.array([roles[i] == mechanics.FREE for i in kept])
     found = _in_space(drawn, free) if layout.dimension == 3 else _in_the_plane(drawn)
     for key in ("overlapping", "open_joints"):
         found[key] = tuple((int(kept[i]), int(kept[j]), by) for i, j, by in found.get(key, ()))
@@ -285,7 +286,7 @@ def _closing_thickness(open_joints: Sequence[tuple[int, int, float]]) -> float:
 
 def _open_joints(assembly: solver.Assembly, width: float) -> list[tuple[int, int, float]]:
     """Pairs of blocks of which faces cover each other across a gap, and its width [m], widest first."""
-    contacts = solver.find_contacts(assembly, assembly.vertices, WIDEST_JOINT * width)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, WIDEST_JOINT * width)
     pairs, joint = contacts.joints()
     n = len(pairs)
     low, high = np.full(n, np.inf), np.full(n, -np.inf)

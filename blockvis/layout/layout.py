@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 import solver
+from solver import mechanics
 
 from .left_out import LeftOut
 from .notes import CHANGED, Note
@@ -165,14 +166,14 @@ class Layout:
 
 def layout_of(assembly: solver.Assembly, *, pose: solver.Pose | None = None) -> Layout:
     """Make a layout of an assembly, with its blocks as drawn or as displaced in a pose."""
-    vertices = assembly.vertices if pose is None else solver.moved_vertices(assembly, pose)
+    vertices = assembly.vertices if pose is None else mechanics.moved_vertices(assembly, pose)
     shared: dict[str, Any] = {
         "names": assembly.names,
         "roles": tuple(map(str, assembly.roles)),
         "materials": assembly.materials,
         "density": assembly.density,
     }
-    if isinstance(assembly.shapes, solver.Polyhedra):
+    if isinstance(assembly.shapes, mechanics.Polyhedra):
         shapes = assembly.shapes
         corners = np.split(vertices, shapes.offsets[1:-1])
         return Layout(blocks=tuple((own, shapes.surface(i)[1]) for i, own in enumerate(corners)), **shared)

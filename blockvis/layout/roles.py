@@ -5,16 +5,16 @@ from __future__ import annotations
 import fnmatch
 from collections.abc import Mapping, Sequence
 
-import solver
 from blockvis.text import by_similarity
+from solver import mechanics
 
 from .layout import Layout
 
 
 def checked_role(role: str, whose: str) -> str:
     """Return the role if it is one; ``whose`` is named in the error."""
-    if role not in solver.ROLES:
-        raise ValueError(f"{whose} has role '{role}'; roles are {', '.join(solver.ROLES)}")
+    if role not in mechanics.ROLES:
+        raise ValueError(f"{whose} has role '{role}'; roles are {', '.join(mechanics.ROLES)}")
     return role
 
 
@@ -26,7 +26,7 @@ def roles_of(layout: Layout, roles: Mapping[str, str], *, all_match: bool = True
     found = []
     for name, group, role in zip(layout.names, layout.groups, layout.roles, strict=True):
         said = (role, group.strip().lower(), name.strip().lower())
-        found.append(next((word for word in said if word in solver.ROLES), solver.FREE))
+        found.append(next((word for word in said if word in mechanics.ROLES), mechanics.FREE))
     labels = {"name": layout.names, "group": layout.groups, "material": layout.materials}
     by_name: list[tuple[list[int], str]] = []
     by_group: list[tuple[list[int], str]] = []
@@ -64,7 +64,7 @@ def dropped_twins(layout: Layout, twins: Sequence[tuple[int, int]], roles: Mappi
     roles : mapping of str to {"free", "fixed", "moving"}
     """
     said = roles_of(layout, roles, all_match=False)
-    return {first if said[first] == solver.FREE != said[copy] else copy for first, copy in twins}
+    return {first if said[first] == mechanics.FREE != said[copy] else copy for first, copy in twins}
 
 
 def twins_note(layout: Layout, twins: Sequence[tuple[int, int]], dropped: set[int]) -> str:

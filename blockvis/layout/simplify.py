@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-import solver
+from solver import mechanics
 
 from .joints.trimming import with_corners_on_edges
 from .linked import linked
@@ -160,9 +160,9 @@ def _spoilt(found: list[np.ndarray], drawn: Sequence[np.ndarray], tolerance: flo
     if bad:
         return bad
     offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in found])])
-    a, b, _ = solver.overlap_depths(np.concatenate(found), offsets, 1e-3 * tolerance)
+    a, b, _ = mechanics.overlap_depths(np.concatenate(found), offsets, 1e-3 * tolerance)
     offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in drawn])])
-    i, j, _ = solver.overlap_depths(np.concatenate(drawn), offsets, 1e-3 * tolerance)
+    i, j, _ = mechanics.overlap_depths(np.concatenate(drawn), offsets, 1e-3 * tolerance)
     already = set(zip(i.tolist(), j.tolist(), strict=True))
     new = set(zip(a.tolist(), b.tolist(), strict=True)) - already
     return {block for pair in new for block in pair}

@@ -9,6 +9,7 @@ import numpy as np
 import solver
 from blockvis.results.about import loss_of
 from blockvis.text import force_text
+from solver import mechanics
 
 #: Warning on frames of a fall in real time.
 FALL_BADGE = "FALLING · real time"
@@ -61,8 +62,8 @@ def in_one_unit(response: solver.Response, phase: int | None = None) -> solver.R
     return replace(
         response,
         increments=tuple(i for i in response.increments if first <= i.phase <= last),
-        parameter=solver.settlement_in(units[phase]),
-        measured=solver.reaction_to(units[phase]),
+        parameter=mechanics.settlement_in(units[phase]),
+        measured=mechanics.reaction_to(units[phase]),
     )
 
 
@@ -181,7 +182,7 @@ def _value_text(increment: solver.Increment, response: solver.Response) -> str:
     if not np.isfinite(increment.measured):
         return f"{name} {measured.symbol} unbounded"
     text = f"{name} {measured.symbol} = {increment.measured:.5g} {measured.unit}".rstrip()
-    live = increment.reaction if measured == solver.LOAD_MULTIPLIER else 0.0
+    live = increment.reaction if measured == mechanics.LOAD_MULTIPLIER else 0.0
     return text + (f"   ·   Live load {force_text(live)}" if live else "")
 
 

@@ -18,6 +18,7 @@ import solver
 from blockvis.results.about import about, collapse_mechanism, counts_text
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.system.atomic_files import whole_file
+from solver import mechanics
 
 from . import palette
 from .captions import (
@@ -114,7 +115,7 @@ def events_of(response: solver.Response) -> list[Event]:
     total, values = response.parameters, response.values
     found = []
     # One mechanism per increment: its contact points may come from a file.
-    pairs = (_joints(solver.mechanism_of(response.assembly, increment)) for increment in path)
+    pairs = (_joints(mechanics.mechanism_of(response.assembly, increment)) for increment in path)
     for k, (earlier, later) in enumerate(pairwise(pairs), start=1):
         text = []
         for word, before, after in zip(("hinge", "sliding joint"), earlier, later, strict=True):
@@ -397,6 +398,6 @@ def _mark_events(axes: Axes, response: solver.Response, factor: float, text: flo
     )  # fmt: skip
 
 
-def _joints(mechanism: solver.Mechanism) -> list[set[tuple[int, int]]]:
+def _joints(mechanism: mechanics.Mechanism) -> list[set[tuple[int, int]]]:
     """Pairs of blocks of the hinges, and of the sliding joints."""
     return [set(map(tuple, pairs.tolist())) for pairs in (mechanism.hinges, mechanism.sliding)]

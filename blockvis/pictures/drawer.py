@@ -15,6 +15,7 @@ from blockvis.dynamics.fall import CAPTION, Fall, falling_increment
 from blockvis.results.cracks import cracks_of
 from blockvis.results.joints import faces_at, initial_joints
 from blockvis.text import force_text, rounded_length
+from solver import mechanics
 
 from . import palette
 from .captions import FAILED_BADGE, FALL_BADGE, badge_of, caption_of, matters
@@ -331,7 +332,7 @@ class Drawer:
         for k, blocks in enumerate(chosen):
             weight = volumes[blocks] / volumes[blocks].sum()
             tails[k] = weight @ pose.positions[blocks]
-            tips[k] = solver.carried(tails[[k]], blocks[:1], pose, swing.displaced)[0]
+            tips[k] = mechanics.carried(tails[[k]], blocks[:1], pose, swing.displaced)[0]
         self.tints = mechanism_colours(self.assembly, self.fill, swing)
         self._drawn_at = self.scene.show_motion(swing, tails, tips)
 
@@ -466,7 +467,7 @@ class Drawer:
         size = np.linalg.norm(forces, axis=1)
         kept = size > SMALLEST_RESULTANT * size.max(initial=0.0)
         points, forces, blocks = points[kept], forces[kept], blocks[kept]
-        points = solver.carried_between(points, blocks[:, 0], blocks[:, 1], increment.pose, shown)
+        points = mechanics.carried_between(points, blocks[:, 0], blocks[:, 1], increment.pose, shown)
         half = 0.5 * self.force_scale * forces
         line = np.zeros((0, 2, self.assembly.dimension))
         if self.look.forces == "thrust":
@@ -493,7 +494,7 @@ class Drawer:
         lines = []
         for block, other in ((joints.block_a, joints.block_b), (joints.block_b, joints.block_a)):
             on = ~free[block] & free[other]
-            ends = [solver.carried(joints.ends[on, k], block[on], drawn, shown) for k in (0, 1)]
+            ends = [mechanics.carried(joints.ends[on, k], block[on], drawn, shown) for k in (0, 1)]
             lines.append(np.stack(ends, axis=1))
         self.scene.bearings(np.concatenate(lines))
 
@@ -538,16 +539,16 @@ def sampled(numbers: list[int]) -> frozenset[int]:
     return frozenset(numbers[k] for k in chosen)
 
 
-def contacts_at(increment: solver.Increment, pose: solver.Pose) -> solver.Contacts:
+def contacts_at(increment: solver.Increment, pose: solver.Pose) -> mechanics.Contacts:
     """Contact points of an increment, carried to a pose nearby."""
     contacts = increment.contacts
-    points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
+    points = mechanics.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
     return replace(contacts, points=points)
 
 
 def largest_displacement(assembly: solver.Assembly, increment: solver.Increment) -> float:
     """Largest displacement [m] of a corner of a free block since the layout."""
-    moved = solver.moved_vertices(assembly, increment.pose) - assembly.vertices
+    moved = mechanics.moved_vertices(assembly, increment.pose) - assembly.vertices
     return float(np.linalg.norm(moved, axis=1)[assembly.free[assembly.block_of_vertex]].max(initial=0.0))
 
 

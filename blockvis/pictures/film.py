@@ -11,6 +11,7 @@ import numpy as np
 from PIL import Image
 
 import solver
+from solver import mechanics
 
 from .captions import matters
 from .drawer import Drawer
@@ -71,11 +72,11 @@ def film_of(
 
 def _distinct(drawer: Drawer, path: list[solver.Increment], most: int) -> int:
     """How many pictures of the path differ: one for each pixel of the way of the block that goes farthest."""
-    if len(path) == 1 or solver.path_parameters(path)[-1] <= solver.path_parameters(path)[0]:
+    if len(path) == 1 or mechanics.path_parameters(path)[-1] <= mechanics.path_parameters(path)[0]:
         return 1
     way, before = 0.0, None
     for increment in path:
-        corners = solver.moved_vertices(drawer.assembly, increment.pose)
+        corners = mechanics.moved_vertices(drawer.assembly, increment.pose)
         if before is not None:
             way += float(np.linalg.norm(corners - before, axis=1).max())
         before = corners
@@ -99,7 +100,7 @@ def _falling(drawer: Drawer, fps: float) -> list[tuple[Draw, int]]:
     shown: list[tuple[Draw, int]] = []
     drawn = None
     for draw, pose in zip(draws, poses, strict=True):
-        corners = solver.moved_vertices(drawer.assembly, pose)
+        corners = mechanics.moved_vertices(drawer.assembly, pose)
         if drawn is not None and np.abs(corners - drawn).max() <= STILL * drawer.scene.pixel:
             shown[-1] = shown[-1][0], shown[-1][1] + 1
             continue
@@ -126,7 +127,7 @@ def _even_motion(
     """``n`` frames at even steps of the parameter: the increment before each, its pose, and its parameter."""
     if not path:
         return
-    total = solver.path_parameters(path)
+    total = mechanics.path_parameters(path)
     if total[-1] <= total[0]:
         yield path[-1], None, None
         return

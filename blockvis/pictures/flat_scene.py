@@ -12,6 +12,7 @@ from matplotlib.transforms import Affine2D
 from PIL import Image
 
 import solver
+from solver import mechanics
 
 from . import palette
 from .frame import Frame
@@ -84,12 +85,12 @@ class FlatScene:
         """
         if block_fill is not None:
             self._paint(block_fill)
-        corners = solver.moved_vertices(self.assembly, shown)
+        corners = mechanics.moved_vertices(self.assembly, shown)
         for layer in (*self._fills, self._layers["outline"]):
             layer.move(corners)
         if "hatch" in self._layers:
             points, blocks = self._hatched
-            self._layers["hatch"].move(solver.carried(points, blocks, solver.Pose.initial(self.assembly), shown))
+            self._layers["hatch"].move(mechanics.carried(points, blocks, solver.Pose.initial(self.assembly), shown))
 
     def polygons(self, layer: str, corners: np.ndarray, colour: Colour) -> None:
         """Fill polygons, (n, k, 2) [m], in one layer, instead of those before."""
@@ -163,7 +164,7 @@ class FlatScene:
     def show_motion(self, swing: Swing, tails: np.ndarray, tips: np.ndarray) -> solver.Pose:
         """Draw the parts of a mechanism as outlines where it takes them; the blocks stay where they are."""
         if swing.n_parts <= MOST_PARTS:
-            corners = solver.moved_vertices(self.assembly, swing.displaced)
+            corners = mechanics.moved_vertices(self.assembly, swing.displaced)
             outlines = part_outlines(self.assembly, corners, swing.parts)
             self.lines("motion outline", outlines, palette.SETTLEMENT, self.size[1] / 600.0)
         self.arrows("motion", tails, tips, palette.SETTLEMENT)

@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 import solver
 from blockvis.text import length_text, rounded_length
+from solver import mechanics
 
 from . import palette
 
@@ -422,7 +423,7 @@ def framed(
     d = assembly.dimension if axes is None else len(axes)
     inner, outer = _Box(d), _Box(d)
     for pose in poses:
-        corners = solver.moved_vertices(assembly, pose)
+        corners = mechanics.moved_vertices(assembly, pose)
         corners = corners if axes is None else corners @ axes.T
         inner.hold(corners[free] if free.any() else corners)
         outer.hold(corners[~free] if (~free).any() else corners)

@@ -9,6 +9,7 @@ import numpy as np
 
 import solver
 from blockvis.text import force_text
+from solver import mechanics
 
 from .marks import MOST_ARROWS, evenly, leaving
 
@@ -45,7 +46,7 @@ class LiveLoad:
 
     def carried(self, pose: solver.Pose) -> np.ndarray:
         """(n, d) array [m]: where the points are when all blocks are at another pose."""
-        return solver.carried(self.points, np.arange(len(self.blocks)), self.pose, _of(self.blocks, pose))
+        return mechanics.carried(self.points, np.arange(len(self.blocks)), self.pose, _of(self.blocks, pose))
 
     @property
     def largest(self) -> float:
@@ -74,7 +75,7 @@ def live_load_of(response: solver.Response, increment: solver.Increment, extent:
     if not (standing and finite):
         nowhere = np.zeros((0, assembly.dimension))
         return LiveLoad(nowhere, nowhere, np.zeros(0, dtype=int), _of(np.zeros(0, dtype=int), pose))
-    live = -(solver.block_forces(increment.contacts, pose, increment.forces) + response.loads.dead)
+    live = -(mechanics.block_forces(increment.contacts, pose, increment.forces) + response.loads.dead)
     live[~assembly.free] = 0.0
     forces = live[:, : assembly.dimension]
     size = np.linalg.norm(forces, axis=1)
@@ -105,7 +106,7 @@ class LiveLoads:
         self._dimension = response.assembly.dimension
         self._swinging = bool(response.limits) and response.collapse is None
         self._loads: dict[tuple[int, float], LiveLoad] = {}
-        if response.measured == solver.LOAD_MULTIPLIER:
+        if response.measured == mechanics.LOAD_MULTIPLIER:
             # Frames of a swinging mechanism have the load of their limit state.
             states = {_place(state): state for state in response.path}
             for increment in increments:
@@ -161,7 +162,7 @@ def _entry(assembly: solver.Assembly, pose: solver.Pose, block: int, load: np.nd
     if abs(moment) < 1e-3 * size * assembly.block_size:
         return centre
     through = centre + moment / size**2 * np.array([force[1], -force[0]])
-    corners = solver.moved_vertices(assembly, pose)[assembly.offsets[block] : assembly.offsets[block + 1]]
+    corners = mechanics.moved_vertices(assembly, pose)[assembly.offsets[block] : assembly.offsets[block + 1]]
     unit = force / size
     across = np.array([-unit[1], unit[0]])
     a = (corners - through) @ across

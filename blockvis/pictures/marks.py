@@ -11,6 +11,7 @@ import solver
 from blockvis.results.cracks import SMALLEST_OPENING
 from blockvis.results.joint_faces import TOUCHING, InitialJoints
 from blockvis.results.joints import carried_faces
+from solver import mechanics
 
 from .frame import Frame
 
@@ -52,7 +53,7 @@ def part_outlines(assembly: solver.Assembly, corners: np.ndarray, parts: np.ndar
     assembly : solver.Assembly
     corners : (n_vertices, 2) array [m]
     parts : (n_blocks,) int array
-        As ``solver.rigid_parts`` gives them.
+        As ``solver.mechanics.rigid_parts`` gives them.
     """
     edges = [np.zeros((0, 2, 2))]
     margin = SLIVER * assembly.block_size
@@ -122,8 +123,8 @@ def marks_of(
     shown : solver.Pose
         Where the blocks are drawn: the increment's own pose, a magnified one, or a later one.
     """
-    contacts, mechanism = increment.contacts, solver.mechanism_of(assembly, increment)
-    points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
+    contacts, mechanism = increment.contacts, mechanics.mechanism_of(assembly, increment)
+    points = mechanics.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, shown)
     hinges = points[hinge_ends(assembly, increment, mechanism)]
     cracks = cracks_between(assembly, joints, increment.pose, shown, increment.fallen)
     if assembly.dimension == 2:
@@ -244,7 +245,7 @@ def length_per_force(sizes: np.ndarray, largest: float, usual_length: float, ext
     return min(max(usual_length, 0.015 * extent) / usual, 0.12 * extent / largest)
 
 
-def hinge_ends(assembly: solver.Assembly, increment: solver.Increment, mechanism: solver.Mechanism) -> np.ndarray:
+def hinge_ends(assembly: solver.Assembly, increment: solver.Increment, mechanism: mechanics.Mechanism) -> np.ndarray:
     """(n, 2) int array: of each hinge the two contact points farthest from each other that do not open.
 
     In the plane it is one, twice.
@@ -253,7 +254,7 @@ def hinge_ends(assembly: solver.Assembly, increment: solver.Increment, mechanism
     ----------
     assembly : solver.Assembly
     increment : solver.Increment
-    mechanism : solver.Mechanism
+    mechanism : solver.mechanics.Mechanism
     """
     contacts = increment.contacts
     if assembly.dimension == 2:
@@ -276,7 +277,7 @@ def hinge_ends(assembly: solver.Assembly, increment: solver.Increment, mechanism
 
 
 def _sliding_faces(
-    assembly: solver.Assembly, joints: InitialJoints, mechanism: solver.Mechanism, shown: solver.Pose
+    assembly: solver.Assembly, joints: InitialJoints, mechanism: mechanics.Mechanism, shown: solver.Pose
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Edges (n, 2, 3) around the faces that slide, and the faces themselves, of both blocks."""
     count = 1 + int(max(joints.block_b.max(initial=0), mechanism.sliding.max(initial=0)))
@@ -321,7 +322,7 @@ def settlement_arrows(
         blocks, places = _seen_places(assembly, blocks, pose, seen)
     else:
         places = pose.positions[blocks]
-    speeds = solver.point_velocities(places, blocks, pose, rate)
+    speeds = mechanics.point_velocities(places, blocks, pose, rate)
     sizes = np.linalg.norm(speeds, axis=1)
     moves = evenly(np.flatnonzero(sizes > 0.0), MOST_ARROWS)
     blocks, directions = blocks[moves], speeds[moves] / sizes[moves, None]
@@ -333,7 +334,7 @@ def _seen_places(
     assembly: solver.Assembly, blocks: np.ndarray, pose: solver.Pose, seen: Frame | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Blocks of the plane that are seen, of many the one in the middle, and places (n, 2) [m] inside what is seen."""
-    corners = solver.moved_vertices(assembly, pose)
+    corners = mechanics.moved_vertices(assembly, pose)
     outlines = [shapely.Polygon(corners[assembly.offsets[b] : assembly.offsets[b + 1]]) for b in blocks]
     shown = outlines if seen is None else shapely.intersection(outlines, shapely.box(*seen.low, *seen.high))
     rows = [k for k, outline in enumerate(shown) if not outline.is_empty]
@@ -356,7 +357,7 @@ def evenly(numbers: np.ndarray, most: int) -> np.ndarray:
 
 def leaving(assembly: solver.Assembly, pose: solver.Pose, blocks: np.ndarray, directions: np.ndarray) -> np.ndarray:
     """(n, 3) array [m]: as far from the centroids of blocks along directions (n, 3) as their corners lie."""
-    corners, offsets = solver.moved_vertices(assembly, pose), assembly.polyhedra.offsets
+    corners, offsets = mechanics.moved_vertices(assembly, pose), assembly.polyhedra.offsets
     places = pose.positions[blocks].copy()
     for k, block in enumerate(blocks.tolist()):
         reach = (corners[offsets[block] : offsets[block + 1]] - places[k]) @ directions[k]
@@ -365,14 +366,14 @@ def leaving(assembly: solver.Assembly, pose: solver.Pose, blocks: np.ndarray, di
 
 
 def sliding_lines(
-    assembly: solver.Assembly, contacts: solver.Contacts, k: np.ndarray, points: np.ndarray
+    assembly: solver.Assembly, contacts: mechanics.Contacts, k: np.ndarray, points: np.ndarray
 ) -> np.ndarray:
     """(n, 2, 2) array [m]: ends of the part of each sliding joint in the plane that slides.
 
     Parameters
     ----------
     assembly : solver.Assembly
-    contacts : solver.Contacts
+    contacts : solver.mechanics.Contacts
     k : (k,) int array
         Numbers of the contact points that slide.
     points : (n_contacts, 2) array [m]
@@ -401,7 +402,7 @@ def sliding_lines(
 
 
 def _extents(
-    contacts: solver.Contacts, points: np.ndarray, pairs: np.ndarray, base: np.ndarray, tangent: np.ndarray
+    contacts: mechanics.Contacts, points: np.ndarray, pairs: np.ndarray, base: np.ndarray, tangent: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest place, (n,) [m], of all contact points of pairs of blocks along their tangents."""
     every, which = contacts.joints()

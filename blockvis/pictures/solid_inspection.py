@@ -10,6 +10,7 @@ from PIL import Image
 
 import solver
 from blockvis.system.atomic_files import whole_file
+from solver import mechanics
 
 from . import palette
 from .frame import Key, Sheet, framed, write_names
@@ -54,7 +55,7 @@ def draw_solid_inspection(inspection: Inspection, path: str | Path) -> Path:
         Key("area", f"{role}: {int(some.sum())}", colour)
         for role, some, colour in (
             ("free", assembly.free & ~twice, palette.rgb(palette.STONES[0])),
-            ("fixed", (assembly.roles == solver.FIXED) & ~twice, palette.SUPPORT),
+            ("fixed", (assembly.roles == mechanics.FIXED) & ~twice, palette.SUPPORT),
             ("moving", assembly.moving & ~twice, palette.MOVING),
             ("drawn twice", twice, TWICE),
         )

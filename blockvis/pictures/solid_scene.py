@@ -15,6 +15,7 @@ from PIL import Image
 from vtkmodules.vtkCommonCore import vtkLogger
 
 import solver
+from solver import mechanics
 
 from . import palette
 from .frame import Frame
@@ -109,7 +110,7 @@ class SolidScene:
         block_fill : (n_blocks, 3) uint8 array, optional
             New colours.
         """
-        corners = solver.moved_vertices(self.assembly, shown)
+        corners = mechanics.moved_vertices(self.assembly, shown)
         self._surface.points = corners
         self._edges.points = corners
         if block_fill is not None:
@@ -223,7 +224,7 @@ class SolidScene:
 
     def show_motion(self, swing: Swing, tails: np.ndarray, tips: np.ndarray) -> solver.Pose:
         """Draw the edges of where the parts of a mechanism were; the blocks go where it takes them."""
-        edges = solver.moved_vertices(self.assembly, swing.increment.pose)[self.edges]
+        edges = mechanics.moved_vertices(self.assembly, swing.increment.pose)[self.edges]
         moving = (swing.parts >= 0)[self.assembly.block_of_vertex[self.edges[:, 0]]]
         self.lines("before", edges[moving], palette.GHOST, self.size[1] / 900.0)
         tips = tips + (LONGER - 1.0) * (tips - tails)

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 import solver
+from solver import mechanics
 
 #: Directions that are tried, from the structure to the eye: three-quarter views, in degrees around and above the level.
 AROUND = (-60.0, -30.0, -120.0, -150.0, 30.0, 60.0, 120.0, 150.0)
@@ -93,12 +94,12 @@ def _scaled(motion: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return motion / weights.sum() if weights.any() else np.zeros_like(motion)
 
 
-def showing_faces(shapes: solver.Polyhedra, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def showing_faces(shapes: mechanics.Polyhedra, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find the face of each block that shows most of itself, hidden or not.
 
     Parameters
     ----------
-    shapes : solver.Polyhedra
+    shapes : solver.mechanics.Polyhedra
     eye : (3,) array
         Unit vector to the eye.
 

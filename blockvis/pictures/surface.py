@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-import solver
+from solver import mechanics
 
 #: Edges between faces that differ by less than this cosine are not drawn.
 FLAT = 0.9995
 
 
-def triangles_of(shapes: solver.Polyhedra) -> tuple[np.ndarray, np.ndarray]:
+def triangles_of(shapes: mechanics.Polyhedra) -> tuple[np.ndarray, np.ndarray]:
     """Cut all faces into triangles.
 
     Parameters
     ----------
-    shapes : solver.Polyhedra
+    shapes : solver.mechanics.Polyhedra
 
     Returns
     -------
@@ -41,7 +41,7 @@ def triangles_of(shapes: solver.Polyhedra) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(triangles), np.concatenate(blocks)
 
 
-def _reentrant(shapes: solver.Polyhedra) -> np.ndarray:
+def _reentrant(shapes: mechanics.Polyhedra) -> np.ndarray:
     """(n_faces,) bool array: which faces have a corner that bends the other way."""
     points = shapes.vertices[shapes.corners]
     along = points[shapes.next_corner] - points
@@ -69,7 +69,7 @@ def _cut(corners: np.ndarray) -> np.ndarray:
     return np.asarray(found)
 
 
-def sharp_edges(shapes: solver.Polyhedra) -> np.ndarray:
+def sharp_edges(shapes: mechanics.Polyhedra) -> np.ndarray:
     """(n, 2) int array: vertices at both ends of each edge between faces that are not in one plane."""
     normals = shapes.faces(shapes.vertices).normals[shapes.face_of_corner]
     twins = shapes.twins

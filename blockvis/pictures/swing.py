@@ -8,6 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.results.swinging import corner_speeds, swung_increment
+from solver import mechanics
 
 from . import palette
 from .frame import framed
@@ -31,7 +32,7 @@ class Swing:
     displaced : solver.Pose
         After the motion; at the increment's own pose where nothing moves.
     parts : (n_blocks,) int array
-        As ``solver.rigid_parts`` gives them.
+        As ``solver.mechanics.rigid_parts`` gives them.
     moves : bool
         Whether anything moves.
     motion : (n_blocks, n_dof) array
@@ -60,7 +61,7 @@ def swing_of(response: solver.Response) -> Swing:
     """
     last = response.governing or response.increments[0]
     motion = last.velocity if response.collapse is None else response.collapse.mechanism
-    last = solver.with_motion(last, motion)
+    last = mechanics.with_motion(last, motion)
     assembly = response.assembly
     speeds = corner_speeds(assembly, last.pose, motion)
     fastest = float(speeds.max(initial=0.0))
@@ -70,8 +71,8 @@ def swing_of(response: solver.Response) -> Swing:
         motion = motion * np.minimum(1.0, fastest / np.maximum(speeds, fastest))[:, None]
     reach = 0.05 * float(framed(assembly, [last.pose]).size.max())
     motion = motion * (reach / fastest if fastest > 0 else 0.0)
-    displaced = solver.swung(last.pose, motion)
-    return Swing(last, displaced, solver.rigid_parts(assembly, last), fastest > 0.0, motion)
+    displaced = mechanics.swung(last.pose, motion)
+    return Swing(last, displaced, mechanics.rigid_parts(assembly, last), fastest > 0.0, motion)
 
 
 def shown_increments(response: solver.Response) -> tuple[solver.Increment, ...]:

@@ -20,6 +20,7 @@ from blockvis.pictures.marks import (
 from blockvis.results.joint_faces import InitialJoints
 from blockvis.results.joints import carried_faces
 from blockvis.text import force_text, rounded_length
+from solver import mechanics
 
 from .packing import FINENESS, FORCE_FINENESS, TURN_UNIT, deflated, rounded
 
@@ -190,7 +191,7 @@ def _marks(
     assembly: solver.Assembly, joints: InitialJoints, increment: solver.Increment
 ) -> tuple[np.ndarray, np.ndarray]:
     """List ends (n, 2, d) [m] of hinges and sliding joints, and (n, 2): 1 and -1, or 2 and in space the joint."""
-    mechanism, contacts = solver.mechanism_of(assembly, increment), increment.contacts
+    mechanism, contacts = mechanics.mechanism_of(assembly, increment), increment.contacts
     points = contacts.points
     hinges = points[hinge_ends(assembly, increment, mechanism)]
     if assembly.dimension == 2:

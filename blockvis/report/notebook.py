@@ -18,6 +18,7 @@ from blockvis.pictures import palette
 from blockvis.pictures.curves import draw_curve
 from blockvis.pictures.render import draw_mechanism
 from blockvis.text import force_text
+from solver import mechanics
 
 from .page import html_rows, report_html, summary_rows
 
@@ -110,7 +111,7 @@ def assembly_html(assembly: solver.Assembly) -> str:
     weight = float((assembly.masses * solver.GRAVITY)[assembly.free].sum())
     materials = [f"{name} {n}" for name, n in sorted(Counter(assembly.materials).items()) if name]
     rows = [
-        ("blocks", f"{assembly.n_blocks}: " + ", ".join(f"{counts[r]} {r}" for r in solver.ROLES if counts[r])),
+        ("blocks", f"{assembly.n_blocks}: " + ", ".join(f"{counts[r]} {r}" for r in mechanics.ROLES if counts[r])),
         ("size", size),
         ("weight", force_text(weight)),
         *([("materials", ", ".join(materials))] if materials else []),

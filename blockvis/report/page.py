@@ -42,6 +42,7 @@ from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
 from blockvis.system.atomic_files import write_whole
 from blockvis.text import force_text
+from solver import mechanics
 
 from .frames import model_of_frames, surveyed
 from .packing import TURN_UNIT, deflated, hexadecimals, rounded
@@ -243,7 +244,7 @@ def _model(response: solver.Response, fall: Fall | None, band: ReactionRange | N
         own = model_in_space(response, swing, shown)
     else:
         own = _model_in_plane(response, shown, None if fall is None else fall.ground)
-    roles = {role: number for number, role in enumerate(solver.ROLES)}
+    roles = {role: number for number, role in enumerate(mechanics.ROLES)}
     fills = palette.block_colours(assembly.materials, assembly.free)
     return own | {
         "space": assembly.dimension == 3,
@@ -342,7 +343,7 @@ def _frames(response: solver.Response, shown: list[_Frame]) -> list[dict[str, An
 
 def _times(shown: list[_Frame]) -> list[float]:
     """Seconds at which each frame plays: even settlement, a pause, the fall in its own time where it has one."""
-    path = solver.path_parameters([frame.increment for frame in shown if not frame.falling])
+    path = mechanics.path_parameters([frame.increment for frame in shown if not frame.falling])
     path = path - path[:1]
     total = float(path[-1]) if len(path) and path[-1] > 0 else 1.0
     times: list[float] = []
@@ -413,7 +414,7 @@ def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tu
     swing = swing_of(response) if path else None
     if swing is not None and swing.moves:
         fails = response.collapse is not None or response.swings
-        counted = counts_text(solver.mechanism_of(assembly, swing.increment))
+        counted = counts_text(mechanics.mechanism_of(assembly, swing.increment))
         rows.append(("mechanism" if fails else "motion that would follow", counted))
     follows = f", {apart} {'of pseudo-motion' if response.swings else 'falling'}" if apart and fall is None else ""
     rows += [
@@ -429,7 +430,7 @@ def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tu
 
 
 def _certificate(response: solver.Response) -> list[tuple[str, str]]:
-    worst = solver.worst_of(i.certificate for i in response.path or response.increments)
+    worst = mechanics.worst_of(i.certificate for i in response.path or response.increments)
     if worst is None:
         return []
     rows = [

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import solver
 from blockvis.text import force_text
+from solver import mechanics
 
 from .increments import folder_of
 from .record import Record, read_record, versions
@@ -79,7 +80,7 @@ def least_reaction(first: solver.Increment) -> float:
     return float(first.least if math.isfinite(first.least) else first.reaction)
 
 
-def collapse_mechanism(response: solver.Response) -> solver.Mechanism | None:
+def collapse_mechanism(response: solver.Response) -> mechanics.Mechanism | None:
     """Find the collapse mechanism at the last equilibrium: what words, tables, curves, pictures and pages count.
 
     Parameters
@@ -88,13 +89,13 @@ def collapse_mechanism(response: solver.Response) -> solver.Mechanism | None:
 
     Returns
     -------
-    solver.Mechanism or None
+    solver.mechanics.Mechanism or None
         None where nothing collapses.
     """
     collapse, path = response.collapse, response.path
     if collapse is None or not path or not collapse.mechanism.any():
         return None
-    return solver.mechanism_of(response.assembly, solver.with_motion(path[-1], collapse.mechanism))
+    return mechanics.mechanism_of(response.assembly, mechanics.with_motion(path[-1], collapse.mechanism))
 
 
 def mechanism_text(response: solver.Response) -> str:
@@ -105,7 +106,7 @@ def mechanism_text(response: solver.Response) -> str:
     return "" if response.collapse is None else response.collapse.words
 
 
-def counts_text(mechanism: solver.Mechanism) -> str:
+def counts_text(mechanism: mechanics.Mechanism) -> str:
     """Count the moving parts, hinges and sliding joints of a mechanism."""
     counted = (
         (len(mechanism.motions), "moving part"),
@@ -149,9 +150,9 @@ def loss_in(assembly: solver.Assembly, falling: solver.Increment) -> Loss:
     assembly : solver.Assembly
     falling : solver.Increment
     """
-    moves = solver.rigid_parts(assembly, falling) >= 0
+    moves = mechanics.rigid_parts(assembly, falling) >= 0
     weight = float(assembly.masses[moves & assembly.free].sum() * solver.GRAVITY)
-    return Loss(weight, weight / solver.total_weight(assembly))
+    return Loss(weight, weight / mechanics.total_weight(assembly))
 
 
 def loss_of(response: solver.Response) -> Loss | None:
@@ -164,4 +165,4 @@ def loss_of(response: solver.Response) -> Loss | None:
     collapse, path = response.collapse, response.path
     if collapse is None or collapse.lost != "equilibrium" or not path or not collapse.mechanism.any():
         return None
-    return loss_in(response.assembly, solver.with_motion(path[-1], collapse.mechanism))
+    return loss_in(response.assembly, mechanics.with_motion(path[-1], collapse.mechanism))

@@ -23,6 +23,7 @@ from vtkmodules.vtkCommonDataModel import (
 )
 
 import solver
+from solver import mechanics
 
 from .joint_faces import InitialJoints, Rings, initial_joints, lengths_of
 from .joints import joint_states
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     import pyvista as pv
 
 #: Numbers of the roles in the cell array ``role``; their names are in the field array ``role_names``.
-ROLE_NUMBERS = {role: number for number, role in enumerate(solver.ROLES)}
+ROLE_NUMBERS = {role: number for number, role in enumerate(mechanics.ROLES)}
 
 
 #: What the points of a dataset of blocks show: where the blocks are, or where the layout has them.
@@ -84,7 +85,7 @@ def block_grid(
 ) -> vtkUnstructuredGrid:
     """Make what :func:`block_dataset` wraps."""
     pose = solver.Pose.initial(assembly) if increment is None else increment.pose
-    corners = solver.moved_vertices(assembly, pose)
+    corners = mechanics.moved_vertices(assembly, pose)
     if assembly.dimension == 2:
         grid = _grid(corners, assembly.offsets, VTK_POLYGON)
     else:
@@ -103,7 +104,7 @@ def block_grid(
     for name, words in (("name", assembly.names), ("role_name", assembly.roles), ("material", assembly.materials)):
         grid.GetCellData().AddArray(_strings(name, words))
     _give_shape(grid, assembly.vertices, shape)
-    grid.GetFieldData().AddArray(_strings("role_names", solver.ROLES))
+    grid.GetFieldData().AddArray(_strings("role_names", mechanics.ROLES))
     grid.GetFieldData().AddArray(_strings("material_names", materials))
     if increment is not None:
         add_arrays(grid.GetCellData(), {"fallen": increment.fallen.astype(np.int32)})
@@ -202,10 +203,10 @@ def contact_dataset(
     pyvista.UnstructuredGrid
         Point arrays ``normal`` and ``tangent`` (n_contacts, 3), ``force`` (n_contacts, 3) on ``block_a`` [N],
         ``normal_force`` (compression positive) and ``shear_force`` [N], ``gap`` [m], ``friction``, ``state``
-        (number of :class:`solver.ContactState`), ``block_a`` and ``block_b``, ``displacement`` and ``reference`` as of
-        :func:`block_dataset`; its field arrays, and ``state_names``. In frames of a fall, which are no
-        equilibrium, forces are 0. In space ``shear_force`` is the size of the vector ``shear`` [N], and ``slip`` [m]
-        is how far block a has moved along block b there since the layout.
+        (number of :class:`solver.mechanics.ContactState`), ``block_a`` and ``block_b``, ``displacement`` and
+        ``reference`` as of :func:`block_dataset`; its field arrays, and ``state_names``. In frames of a fall, which
+        are no equilibrium, forces are 0. In space ``shear_force`` is the size of the vector ``shear`` [N], and
+        ``slip`` [m] is how far block a has moved along block b there since the layout.
     """
     return _as_dataset(contact_grid(assembly, increment, shape=shape))
 
@@ -238,7 +239,7 @@ def contact_grid(
     if in_space:
         points |= {"shear": shear, "slip": _slip(assembly, increment)}
     add_arrays(grid.GetPointData(), points)
-    grid.GetFieldData().AddArray(_strings("state_names", [state.name.lower() for state in solver.ContactState]))
+    grid.GetFieldData().AddArray(_strings("state_names", [state.name.lower() for state in mechanics.ContactState]))
     _describe(grid, increment)
     _state_units(grid)
     return grid
@@ -258,7 +259,7 @@ def _grid(points: np.ndarray, offsets: np.ndarray, kind: int | np.ndarray) -> vt
     return grid
 
 
-def _polyhedra(shapes: solver.Polyhedra, corners: np.ndarray) -> vtkUnstructuredGrid:
+def _polyhedra(shapes: mechanics.Polyhedra, corners: np.ndarray) -> vtkUnstructuredGrid:
     """Make a grid of one polyhedron per block, with the corners of all blocks, (n_vertices, 3) [m]."""
     grid = _grid_of_points(corners)
     grid.SetPolyhedralCells(
@@ -287,11 +288,11 @@ def _slip(assembly: solver.Assembly, increment: solver.Increment) -> np.ndarray:
     """(n_contacts, 3) array [m]: how far block a has moved along block b at each contact point since the layout."""
     contacts, initial = increment.contacts, solver.Pose.initial(assembly)
     on_a, on_b = (
-        solver.carried(contacts.points, block, increment.pose, initial)
+        mechanics.carried(contacts.points, block, increment.pose, initial)
         for block in (contacts.block_a, contacts.block_b)
     )
     # What now lies together was apart by so much, seen with the axes of the layout.
-    moved = solver.turned(on_b - on_a, increment.pose.rotations[contacts.block_b])
+    moved = mechanics.turned(on_b - on_a, increment.pose.rotations[contacts.block_b])
     normal = contacts.frames[:, 0]
     return np.asarray(moved - (moved * normal).sum(axis=1)[:, None] * normal)
 
@@ -307,7 +308,7 @@ def _grid_between(
     """Make a grid of cells whose points lie between two blocks each, (n_points,) int arrays."""
     grid = _grid(rings.points, rings.offsets, kind)
     initial = solver.Pose.initial(assembly)
-    _give_shape(grid, solver.carried_between(rings.points, *blocks, increment.pose, initial), shape)
+    _give_shape(grid, mechanics.carried_between(rings.points, *blocks, increment.pose, initial), shape)
     return grid
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 import solver
 from blockvis.system.atomic_files import PARTIAL, WINDOWS, flush, make_folder, remove, write_whole
+from solver import mechanics
 
 from .cracks import MOST_LISTED, cracks_of
 from .increments import StoredIncrements, packed_increment
@@ -80,7 +81,7 @@ class ResultsFolder:
         What the run is made from.
     overwrite : bool
         Whether results that are there already may be replaced.
-    parameter : solver.Quantity
+    parameter : solver.mechanics.Quantity
         What the increments run over.
     shape : {"moved", "undeformed"}
         Of the blocks in the VTU files; see :func:`blockvis.results.datasets.block_dataset`.
@@ -110,7 +111,7 @@ class ResultsFolder:
         *,
         record: Record | None = None,
         overwrite: bool = False,
-        parameter: solver.Quantity = solver.SETTLEMENT,
+        parameter: mechanics.Quantity = mechanics.SETTLEMENT,
         shape: str = "moved",
     ) -> None:
         self.parameter, self.shape = parameter, shape
@@ -131,14 +132,14 @@ class ResultsFolder:
 
     @classmethod
     def reopened(
-        cls, path: str | Path, parameter: solver.Quantity, kind: type[C], shape: str = "moved"
+        cls, path: str | Path, parameter: mechanics.Quantity, kind: type[C], shape: str = "moved"
     ) -> tuple[ResultsFolder, C | None]:
         """Reopen the folder of a run that was stopped, as it was after its last checkpoint.
 
         Parameters
         ----------
         path : str or Path
-        parameter : solver.Quantity
+        parameter : solver.mechanics.Quantity
             As of the folder.
         kind : type
             Of the checkpoint.
@@ -421,7 +422,7 @@ def _collapse_of(
     falling = [i for i in increments if i.status == solver.Status.FALLING]
     if falling:
         motion = falling[0].velocity
-        mechanism = motion / max(solver.motion_size(motion, assembly.block_size).max(), 1e-300)
+        mechanism = motion / max(mechanics.motion_size(motion, assembly.block_size).max(), 1e-300)
     return solver.Collapse(
         displacement=summary["collapse_displacement"],
         bracket=(summary["collapse_bracket"][0], summary["collapse_bracket"][1]),

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import solver
+from solver import mechanics
 
 from .npz import checked_arrays, compressed, flat, from_flat
 
@@ -46,7 +47,7 @@ class StateInFile:
     number: int
     numbers: tuple[float, ...]
 
-    def read(self) -> solver.State:
+    def read(self) -> mechanics.State:
         """Read the state.
 
         Raises
@@ -156,7 +157,7 @@ def packed_increment(increment: solver.Increment) -> bytes:
     return compressed(_arrays_of(increment.state) | numbers)
 
 
-def _arrays_of(state: solver.State) -> dict[str, np.ndarray]:
+def _arrays_of(state: mechanics.State) -> dict[str, np.ndarray]:
     """Name the arrays as the files do: in the plane a contact point has vertex, edge and corner, and one slip.
 
     In space they have their own names.
@@ -164,7 +165,7 @@ def _arrays_of(state: solver.State) -> dict[str, np.ndarray]:
     arrays = flat(state)
     if state.pose.positions.shape[1] == 3:
         return arrays
-    vertex, edge, corner = solver.corners_and_edges(arrays.pop("features"))
+    vertex, edge, corner = mechanics.corners_and_edges(arrays.pop("features"))
     rotations, slip = arrays["rotations"][:, 0], arrays.pop("slip")[:, 0]
     return arrays | {"vertex": vertex, "edge": edge, "corner": corner, "along": slip, "rotations": rotations}
 
@@ -172,9 +173,9 @@ def _arrays_of(state: solver.State) -> dict[str, np.ndarray]:
 def _increment_of(arrays: Mapping[str, np.ndarray]) -> solver.Increment:
     named = {"fell_at": np.zeros(0), **arrays} | {name: arrays[stored] for name, stored in _STORED_AS.items()}
     if "features" not in arrays:
-        named["features"] = solver.features_of(arrays["vertex"], arrays["edge"], arrays["corner"])
+        named["features"] = mechanics.features_of(arrays["vertex"], arrays["edge"], arrays["corner"])
         named["slip"], named["rotations"] = arrays["along"][:, None], arrays["rotations"][:, None]
-    return from_flat(named, solver.Increment, held=from_flat(named, solver.State), checkpoint=None)
+    return from_flat(named, solver.Increment, held=from_flat(named, mechanics.State), checkpoint=None)
 
 
 def _numbers(increment: solver.Increment) -> tuple[float, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 import solver
+from solver import mechanics
 
 #: Faces count as one initial joint when they are apart by at most this fraction of the block size.
 TOUCHING = 2e-3
@@ -137,7 +138,7 @@ def initial_joints(assembly: solver.Assembly) -> InitialJoints:
     convex hull. Blocks that are not convex may have several.
     """
     tolerance = TOUCHING * assembly.block_size
-    contacts = solver.find_contacts(assembly, assembly.vertices, 2.0 * tolerance)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 2.0 * tolerance)
     contacts = contacts[np.abs(contacts.gaps) <= tolerance]
     if assembly.dimension == 2:
         return _joints_in_plane(assembly, contacts, tolerance)
@@ -145,8 +146,8 @@ def initial_joints(assembly: solver.Assembly) -> InitialJoints:
     return _chosen(found, found.rings.areas() > SMALLEST_FACE * assembly.block_size**2)
 
 
-def _joints_in_plane(assembly: solver.Assembly, contacts: solver.Contacts, tolerance: float) -> InitialJoints:
-    vertex, edge_b, _ = solver.corners_and_edges(contacts.features)
+def _joints_in_plane(assembly: solver.Assembly, contacts: mechanics.Contacts, tolerance: float) -> InitialJoints:
+    vertex, edge_b, _ = mechanics.corners_and_edges(contacts.features)
     # The corner belongs to two faces of block a; either may lie on the edge of block b.
     edge_a = np.concatenate([vertex, assembly.previous_vertex[vertex]])
     edge_b = np.concatenate([edge_b, edge_b])
@@ -176,7 +177,7 @@ def _chosen(faces: InitialJoints, chosen: np.ndarray) -> InitialJoints:
     return InitialJoints(faces.block_a[chosen], faces.block_b[chosen], rings, faces.normals[chosen])
 
 
-def faces_of(contacts: solver.Contacts) -> InitialJoints:
+def faces_of(contacts: mechanics.Contacts) -> InitialJoints:
     """Gather contact points of two blocks that lie in one plane, and take the convex hull of each group."""
     pairs, normals, group = grouped_by_face(contacts)
     if not len(pairs):
@@ -207,7 +208,7 @@ def faces_of(contacts: solver.Contacts) -> InitialJoints:
     return InitialJoints(pairs[:, 0], pairs[:, 1], rings, normals)
 
 
-def grouped_by_face(contacts: solver.Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def grouped_by_face(contacts: mechanics.Contacts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pairs of blocks (n, 2) and normals (n, 3) of groups of contact points in one plane, and the group of each."""
     pairs, joint = contacts.joints()
     side = np.where(contacts.block_a == pairs[joint, 0], 1.0, -1.0) if len(contacts) else np.zeros(0)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import solver
+from solver import mechanics
 
 from .joint_faces import InitialJoints, Rings, faces_of, grouped_by_face, initial_joints, lines
 
@@ -50,9 +51,9 @@ def carried_faces(assembly: solver.Assembly, joints: InitialJoints, pose: solver
     """
     initial, rings = solver.Pose.initial(assembly), joints.rings
     on_a, on_b = (
-        solver.carried(rings.points, block[rings.ring], initial, pose) for block in (joints.block_a, joints.block_b)
+        mechanics.carried(rings.points, block[rings.ring], initial, pose) for block in (joints.block_a, joints.block_b)
     )
-    normals = solver.turned(joints.normals, pose.rotations[joints.block_b])
+    normals = mechanics.turned(joints.normals, pose.rotations[joints.block_b])
     apart, normal = on_a - on_b, normals[rings.ring]
     gaps = (apart * normal).sum(axis=1)
     return Faces(on_a, on_b, gaps, apart - gaps[:, None] * normal, normals)
@@ -200,7 +201,7 @@ def joint_states(assembly: solver.Assembly, joints: InitialJoints, increment: so
     )
 
 
-def _nearest_face(contacts: solver.Contacts, joints: InitialJoints, rings: Rings, normals: np.ndarray) -> np.ndarray:
+def _nearest_face(contacts: mechanics.Contacts, joints: InitialJoints, rings: Rings, normals: np.ndarray) -> np.ndarray:
     """(n_contacts,) int array: the joint between the same blocks that is nearest to each contact point, or -1."""
     count = 1 + max(
         int(block.max(initial=0)) for block in (contacts.block_a, contacts.block_b, joints.block_a, joints.block_b)
@@ -232,7 +233,7 @@ def _nearest_face(contacts: solver.Contacts, joints: InitialJoints, rings: Rings
     return joint
 
 
-def _later_joints(contacts: solver.Contacts) -> tuple[InitialJoints, np.ndarray]:
+def _later_joints(contacts: mechanics.Contacts) -> tuple[InitialJoints, np.ndarray]:
     """Make joints of contact points of blocks that did not touch in the layout, and give the joint of each."""
     if contacts.points.shape[1] == 3:
         # Groups of contact points and their hulls are in the same order.
@@ -254,11 +255,11 @@ class LargestMovements:
     Parameters
     ----------
     assembly : solver.Assembly
-    parameter : solver.Quantity
+    parameter : solver.mechanics.Quantity
         What the increments run over.
     """
 
-    def __init__(self, assembly: solver.Assembly, parameter: solver.Quantity) -> None:
+    def __init__(self, assembly: solver.Assembly, parameter: mechanics.Quantity) -> None:
         self.assembly, self.parameter, self.joints = assembly, parameter, initial_joints(assembly)
         self._largest = np.zeros((len(self.joints), 2))
         self._at = np.zeros_like(self._largest)

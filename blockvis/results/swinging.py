@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 import solver
+from solver import mechanics
 
 
 def corner_speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarray) -> np.ndarray:
@@ -19,7 +20,7 @@ def corner_speeds(assembly: solver.Assembly, pose: solver.Pose, motion: np.ndarr
     motion : (n_blocks, n_dof) array
     """
     block = assembly.block_of_vertex
-    velocity = solver.point_velocities(solver.moved_vertices(assembly, pose), block, pose, motion)
+    velocity = mechanics.point_velocities(mechanics.moved_vertices(assembly, pose), block, pose, motion)
     speeds = np.zeros(assembly.n_blocks)
     np.maximum.at(speeds, block, np.hypot.reduce(velocity, axis=1))
     return np.where(assembly.free, speeds, 0.0)
@@ -43,7 +44,7 @@ def swing_factors(
     fastest = float(corner_speeds(assembly, increment.pose, increment.velocity).max(initial=0.0))
     if fastest == 0.0:
         return np.zeros(len(shares))
-    corners = solver.moved_vertices(assembly, increment.pose)[assembly.free[assembly.block_of_vertex]]
+    corners = mechanics.moved_vertices(assembly, increment.pose)[assembly.free[assembly.block_of_vertex]]
     return np.asarray(shares * (reach * float(np.ptp(corners, axis=0).max())) / fastest)
 
 
@@ -55,7 +56,7 @@ def swung_increment(increment: solver.Increment, motion: np.ndarray) -> solver.I
     increment : solver.Increment
     motion : (n_blocks, n_dof) array
     """
-    contacts, pose = increment.contacts, solver.swung(increment.pose, motion)
-    points = solver.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
+    contacts, pose = increment.contacts, mechanics.swung(increment.pose, motion)
+    points = mechanics.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
     moved = increment.with_arrays(pose=pose, contacts=replace(contacts, points=points))
     return replace(moved, status=solver.Status.FALLING, programs=0, seconds=0.0, checkpoint=None)

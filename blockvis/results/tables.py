@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import solver
+from solver import mechanics
 
 from .about import collapse_mechanism, least_reaction, loss_of, mechanism_text
 from .record import Record
@@ -57,7 +58,7 @@ def summary_of(response: solver.Response, *, seconds: float, record: Record, own
         What the kind of analysis adds.
     """
     path, collapse = response.path, response.collapse
-    worst = solver.worst_of(i.certificate for i in path)
+    worst = mechanics.worst_of(i.certificate for i in path)
     residuals = {name: getattr(worst, name, math.nan) for name in MEASURES}
     return {
         "status": str(response.stop),
@@ -122,14 +123,14 @@ def _loss(response: solver.Response) -> dict[str, Any]:
     }
 
 
-def own_columns(parameter: solver.Quantity) -> tuple[str, ...]:
+def own_columns(parameter: mechanics.Quantity) -> tuple[str, ...]:
     """Name the column that response.csv has for a parameter; none for a settlement, which is in :data:`COLUMNS`."""
     name = parameter.name.replace(" ", "_")
     return () if name in COLUMNS else (name,)
 
 
 def row_of_increment(
-    number: int, increment: solver.Increment, assembly: solver.Assembly, parameter: solver.Quantity
+    number: int, increment: solver.Increment, assembly: solver.Assembly, parameter: mechanics.Quantity
 ) -> Sequence[Any]:
     """Make the row of response.csv for an increment, in the order of :data:`COLUMNS`.
 
@@ -138,21 +139,21 @@ def row_of_increment(
     number : int
     increment : solver.Increment
     assembly : solver.Assembly
-    parameter : solver.Quantity
+    parameter : solver.mechanics.Quantity
         What the increments run over.
     """
     certificate = increment.certificate
     value = repr(float(increment.parameter))
     settlement = value if parameter.is_path else repr(0.0)
-    mechanism = solver.mechanism_of(assembly, increment)
+    mechanism = mechanics.mechanism_of(assembly, increment)
     own = [value for _ in own_columns(parameter)]
-    counts = np.bincount(increment.states, minlength=len(solver.ContactState))
+    counts = np.bincount(increment.states, minlength=len(mechanics.ContactState))
     return (
         number,
         increment.phase,
         settlement,
         repr(float(increment.reaction)),
-        repr(float(increment.reaction) / solver.total_weight(assembly)),
+        repr(float(increment.reaction) / mechanics.total_weight(assembly)),
         repr(float(increment.load_multiplier)),
         repr(float(increment.least)),
         repr(float(increment.largest)),

@@ -16,6 +16,7 @@ from blockvis.cases.contents import Case
 from blockvis.kinds.kinds import KINDS
 from blockvis.results.folder import stored_assembly
 from blockvis.system.worker import Say, Worker, WorkerEnded, end_with_caller, serve
+from solver import mechanics
 
 from .plan import planned
 
@@ -23,7 +24,7 @@ from .plan import planned
 SAME = 1e-9
 
 #: The way to find increments that has no steps of its own.
-LINEAR_PROGRAM = solver.INCREMENTS[1]
+LINEAR_PROGRAM = mechanics.INCREMENTS[1]
 
 #: How much less urgent the other path is, where the system knows such a thing: it is not to slow the first.
 LESS_URGENT = 5

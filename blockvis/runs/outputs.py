@@ -13,6 +13,7 @@ from blockvis.cases.contents import Case
 from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.results.fall_files import stored_fall, write_fall
 from blockvis.results.folder import ResultsFolder
+from solver import mechanics
 
 from .progress import DrawingProgress
 
@@ -35,7 +36,7 @@ class Clock:
         finally:
             self.seconds[part] = self.seconds.get(part, 0.0) + time.perf_counter() - started
 
-    def each(self, part: str, increments: solver.Increments) -> Iterator[solver.Increment]:
+    def each(self, part: str, increments: mechanics.Increments) -> Iterator[solver.Increment]:
         """Give each of the increments, and count the seconds it takes to find it to a part."""
         while True:
             with self.counting(part):

@@ -11,6 +11,7 @@ from blockvis.cases.build import case_interfaces, case_loads, case_settlements
 from blockvis.cases.contents import Case
 from blockvis.kinds.kind import AnalysisRun, RunInput
 from blockvis.kinds.kinds import KINDS
+from solver import mechanics
 
 
 def planned(
@@ -41,5 +42,5 @@ def planned(
     case = replace(case, settlements=case_settlements(case, assembly), profiles=())
     given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly))
     if case.settlements:
-        solver.check_settlement(assembly, case.settlements, case.controls)
+        mechanics.check_settlement(assembly, case.settlements, case.controls)
     return kind.start(given, resume, found)

@@ -12,6 +12,7 @@ import numpy as np
 import solver
 from blockvis.dynamics.fall import LONGEST
 from blockvis.kinds.kind import Course
+from solver import mechanics
 
 #: Seconds between two redrawings of the bar.
 REDRAW = 0.1
@@ -98,7 +99,7 @@ class Progress:
     def __init__(self, course: Course, stream: TextIO | None = None, names: Sequence[str] = ()) -> None:
         self.course, self.count, self.names, self._line = course, 0, names, _Line(stream)
 
-    def step(self, state: solver.PathState) -> None:
+    def step(self, state: mechanics.PathState) -> None:
         """Show where an increment is that takes long: its settlement, the next step, and what moves most."""
         if not self._line.due or not self.course.drivers:
             return

@@ -25,6 +25,7 @@ from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
 from blockvis.results.viewer_files import restore_grids
 from blockvis.system.atomic_files import PARTIAL
+from solver import mechanics
 
 from .outputs import Clock, Drawing, Output
 from .plan import planned
@@ -244,7 +245,7 @@ def _solved(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Seque
     folder = results.path
     progress = Progress(run.course, names=results.assembly.names)
     run.given.listeners.append(progress.step)
-    ending = solver.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
+    ending = mechanics.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
     try:
         for increment in clock.each("solve", run.steps):
             with clock.counting("write"):

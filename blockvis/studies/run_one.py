@@ -22,6 +22,7 @@ from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.about import least_reaction, loss_in
 from blockvis.results.swinging import swing_factors
 from blockvis.runs.plan import planned
+from solver import mechanics
 
 from .study_file import run_values
 
@@ -121,7 +122,7 @@ def _outcome(case: Case, seconds: float | None) -> tuple[dict[str, Any], bytes]:
     if falls is None or "collapse_displacement" not in found:
         return found, b""
     assembly = response.assembly
-    mechanism = solver.mechanism_of(assembly, falls)
+    mechanism = mechanics.mechanism_of(assembly, falls)
     found |= {
         "falling_share": loss_in(assembly, falls).share,
         "mechanism": str(mechanism),
@@ -163,16 +164,16 @@ def _numbers(response: solver.Response) -> dict[str, Any]:
 def _falling(response: solver.Response) -> solver.Increment | None:
     """Find what moves as the mechanism does: the last equilibrium, as everywhere else, or what falls from the start."""
     if response.collapse is not None and response.path:
-        return solver.with_motion(response.path[-1], response.collapse.mechanism)
+        return mechanics.with_motion(response.path[-1], response.collapse.mechanism)
     return next((i for i in response.increments if i.status is solver.Status.FALLING), None)
 
 
-def mechanism_class(mechanism: solver.Mechanism) -> str:
+def mechanism_class(mechanism: mechanics.Mechanism) -> str:
     """Name the class of a mechanism by its hinges and sliding joints, or by their numbers if there are many.
 
     Parameters
     ----------
-    mechanism : solver.Mechanism
+    mechanism : solver.mechanics.Mechanism
 
     Returns
     -------
@@ -207,7 +208,7 @@ def _joints(names: Sequence[str], pairs: Sequence[Sequence[int]]) -> str:
 
 
 def _shape(
-    assembly: solver.Assembly, falling: solver.Increment, mechanism: solver.Mechanism, settlement: solver.Settlement
+    assembly: solver.Assembly, falling: solver.Increment, mechanism: mechanics.Mechanism, settlement: solver.Settlement
 ) -> bytes:
     """Pack the blocks as the mechanism displaces them, in single precision, for a small picture.
 
@@ -215,11 +216,11 @@ def _shape(
     which way.
     """
     free = assembly.free[assembly.block_of_vertex]
-    at_rest = solver.moved_vertices(assembly, falling.pose)
+    at_rest = mechanics.moved_vertices(assembly, falling.pose)
     size = float(np.ptp(at_rest[free], axis=0).max())
     (factor,) = swing_factors(assembly, falling, SWING, np.ones(1))
-    moved = solver.swung(falling.pose, falling.velocity * factor)
-    vertices = solver.moved_vertices(assembly, moved)
+    moved = mechanics.swung(falling.pose, falling.velocity * factor)
+    vertices = mechanics.moved_vertices(assembly, moved)
     if assembly.dimension == 2:
         low, high = at_rest[free].min(axis=0) - 0.15 * size, at_rest[free].max(axis=0) + 0.15 * size
         _, places, directions = settlement_arrows(assembly, settlement, falling.pose, Frame(low, high))

@@ -10,13 +10,14 @@ import math
 
 import blockvis
 import solver
+from solver import mechanics
 
 ground = [[-1, -0.2], [3, -0.2], [3, 0], [-1, 0]]
 block = [[0, 0], [2, 0], [2, 1], [0, 1]]
 assembly = solver.Assembly.from_outlines(
     [ground, block], roles=["fixed", "free"], names=["ground", "block"], materials=["rock", "marble"]
 )
-weight = solver.total_weight(assembly)
+weight = mechanics.total_weight(assembly)
 area = 2.0 * 1.0  # m², width times thickness
 cohesion = 0.2 * weight / area  # Pa
 joints = solver.Interfaces(

@@ -6,6 +6,7 @@ import pytest
 import solver
 from blockvis import generators, read, read_layout, save_layout, write_layout
 from blockvis.cli import main
+from solver import mechanics
 
 #: What a file cannot say of a block.
 SILENT = {".stl": ("roles", "materials", "density")}
@@ -69,7 +70,7 @@ def test_the_same_joints_are_found(vault, suffix, tmp_path):
     path = tmp_path / f"vault{suffix}"
     save_layout(vault, path)
     again = read(path, roles={"springer *": "fixed"})
-    points = [len(solver.find_contacts(a, a.vertices, 1e-6)) for a in (vault, again)]
+    points = [len(mechanics.find_contacts(a, a.vertices, 1e-6)) for a in (vault, again)]
     assert points[0] == points[1]
 
 

@@ -8,6 +8,7 @@ import pytest
 import solver
 from blockvis import generators, read_case
 from blockvis.cases.build import case_assembly, case_interfaces
+from solver import mechanics
 
 FACADE = Path(__file__).parents[2] / "examples" / "facade.toml"
 
@@ -24,7 +25,7 @@ def key_sinks(assembly, pose, arch):
     """How far the key of an arch has slipped below its left and its right neighbour along their joints [m]."""
     number = sum(name.startswith(f"voussoir {arch}-") for name in assembly.names)
     left, key, right = (assembly.index(f"voussoir {arch}-{number // 2 + k}") for k in (0, 1, 2))
-    corners = solver.moved_vertices(assembly, pose)
+    corners = mechanics.moved_vertices(assembly, pose)
     sinks = []
     for neighbour in (left, right):
         beside, own = (np.arange(*assembly.offsets[block : block + 2]) for block in (neighbour, key))

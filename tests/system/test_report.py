@@ -19,6 +19,7 @@ from blockvis import show, write_report
 from blockvis.pictures import palette
 from blockvis.pictures.frame import framed
 from blockvis.report.page import report_html
+from solver import mechanics
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
@@ -57,7 +58,7 @@ def body_of(page, tmp_path, anchor=""):
 def checksum(response, increment):
     """What the page's script works out from the corners it has unpacked."""
     frame = framed(response.assembly, [solver.Pose.initial(response.assembly), *(i.pose for i in response.increments)])
-    corners = (solver.moved_vertices(response.assembly, increment.pose) - np.round(frame.low, 3)).ravel()
+    corners = (mechanics.moved_vertices(response.assembly, increment.pose) - np.round(frame.low, 3)).ravel()
     return float(corners @ (np.arange(len(corners)) % 97 + 1))
 
 

@@ -23,6 +23,7 @@ from blockvis.pictures import palette
 from blockvis.pictures.swing import swing_of
 from blockvis.report.page import report_html
 from blockvis.results.joints import initial_joints, joint_states
+from solver import mechanics
 
 ASK = """<script>const wait = setInterval(async () => { if (!document.body.dataset.ready) return; clearInterval(wait);
   const $ = (id) => document.getElementById(id), canvas = $("blocks"), out = {};
@@ -150,7 +151,7 @@ def test_toggles_change_the_picture_and_the_legend_follows(tmp_path):
         out.legends[name] = legend().join(" | "); }"""
     found = told(page, tmp_path, script, anchor=f"#frame={len(response.path) - 1}")
     assert all(found["changed"].values()), found["changed"]
-    hinges = len(solver.mechanism_of(response.assembly, swing_of(response).increment).hinges)
+    hinges = len(mechanics.mechanism_of(response.assembly, swing_of(response).increment).hinges)
     assert found["counts"] == [f"hinges ({hinges})", "sliding joints (0)"]
     assert "open joint" in found["before"]
     assert "sliding joint" not in found["before"], "the arch slides nowhere"

@@ -31,6 +31,7 @@ from blockvis.pictures.swing import swing_of
 from blockvis.results.datasets import block_dataset, contact_dataset, joint_dataset
 from blockvis.results.joints import initial_joints, joint_states
 from blockvis.system.vtk_files import write_vtu
+from solver import mechanics
 
 SMALL = (640, 360)
 
@@ -75,7 +76,7 @@ def test_polyhedra_come_back_through_pyvista(tmp_path):
     last, volumes = response.path[-1], response.assembly.shapes.volumes
     file = write_vtu(block_dataset(response.assembly, last), tmp_path / "blocks.vtu")
     back = pv.read(file)
-    np.testing.assert_array_equal(back.points, solver.moved_vertices(response.assembly, last.pose))
+    np.testing.assert_array_equal(back.points, mechanics.moved_vertices(response.assembly, last.pose))
     np.testing.assert_allclose(back.compute_cell_sizes()["Volume"], volumes, rtol=1e-12)
     assert [str(name) for name in back.cell_data["name"]] == list(response.assembly.names)
     np.testing.assert_allclose(
@@ -98,7 +99,9 @@ def test_results_reach_meshio_as_the_manual_says(response, tmp_path, monkeypatch
     read = {}
     exec(code, read)
     mesh = read["mesh"]
-    np.testing.assert_array_equal(mesh.points[:, : assembly.dimension], solver.moved_vertices(assembly, increment.pose))
+    np.testing.assert_array_equal(
+        mesh.points[:, : assembly.dimension], mechanics.moved_vertices(assembly, increment.pose)
+    )
     assert sum(len(cells.data) for cells in mesh.cells) == assembly.n_blocks
     numbers = np.concatenate(mesh.cell_data["block_id"])
     assert [read["names"][k] for k in numbers] == [assembly.names[k] for k in numbers]
@@ -124,7 +127,7 @@ def test_joints_open_on_one_side_and_carry_the_weight():
     np.subtract.at(total, states.block_b, states.force)
     weight = assembly.masses * solver.GRAVITY
     np.testing.assert_allclose(total[assembly.free, 2], weight[assembly.free], rtol=1e-6)
-    hinges = solver.mechanism_of(assembly, last).hinges
+    hinges = mechanics.mechanism_of(assembly, last).hinges
     pairs = np.sort(np.stack([states.block_a, states.block_b], axis=1), axis=1).tolist()
     opened = 0
     for pair in hinges.tolist():
@@ -155,7 +158,7 @@ def test_slip_is_what_one_block_has_moved_along_another():
     two = solver.Assembly.from_solids([prism(plate), prism(brick)], roles=["fixed", "free"])
     start = solver.Pose.initial(two)
     pose = solver.Pose(start.positions + np.array([[0, 0, 0], [0.3, 0.1, 0]]), start.rotations)
-    contacts = solver.find_contacts(two, solver.moved_vertices(two, pose), 0.01)
+    contacts = mechanics.find_contacts(two, mechanics.moved_vertices(two, pose), 0.01)
     nothing = np.zeros((len(contacts), 3))
     increment = vault_response().path[0].with_arrays(
         pose=pose, contacts=contacts, forces=nothing, displacements=nothing, friction=np.ones(len(contacts)),
@@ -255,7 +258,7 @@ def test_what_is_where():
     )
     assert alike(colour_at(0.9 * inside.mean(axis=0) + 0.1 * found.cracks[wide].mean(axis=0)), palette.CRACKS[2], 60)
     support = np.flatnonzero(assembly.moving)[0]
-    corner = solver.moved_vertices(assembly, last.pose)[assembly.block_of_vertex == support]
+    corner = mechanics.moved_vertices(assembly, last.pose)[assembly.block_of_vertex == support]
     face = corner[corner[:, 1] < 0].mean(axis=0)
     shade = colour_at(face) / np.array(palette.MOVING)
     assert np.ptp(shade) < 0.05
@@ -268,7 +271,7 @@ def test_nothing_leaves_the_picture_and_all_frames_look_the_same_way(tmp_path):
     drawer = Drawer(response, Look(colour_by="mechanism"), SMALL, response.increments)
     low, high = np.zeros(2), np.array(drawer.scene.size)
     for increment in response.increments:
-        corners = solver.moved_vertices(response.assembly, increment.pose)
+        corners = mechanics.moved_vertices(response.assembly, increment.pose)
         free = response.assembly.free[response.assembly.block_of_vertex]
         pixels = drawer.scene.at_pixel(corners[free])
         assert (pixels > low).all()
@@ -334,7 +337,7 @@ def test_page_unpacks_every_frame_as_it_was(tmp_path):
     assert attributes["ready"] == "1"
     poses = [solver.Pose.initial(response.assembly), *(i.pose for i in response.increments)]
     frame = framed(response.assembly, poses, margin=0.0, supports=0.25)
-    corners = solver.moved_vertices(response.assembly, response.increments[k].pose) - np.round(frame.low, 3)
+    corners = mechanics.moved_vertices(response.assembly, response.increments[k].pose) - np.round(frame.low, 3)
     expected = float(corners.ravel() @ (np.arange(corners.size) % 97 + 1))
     assert float(attributes["corners"]) == pytest.approx(expected, abs=0.02)
 

@@ -26,6 +26,7 @@ from blockvis import generators
 from blockvis.cli import main
 from blockvis.results.folder import ResultsExist, ResultsFolder
 from blockvis.results.npz import packed, unpacked
+from solver import mechanics
 
 #: Two phases, and a hinge that jumps: the path goes back, halves its steps, proves places.
 CASE = """
@@ -230,10 +231,10 @@ def test_killed_limit_loads_and_pushovers_go_on(tmp_path, monkeypatch, kind, mom
     before = [file.stat().st_mtime_ns for file in sorted((tmp_path / "out" / "increments").glob("state_*"))][:kept]
     assert len(before) == kept
     found = []
-    for name in ("limit_load", "settlement_increments"):
-        function = getattr(solver, name)
+    for module, name in ((solver, "limit_load"), (mechanics, "settlement_increments")):
+        function = getattr(module, name)
         monkeypatch.setattr(
-            solver, name, lambda *a, name=name, function=function, **k: found.append(name) or function(*a, **k)
+            module, name, lambda *a, name=name, function=function, **k: found.append(name) or function(*a, **k)
         )
     assert run_command("--resume", tmp_path / "out") == 0
     _same_result(tmp_path / "whole", tmp_path / "out")
@@ -367,15 +368,15 @@ def test_every_checkpoint_leads_to_the_same_end():
         "loads": solver.self_weight(arch),
         "controls": solver.Controls(falling_frames=2),
     }
-    told = list(solver.settlement_increments(arch, phases, **setting))
+    told = list(mechanics.settlement_increments(arch, phases, **setting))
     assert {i.phase for i in told} == {0, 1}
     for k in range(0, len(told), 3):
         if told[k].checkpoint is None:
             continue
-        checkpoint, extra = unpacked(packed(told[k].checkpoint, increments=k + 1), solver.PathState)
+        checkpoint, extra = unpacked(packed(told[k].checkpoint, increments=k + 1), mechanics.PathState)
         assert extra == {"increments": k + 1}
         assert _equal(checkpoint, told[k].checkpoint)
-        again = list(solver.settlement_increments(arch, phases, resume=checkpoint, **setting))
+        again = list(mechanics.settlement_increments(arch, phases, resume=checkpoint, **setting))
         assert len(again) == len(told) - k - 1
         for one, other in zip(again, told[k + 1 :], strict=True):
             for name in (
@@ -401,13 +402,13 @@ def test_every_checkpoint_of_a_pushover_leads_to_the_same_end():
         "loads": solver.Loads(solver.self_weight(arch).dead, live),
         "controls": solver.Controls(falling_frames=2),
     }
-    told = list(solver.pushover_increments(arch, control, **setting))
+    told = list(mechanics.pushover_increments(arch, control, **setting))
     kept = [k for k, increment in enumerate(told) if increment.checkpoint is not None]
     assert len(kept) > 5
     for k in kept:
-        checkpoint, _ = unpacked(packed(told[k].checkpoint), solver.PathState)
+        checkpoint, _ = unpacked(packed(told[k].checkpoint), mechanics.PathState)
         assert _equal(checkpoint, told[k].checkpoint)
-        again = list(solver.pushover_increments(arch, control, resume=checkpoint, **setting))
+        again = list(mechanics.pushover_increments(arch, control, resume=checkpoint, **setting))
         assert len(again) == len(told) - k - 1
         for one, other in zip(again, told[k + 1 :], strict=True):
             for name in ("settlement", "load_multiplier", "pose", "forces", "velocity", "programs", "checkpoint"):
@@ -415,22 +416,22 @@ def test_every_checkpoint_of_a_pushover_leads_to_the_same_end():
     other = generators.arch(voussoirs=12)
     setting["loads"] = solver.Loads(solver.self_weight(other).dead, solver.weight_fraction(other, (1.0, 0.0), [3]))
     with pytest.raises(ValueError, match=r"has 15 blocks, the assembly 14: it belongs to another run"):
-        next(solver.pushover_increments(other, control, resume=checkpoint, **setting))
+        next(mechanics.pushover_increments(other, control, resume=checkpoint, **setting))
 
 
 def test_checkpoint_behind_the_last_increment_has_nothing_left_to_do():
     arch = generators.arch()
     phases = [solver.Settlement(direction=(1, 0), increment=0.01, limit=limit) for limit in (0.02, 0.01)]
     setting = {"interfaces": solver.Interfaces(), "loads": solver.self_weight(arch)}
-    told = list(solver.settlement_increments(arch, phases, **setting))
+    told = list(mechanics.settlement_increments(arch, phases, **setting))
     ends = [k for k, i in enumerate(told) if i.checkpoint.ended]
     assert [(told[k].phase, told[k].checkpoint.phase) for k in ends] == [(0, 0), (1, 1)]
     assert ends[-1] == len(told) - 1
-    steps = solver.settlement_increments(arch, phases, resume=told[-1].checkpoint, **setting)
+    steps = mechanics.settlement_increments(arch, phases, resume=told[-1].checkpoint, **setting)
     assert steps.all() == ()
     assert steps.ending.stop is solver.Status.LIMIT_REACHED
     assert steps.ending.message == "the settlement reached its limit of 0.01 m"
-    first = next(solver.settlement_increments(arch, phases, resume=told[ends[0]].checkpoint, **setting))
+    first = next(mechanics.settlement_increments(arch, phases, resume=told[ends[0]].checkpoint, **setting))
     assert _equal(first.pose, told[ends[0] + 1].pose)
     assert first.programs == told[ends[0] + 1].programs
 
@@ -440,10 +441,10 @@ def test_checkpoint_of_another_run_is_refused():
     spread = solver.Settlement(direction=(1, 0), increment=0.03, limit=0.06)
     setting = {"interfaces": solver.Interfaces(), "controls": solver.Controls()}
     checkpoint = next(
-        solver.settlement_increments(arch, (spread,), loads=solver.self_weight(arch), **setting)
+        mechanics.settlement_increments(arch, (spread,), loads=solver.self_weight(arch), **setting)
     ).checkpoint
     with pytest.raises(ValueError, match="belongs to another run"):
-        solver.settlement_increments(other, (spread,), loads=solver.self_weight(other), resume=checkpoint, **setting)
+        mechanics.settlement_increments(other, (spread,), loads=solver.self_weight(other), resume=checkpoint, **setting)
 
 
 def test_a_response_keeps_no_checkpoints():
@@ -454,8 +455,8 @@ def test_a_response_keeps_no_checkpoints():
 
 def test_stored_values_refuse_what_they_cannot_hold():
     with pytest.raises(TypeError, match="cannot be stored"):
-        packed(solver.Ending(solver.Status.LOCKED, {"a": 1}))
+        packed(mechanics.Ending(solver.Status.LOCKED, {"a": 1}))
     buffer = io.BytesIO()
     np.savez(buffer, tree=np.array('{"value": {"phase": 1}, "extra": {}}'))
     with pytest.raises(ValueError, match="it has the fields"):
-        unpacked(buffer.getvalue(), solver.PathState)
+        unpacked(buffer.getvalue(), mechanics.PathState)

@@ -17,6 +17,7 @@ from blockvis.results.folder import ResultsFolder
 from blockvis.results.record import Record
 from blockvis.system.atomic_files import PARTIAL, whole_file, write_whole
 from blockvis.system.vtk_files import write_pvd
+from solver import mechanics
 
 ROOT = Path(__file__).parents[2]
 
@@ -86,7 +87,7 @@ def test_a_layout_that_cannot_be_written_leaves_the_file_before(tmp_path, monkey
 
 
 def _steps(arch):
-    return solver.settlement_increments(
+    return mechanics.settlement_increments(
         arch,
         [solver.Settlement(direction=(1, 0), increment=0.02, limit=0.1)],
         interfaces=solver.Interfaces(),
@@ -133,7 +134,7 @@ def test_what_a_power_cut_has_left_of_the_files_of_increments_is_made_again(tmp_
     (folder / "contacts_00001.vtu").unlink()
     (tmp_path / "out" / "blocks.pvd").write_bytes(b"")
     untouched = (folder / "contacts_00002.vtu").stat().st_mtime_ns
-    again, _ = ResultsFolder.reopened(tmp_path / "out", solver.SETTLEMENT, solver.PathState)
+    again, _ = ResultsFolder.reopened(tmp_path / "out", mechanics.SETTLEMENT, mechanics.PathState)
     assert len(again.increments) == 3
     assert {file.name: file.read_bytes() for file in (*folder.glob("*.vtu"), tmp_path / "out" / "blocks.pvd")} == whole
     assert (folder / "contacts_00002.vtu").stat().st_mtime_ns == untouched

@@ -13,6 +13,7 @@ from blockvis.cases import imperfections
 from blockvis.kinds.kinds import KINDS
 from blockvis.studies import study_keys
 from blockvis.studies.study_file import read_study
+from solver import mechanics
 
 ROOT = Path(__file__).parents[2]
 
@@ -55,7 +56,7 @@ def test_every_key_is_read_and_checked(name, key):
 
 
 def test_the_other_choices_are_those_of_the_code():
-    assert SECTIONS["roles"].names.schema["enum"] == list(solver.ROLES)
+    assert SECTIONS["roles"].names.schema["enum"] == list(mechanics.ROLES)
     assert SECTIONS["analysis"].key("kind").choices == tuple(KINDS)
 
 

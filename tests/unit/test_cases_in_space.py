@@ -14,6 +14,7 @@ from blockvis.cli import main
 from blockvis.layout.assemble import assemble
 from blockvis.layout.layout import Layout, layout_of
 from blockvis.layout.solids import box
+from solver import mechanics
 
 DOME = '[geometry]\nlayout = "dome"\nparameters = {lunes = 4, courses = 1}\n'
 ARCH = '[geometry]\nlayout = "arch"\nparameters = {voussoirs = 5}\n'
@@ -128,7 +129,7 @@ def test_new_writes_a_case_in_space(tmp_path, capsys):
     assert "8 blocks in space" in text
     assembly = case_assembly(parse_case(text, tmp_path / "corner.toml"))
     assert assembly.names[-2:] == ("ground left", "ground right")
-    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-9)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-9)
     assert (contacts.block_b == assembly.index("ground right")).any() or (
         contacts.block_a == assembly.index("ground right")
     ).any()

@@ -14,6 +14,7 @@ from blockvis import read_layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.joints.close import close_joints
 from blockvis.layout.joints.facing_edges import facing_edges, proposed_thickness
+from solver import mechanics
 
 FACADE = Path(__file__).resolve().parents[3] / "shared" / "data" / "facade" / "facade.dxf"
 needs_facade = pytest.mark.skipif(not FACADE.exists(), reason="third-party drawing, not part of the project")
@@ -54,7 +55,7 @@ def total_area(rings):
 def assert_closed(rings, thickness, scale):
     """No overlap, and no gap left where edges face each other."""
     assembly = solver.Assembly.from_outlines(rings)
-    _, _, depth = solver.overlap_depths(assembly.vertices, assembly.offsets, 1e-9 * scale)
+    _, _, depth = mechanics.overlap_depths(assembly.vertices, assembly.offsets, 1e-9 * scale)
     assert len(depth) == 0, depth
     left = facing_edges(rings, thickness, 1e-6 * scale)
     assert len(left) > 0
@@ -179,13 +180,13 @@ def test_the_facade_closes_without_overlap_and_its_openings_stay():
     with pytest.warns(UserWarning, match="6 of 1568 blocks are drawn twice and were dropped"):
         assembly = assemble(drawing, supports=supports, joint_thickness="auto")
     assert assembly.n_blocks == 1564
-    assert len(solver.overlap_depths(assembly.vertices, assembly.offsets, 1e-7)[0]) == 0
+    assert len(mechanics.overlap_depths(assembly.vertices, assembly.offsets, 1e-7)[0]) == 0
     walls = shapely.union_all([shapely.Polygon(assembly.outline(i)).buffer(1e-7) for i in range(1562)])
     windows = [hole for hole in walls.interiors if shapely.Polygon(hole).area > 0.1]
     assert len(windows) == 4
     for hole in windows:
         assert shapely.Polygon(hole).bounds[2] - shapely.Polygon(hole).bounds[0] == pytest.approx(1.05, abs=0.012)
-    contacts = solver.find_contacts(assembly, assembly.vertices, reach=0.005)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, reach=0.005)
     # No corner starts behind a face, and the faces of the joints touch.
     assert contacts.gaps.min() > -1e-9
     assert (np.abs(contacts.gaps) < 1e-6).mean() > 0.95
@@ -205,7 +206,7 @@ def test_drawings_by_hand_leave_no_overlap(seed, kind):
     thickness, _ = proposed_thickness(drawn)
     closing = close_joints(drawn, thickness)
     assembly = solver.Assembly.from_outlines(closing.outlines)
-    assert len(solver.overlap_depths(assembly.vertices, assembly.offsets, 1e-7)[0]) == 0
+    assert len(mechanics.overlap_depths(assembly.vertices, assembly.offsets, 1e-7)[0]) == 0
     # Every block still touches its neighbours: along most of the length over which it faced them.
     faced = facing_edges(drawn, thickness).lengths.sum()
     left = facing_edges(closing.outlines, thickness, 1e-6)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import solver
+from solver import mechanics
 from solver.kinematics import rotation_matrices
 
 ANGLES = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
@@ -96,7 +97,7 @@ def test_only_whole_stones_touch_each_other():
     stone = prism(OUTLINES["U"][0])
     key = prism([(1, 1), (2, 1), (2, 2), (1, 2)])
     assembly = solver.Assembly.from_solids([stone, key])
-    contacts = solver.find_contacts(assembly, assembly.vertices, 0.1)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 0.1)
     assert (contacts.block_a != contacts.block_b).all()
     normals, counts = np.unique(np.round(contacts.frames[:, 0], 9) + 0.0, axis=0, return_counts=True)
     assert len(normals) == 3
@@ -123,7 +124,7 @@ def test_the_arm_of_one_groin_stone_does_not_touch_the_cut_of_the_next(shift):
     slid = second[0] + np.array([0.0, -1.0, 0.0]) * shift
     assembly = solver.Assembly.from_solids([first, (slid, second[1])])
     assert np.bincount(assembly.shapes.parts.block_of_part).tolist() == [2, 2]
-    contacts = solver.find_contacts(assembly, assembly.vertices, 0.05)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 0.05)
     assert len(contacts) >= 8
     sense = np.where(contacts.block_a == 1, 1.0, -1.0)[:, None]
     joint_faces = np.array([[-np.sin(middle), 0.0, np.cos(middle)], [0.0, -np.sin(middle), np.cos(middle)]])

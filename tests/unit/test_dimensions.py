@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 import solver
+from solver import mechanics
 from solver.equilibrium import wrench_matrix
 from solver.geometry.contacts import matched_contacts
 from solver.kinematics import (
@@ -61,9 +62,9 @@ def test_composed_rotations_are_products_of_matrices():
 def test_velocities_are_the_limit_of_small_movements(d):
     pose, block = poses(d), np.arange(20)
     points, motion = RANDOM.normal(size=(20, d)), RANDOM.normal(size=(20, d + rotation_count(d)))
-    velocity = solver.point_velocities(points, block, pose, motion)
-    for move in (moved, solver.swung):
-        small = solver.carried(points, block, pose, move(pose, 1e-7 * motion))
+    velocity = mechanics.point_velocities(points, block, pose, motion)
+    for move in (moved, mechanics.swung):
+        small = mechanics.carried(points, block, pose, move(pose, 1e-7 * motion))
         np.testing.assert_allclose((small - points) / 1e-7, velocity, atol=1e-5)
 
 
@@ -75,8 +76,8 @@ def test_swung_blocks_of_one_rigid_motion_stay_together(d):
     travel = RANDOM.normal(size=d) + np.einsum("nri,r->ni", rows, spin)
     motion = np.concatenate([travel, np.tile(spin, (2, 1))], axis=1)
     points = RANDOM.normal(size=(5, d))
-    after = solver.swung(pose, motion)
-    on_each = [solver.carried(points, np.full(5, k), pose, after) for k in (0, 1)]
+    after = mechanics.swung(pose, motion)
+    on_each = [mechanics.carried(points, np.full(5, k), pose, after) for k in (0, 1)]
     np.testing.assert_allclose(on_each[0], on_each[1], atol=1e-12)
 
 
@@ -84,7 +85,7 @@ def test_swung_blocks_of_one_rigid_motion_stay_together(d):
 def test_size_of_a_motion(d):
     motion = np.zeros((2, d + rotation_count(d)))
     motion[0, 0], motion[1, -1] = -0.3, 0.2
-    np.testing.assert_allclose(solver.motion_size(motion, 2.0), [0.3, 0.4])
+    np.testing.assert_allclose(mechanics.motion_size(motion, 2.0), [0.3, 0.4])
     assert dimension_of(motion.shape[1]) == d
 
 
@@ -95,7 +96,7 @@ def block_on_a_plane(d, width, height):
     up = np.eye(d)[-1]
     tangents = np.eye(d)[:-1] * (-1.0 if d == 2 else 1.0)
     zero = np.zeros(n)
-    contacts = solver.Contacts(
+    contacts = mechanics.Contacts(
         features=np.stack([zero, np.arange(n), zero, zero - 1], axis=1).astype(int),
         block_a=np.zeros(n, dtype=int),
         block_b=np.ones(n, dtype=int),
@@ -140,14 +141,14 @@ def test_contact_points_are_known_by_their_first_three_features():
     other = contacts.features.copy()
     other[:, 3] = 9
     other[0, 0] = 1
-    before = solver.Contacts(other[::-1], *(getattr(contacts, name)[::-1] for name in list(contacts.__dict__)[1:]))
+    before = mechanics.Contacts(other[::-1], *(getattr(contacts, name)[::-1] for name in list(contacts.__dict__)[1:]))
     place, same = matched_contacts(contacts, before)
     assert same.tolist() == [False, True, True, True]
     assert place[1:].tolist() == [2, 1, 0]
 
 
 def test_polygons_have_what_shapes_ask_for():
-    shapes: solver.Shapes = solver.Assembly.from_outlines([[(0, 0), (2, 0), (2, 1), (0, 1)]], thickness=0.5).shapes
+    shapes: mechanics.Shapes = solver.Assembly.from_outlines([[(0, 0), (2, 0), (2, 1), (0, 1)]], thickness=0.5).shapes
     assert shapes.volumes.tolist() == [1.0]
     assert shapes.centroids.tolist() == [[1.0, 0.5]]
     assert shapes.size(np.array([True])) == pytest.approx(np.sqrt(2.0))

@@ -25,6 +25,7 @@ from blockvis.explanation.forward import AS_FAR, ENOUGH, FARTHEST, LEANING, Vari
 from blockvis.explanation.likelihood import Comparison, Trust
 from blockvis.explanation.observations import read_observations
 from blockvis.explanation.ranking import ranked
+from solver import mechanics
 
 CASE = structures.Path("case.toml")
 ARCH = generators.arch(voussoirs=6)
@@ -70,7 +71,7 @@ def test_a_support_turns_about_the_middle_of_where_it_carries():
     _, found = candidates(ARCH, directions=("rotation",))
     turn = next(one for one in found if one.cause == "left springer turns counter-clockwise")
     dx, dy, angle = turn.motions["left springer"]
-    contacts = solver.find_contacts(ARCH, ARCH.vertices, 1e-4)
+    contacts = mechanics.find_contacts(ARCH, ARCH.vertices, 1e-4)
     block = ARCH.index("left springer")
     here = contacts.points[(contacts.block_a == block) | (contacts.block_b == block)]
     arms = here - ARCH.centroids[block]

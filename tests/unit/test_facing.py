@@ -14,6 +14,7 @@ from blockvis.layout.facing import faced
 from blockvis.layout.inspect import inspected
 from blockvis.layout.layout import layout_of
 from blockvis.layout.solids import box, triangles_of, volume
+from solver import mechanics
 
 SMALL = {
     "barrel vault": {"voussoirs": 5, "stones": 2},
@@ -33,7 +34,7 @@ def shaken(layout, amount, seed=3):
 
 def joints(assembly, least):
     """Pairs of blocks with at least so many contact points of faces that cover each other."""
-    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-5 * assembly.block_size)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-5 * assembly.block_size)
     contacts = contacts[contacts.areas > 0.0]
     pairs = Counter(map(frozenset, zip(contacts.block_a.tolist(), contacts.block_b.tolist(), strict=True)))
     return {pair for pair, count in pairs.items() if count >= least}

@@ -19,6 +19,7 @@ from blockvis.dynamics import fall as fall_module
 from blockvis.dynamics.fall import CAPTION, Fall, fall_of
 from blockvis.report.page import report_html
 from blockvis.results.fall_files import stored_fall, write_fall
+from solver import mechanics
 
 ARCH = Path(__file__).parents[2] / "assets" / "semicircular_arch.msh"
 
@@ -51,7 +52,7 @@ def fallen(structure):
 
 
 def outlines(assembly, pose):
-    corners = solver.moved_vertices(assembly, pose)
+    corners = mechanics.moved_vertices(assembly, pose)
     return np.array([shapely.Polygon(ring) for ring in np.split(corners, assembly.offsets[1:-1])])
 
 
@@ -128,7 +129,7 @@ def test_files_have_the_time_as_their_parameter(tmp_path):
     assert reader.time_values == pytest.approx(list(fall.times))
     reader.set_active_time_value(reader.time_values[-1])
     (mesh,) = reader.read()
-    corners = solver.moved_vertices(response.assembly, fall.pose(len(fall) - 1))
+    corners = mechanics.moved_vertices(response.assembly, fall.pose(len(fall) - 1))
     np.testing.assert_allclose(mesh.points[:, :2], corners, atol=1e-12)
     assert mesh.field_data["time"] == pytest.approx(fall.times[-1])
     assert not {"reaction", "settlement", "load_multiplier"} & set(mesh.field_data.keys())
@@ -156,7 +157,7 @@ def test_what_does_not_collapse_along_a_path_does_not_fall():
     assert fall_of(replace(response, stop=solver.Status.LIMIT_REACHED, collapse=None)) is None
     limits = solver.LimitLoad
     assert fall_of(replace(response, limits=(limits,))) is None
-    assert fall_of(replace(response, parameter=solver.Quantity("position", "x", "m", is_path=False))) is None
+    assert fall_of(replace(response, parameter=mechanics.Quantity("position", "x", "m", is_path=False))) is None
 
 
 def test_without_the_engine_there_is_no_fall(monkeypatch):
@@ -174,7 +175,7 @@ def test_friction_of_each_pair_of_materials():
     )
     base = parted(wall(3, 2), 2, 0)
     pose = solver.Pose.initial(assembly)
-    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-3)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-3)
     zeros = np.zeros((len(contacts), 2))
     last = base.path[-1].with_arrays(
         pose=pose, contacts=contacts, forces=zeros, displacements=zeros, friction=np.full(len(contacts), 0.3),
@@ -231,7 +232,7 @@ def test_bent_blocks_fall_in_one_piece():
         [shape, [[-0.5, -0.3], [0.6, -0.3], [0.6, 0.0], [-0.5, 0.0]]], roles=["free", "moving"]
     )
     base = parted(wall(3, 2), 2, 0)
-    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-3)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-3)
     zeros = np.zeros((len(contacts), 2))
     last = base.path[-1].with_arrays(
         pose=solver.Pose.initial(assembly), contacts=contacts, forces=zeros, displacements=zeros,

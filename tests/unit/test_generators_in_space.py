@@ -9,6 +9,7 @@ import solver
 from blockvis import generators
 from blockvis.layout.layout import layout_of
 from blockvis.layout.solids import volume
+from solver import mechanics
 
 #: Sizes at which they take a fraction of a second.
 SMALL = {
@@ -35,7 +36,7 @@ def test_no_block_overlaps_another_and_each_touches_others(name):
     assembly = built(name)
     assert assembly.dimension == 3
     assert not len(assembly.shapes.overlaps(assembly.vertices, 1e-9)[0])
-    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-9)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-9)
     touched = np.bincount(np.concatenate([contacts.block_a, contacts.block_b]), minlength=assembly.n_blocks)
     assert (touched[assembly.free] >= 6).all(), [assembly.names[i] for i in np.flatnonzero(touched < 6)]
     assert np.abs(contacts.gaps).max() < 1e-12

@@ -9,6 +9,7 @@ from blockvis import generators
 from blockvis.case_files.read import parse_case
 from blockvis.cases.build import case_assembly, case_interfaces
 from blockvis.cases.imperfections import Imperfection, imperfect, moved_corners, read_imperfection
+from solver import mechanics
 
 WINDOW = {"x": 1.0, "y": 0.6, "width": 1.0, "height": 0.6, "head": "segmental arch", "voussoirs": 9}
 
@@ -42,7 +43,7 @@ def test_joints_stay_closed_and_nothing_overlaps(name):
     layout, parameters, deviation = STRUCTURES[name]
     drawn = layout(**parameters)
     moved = imperfect(drawn, [_vertices(deviation)])
-    assert solver.overlap_depths(moved.vertices, moved.offsets, 0.0)[2].max(initial=0.0) < 1e-12
+    assert mechanics.overlap_depths(moved.vertices, moved.offsets, 0.0)[2].max(initial=0.0) < 1e-12
     before, after = _touching(drawn), _touching(moved)
     assert before.keys() == after.keys(), "the same blocks touch"
     for pair, length in before.items():

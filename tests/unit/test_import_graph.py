@@ -36,6 +36,7 @@ ORDER = (
     "blockvis.text",
     "blockvis.system",
     "solver",
+    "solver.mechanics",
     "solver.structure",
     "solver.analysis",
     "solver.paper_method",
@@ -155,7 +156,7 @@ def test_solver_never_imports_blockvis_and_blockvis_takes_public_names_of_solver
         if module.startswith("solver"):
             assert not [name for name in names if name.startswith("blockvis")], module
         else:
-            assert not [name for name in names if name.startswith("solver.")], module
+            assert not {name for name in names if name.startswith("solver.")} - {"solver.mechanics"}, module
 
 
 def test_type_checkers_see_every_public_name_where_it_lives():

@@ -21,6 +21,7 @@ from blockvis.pictures.curves import events_of
 from blockvis.pictures.swing import swing_of
 from blockvis.report.page import report_html, summary_rows
 from blockvis.results.joints import initial_joints
+from solver import mechanics
 
 SINKS = (0.0, -1.0)
 
@@ -46,7 +47,7 @@ EACH = pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name,
 
 
 def counted(response, increment):
-    mechanism = solver.mechanism_of(response.assembly, increment)
+    mechanism = mechanics.mechanism_of(response.assembly, increment)
     return len(mechanism.hinges), len(mechanism.sliding)
 
 
@@ -72,7 +73,7 @@ def test_every_increment_has_one_count(name, tmp_path):
     assert max(hinges for hinges, _ in expected) > 0
     joints = initial_joints(response.assembly)
     for increment, (hinges, sliding) in zip(response.increments, expected, strict=True):
-        words = str(solver.mechanism_of(response.assembly, increment))
+        words = str(mechanics.mechanism_of(response.assembly, increment))
         assert in_words(words) == (hinges, sliding)
         marked = marks.marks_of(response.assembly, joints, increment, increment.pose)
         assert (len(marked.hinges), len(marked.sliding)) == (hinges, sliding)
@@ -109,13 +110,13 @@ def test_curve_names_the_count_it_changes_to(name):
 def test_collapse_has_one_count(name, tmp_path):
     """Of the fall, of the last equilibrium in the motion of the fall, which the picture shows, and in the summary."""
     response = RESPONSES[name]()
-    falling = solver.with_motion(response.path[-1], response.collapse.mechanism)
+    falling = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
     expected = counted(response, falling)
     assert in_words(response.collapse.words) == expected
     assert counted(response, response.increments[len(response.path)]) == expected
     summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
     assert (summary["hinges"], summary["sliding_joints"]) == expected
-    parts = len(solver.mechanism_of(response.assembly, falling).motions)
+    parts = len(mechanics.mechanism_of(response.assembly, falling).motions)
     counts = dict(summary_rows(response))["mechanism"]
     assert summary["mechanism"].startswith(f"{parts} macro-blocks; ")
     assert counts.startswith(f"{parts} moving parts, {expected[0]} hinges")
@@ -129,7 +130,7 @@ def test_console_and_summary_count_what_the_picture_shows(tmp_path):
     collapse = replace(response.collapse, words="9 macro-blocks; hinge at a | b")
     response = replace(response, collapse=collapse)
     said = next(line for line in KINDS["settlement"].lines(response) if line.startswith("mechanism: "))
-    assert said == f"mechanism: {solver.mechanism_of(response.assembly, shown)}"
+    assert said == f"mechanism: {mechanics.mechanism_of(response.assembly, shown)}"
     summary = json.loads((blockvis.write(response, tmp_path / "out") / "summary.json").read_text(encoding="utf-8"))
     assert f"mechanism: {summary['mechanism']}" == said
 

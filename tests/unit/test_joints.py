@@ -11,6 +11,7 @@ from structures import BENT, arch_response, parted, wall
 import blockvis
 import solver
 from blockvis.results.joints import LargestMovements, initial_joints, joint_states, opening_and_slip
+from solver import mechanics
 
 
 def stacked(shift=(0.0, 0.0), turn=0.0):
@@ -46,7 +47,7 @@ def test_joints_carry_the_weight_above_them():
         # The springing joints of a semicircle are horizontal.
         assert states.normal_force[at_supports].sum() == pytest.approx(response.total_weight, rel=1e-6)
         assert len(states.normal_force) == response.assembly.n_blocks - 1
-    mechanism = solver.mechanism_of(response.assembly, last)
+    mechanism = mechanics.mechanism_of(response.assembly, last)
     wide = states.opening > 0.01
     assert wide.sum() == 3
     hinged = {tuple(pair) for pair in mechanism.hinges}
@@ -61,7 +62,7 @@ def test_blocks_that_are_not_convex_have_a_joint_on_each_face_and_keep_their_for
     pairs = {tuple(sorted(p)) for p in zip(joints.block_a, joints.block_b, strict=True)}
     assert pairs == {(0, 1), (0, 2)}
     assert len(joints.block_a) == 3, "the tooth touches the L below and at its side"
-    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-3)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-3)
     forces = np.where(np.abs(contacts.frames[:, 0, 1:]) > 0.5, [[10.0, 0.0]], [[1.0, 0.0]])
     path = arch_response().path[0]
     pose = solver.Pose.initial(assembly)
@@ -80,7 +81,7 @@ def test_blocks_that_come_to_touch_later_have_a_joint_that_carries_their_force()
         [assembly.outline(0), assembly.outline(1) + np.array([0.0, 0.5])], roles=["fixed", "free"]
     )
     landed = solver.Pose(apart.centroids - np.array([(0, 0), (0, 0.5)]), np.zeros((2, 1)))
-    contacts = solver.find_contacts(apart, solver.moved_vertices(apart, landed), 1e-3)
+    contacts = mechanics.find_contacts(apart, mechanics.moved_vertices(apart, landed), 1e-3)
     path = arch_response().path[0]
     forces = np.tile([5.0, 0.0], (len(contacts), 1))
     increment = replace(path, held=replace(path.state, pose=landed, contacts=contacts, forces=forces))
@@ -110,7 +111,7 @@ def test_frames_of_a_fall_have_no_forces():
 @pytest.mark.parametrize("shape", ["moved", "undeformed"])
 def test_the_first_warp_leads_from_one_shape_to_the_other(shape):
     response = arch_response()
-    moved = solver.moved_vertices(response.assembly, response.path[-1].pose)
+    moved = mechanics.moved_vertices(response.assembly, response.path[-1].pose)
     drawn = response.assembly.vertices
     mesh = response.mesh(len(response.path) - 1, shape=shape)
     here, there = (moved, drawn) if shape == "moved" else (drawn, moved)

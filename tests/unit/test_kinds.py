@@ -23,6 +23,7 @@ from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.captions import state_text
 from blockvis.report.page import report_html
 from blockvis.runs.progress import Progress
+from solver import mechanics
 
 ROOT = Path(__file__).parents[2]
 
@@ -67,15 +68,15 @@ class TiltKind(AnalysisKind):
     """Gravity turns about the structure in equal steps until its limit load at that tilt is used up."""
 
     name = "tilt"
-    parameter = solver.Quantity("tilt", "θ", "rad")
-    measured = solver.Quantity("reserve", "r", "")
+    parameter = mechanics.Quantity("tilt", "θ", "rad")
+    measured = mechanics.Quantity("reserve", "r", "")
 
     def read(self, top: Any, analysis: Any) -> float:
         return analysis.number("tilt_step", 0.02, positive=True)
 
     def start(self, given: RunInput, resume: Any, found: Sequence[solver.Increment]) -> AnalysisRun:
         return AnalysisRun(
-            self.name, given, self.course(given.case), solver.Increments(_tilted(given, given.case.settings))
+            self.name, given, self.course(given.case), mechanics.Increments(_tilted(given, given.case.settings))
         )
 
     def summary(self, response: solver.Response) -> dict[str, Any]:
@@ -93,12 +94,12 @@ def _tilted(given: RunInput, step: float) -> Steps:
         state = replace(limit.increment, parameter=angle, measured=limit.multiplier)
         if previous is not None and not limit.multiplier > 0.0:
             last = previous.parameter
-            words = str(solver.mechanism_of(given.assembly, previous))
+            words = str(mechanics.mechanism_of(given.assembly, previous))
             collapse = solver.Collapse((last + angle) / 2, (last, angle), 0.0, previous.velocity, "rad", words)
-            return solver.Ending(solver.Status.COLLAPSED, str(collapse), collapse)
+            return mechanics.Ending(solver.Status.COLLAPSED, str(collapse), collapse)
         previous = state
         yield state
-    return solver.Ending(solver.Status.LIMIT_REACHED)
+    return mechanics.Ending(solver.Status.LIMIT_REACHED)
 
 
 TILT = """
@@ -180,7 +181,7 @@ def test_the_bar_shows_the_quantities_of_the_kind(analysis, extra, line, tmp_pat
     stream = Terminal()
     certificate = solver.Certificate()
     nothing = np.zeros((0, 2))
-    state = solver.State(None, None, nothing, nothing, nothing, nothing, nothing)
+    state = mechanics.State(None, None, nothing, nothing, nothing, nothing, nothing)
     standing = solver.Increment(0.05, 7.0, 0, 7.0, 7.0, certificate, solver.Status.EQUILIBRIUM, 1, 0.1, state)
     Progress(course, stream).increment(standing)
     assert f"] {line}" in stream.getvalue()
@@ -193,7 +194,7 @@ def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monke
     bar = Progress(KINDS["settlement"].course(parse_case(text, tmp_path / "case.toml")), stream, ["ground", "block"])
     outlines = [[[-1, -1], [1, -1], [1, 0], [-1, 0]], [[-0.2, 0], [0.2, 0], [0.2, 1], [-0.2, 1]]]
     assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
-    steps = solver.settlement_increments(
+    steps = mechanics.settlement_increments(
         assembly,
         [solver.Settlement(direction=(0, -1), increment=0.1, limit=0.1)],
         interfaces=solver.Interfaces(solver.InterfaceLaw(0.6)),

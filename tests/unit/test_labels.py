@@ -19,6 +19,7 @@ from blockvis.pictures.film import film_of
 from blockvis.pictures.frame import Sheet, write_labels
 from blockvis.studies import pictures
 from blockvis.studies.run_one import _shape
+from solver import mechanics
 
 SMALL, LARGE = (320, 180), (960, 540)
 
@@ -58,7 +59,7 @@ def swinging():
     return solver.Response(
         assembly=arch, settlements=(), interfaces=solver.Interfaces(), loads=loads[0],
         increments=(*states, falling), stop=solver.Status.COLLAPSED, analysis="limit load", limits=limits,
-        parameter=solver.LOAD_POSITION, measured=solver.LOAD_MULTIPLIER,
+        parameter=mechanics.LOAD_POSITION, measured=mechanics.LOAD_MULTIPLIER,
     )  # fmt: skip
 
 
@@ -198,20 +199,20 @@ def test_picture_film_and_page_count_the_last_equilibrium_alike(monkeypatch):
     filmed(response, fps=1.0)
     last = response.path[-1]
     counts = {(hinges, sliding) for at, hinges, sliding in marked if at == last.parameter}
-    falling = solver.mechanism_of(response.assembly, solver.with_motion(last, response.collapse.mechanism))
+    falling = mechanics.mechanism_of(response.assembly, mechanics.with_motion(last, response.collapse.mechanism))
     assert (len(falling.hinges), len(falling.sliding)) in counts
     assert (3, 0) not in counts, "three hinges are those of the settlement, not of the collapse"
 
 
 def test_tiles_of_studies_hold_supports_and_their_arrow():
     response = arch_response()
-    last = solver.with_motion(response.path[-1], response.collapse.mechanism)
-    mechanism = solver.mechanism_of(response.assembly, last)
+    last = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
+    mechanism = mechanics.mechanism_of(response.assembly, last)
     with np.load(io.BytesIO(_shape(response.assembly, last, mechanism, response.settlements[0]))) as stored:
         shape = {name: stored[name] for name in stored.files}
     np.testing.assert_allclose(shape["arrows"][:, 1], [[1.0, 0.0]])
     moving = int(np.flatnonzero(response.assembly.moving)[0])
-    support = solver.moved_vertices(response.assembly, last.pose)[response.assembly.block_of_vertex == moving]
+    support = mechanics.moved_vertices(response.assembly, last.pose)[response.assembly.block_of_vertex == moving]
     place = shape["arrows"][0, 0]
     assert (support.min(axis=0) < place).all()
     assert (place < support.max(axis=0)).all()

@@ -5,7 +5,7 @@ import pytest
 
 import solver
 from blockvis import generators
-from solver import Structure, limit_load
+from solver import Structure, limit_load, mechanics
 
 GROUND = [[-2, -1], [3, -1], [3, 0], [-2, 0]]
 
@@ -26,7 +26,7 @@ def pushed(assembly, live):
 @pytest.mark.parametrize(("friction", "height", "force"), [(0.3, 1.0, 0.3), (0.6, 2.0, 0.25), (0.6, 1.0, 0.5)])
 def test_a_block_pushed_at_its_top_slides_or_overturns(flow, friction, height, force):
     assembly = block(1.0, height)
-    weight = solver.total_weight(assembly)
+    weight = mechanics.total_weight(assembly)
     live = solver.point_load(assembly, 0, (1.0, 0.0), point=(0.0, height))
     limit = limit_load(assembly, loads=pushed(assembly, live), friction_coefficient=friction, flow=flow)
     assert limit.status is solver.LimitStatus.FOUND
@@ -100,7 +100,7 @@ def test_a_joint_that_is_open_by_less_than_the_displacement_counts_by_its_gap(fl
     assembly = solver.Assembly.from_outlines(
         [*outlines, [[-1, -1], [5, -1], [5, 0], [-1, 0]]], roles=["free", "free", "fixed"]
     )
-    brick = solver.total_weight(assembly) / 3.0
+    brick = mechanics.total_weight(assembly) / 3.0
     live = solver.point_load(assembly, 0, (brick, 0.0))
     options = {"loads": pushed(assembly, live), "friction_coefficient": mu, "pose": solver.Pose.initial(assembly)}
     strict = limit_load(assembly, flow=flow, **options)

@@ -7,7 +7,8 @@ import pytest
 
 import solver
 from blockvis import generators
-from solver import settlement_increments, tolerances
+from solver import tolerances
+from solver.mechanics import settlement_increments
 
 pytestmark = pytest.mark.path
 

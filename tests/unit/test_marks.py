@@ -12,6 +12,7 @@ from blockvis.pictures import marks
 from blockvis.pictures.hatching import hatch_lines
 from blockvis.results.joints import initial_joints
 from blockvis.text import rounded_length
+from solver import mechanics
 
 
 def stacked(shift=(0.0, 0.0), turn=0.0):
@@ -127,7 +128,7 @@ def test_a_joint_that_slides_on_one_point_is_marked_over_a_length():
 def test_the_mark_of_a_brick_that_slides_beside_a_large_stone_stays_with_the_brick():
     response = dropped_brick()
     assembly, last = response.assembly, response.path[-1]
-    falls = solver.with_motion(last, response.collapse.mechanism)
+    falls = mechanics.with_motion(last, response.collapse.mechanism)
     lines = marks.marks_of(assembly, initial_joints(assembly), falls, last.pose).sliding
     assert len(lines) == 1
     assert np.hypot(*(lines[0, 1] - lines[0, 0])) <= 0.2, "the brick is 0.2 m thick, the stone 4 m wide"
@@ -141,7 +142,7 @@ def test_joints_that_hardly_slide_are_not_marked():
     for slip, drawn in ((0.5, True), (1e-4, False)):
         along = np.tile([0.0, slip * fastest], (len(last.contacts), 1))
         sliding = last.with_arrays(forces=used_up, displacements=along)
-        assert (sliding.states == solver.ContactState.SLIDING).any()
+        assert (sliding.states == mechanics.ContactState.SLIDING).any()
         assert (len(marks.marks_of(response.assembly, joints, sliding, last.pose).sliding) > 0) is drawn
 
 
@@ -162,27 +163,27 @@ def test_arch_spreads_on_three_hinges_and_falls_on_five():
     last, joints = response.path[-1], initial_joints(response.assembly)
     spreading = marks.marks_of(response.assembly, joints, last, last.pose)
     assert len(spreading.hinges) == 3
-    falling = solver.with_motion(last, response.collapse.mechanism)
+    falling = mechanics.with_motion(last, response.collapse.mechanism)
     assert len(marks.marks_of(response.assembly, joints, falling, last.pose).hinges) == 5
-    parts = solver.rigid_parts(response.assembly, falling)
+    parts = mechanics.rigid_parts(response.assembly, falling)
     assert sorted(np.bincount(parts[parts >= 0]).tolist()) == [2, 2, 4, 4]
     assert (parts[~response.assembly.free] == -1).all()
 
 
 def test_parts_swing_as_one_body():
     response = arch_response()
-    falling = solver.with_motion(response.path[-1], response.collapse.mechanism)
-    parts = solver.rigid_parts(response.assembly, falling)
-    displaced = solver.swung(falling.pose, 0.1 * response.collapse.mechanism)
-    outlines = marks.part_outlines(response.assembly, solver.moved_vertices(response.assembly, displaced), parts)
+    falling = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
+    parts = mechanics.rigid_parts(response.assembly, falling)
+    displaced = mechanics.swung(falling.pose, 0.1 * response.collapse.mechanism)
+    outlines = marks.part_outlines(response.assembly, mechanics.moved_vertices(response.assembly, displaced), parts)
     length = np.hypot(*(outlines[:, 1] - outlines[:, 0]).T).sum()
-    before = marks.part_outlines(response.assembly, solver.moved_vertices(response.assembly, falling.pose), parts)
+    before = marks.part_outlines(response.assembly, mechanics.moved_vertices(response.assembly, falling.pose), parts)
     np.testing.assert_allclose(length, np.hypot(*(before[:, 1] - before[:, 0]).T).sum(), rtol=1e-2)
 
 
 def test_a_sinking_wall_is_one_part():
     response = parted(wall(8, 6), 2, 0)
-    parts = solver.rigid_parts(response.assembly, response.increments[-1])
+    parts = mechanics.rigid_parts(response.assembly, response.increments[-1])
     assert set(parts) == {-1, 0}
 
 
@@ -209,5 +210,5 @@ def test_carried_there_and_back(turn, x, y):
     before = solver.Pose(np.array([[1.0, 2.0]]), np.array([[0.3]]))
     after = solver.Pose(np.array([[x, y]]), np.array([[turn]]))
     point = np.array([[0.7, -0.4]])
-    there = solver.carried(point, np.array([0]), before, after)
-    np.testing.assert_allclose(solver.carried(there, np.array([0]), after, before), point, atol=1e-9)
+    there = mechanics.carried(point, np.array([0]), before, after)
+    np.testing.assert_allclose(mechanics.carried(there, np.array([0]), after, before), point, atol=1e-9)

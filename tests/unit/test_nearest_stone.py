@@ -11,6 +11,7 @@ from blockvis.layout.joints.close import close_joints, proposed
 from blockvis.layout.joints.facing_edges import proposed_thickness
 from blockvis.layout.joints.nearest_stone import share_out
 from blockvis.layout.layout import Layout
+from solver import mechanics
 
 WIDTH, HEIGHT = 1.6, 1.2
 
@@ -55,7 +56,7 @@ def layout(rings):
 
 def first_increment(assembly, friction=0.6):
     """Status and reaction over weight before the ground moves."""
-    increments = solver.settlement_increments(
+    increments = mechanics.settlement_increments(
         assembly,
         (solver.Settlement(direction=(0, -1), increment=5e-4, limit=5e-4),),
         interfaces=solver.Interfaces(solver.InterfaceLaw(friction)),
@@ -63,7 +64,7 @@ def first_increment(assembly, friction=0.6):
         controls=solver.Controls(falling_frames=1),
     )
     increment = next(increments)
-    return increment.status, increment.reaction / solver.total_weight(assembly)
+    return increment.status, increment.reaction / mechanics.total_weight(assembly)
 
 
 @pytest.mark.thorough

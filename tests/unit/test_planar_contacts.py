@@ -7,6 +7,7 @@ import pytest
 import shapely
 
 import solver
+from solver import mechanics
 from solver.equilibrium import wrench_matrix
 from solver.geometry.planar_contacts import ON_CORNER
 
@@ -23,7 +24,7 @@ def square(x, y):
 
 def find(outlines, roles=None, reach=0.05):
     assembly = solver.Assembly.from_outlines(outlines, roles=roles)
-    return assembly, solver.find_contacts(assembly, assembly.vertices, reach)
+    return assembly, mechanics.find_contacts(assembly, assembly.vertices, reach)
 
 
 def turned(outline, angle, centre):
@@ -225,7 +226,7 @@ def test_gaps_follow_the_moved_block():
     random = np.random.default_rng(3)
     q = 1e-6 * random.normal(size=(assembly.n_blocks, 3))
     pose = solver.Pose(assembly.centroids + q[:, :2], q[:, 2:])
-    after = solver.measure_contacts(assembly, solver.moved_vertices(assembly, pose), before)
+    after = mechanics.measure_contacts(assembly, mechanics.moved_vertices(assembly, pose), before)
     relative = wrench_matrix(before, solver.Pose.initial(assembly)).T @ q.ravel()
     assert np.abs(after.gaps - before.gaps - relative[0::2]).max() < 1e-10
     assert np.abs(after.slip[:, 0] - before.slip[:, 0] - relative[1::2]).max() < 1e-10
@@ -236,7 +237,7 @@ def test_wrench_matrix_gives_resultants():
     assembly, contacts = find(LAYOUTS["running bond"])
     forces = np.random.default_rng(4).normal(size=(len(contacts), 2))
     pose = solver.Pose.initial(assembly)
-    resultants = solver.block_forces(contacts, pose, forces)
+    resultants = mechanics.block_forces(contacts, pose, forces)
     assert np.abs(resultants[:, :2].sum(axis=0)).max() < 1e-12
     moment = assembly.centroids[:, 0] * resultants[:, 1] - assembly.centroids[:, 1] * resultants[:, 0]
     assert abs((moment + resultants[:, 2]).sum()) < 1e-11
@@ -258,7 +259,7 @@ def test_friction_of_pairs_of_materials():
 
 def depths(outlines, tolerance=1e-6):
     assembly = solver.Assembly.from_outlines(outlines)
-    i, j, depth = solver.overlap_depths(assembly.vertices, assembly.offsets, tolerance)
+    i, j, depth = mechanics.overlap_depths(assembly.vertices, assembly.offsets, tolerance)
     return dict(zip(zip(i.tolist(), j.tolist(), strict=True), depth.tolist(), strict=True))
 
 
@@ -311,7 +312,7 @@ def test_where_three_blocks_meet_two_corners_touch_along_their_closest_faces_onl
     post = [[2.4, 0], [3, 0], [3, 2], [1.61, 2], [2, 1]]
     wedge = [[0, 1], [2, 1], [1.61, 2], [0, 2]]
     assembly = solver.Assembly.from_outlines([slab, post, wedge])
-    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-3)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-3)
     pair = {*zip(contacts.block_a.tolist(), contacts.block_b.tolist(), strict=True)} & {(0, 1), (1, 0)}
     chosen = np.array([(a, b) in pair for a, b in zip(contacts.block_a, contacts.block_b, strict=True)])
     assert sorted(contacts.points[chosen].tolist()) == [[2.0, 1.0], [2.4, 0.0]]

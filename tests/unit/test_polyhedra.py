@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import solver
+from solver import mechanics
 from solver.geometry.contacts import matched_contacts
 from solver.geometry.spatial_contacts import ACROSS, ON_CORNER, ON_FACE
 from solver.kinematics import moved, relative_velocities, rotation_matrices
@@ -24,7 +25,7 @@ def turned(solid, rotation, centre=(0.0, 0.0, 0.0)):
 
 def points(solids, reach=0.1, roles=None):
     assembly = solver.Assembly.from_solids(solids, roles=roles)
-    return assembly, solver.find_contacts(assembly, assembly.vertices, reach)
+    return assembly, mechanics.find_contacts(assembly, assembly.vertices, reach)
 
 
 def test_integrals_of_a_tetrahedron_far_from_the_origin():
@@ -83,7 +84,7 @@ def test_gaps_and_slips_follow_the_motion_of_the_blocks(scene):
     pose = solver.Pose.initial(assembly)
     for size in (1e-4, 1e-5):
         motion = RANDOM.normal(size=(2, 6)) * size
-        there = solver.measure_contacts(assembly, solver.moved_vertices(assembly, moved(pose, motion)), contacts)
+        there = mechanics.measure_contacts(assembly, mechanics.moved_vertices(assembly, moved(pose, motion)), contacts)
         expected = relative_velocities(contacts, pose, motion)
         np.testing.assert_allclose(there.gaps - contacts.gaps, expected[:, 0], atol=60 * size**2)
         np.testing.assert_allclose(there.slip - contacts.slip, expected[:, 1:], atol=60 * size**2)
@@ -96,8 +97,8 @@ def test_points_are_recognised_after_a_small_motion(scene, kinds):
     assembly, contacts = points(SCENES[scene])
     assert set(contacts.features[:, 0]) == kinds
     motion = RANDOM.normal(size=(2, 6)) * 1e-3
-    vertices = solver.moved_vertices(assembly, moved(solver.Pose.initial(assembly), motion))
-    place, known = matched_contacts(solver.find_contacts(assembly, vertices, 0.1), contacts)
+    vertices = mechanics.moved_vertices(assembly, moved(solver.Pose.initial(assembly), motion))
+    place, known = matched_contacts(mechanics.find_contacts(assembly, vertices, 0.1), contacts)
     assert known.all()
     np.testing.assert_array_equal(np.sort(place), np.arange(len(contacts)))
 

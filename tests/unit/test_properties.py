@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import solver
 from blockvis import generators
+from solver import mechanics
 
 pytestmark = pytest.mark.path
 
@@ -117,7 +118,7 @@ def rotation(angle):
 def test_cases_are_worth_it():
     assert original("hinging arch").stop is solver.Status.COLLAPSED
     assert original("sliding arch").stop is solver.Status.COLLAPSED
-    assert any((i.states == solver.ContactState.SLIDING).any() for i in original("sliding arch").path)
+    assert any((i.states == mechanics.ContactState.SLIDING).any() for i in original("sliding arch").path)
     wall = original("sinking wall")
     assert wall.stop is solver.Status.LIMIT_REACHED
     assert 0.05 < wall.initial_reaction / wall.total_weight < 0.6

@@ -6,7 +6,7 @@ import pytest
 
 import solver
 from blockvis import generators
-from solver import limit_load, pushover
+from solver import limit_load, mechanics, pushover
 from solver.tolerances import SHEAR_COMPLIANCE
 
 pytestmark = pytest.mark.path
@@ -109,7 +109,7 @@ def test_pushed_only_so_far_it_keeps_capacity():
     assert response.settlement == pytest.approx([*(0.01 * np.arange(10)), 0.095], abs=1e-9)
     assert response.path[-1].load_multiplier == pytest.approx(np.tan(np.arctan(0.2) - np.arcsin(0.095)), abs=1e-6)
     assert len(seen) == len(response.increments)
-    weight = solver.total_weight(assembly)
+    weight = mechanics.total_weight(assembly)
     assert response.reaction == pytest.approx([i.load_multiplier * weight for i in response.path])
     # Going on from there gives the same curve, its displacement counted anew.
     again = pushover(assembly, control, loads=sideways(assembly), pose=response.path[-1].pose)

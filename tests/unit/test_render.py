@@ -20,6 +20,7 @@ from blockvis.pictures.film import film_of
 from blockvis.pictures.flat_scene import FlatScene
 from blockvis.pictures.frame import Frame, framed
 from blockvis.pictures.swing import swing_of
+from solver import mechanics
 
 SMALL = (640, 360)
 
@@ -44,8 +45,8 @@ def test_what_is_where(tmp_path):
         x, y = drawer.scene.at_pixel(np.array([point]))[0].round().astype(int)
         return picture[top + y, left + x]
 
-    corners = solver.moved_vertices(assembly, last.pose)
-    hinges = last.contacts.points[solver.mechanism_of(assembly, last).hinge_points]
+    corners = mechanics.moved_vertices(assembly, last.pose)
+    hinges = last.contacts.points[mechanics.mechanism_of(assembly, last).hinge_points]
     crown = hinges[np.argmax(hinges[:, 1])]
     assert alike(colour_at(crown), palette.HINGE)
     assert alike(colour_at(crown - [0.0, 0.12]), palette.OPEN)
@@ -217,7 +218,7 @@ def test_supports_are_shown_whole_where_there_is_room():
 def test_magnified_keeps_blocks_rigid():
     response = arch_response()
     pose = magnified(response.assembly, response.path[-1].pose, 3.0)
-    corners = solver.moved_vertices(response.assembly, pose)
+    corners = mechanics.moved_vertices(response.assembly, pose)
     lengths = np.hypot(*(corners[response.assembly.next_vertex] - corners).T)
     np.testing.assert_allclose(lengths, response.assembly.edge_lengths, rtol=1e-12)
     moved = pose.displacements(response.assembly)
@@ -257,14 +258,14 @@ def test_the_film_has_the_tints_and_dots_of_the_mechanism(tmp_path):
     picture = pixels(draw_mechanism(response, tmp_path / "mechanism.png", size=(1280, 720)))
     drawer = Drawer(response, Look(colour_by="mechanism", forces="none"), (1280, 720), response.path)
     last = np.asarray(drawer.picture(response.path[-1])).astype(int)
-    parts = solver.rigid_parts(response.assembly, swing_of(response).increment)
+    parts = mechanics.rigid_parts(response.assembly, swing_of(response).increment)
     tinted = palette.part_colours(palette.block_colours(("",), np.array([True])).repeat(4, 0), np.arange(4))
     assert parts.max() == 3
     for tint in tinted:
         assert alike(last[100:600], tint, 6).sum() > 2000
     # As many dots: they are of one size in both, up to the scale.
     ends = swing_of(response).increment
-    hinges = ends.contacts.points[solver.mechanism_of(response.assembly, ends).hinge_points]
+    hinges = ends.contacts.points[mechanics.mechanism_of(response.assembly, ends).hinge_points]
     left, top = drawer.sheet.inside[:2]
     for x, y in drawer.scene.at_pixel(hinges).round().astype(int):
         assert alike(last[top + y, left + x], palette.HINGE)

@@ -9,6 +9,7 @@ import pytest
 import solver
 from blockvis import generators, read_case
 from blockvis.cases.build import case_assembly
+from solver import mechanics
 
 #: A national grid: coordinates of five thousand kilometres are rounded to a nanometre.
 GRID = np.array([5e5, 5e6])
@@ -84,8 +85,8 @@ def test_a_run_on_the_grid_goes_on_where_it_was_stopped():
     arch = _arch(place=GRID)
     setting = {"interfaces": solver.Interfaces(solver.InterfaceLaw(0.7)), "loads": solver.self_weight(arch)}
     spread = (replace(_spread(), limit=0.1),)
-    told = list(solver.settlement_increments(arch, spread, **setting))
-    again = list(solver.settlement_increments(arch, spread, resume=told[2].checkpoint, **setting))
+    told = list(mechanics.settlement_increments(arch, spread, **setting))
+    again = list(mechanics.settlement_increments(arch, spread, resume=told[2].checkpoint, **setting))
     assert len(again) == len(told) - 3
     for one, other in zip(again, told[3:], strict=True):
         assert one.reaction == other.reaction

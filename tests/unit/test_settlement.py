@@ -11,6 +11,7 @@ from structures import equal_certificates
 
 import solver
 from blockvis import generators
+from solver import mechanics
 from solver.programs.highs import run_highs
 
 pytestmark = pytest.mark.path
@@ -336,7 +337,9 @@ def test_forces_are_in_equilibrium_and_in_their_cones(name):
     response = RESPONSES[name]()
     assembly, weight = response.assembly, response.total_weight
     for increment in response.path:
-        resultant = solver.block_forces(increment.contacts, increment.pose, increment.forces) + response.loads.total()
+        resultant = (
+            mechanics.block_forces(increment.contacts, increment.pose, increment.forces) + response.loads.total()
+        )
         unbalanced = resultant[assembly.free] / (weight * np.array([1, 1, assembly.block_size]))
         assert np.abs(unbalanced).max() < 1e-8
         normal, shear = increment.forces.T
@@ -354,7 +357,7 @@ def test_blocks_do_not_overlap(name):
     assembly = response.assembly
     smallest = assembly.widths.min()
     for increment in response.increments[:: 1 if len(response.increments) < 20 else 3]:
-        corners = solver.moved_vertices(assembly, increment.pose)
+        corners = mechanics.moved_vertices(assembly, increment.pose)
         blocks = [shapely.Polygon(c) for c in np.split(corners, assembly.offsets[1:-1])]
         for i, j in zip(*shapely.STRtree(blocks).query(blocks), strict=True):
             if i < j and (assembly.free[i] or assembly.free[j]):
@@ -369,8 +372,8 @@ def test_brick_that_rises_past_its_neighbour_does_not_turn_into_it():
     sink = solver.Settlement(direction=(0, -1), increment=0.05, limit=0.1)
     response = solver.settle(wall, sink, friction_coefficient=0.9, controls=NO_FALL)
     for increment in response.path:
-        corners = solver.moved_vertices(wall, increment.pose)
-        _, _, depth = solver.overlap_depths(corners, wall.offsets, 1e-9)
+        corners = mechanics.moved_vertices(wall, increment.pose)
+        _, _, depth = mechanics.overlap_depths(corners, wall.offsets, 1e-9)
         assert depth.max(initial=0.0) < 1e-3 * wall.widths.min(), increment.settlement
 
 
@@ -396,7 +399,7 @@ def test_reaction_does_the_work_that_gravity_loses():
 def test_sliding_costs_energy():
     """With friction the reaction does less work than gravity loses."""
     response = sliding_response()
-    assert any((i.states == solver.ContactState.SLIDING).any() for i in response.path)
+    assert any((i.states == mechanics.ContactState.SLIDING).any() for i in response.path)
     weights = response.assembly.masses * solver.GRAVITY * response.assembly.free
     energy = [weights @ i.pose.positions[:, 1] for i in (response.path[0], response.path[-1])]
     assert np.trapezoid(response.reaction, response.settlement) < 0.99 * (energy[0] - energy[1])
@@ -480,7 +483,7 @@ def test_no_brick_falls_into_another_where_little_drag_holds_it():
     response = solver.settle(wall, sideways, friction_coefficient=0.72)
     assert response.stop in (solver.Status.COLLAPSED, solver.Status.LIMIT_REACHED), response.message
     for increment in response.path:
-        moved = np.split(solver.moved_vertices(wall, increment.pose), wall.shapes.offsets[1:-1])
+        moved = np.split(mechanics.moved_vertices(wall, increment.pose), wall.shapes.offsets[1:-1])
         shapes = [shapely.Polygon(corners) for corners in moved]
         shared = [a.intersection(b).area for a, b in combinations(shapes, 2) if a.intersects(b)]
         assert max(shared, default=0.0) < 1e-6 * max(shape.area for shape in shapes)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import shapely
 
-import solver
 from blockvis.layout.assemble import assemble
 from blockvis.layout.layout import Layout
 from blockvis.layout.simplify import default_tolerance, simplified
+from solver import mechanics
 
 
 def split_square(n, amplitude=0.004, seed=1):
@@ -34,7 +34,7 @@ def test_a_corner_of_one_block_on_the_edge_of_another_stays_there():
     rough = [ring + np.array([0.0, 1.0]) for ring in split_square(100)]
     found, note = simplified([base, *rough], 0.01)
     assert note
-    assert len(solver.overlap_depths(np.concatenate(found), np.cumsum([0, *map(len, found)]), 1e-9)[0]) == 0
+    assert len(mechanics.overlap_depths(np.concatenate(found), np.cumsum([0, *map(len, found)]), 1e-9)[0]) == 0
     assert min(found[1][:, 1]) == min(found[2][:, 1]) == 1.0
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import solver
+from solver import mechanics
 from solver.kinematics import rotation_matrices
 
 
@@ -75,7 +76,7 @@ def dome(lunes=10, courses=5, thickness=0.15):
 
 def found(solids, reach=0.01):
     assembly = solver.Assembly.from_solids(solids)
-    return solver.find_contacts(assembly, assembly.vertices, reach)
+    return mechanics.find_contacts(assembly, assembly.vertices, reach)
 
 
 def table(contacts, number=None, turn=None):

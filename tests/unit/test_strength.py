@@ -9,6 +9,7 @@ from structures import run_command
 import solver
 from blockvis import generators
 from blockvis.case_files.read import parse_case
+from solver import mechanics
 
 WIDTH, HEIGHT, THICKNESS = 0.8, 0.5, 0.3
 AREA = WIDTH * THICKNESS
@@ -21,7 +22,7 @@ def block(height=HEIGHT, **law):
         names=["block", "ground"],
         thickness=THICKNESS,
     )
-    return assembly, solver.Interfaces(solver.InterfaceLaw(**law)), solver.total_weight(assembly)
+    return assembly, solver.Interfaces(solver.InterfaceLaw(**law)), mechanics.total_weight(assembly)
 
 
 def limit(assembly, interfaces, live, **options):
@@ -87,7 +88,7 @@ def test_cohesion_does_not_hold_a_joint_together():
 def test_faces_are_shared_out_among_their_contact_points():
     """A brick on two: each interface has its own length, and the parts of all points make up the whole face."""
     wall = generators.build("wall", {"bricks": 4, "courses": 3, "depth": 0.2})
-    contacts = solver.find_contacts(wall, wall.vertices, 1e-6)
+    contacts = mechanics.find_contacts(wall, wall.vertices, 1e-6)
     areas = contacts.areas
     for course, bearing in ((0, 4 * 0.25), (1, 4 * 0.25), (2, 4 * 0.25)):
         flat = np.abs(contacts.frames[:, 0, 1]) > 0.5

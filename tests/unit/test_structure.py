@@ -8,6 +8,7 @@ import pytest
 import blockvis
 import solver
 from blockvis import generators
+from solver import mechanics
 
 #: A block twice as high as wide overturns at a horizontal acceleration of its slenderness, 0.5 g, unless it slides.
 GROUND = [[-1, -0.2], [3, -0.2], [3, 0], [-1, 0]]
@@ -54,7 +55,7 @@ def test_limit_load_is_a_response_of_its_own(block, tmp_path):
     response = limit.response
     assert response.limits == (limit,)
     assert response.values == pytest.approx([0.5])
-    assert response.loads.live[1, 0] == pytest.approx(solver.total_weight(block))
+    assert response.loads.live[1, 0] == pytest.approx(mechanics.total_weight(block))
     assert "0.5" in limit.plot()._repr_html_()
     picture = blockvis.draw_mechanism(limit, tmp_path / "mechanism.png")
     assert picture.stat().st_size > 10_000
@@ -82,7 +83,7 @@ def test_what_is_analysed_shows_itself_in_a_notebook():
 
 def test_increments_are_asked_for_and_then_how_it_ended():
     arch = generators.arch()
-    increments = solver.settlement_increments(
+    increments = mechanics.settlement_increments(
         arch,
         [solver.Settlement(direction=(1, 0), increment=0.01, limit=0.02)],
         interfaces=solver.Interfaces(),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import solver
+from solver import mechanics
 
 pytestmark = pytest.mark.path
 
@@ -283,5 +284,5 @@ def test_brick_in_a_tray_that_turns(friction_coefficient, clearance, limit):
     turned = [increment.pose.rotations[0, 0] for increment in response.path]
     assert turned == pytest.approx(response.settlement, abs=1.5 * clearance + 1e-5)
     # Walls that only hold the brick do not squeeze it.
-    weight = solver.total_weight(response.assembly)
+    weight = mechanics.total_weight(response.assembly)
     assert max(increment.forces[:, 0].max() for increment in response.path) < 2.0 * weight

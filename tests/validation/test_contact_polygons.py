@@ -11,6 +11,7 @@ import solver
 from blockvis import generators, read_case
 from blockvis.cases.build import case_assembly
 from blockvis.layout.solids import extruded
+from solver import mechanics
 from solver.kinematics import moved, rotation_matrices
 
 #: Here coal 3.0.3 gives a polygon of half the area, whose corners are on no edge of the faces.
@@ -78,7 +79,7 @@ def test_polygons_are_those_of_coal(scene):
     overlap = shapely.get_coordinates(polygons[0] & polygons[1])[:-1]
     expected = np.column_stack([overlap, np.zeros(len(overlap))]) @ turn.T
     assembly = solver.Assembly.from_solids([hull_of(first @ turn.T), hull_of(second @ turn.T)])
-    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-3)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-3)
     assert same_places(contacts.points, expected)
     sense = np.where(contacts.block_a == 1, 1.0, -1.0)[:, None]
     np.testing.assert_allclose(sense * contacts.frames[:, 0], np.tile(turn[:, 2], (len(contacts), 1)), atol=1e-6)
@@ -127,7 +128,7 @@ def test_extruded_structures_have_the_points_of_the_plane(name, size):
     in_space[:, 0], in_space[:, 2], in_space[:, 4] = motion[:, 0], motion[:, 1], -motion[:, 2]
     reach = 0.05 * plane.block_size
     flat, solid = (
-        solver.find_contacts(one, solver.moved_vertices(one, moved(solver.Pose.initial(one), by)), reach)
+        mechanics.find_contacts(one, mechanics.moved_vertices(one, moved(solver.Pose.initial(one), by)), reach)
         for one, by in ((plane, motion), (space, in_space))
     )
     expected = rows(flat, True)
@@ -155,8 +156,8 @@ def test_what_touches_in_the_plane_touches_there_in_space(name):
     else:
         plane = generators.build(name) if name in PLANE else case_assembly(EXAMPLES[name])
     space, reach = in_space_of(plane), 1e-6 * plane.block_size
-    expected = rows(solver.find_contacts(plane, plane.vertices, reach), True)
-    solid = solver.find_contacts(space, space.vertices, reach)
+    expected = rows(mechanics.find_contacts(plane, plane.vertices, reach), True)
+    solid = mechanics.find_contacts(space, space.vertices, reach)
     weights = np.array([1, 1, 1, 1, 1e-2, 1e-2, 1])
     for end in (0.0, THICKNESS):
         found = rows(solid[np.abs(solid.points[:, 1] - end) < 1e-9], False)
@@ -176,7 +177,7 @@ def test_cells_of_space_touch_in_their_common_faces():
     solids = [hull_of(cells.vertices[cells.regions[cells.point_region[k]]]) for k in range(n)]
     assembly = solver.Assembly.from_solids(solids)
     assert assembly.shapes.volumes.sum() == pytest.approx(1.0, rel=1e-9)
-    contacts = solver.find_contacts(assembly, assembly.vertices, 1e-7)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-7)
     pairs, joint = contacts.joints()
     found = dict(zip(map(tuple, pairs.tolist()), np.bincount(joint, contacts.areas), strict=True))
     expected = {}

@@ -9,7 +9,7 @@ from test_panels import panel
 
 import solver
 from blockvis import generators
-from solver import settlement_increments
+from solver.mechanics import settlement_increments
 
 pytestmark = pytest.mark.path
 

@@ -6,6 +6,7 @@ from test_space_paths import leaning_plug
 
 import solver
 from blockvis.generators import dome, l_corner
+from solver import mechanics
 
 manifold = pytest.importorskip("manifold3d", reason="manifold3d, the judge of shared volumes, is not installed")
 
@@ -53,7 +54,7 @@ def test_blocks_share_no_volume_at_any_increment(name):
     moved = np.abs(response.path[-1].pose.positions - assembly.centroids)[assembly.free]
     assert moved.max() > 0.5 * settlement.limit
     for increment in response.path:
-        vertices = solver.moved_vertices(assembly, increment.pose)
+        vertices = mechanics.moved_vertices(assembly, increment.pose)
         assert largest_shared_volume(assembly, vertices) < SHARED, increment.parameter
 
 

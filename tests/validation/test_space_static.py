@@ -9,6 +9,7 @@ import pytest
 
 import solver
 from blockvis import generators
+from solver import mechanics
 from solver.program.admissible import admissible
 from solver.program.model import Model
 from solver.tolerances import COMPUTED_GAP
@@ -71,7 +72,7 @@ def bounds(assembly, friction, rate=None, turned_by=0.0, azimuth=0.0):
     load[:, :3] = (assembly.masses * solver.GRAVITY)[:, None] * down
     force, length = float(np.linalg.norm(load[free, :3], axis=1).mean()), assembly.block_size
     model = Model(assembly, solver.Interfaces(solver.InterfaceLaw(friction)), load, length, force, length / 4.0)
-    contacts = solver.find_contacts(assembly, assembly.vertices, COMPUTED_GAP * length)
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, COMPUTED_GAP * length)
     return admissible(model, solver.Pose.initial(assembly), contacts, np.full(len(contacts), friction), rate)
 
 
@@ -219,7 +220,7 @@ def test_a_turned_cube_under_a_uniform_pressure(flow):
     assert found.torsion == "uniform"
     assert "uniform torsion" in str(found)
     # What is reported at the points has the same resultants.
-    on_block = solver.block_forces(found.contacts, found.pose, found.forces)[0]
+    on_block = mechanics.block_forces(found.contacts, found.pose, found.forces)[0]
     np.testing.assert_allclose(
         on_block, np.array([0, 0, 1, 0, 0, -found.multiplier]) * live[0, 5], atol=1e-6 * live[0, 5]
     )

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-import solver
 from blockvis.layout.outlines import without_collinear
+from solver import mechanics
 
 from .facing_edges import CLOSED, Edges, Facing
 from .midlines import Line, moved_outlines, normal_form
@@ -141,7 +141,7 @@ def separated(rings: list[np.ndarray], still: np.ndarray, thickness: float, clos
 
 def _overlaps(rings: list[np.ndarray], closed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
-    return solver.overlap_depths(np.concatenate(rings), offsets, closed)
+    return mechanics.overlap_depths(np.concatenate(rings), offsets, closed)
 
 
 def _outward_form(edges: Edges, lines: dict[int, Line], edge: int) -> tuple[np.ndarray, float]:

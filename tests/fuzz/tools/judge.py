@@ -13,6 +13,7 @@ from rubble import Trial, trial
 
 import solver
 from blockvis.runs.run import AS_DRAWN
+from solver import mechanics
 
 #: Distance at which corners touch, in block sizes: above what the solver leaves open, below every real gap.
 NEAR = 1e-5
@@ -322,4 +323,4 @@ def _near(assembly: solver.Assembly, path: tuple[solver.Increment, ...], k: int)
 
 
 def _rings(assembly: solver.Assembly, pose: solver.Pose) -> list[np.ndarray]:
-    return np.split(solver.moved_vertices(assembly, pose), assembly.offsets[1:-1])
+    return np.split(mechanics.moved_vertices(assembly, pose), assembly.offsets[1:-1])

@@ -1,0 +1,80 @@
+"""What a package of files and pictures needs of the mechanics beside what users do: shapes, contacts, poses, words."""
+
+from .analysis.increments import Increments
+from .analysis.pushover import pushover_increments
+from .analysis.settlement import check_settlement, settlement_increments
+from .assembly import FIXED, FREE, MOVING, ROLES, find_contacts, measure_contacts
+from .equilibrium import block_forces
+from .geometry.contacts import Contacts
+from .geometry.outlines import overlap_depths
+from .geometry.planar_contacts import corners_and_edges, features_of
+from .geometry.polygons import Polygons
+from .geometry.polyhedra import Polyhedra
+from .geometry.shapes import Shapes
+from .kinematics import carried, carried_between, motion_size, moved_vertices, point_velocities, swung, turned
+from .path.controls import INCREMENTS, Ending
+from .path.state import PathState
+from .results.certificate import worst_of
+from .results.increment import ContactState, State, StoredState
+from .results.mechanism import Mechanism, mechanism_of, rigid_parts, with_motion
+from .results.quantities import (
+    CONTROL_DISPLACEMENT,
+    LOAD_MULTIPLIER,
+    LOAD_POSITION,
+    REACTION,
+    SETTLEMENT,
+    Quantity,
+    reaction_to,
+    settlement_in,
+)
+from .results.response import Control, path_parameters, total_weight
+
+__all__ = [
+    "CONTROL_DISPLACEMENT",
+    "FIXED",
+    "FREE",
+    "INCREMENTS",
+    "LOAD_MULTIPLIER",
+    "LOAD_POSITION",
+    "MOVING",
+    "REACTION",
+    "ROLES",
+    "SETTLEMENT",
+    "ContactState",
+    "Contacts",
+    "Control",
+    "Ending",
+    "Increments",
+    "Mechanism",
+    "PathState",
+    "Polygons",
+    "Polyhedra",
+    "Quantity",
+    "Shapes",
+    "State",
+    "StoredState",
+    "block_forces",
+    "carried",
+    "carried_between",
+    "check_settlement",
+    "corners_and_edges",
+    "features_of",
+    "find_contacts",
+    "measure_contacts",
+    "mechanism_of",
+    "motion_size",
+    "moved_vertices",
+    "overlap_depths",
+    "path_parameters",
+    "point_velocities",
+    "pushover_increments",
+    "reaction_to",
+    "rigid_parts",
+    "settlement_in",
+    "settlement_increments",
+    "swung",
+    "total_weight",
+    "turned",
+    "with_motion",
+    "worst_of",
+]
