@@ -98,7 +98,8 @@ def test_increments_are_asked_for_and_then_how_it_ended():
 
 
 def test_public_names_are_all_that_is_seen():
-    assert {name for name in dir(blockvis) if not name.startswith("__")} == set(blockvis.__all__)
+    assert {name for name in dir(blockvis) if not name.startswith("__")} == {*blockvis.__all__, "generators"}
+    assert blockvis.generators is generators
 
 
 class _Mesh:
