@@ -301,6 +301,10 @@ def weight_fraction(assembly: Assembly, fraction: Sequence[float], blocks: np.nd
     """
     load = _no_load(assembly)
     chosen = slice(None) if blocks is None else blocks
+    if len(fraction) != assembly.dimension:
+        raise ValueError(
+            f"a fraction of the weight is {list(fraction)}; give {assembly.dimension} numbers, one per axis"
+        )
     load[chosen, : assembly.dimension] = (assembly.masses * GRAVITY)[chosen, None] * np.asarray(fraction, dtype=float)
     return load
 

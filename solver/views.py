@@ -60,11 +60,5 @@ class Shown:
         return None if found is None else found.html(self)
 
     def plot(self, **options: Any) -> Any:
-        """Show it in a notebook, for the last line of a cell: a player of a response, a picture of all else.
-
-        Parameters
-        ----------
-        **options
-            Of a response ``height`` [pixels].
-        """
+        """Show it in a notebook, as the last line of a cell: a response in a player of ``height`` pixels, else a picture."""
         return views().shown(self, **options)

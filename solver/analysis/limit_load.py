@@ -387,5 +387,5 @@ def checked_live(assembly: Assembly, loads: Loads) -> Loads:
     loads = checked_loads(assembly, loads)
     live = np.where(assembly.free[:, None], loads.live, 0.0)
     if not live.any():
-        raise ValueError("no live load acts on any free block; give Loads whose 'live' is not zero")
+        raise ValueError("no live load acts on any free block; give an acceleration, or Loads whose 'live' is not zero")
     return replace(loads, live=live)

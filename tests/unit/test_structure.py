@@ -36,6 +36,8 @@ def test_friction_is_never_assumed(block):
         solver.Structure(block, solver.Interfaces(), friction_coefficient=0.5)
     with pytest.raises(ValueError, match="friction_coefficient is -1"):
         solver.Structure(block, friction_coefficient=-1.0)
+    with pytest.raises(ValueError, match=r"is \[1, 0, 0\]; give 2 numbers, one per axis"):
+        solver.Structure(block, friction_coefficient=0.5).limit_load(acceleration=(1, 0, 0))
     with pytest.raises(TypeError, match="either the live loads or an acceleration"):
         solver.Structure(block, friction_coefficient=0.5).with_live()
     assert solver.Structure(block, friction_coefficient=0.0).interfaces.default.friction_coefficient == 0.0
