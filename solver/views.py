@@ -60,5 +60,5 @@ class Shown:
         return None if found is None else found.html(self)
 
     def plot(self, **options: Any) -> Any:
-        """Show it in a notebook, as the last line of a cell: a response in a player of ``height`` pixels, else a picture."""
+        """Show it, as the last line of a notebook cell: a response in a player of ``height`` pixels, else pictured."""
         return views().shown(self, **options)
