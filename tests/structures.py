@@ -13,6 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 import solver
 from blockvis import generators
@@ -27,12 +28,58 @@ BENT = {
 }
 
 
+def rectangle(left: float, low: float, right: float, high: float) -> np.ndarray:
+    """Outline of a rectangle, counter-clockwise from its lower left corner."""
+    return np.array([[left, low], [right, low], [right, high], [left, high]], dtype=float)
+
+
+def brick(x: float, y: float, width: float, height: float) -> np.ndarray:
+    """Outline of a rectangle by its lower left corner and its size."""
+    return rectangle(x, y, x + width, y + height)
+
+
+def prism(outline, low: float = 0.0, high: float = 1.0) -> tuple[np.ndarray, list[list[int]]]:
+    """Extrude an outline in x and y, counter-clockwise seen from above, from z = low to z = high."""
+    n = len(outline)
+    corners = np.array([[*point, z] for z in (low, high) for point in outline], dtype=float)
+    sides = [[k, (k + 1) % n, n + (k + 1) % n, n + k] for k in range(n)]
+    return corners, [list(range(n))[::-1], list(range(n, 2 * n)), *sides]
+
+
+def box(low, high) -> tuple[np.ndarray, list[list[int]]]:
+    """Vertices and faces of a box between two corners."""
+    return prism(rectangle(*low[:2], *high[:2]), low[2], high[2])
+
+
+def hull_of(points) -> tuple[np.ndarray, list[list[int]]]:
+    """Closed surface of the convex hull of points, in triangles."""
+    hull = ConvexHull(points)
+    faces = []
+    for corners, plane in zip(hull.simplices, hull.equations, strict=True):
+        a, b, c = hull.points[corners]
+        faces.append((corners if np.cross(b - a, c - a) @ plane[:3] > 0.0 else corners[::-1]).tolist())
+    return hull.points, faces
+
+
+def stacked(shift=(0.0, 0.0), turn: float = 0.0) -> tuple[solver.Assembly, solver.Pose]:
+    """A block of 1 m on another, and the pose with the upper one moved."""
+    assembly = solver.Assembly.from_outlines([rectangle(0, 0, 1, 1), rectangle(0, 1, 1, 2)], roles=["fixed", "free"])
+    return assembly, solver.Pose(assembly.centroids + np.array([(0.0, 0.0), shift]), np.array([[0.0], [turn]]))
+
+
 @cache
 def arch_response() -> solver.Response:
     """A semicircular arch of 12 voussoirs whose right springer spreads until it collapses."""
     spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
     controls = solver.Controls(falling_frames=12)
     return solver.settle(generators.arch(), spread, friction_coefficient=0.6, controls=controls)
+
+
+@cache
+def portal_response() -> solver.Response:
+    """A portal frame whose moving support sinks until it collapses."""
+    sinks = solver.Settlement(direction=(0, -1), increment=0.05, limit=2.5, tolerance=5e-3)
+    return solver.settle(generators.portal(), sinks, friction_coefficient=0.6)
 
 
 @cache

@@ -6,7 +6,6 @@ import json
 import os
 import re
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -51,12 +50,6 @@ def told(page, tmp_path, script, *options, anchor=""):
     found = json.loads(html.unescape(re.search(r'data-out="([^"]*)"', body).group(1)))
     assert "error" not in found, found["error"]
     return found
-
-
-@cache
-def portal():
-    sinks = solver.Settlement(direction=(0, -1), increment=0.05, limit=2.5, tolerance=5e-3)
-    return solver.settle(blockvis.generators.portal(), sinks, friction_coefficient=0.6)
 
 
 def test_title_names_case_file_date_and_version(tmp_path):

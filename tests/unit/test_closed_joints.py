@@ -8,6 +8,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from structures import brick
 
 import solver
 from blockvis import read_layout
@@ -20,17 +21,13 @@ FACADE = Path(__file__).resolve().parents[3] / "shared" / "data" / "facade" / "f
 needs_facade = pytest.mark.skipif(not FACADE.exists(), reason="third-party drawing, not part of the project")
 
 
-def box(x, y, w, h):
-    return np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]], dtype=float)
-
-
 def wall(joints, courses, height=0.065, length=0.25):
     """Running bond with a joint thickness of its own per course and per head joint."""
     bricks, y = [], 0.0
     for k in range(courses):
         x = 0.0 if k % 2 == 0 else length / 2
         for m in range(4):
-            bricks.append(box(x, y, length, height))
+            bricks.append(brick(x, y, length, height))
             x += length + joints[(5 * k + m) % len(joints)]
         y += height + joints[(3 * k + 1) % len(joints)]
     return bricks
@@ -63,21 +60,21 @@ def assert_closed(rings, thickness, scale):
 
 
 def test_two_bricks_meet_half_way_and_keep_their_outer_corners():
-    closing = close_joints([box(0, 0, 1, 1), box(1.02, 0, 1, 1)], 0.03)
+    closing = close_joints([brick(0, 0, 1, 1), brick(1.02, 0, 1, 1)], 0.03)
     assert closing.n_joints == 1
-    assert np.allclose(closing.outlines[0], box(0, 0, 1.01, 1), atol=1e-15)
-    assert np.allclose(closing.outlines[1], box(1.01, 0, 1.01, 1), atol=1e-15)
+    assert np.allclose(closing.outlines[0], brick(0, 0, 1.01, 1), atol=1e-15)
+    assert np.allclose(closing.outlines[1], brick(1.01, 0, 1.01, 1), atol=1e-15)
 
 
 def test_a_wider_gap_is_an_opening():
-    blocks = [box(0, 0, 1, 1), box(1.02, 0, 1, 1)]
+    blocks = [brick(0, 0, 1, 1), brick(1.02, 0, 1, 1)]
     closing = close_joints(blocks, 0.01)
     assert closing.n_joints == 0
     assert all((a == b).all() for a, b in zip(closing.outlines, blocks, strict=True))
 
 
 def test_t_junction_of_running_bond_closes_exactly():
-    blocks = [box(0, 0, 1, 0.5), box(1.01, 0, 1, 0.5), box(0.5, 0.51, 1, 0.5)]
+    blocks = [brick(0, 0, 1, 0.5), brick(1.01, 0, 1, 0.5), brick(0.5, 0.51, 1, 0.5)]
     closing = close_joints(blocks, 0.012)
     assert [len(ring) for ring in closing.outlines] == [4, 4, 4]
     assert closing.outlines[2][0] == pytest.approx([0.5, 0.505], abs=1e-15)
@@ -101,13 +98,13 @@ def test_wedges_between_voussoirs_close_to_their_bisector(n):
 
 
 def test_what_faces_a_support_comes_all_the_way():
-    closing = close_joints([box(0, 0.01, 1, 1), box(-1, -1, 3, 1)], 0.02, anchored=np.array([False, True]))
-    assert (closing.outlines[1] == box(-1, -1, 3, 1)).all()
-    assert np.allclose(closing.outlines[0], box(0, 0, 1, 1.01), atol=1e-15)
+    closing = close_joints([brick(0, 0.01, 1, 1), brick(-1, -1, 3, 1)], 0.02, anchored=np.array([False, True]))
+    assert (closing.outlines[1] == brick(-1, -1, 3, 1)).all()
+    assert np.allclose(closing.outlines[0], brick(0, 0, 1, 1.01), atol=1e-15)
 
 
 def test_windows_keep_their_size():
-    frame = [box(0, 0, 3, 1), box(0, 1.01, 1, 1), box(2, 1.01, 1, 1), box(0, 2.02, 3, 1)]
+    frame = [brick(0, 0, 3, 1), brick(0, 1.01, 1, 1), brick(2, 1.01, 1, 1), brick(0, 2.02, 3, 1)]
     closing = close_joints(frame, 0.02)
     window = shapely.union_all([shapely.Polygon(ring) for ring in closing.outlines]).interiors[0]
     assert np.allclose(shapely.Polygon(window).bounds, (1, 1.005, 2, 2.015), atol=1e-9)
@@ -115,7 +112,7 @@ def test_windows_keep_their_size():
 
 def test_a_back_that_no_line_serves_is_cut_to_fit():
     """Three tops of a polygonal arch under one straight beam."""
-    beam = box(-1.0, 0.6, 2.0, 0.4)
+    beam = brick(-1.0, 0.6, 2.0, 0.4)
     tops = []
     for centre, slope in ((-0.6, 0.3), (0.0, 0.0), (0.6, -0.3)):
         x = np.array([centre - 0.29, centre + 0.29])
@@ -130,7 +127,7 @@ def test_a_back_that_no_line_serves_is_cut_to_fit():
 
 
 def test_small_overlap_is_resolved_to_the_midline():
-    closing = close_joints([box(0, 0, 1, 1), box(0.99, 0, 1, 1)], 0.0, overlap=0.02)
+    closing = close_joints([brick(0, 0, 1, 1), brick(0.99, 0, 1, 1)], 0.0, overlap=0.02)
     assert closing.outlines[0][:, 0].max() == pytest.approx(0.995, abs=1e-15)
     assert closing.outlines[1][:, 0].min() == pytest.approx(0.995, abs=1e-15)
 
@@ -166,7 +163,7 @@ def test_proposed_thickness_is_the_widest_joint():
     thickness, found = proposed_thickness(wall([0.0101, 0.008], 4))
     assert thickness == pytest.approx(0.011)
     assert len(found) > 20
-    assert proposed_thickness([box(0, 0, 1, 1), box(1, 0, 1, 1)])[0] == 0.0
+    assert proposed_thickness([brick(0, 0, 1, 1), brick(1, 0, 1, 1)])[0] == 0.0
 
 
 @pytest.mark.thorough
@@ -198,7 +195,7 @@ def test_drawings_by_hand_leave_no_overlap(seed, kind):
     """Every corner off by up to a millimetre, where joints are a centimetre wide."""
     blocks = {
         "running": lambda: wall([0.01, 0.008, 0.012], 5),
-        "stack": lambda: [box(0.26 * i, 0.075 * j, 0.25, 0.065) for i in range(4) for j in range(4)],
+        "stack": lambda: [brick(0.26 * i, 0.075 * j, 0.25, 0.065) for i in range(4) for j in range(4)],
         "arch": lambda: voussoirs(11, 1.0, 1.25, 0.01),
     }[kind]()
     generator = np.random.default_rng(seed)

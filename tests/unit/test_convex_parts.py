@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from structures import prism
 
 import solver
 from solver import mechanics
@@ -21,14 +22,6 @@ OUTLINES = {
         3,
     ),
 }
-
-
-def prism(outline, height=1.0):
-    outline = np.asarray(outline, dtype=float)
-    n = len(outline)
-    low, high = (np.column_stack([outline, np.full(n, z)]) for z in (0.0, height))
-    sides = [[k, (k + 1) % n, (k + 1) % n + n, k + n] for k in range(n)]
-    return np.concatenate([low, high]), [list(range(n))[::-1], list(range(n, 2 * n)), *sides]
 
 
 def ring():

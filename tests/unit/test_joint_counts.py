@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from structures import arch_response
+from structures import arch_response, portal_response
 
 import blockvis
 import solver
@@ -27,19 +27,13 @@ SINKS = (0.0, -1.0)
 
 
 @cache
-def portal():
-    sinks = solver.Settlement(direction=SINKS, increment=0.05, limit=2.5, tolerance=5e-3)
-    return solver.settle(generators.portal(), sinks, friction_coefficient=0.6)
-
-
-@cache
 def facade():
     bricks = {"bricks": 14, "courses": 24, "storeys": 1, "windows": 1, "window_bricks": 3, "voussoirs": 3}
     sinks = solver.Settlement(direction=SINKS, increment=0.01, limit=0.04)
     return solver.settle(generators.build("facade", bricks), sinks, friction_coefficient=0.6)
 
 
-RESPONSES = {"portal frame": portal, "semicircular arch": arch_response, "small façade": facade}
+RESPONSES = {"portal frame": portal_response, "semicircular arch": arch_response, "small façade": facade}
 
 #: The façade takes as long as all others together.
 MARKS = {"portal frame": pytest.mark.thorough, "small façade": pytest.mark.slow}
@@ -125,7 +119,7 @@ def test_collapse_has_one_count(name, tmp_path):
 @pytest.mark.thorough
 def test_console_and_summary_count_what_the_picture_shows(tmp_path):
     """Not the first frame of the fall, whose contact points and forces are others."""
-    response = portal()
+    response = portal_response()
     shown = swing_of(response).increment
     collapse = replace(response.collapse, words="9 macro-blocks; hinge at a | b")
     response = replace(response, collapse=collapse)

@@ -6,20 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import pyvista as pv
-from structures import BENT, arch_response, parted, wall
+from structures import BENT, arch_response, parted, stacked, wall
 
 import blockvis
 import solver
 from blockvis.results.joints import LargestMovements, initial_joints, joint_states, opening_and_slip
 from solver import mechanics
-
-
-def stacked(shift=(0.0, 0.0), turn=0.0):
-    """A block of 1 m on another, and the pose with the upper one moved."""
-    assembly = solver.Assembly.from_outlines(
-        [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 1], [1, 2], [0, 2]]], roles=["fixed", "free"]
-    )
-    return assembly, solver.Pose(assembly.centroids + np.array([(0.0, 0.0), shift]), np.array([[0.0], [turn]]))
 
 
 def test_a_block_that_slides_has_slip_and_one_that_rocks_has_opening():

@@ -5,7 +5,7 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from structures import BENT, arch_response, dropped_brick, parted, wall
+from structures import BENT, arch_response, dropped_brick, parted, stacked, wall
 
 import solver
 from blockvis.pictures import marks
@@ -13,15 +13,6 @@ from blockvis.pictures.hatching import hatch_lines
 from blockvis.results.joints import initial_joints
 from blockvis.text import rounded_length
 from solver import mechanics
-
-
-def stacked(shift=(0.0, 0.0), turn=0.0):
-    """A block on another, 1 m wide, and the pose with the upper one moved."""
-    assembly = solver.Assembly.from_outlines(
-        [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 1], [1, 2], [0, 2]]], roles=["fixed", "free"]
-    )
-    pose = solver.Pose(assembly.centroids + np.array([(0.0, 0.0), shift]), np.array([[0.0], [turn]]))
-    return assembly, pose
 
 
 def all_cracks(assembly, pose):

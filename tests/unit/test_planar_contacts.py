@@ -5,6 +5,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 import shapely
+from structures import rectangle
 
 import solver
 from solver import mechanics
@@ -12,10 +13,6 @@ from solver.equilibrium import wrench_matrix
 from solver.geometry.planar_contacts import ON_CORNER
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-
-
-def rectangle(left, low, right, high):
-    return [[left, low], [right, low], [right, high], [left, high]]
 
 
 def square(x, y):

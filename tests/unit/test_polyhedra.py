@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from structures import box
 
 import solver
 from solver import mechanics
@@ -10,12 +11,6 @@ from solver.geometry.spatial_contacts import ACROSS, ON_CORNER, ON_FACE
 from solver.kinematics import moved, relative_velocities, rotation_matrices
 
 RANDOM = np.random.default_rng(3)
-
-
-def box(low, high):
-    (x, y, z), (u, v, w) = low, high
-    corners = [[x, y, z], [u, y, z], [u, v, z], [x, v, z], [x, y, w], [u, y, w], [u, v, w], [x, v, w]]
-    return corners, [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
 
 
 def turned(solid, rotation, centre=(0.0, 0.0, 0.0)):

@@ -3,6 +3,7 @@
 import ezdxf
 import numpy as np
 import pytest
+from structures import brick
 
 from blockvis import inspect, read, read_case, read_layout
 from blockvis.case_files.read import parse_case
@@ -13,14 +14,10 @@ from blockvis.layout.selection import without_debris, without_surroundings
 from blockvis.pictures.inspection import draw_inspection
 
 
-def box(x, y, w, h):
-    return np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]], dtype=float)
-
-
 def wall(space, layer="brick", x=0.0, n=4):
     for course in range(4):
         for k in range(n):
-            ring = box(x + 250 * k, 75 * course, 240, 65)
+            ring = brick(x + 250 * k, 75 * course, 240, 65)
             space.add_lwpolyline(ring.tolist(), close=True, dxfattribs={"layer": layer})
 
 
@@ -41,8 +38,8 @@ def outline(ring, layer, close=True):
 
 def hatch_with_hole(space):
     hatch = space.add_hatch(dxfattribs={"layer": "mortar"})
-    hatch.paths.add_polyline_path(box(0, 0, 990, 290).tolist())
-    hatch.paths.add_polyline_path(box(250, 75, 240, 65).tolist())
+    hatch.paths.add_polyline_path(brick(0, 0, 990, 290).tolist())
+    hatch.paths.add_polyline_path(brick(250, 75, 240, 65).tolist())
 
 
 @pytest.mark.parametrize(
@@ -53,10 +50,16 @@ def hatch_with_hole(space):
             r"left out: 1 line that closes no outline on layer 'notes', 'line \w+' at \(1.5, 0.6\), its ends 0.204",
         ),
         (outline([[0, 500], [100, 500], [300, 500]], "brick"), "left out: 1 outline without area on layer 'brick'"),
-        (outline(box(0, 500, 900, 0.05), "brick"), r"left out: 1 sliver on layer 'brick', 'block \w+' at \(0.45, 0.5"),
+        (
+            outline(brick(0, 500, 900, 0.05), "brick"),
+            r"left out: 1 sliver on layer 'brick', 'block \w+' at \(0.45, 0.5",
+        ),
         (hatch_with_hole, r"left out: 1 mortar surface on layer 'mortar', 'hatch \w+' at \(0.495, 0.145\)"),
-        (outline(box(-500, -500, 2000, 1500), "sheet"), "left out: 1 frame or background around other blocks on layer"),
-        (outline(box(0, 900, 500, 60), "Title"), "left out: 1 outline on a layer of annotations on layer 'Title'"),
+        (
+            outline(brick(-500, -500, 2000, 1500), "sheet"),
+            "left out: 1 frame or background around other blocks on layer",
+        ),
+        (outline(brick(0, 900, 500, 60), "Title"), "left out: 1 outline on a layer of annotations on layer 'Title'"),
     ],
 )
 def test_what_is_no_block_is_left_out_with_a_note(tmp_path, extra, note):
@@ -82,34 +85,36 @@ def test_lines_across_the_wall_are_left_out_and_cut_nothing(tmp_path):
 
 
 def test_a_title_block_goes_with_its_frame_and_bricks_on_a_background_stay(tmp_path):
-    cells = [outline(box(1000 + 200 * k, -500, 200, 120), "sheet") for k in range(3)]
-    drawing = read_layout(drawn(tmp_path, outline(box(-500, -500, 2100, 1500), "sheet"), *cells))
+    cells = [outline(brick(1000 + 200 * k, -500, 200, 120), "sheet") for k in range(3)]
+    drawing = read_layout(drawn(tmp_path, outline(brick(-500, -500, 2100, 1500), "sheet"), *cells))
     assert drawing.n_blocks == 16
     assert any("3 cells of a title block on layer 'sheet'" in note for note in drawing.notes)
     # Bricks that reach the border of what lies behind them are no title block.
-    drawing = read_layout(drawn(tmp_path, outline(box(0, 0, 990, 290), "mortar")))
+    drawing = read_layout(drawn(tmp_path, outline(brick(0, 0, 990, 290), "mortar")))
     assert drawing.n_blocks == 16
     assert any("1 mortar surface on layer 'mortar'" in note for note in drawing.notes)
 
 
 def test_inner_lines_of_blocks_go_and_one_block_in_another_is_refused(tmp_path):
-    inner = [outline(box(250 * k + 10, 10, 220, 45), "brick") for k in range(4)]
+    inner = [outline(brick(250 * k + 10, 10, 220, 45), "brick") for k in range(4)]
     drawing = read_layout(drawn(tmp_path, *inner))
     assert drawing.n_blocks == 16
     assert any("4 inner lines of blocks on layer 'brick'" in note for note in drawing.notes)
     with pytest.raises(ValueError, match="overlaps"):
-        read(drawn(tmp_path, outline(box(10, 10, 220, 45), "brick")))
+        read(drawn(tmp_path, outline(brick(10, 10, 220, 45), "brick")))
 
 
 def test_mortar_drawn_as_blocks_of_its_own_stays():
-    bricks = [box(0, 0, 1, 0.4), box(1.05, 0, 1, 0.4), box(0, 0.45, 2.05, 0.4)]
-    mortar = [box(1.0, 0, 0.05, 0.4), box(0, 0.4, 2.05, 0.05)]
+    bricks = [brick(0, 0, 1, 0.4), brick(1.05, 0, 1, 0.4), brick(0, 0.45, 2.05, 0.4)]
+    mortar = [brick(1.0, 0, 0.05, 0.4), brick(0, 0.4, 2.05, 0.05)]
     drawing = Layout(tuple(bricks + mortar), tuple("abcde"), groups=("stone",) * 3 + ("mortar",) * 2)
     assert without_surroundings(without_debris(drawing)).n_blocks == 5
 
 
 def test_ignore_and_only(tmp_path):
-    path = drawn(tmp_path, outline(box(2000, 0, 300, 100), "steel"), outline(box(2000, 200, 300, 100), "steel beam"))
+    path = drawn(
+        tmp_path, outline(brick(2000, 0, 300, 100), "steel"), outline(brick(2000, 200, 300, 100), "steel beam")
+    )
     assert read_layout(path).n_blocks == 18
     assert read_layout(path, ignore="steel").n_blocks == 17
     assert read_layout(path, ignore=["steel*"]).n_blocks == 16
@@ -131,7 +136,7 @@ def test_ignore_and_only(tmp_path):
 
 
 def test_what_only_names_is_not_left_out_by_itself(tmp_path):
-    path = drawn(tmp_path, outline(box(0, 900, 500, 60), "Title"))
+    path = drawn(tmp_path, outline(brick(0, 900, 500, 60), "Title"))
     assert read_layout(path, only=["brick", "Title"]).n_blocks == 17
 
 
@@ -139,7 +144,7 @@ def test_what_is_asked_to_go_cannot_refuse_the_file(tmp_path):
     """A surface in pieces is refused, unless it is left out."""
     from blockvis.formats.read import write_layout
 
-    rings = [box(0, 0, 1, 1), box(1, 0, 1, 1), box(5, 5, 1, 1)]
+    rings = [brick(0, 0, 1, 1), brick(1, 0, 1, 1), brick(5, 5, 1, 1)]
     write_layout(Layout(tuple(rings), ("a", "b", "c"), groups=("stone", "soil", "soil")), tmp_path / "a.vtu")
     import pyvista as pv
 
@@ -153,7 +158,7 @@ def test_what_is_asked_to_go_cannot_refuse_the_file(tmp_path):
 
 
 def test_keys_of_the_case(tmp_path):
-    drawn(tmp_path, outline(box(2000, 0, 300, 100), "steel"))
+    drawn(tmp_path, outline(brick(2000, 0, 300, 100), "steel"))
     text = '[geometry]\nfile = "wall.dxf"\nignore = ["steel"]\njoint_thickness = "auto"\nclosing = "faces"\n'
     text += '[roles]\n"block 2F" = "moving"\n[settlement]\ndirection = [0, -1]\n'
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
@@ -170,7 +175,7 @@ def test_keys_of_the_case(tmp_path):
 
 
 def test_on_the_command_line(tmp_path, capsys):
-    path = drawn(tmp_path, outline(box(2000, 0, 300, 100), "steel"), outline(box(2000, 200, 300, 100), "wood"))
+    path = drawn(tmp_path, outline(brick(2000, 0, 300, 100), "steel"), outline(brick(2000, 200, 300, 100), "wood"))
     assert main(["info", str(path), "--ignore", "steel", "--ignore", "wood"]) == 0
     assert "outlines        16" in capsys.readouterr().out
     assert main(["convert", str(path), str(tmp_path / "a.json"), "--only", "brick"]) == 0
@@ -180,8 +185,8 @@ def test_on_the_command_line(tmp_path, capsys):
 def test_info_honours_roles_of_layers_and_draws_what_was_left_out(tmp_path):
     path = drawn(
         tmp_path,
-        outline(box(-100, -100, 600, 100), "fixed"),
-        outline(box(500, -100, 600, 100), "Moving"),
+        outline(brick(-100, -100, 600, 100), "fixed"),
+        outline(brick(500, -100, 600, 100), "Moving"),
         outline([[1500, 600], [1600, 700], [1700, 640]], "notes", close=False),
     )
     found = inspect(path)

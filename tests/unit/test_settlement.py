@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 from scipy.optimize import linprog
-from structures import equal_certificates
+from structures import equal_certificates, rectangle
 
 import solver
 from blockvis import generators
@@ -18,10 +18,6 @@ pytestmark = pytest.mark.path
 
 NO_FALL = solver.Controls(falling_frames=0)
 DOWN = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.02)
-
-
-def rectangle(left, low, right, high):
-    return [[left, low], [right, low], [right, high], [left, high]]
 
 
 def two_bricks(**roles_and_names):

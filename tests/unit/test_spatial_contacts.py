@@ -4,34 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull
+from structures import box, hull_of
 
 import solver
 from solver import mechanics
 from solver.kinematics import rotation_matrices
-
-
-def box(low, high):
-    (x, y, z), (u, v, w) = low, high
-    corners = [[x, y, z], [u, y, z], [u, v, z], [x, v, z], [x, y, w], [u, y, w], [u, v, w], [x, v, w]]
-    return np.array(corners, dtype=float), [
-        [3, 2, 1, 0],
-        [4, 5, 6, 7],
-        [0, 1, 5, 4],
-        [1, 2, 6, 5],
-        [2, 3, 7, 6],
-        [3, 0, 4, 7],
-    ]
-
-
-def hull_of(points):
-    """Closed surface of the convex hull of points, in triangles."""
-    hull = ConvexHull(points)
-    faces = []
-    for corners, plane in zip(hull.simplices, hull.equations, strict=True):
-        a, b, c = hull.points[corners]
-        faces.append((corners if np.cross(b - a, c - a) @ plane[:3] > 0.0 else corners[::-1]).tolist())
-    return hull.points, faces
 
 
 def corner_of_walls(bricks=3, courses=4, length=0.25, height=0.08):

@@ -5,15 +5,12 @@ Reference: statics and three-hinge kinematics by hand, in the docstring of each 
 
 import numpy as np
 import pytest
+from structures import rectangle
 
 import solver
 from solver import mechanics
 
 pytestmark = pytest.mark.path
-
-
-def rectangle(left, low, right, high):
-    return [[left, low], [right, low], [right, high], [left, high]]
 
 
 def settle(outlines, roles, settlement, friction_coefficient, **controls):
@@ -268,7 +265,7 @@ def test_keystone_locked_between_approaching_supports(degrees, friction_coeffici
 )
 def test_brick_in_a_tray_that_turns(friction_coefficient, clearance, limit):
     """Brick between the walls of its support: it turns with it, and slides out along a wall at 90° + atan μ."""
-    brick, tray = rectangle(0, 0, 1, 1), rectangle(-1, -1, 2, 2)
+    brick, tray = rectangle(0, 0, 1, 1), rectangle(-1, -1, 2, 2).tolist()
     left, right = -clearance, 1 + clearance
     tray[3:3] = [[right, 2], [right, 0], [left, 0], [left, 2]]
     slides_out = np.pi / 2.0 + np.arctan(friction_coefficient)

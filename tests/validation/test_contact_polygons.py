@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from scipy.spatial import ConvexHull, Voronoi, cKDTree
+from scipy.spatial import Voronoi, cKDTree
+from structures import hull_of
 
 import solver
 from blockvis import generators, read_case
@@ -16,16 +17,6 @@ from solver.kinematics import moved, rotation_matrices
 
 #: Here coal 3.0.3 gives a polygon of half the area, whose corners are on no edge of the faces.
 LOST_BY_COAL = 4
-
-
-def hull_of(points):
-    """Closed surface of the convex hull of points, in triangles."""
-    hull = ConvexHull(points)
-    faces = []
-    for corners, plane in zip(hull.simplices, hull.equations, strict=True):
-        a, b, c = hull.points[corners]
-        faces.append((corners if np.cross(b - a, c - a) @ plane[:3] > 0.0 else corners[::-1]).tolist())
-    return hull.points, faces
 
 
 def random_stone(random, bottom):

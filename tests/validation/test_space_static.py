@@ -6,6 +6,7 @@ a bar on two edges, a cube that is turned, a plug between faces and a stack with
 
 import numpy as np
 import pytest
+from structures import box, prism
 
 import solver
 from blockvis import generators
@@ -15,14 +16,6 @@ from solver.program.model import Model
 from solver.tolerances import COMPUTED_GAP
 
 EXACT = 1e-6
-
-
-def prism(outline, low, high):
-    """Extrude an outline in x and y, counter-clockwise seen from above, from z = low to z = high."""
-    n = len(outline)
-    corners = np.array([[*point, z] for z in (low, high) for point in outline])
-    sides = [[k, (k + 1) % n, n + (k + 1) % n, n + k] for k in range(n)]
-    return corners, [list(range(n))[::-1], list(range(n, 2 * n)), *sides]
 
 
 def along_x(outline, low, high):
@@ -35,11 +28,6 @@ def along_y(outline, low, high):
     """Extrude an outline in x and z from y = low to y = high."""
     corners, faces = prism(outline, low, high)
     return corners[:, [0, 2, 1]], [face[::-1] for face in faces]
-
-
-def box(low, high):
-    (x, y, z), (u, v, w) = low, high
-    return prism([[x, y], [u, y], [u, v], [x, v]], z, w)
 
 
 def on_ground(solids, extent=5.0):

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from structures import rectangle
 
 import solver
 from blockvis import generators
@@ -131,17 +132,13 @@ def test_a_wall_a_thousand_times_as_heavy_ends_alike():
     assert response.reaction / response.total_weight == pytest.approx(expected, rel=2e-3)
 
 
-def box(left, low, right, high):
-    return np.array([[left, low], [right, low], [right, high], [left, high]], dtype=float)
-
-
 def test_a_column_that_nothing_presses_against_a_wall_hangs_nothing_on_it():
     """Coulomb friction does not lift a block off what it slides along: no force in the head joint, R = W.
 
     The least admissible reaction, that of associative friction, is W / (1 + μ²); it is told where nothing has moved.
     """
     column = solver.Assembly.from_outlines(
-        [box(0, 0, 1, 1), box(0, 1, 1, 2), box(-2, -1, 0, 3), box(0, -1, 3, 0)],
+        [rectangle(0, 0, 1, 1), rectangle(0, 1, 1, 2), rectangle(-2, -1, 0, 3), rectangle(0, -1, 3, 0)],
         roles=["free", "free", "fixed", "moving"],
     )
     sinks = solver.Settlement(direction=(0, -1), increment=0.01, limit=0.1)
@@ -156,8 +153,8 @@ def test_a_column_that_nothing_presses_against_a_wall_hangs_nothing_on_it():
 def test_blocks_that_meet_at_a_corner_do_not_hold_each_other(turn):
     """One passes below the other, turned by a hair, on a support that moves to the left and down: R = W sin 30°."""
     cos, sin = np.cos(turn), np.sin(turn)
-    turned = np.array(box(-1, 0, 0, 1)) @ np.array([[cos, sin], [-sin, cos]])
-    outlines = [box(0, -1, 1, 0), turned, box(-3, -2, 4, -1)]
+    turned = np.array(rectangle(-1, 0, 0, 1)) @ np.array([[cos, sin], [-sin, cos]])
+    outlines = [rectangle(0, -1, 1, 0), turned, rectangle(-3, -2, 4, -1)]
     assembly = solver.Assembly.from_outlines(outlines, roles=["free", "fixed", "moving"])
     away = solver.Settlement(direction=(-np.cos(np.pi / 6.0), -0.5), increment=0.01, limit=0.1)
     response = solver.settle(assembly, away, friction_coefficient=0.6, controls=NO_FALL)
