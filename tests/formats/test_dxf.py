@@ -246,7 +246,7 @@ def test_a_spline_of_degree_one_is_straight(tmp_path):
     assert len(read(saved(tmp_path, draw)).vertices) == 4
 
 
-def test_faces_of_lines_are_told_where_they_are_analysed(tmp_path):
+def test_faces_of_lines_are_noted_where_they_are_analysed(tmp_path):
     def draw(document, space):
         corners = [*SQUARE, SQUARE[0]]
         for start, end in itertools.pairwise(corners):

@@ -48,7 +48,7 @@ def test_a_folder_of_one_stone_per_file(tmp_path, suffix):
     assert assembly.centroids[11] == pytest.approx([11.5, 0.5])
 
 
-def test_stones_that_touch_are_told_apart_and_seen_together(tmp_path):
+def test_stones_that_touch_are_separate_bodies_in_one_view(tmp_path):
     folder = stones(tmp_path / "stones", n=2)
     at = trimesh.transformations.translation_matrix((0.5, 0.25, 1.5))
     trimesh.creation.box((1, 0.5, 1), transform=at).export(folder / "stone 3.stl")

@@ -38,7 +38,7 @@ def test_named_objects_may_touch(tmp_path):
 
 @pytest.mark.parametrize("suffix", ["stl", "ply"])
 @pytest.mark.parametrize("name", ["dome", "T corner", "cross vault"])
-def test_stones_of_one_mesh_that_touch_are_told_apart(tmp_path, name, suffix):
+def test_stones_of_one_mesh_that_touch_are_separate_blocks(tmp_path, name, suffix):
     """The faces in any order, turned inside out or not: around each edge they go together by their insides."""
     layout = generators.build(name, {"courses": 3} if name == "T corner" else None)
     random = np.random.default_rng(3)

@@ -270,7 +270,7 @@ def test_of_two_copies_that_with_a_role_stays(tmp_path):
 
 
 @pytest.mark.parametrize(("sides", "told"), [(24, False), (96, True)])
-def test_a_round_stone_that_loses_volume_says_so(tmp_path, sides, told):
+def test_a_round_stone_that_loses_volume_is_noted(tmp_path, sides, told):
     trimesh = pytest.importorskip("trimesh")
     drum = trimesh.creation.cylinder(0.25, 0.3, sections=sides)
     trimesh.Scene({"drum": drum}).export(tmp_path / "drum.obj")

@@ -314,7 +314,7 @@ def test_pressure_on_the_top_and_on_an_edge(tmp_path):
     assert flank["limit_load_multiplier"] == pytest.approx(summary["limit_load_multiplier"], rel=1e-9)
 
 
-def test_a_load_without_limit_says_so(tmp_path, capsys):
+def test_a_load_without_limit_is_unbounded(tmp_path, capsys):
     down = '[[loads]]\nkind = "live"\nforce = [0.0, -1.0]\n'
     folder, summary = ran(COLUMN + '[analysis]\nkind = "limit load"\n[output]\nanimation = false\n' + down, tmp_path)
     assert summary["status"] == "limit reached"
@@ -324,7 +324,7 @@ def test_a_load_without_limit_says_so(tmp_path, capsys):
     assert blockvis.open_results(folder).limits[0].multiplier == np.inf
 
 
-def test_live_loads_in_a_settlement_are_told_to_be_left_out(tmp_path, capsys):
+def test_live_loads_in_a_settlement_are_left_out_with_a_note(tmp_path, capsys):
     text = COLUMN + '[roles]\n"ground" = "moving"\n[settlement]\ndirection = [0.0, -1.0]\nlimit = 0.02\n'
     ran(text + "[output]\nanimation = false\n" + SIDEWAYS, tmp_path)
     assert 'a settlement analysis leaves the live loads out; give loads that act during it kind = "dead"' in (

@@ -95,7 +95,7 @@ def test_console_script_and_exit_code():
     assert "Traceback" not in done.stderr
 
 
-def test_a_layout_in_place_of_the_case_file_says_so(capsys):
+def test_a_layout_in_place_of_the_case_file_is_named(capsys):
     layout = Path(__file__).parents[2] / "assets" / "semicircular_arch.msh"
     assert run_command(layout) == 2
     said = capsys.readouterr().err
@@ -305,7 +305,7 @@ def test_no_initial_equilibrium_has_its_own_exit_code(case, capsys):
     assert "5 no initial equilibrium" in " ".join(capsys.readouterr().out.split())
 
 
-def test_output_that_nobody_reads_to_its_end_is_no_error(case):
+def test_a_pipe_closed_early_is_no_error(case):
     command = f"{sys.executable} -m blockvis info {case.parent / 'arch.msh'} | true"
     done = subprocess.run(
         ["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"], capture_output=True, text=True, check=False, cwd=ROOT

@@ -51,7 +51,7 @@ def _run(*arguments):
 
 
 @pytest.mark.thorough
-def test_full_disk_leaves_what_is_there_and_the_run_goes_on(case, tmp_path):
+def test_full_disk_keeps_what_is_there_and_the_run_resumes(case, tmp_path):
     disk = tmp_path / "disk"
     with _mounted(disk, "size=100k"):
         for size in ("100k", "300k"):

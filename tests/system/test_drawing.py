@@ -118,7 +118,7 @@ def test_film_and_pictures_may_be_left_out(case, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_ctrl_c_while_drawing_says_how_to_go_on(case, tmp_path):
+def test_ctrl_c_while_drawing_names_the_command_that_resumes(case, tmp_path):
     """A real Ctrl-C, to all processes of the group as a terminal sends it."""
     out = tmp_path / "out"
     code = """

@@ -86,7 +86,7 @@ def test_the_cause_comes_first_with_its_amount(folder, said):
     assert "right springer moves right" in said.splitlines()[1].lower()
 
 
-def test_the_page_needs_no_network_and_tells_the_same(folder, said):
+def test_the_page_needs_no_network_and_has_the_same_causes(folder, said):
     page = (folder / "out" / "explain.html").read_text(encoding="utf-8")
     assert not re.findall(r"(?:src|href)=\"(?!data:)", page)
     assert "http:" not in page
@@ -137,7 +137,7 @@ def test_one_crack_leaves_causes_open_and_a_joint_to_measure(folder, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_crack_that_no_candidate_makes_is_said_to_be_unexplained(folder):
+def test_a_crack_that_no_candidate_makes_is_unexplained(folder):
     case = read_explained(folder / "arch.toml")
     runs = {}
     seen = [

@@ -143,7 +143,7 @@ def test_a_few_small_increments_are_read_once(folder, monkeypatch):
 
 
 @pytest.mark.thorough
-def test_stored_increments_are_what_was_told(tmp_path):
+def test_stored_increments_equal_those_in_memory(tmp_path):
     assembly = generators.arch()
     spread = solver.Settlement(direction=(1, 0), increment=0.04, limit=0.5)
     told = solver.settle(assembly, spread, controls=solver.Controls(falling_frames=2))

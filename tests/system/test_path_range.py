@@ -46,7 +46,7 @@ def path(last, collapse=None, factor=1.0, unit=0.1):
     return Traced(np.zeros(len(s), dtype=int), s, factor * (10.0 + s), np.zeros((len(s), 1, 2)), collapse, "ended")
 
 
-def test_a_range_is_told_written_and_drawn(tmp_path, monkeypatch, capsys):
+def test_a_range_is_printed_written_and_drawn(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(path_range, "OnceMore", Here)
     monkeypatch.setattr(path_range, "VARIATIONS", VARIATIONS[1:2])
     assert run_here(tmp_path, CASE, "--range") == 0

@@ -84,7 +84,7 @@ def failed(response):
     )  # fmt: skip
 
 
-def test_a_failed_run_says_so_first():
+def test_the_failure_of_a_run_is_the_heading():
     page = report_html(failed(arch_response()))
     assert "solver failed" in re.search("<h1>(.*?)</h1>", page).group(1).lower()
     banner = re.search('<p class="failed">(.*?)</p>', page).group(1)
@@ -99,7 +99,7 @@ def test_the_report_of_an_example_stays_below_a_megabyte(tmp_path):
 
 
 @browser
-def test_a_block_tells_its_joints(tmp_path):
+def test_the_tip_of_a_block_lists_its_joints(tmp_path):
     response = arch_response()
     last = len(response.path) - 1
     page = write_report(response, tmp_path / "report.html")
@@ -174,7 +174,7 @@ def test_the_mechanism_has_the_colours_of_its_picture(tmp_path):
 
 
 @browser
-def test_on_walls_of_many_blocks_dots_are_off_and_the_legend_says_so(tmp_path):
+def test_on_walls_of_many_blocks_dots_are_off_in_picture_and_legend(tmp_path):
     found = told(
         write_report(parted(wall(20, 18), 4, 0), tmp_path / "report.html"), tmp_path,
         'out.legend = legend().join(" | "); out.boxes = [$("hinges").checked, $("sliding").checked];'

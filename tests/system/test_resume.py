@@ -178,7 +178,7 @@ def whole(tmp_path_factory):
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
 @pytest.mark.thorough
-def test_run_killed_by_the_signal_goes_on(whole, tmp_path):
+def test_run_killed_by_the_signal_resumes(whole, tmp_path):
     out = tmp_path / "out"
     process = _command(tmp_path, "run", whole / "case.toml", "-o", out, code=_killed_at(74))
     _, said = process.communicate(timeout=120)
@@ -195,7 +195,7 @@ def test_run_killed_by_the_signal_goes_on(whole, tmp_path):
         *(pytest.param(moments, marks=pytest.mark.thorough) for moments in ((30, 40), (2,), (75,), (100,))),
     ],
 )
-def test_killed_run_goes_on(whole, tmp_path, moments):
+def test_killed_run_resumes(whole, tmp_path, moments):
     out = tmp_path / "out"
     arguments = [whole / "case.toml", "-o", out]
     for moment in moments:
@@ -222,7 +222,7 @@ def test_killed_run_goes_on(whole, tmp_path, moments):
         pytest.param("load that moves", "summary.json", 5, marks=pytest.mark.thorough),
     ],
 )
-def test_killed_limit_loads_and_pushovers_go_on(tmp_path, monkeypatch, kind, moment, kept):
+def test_killed_limit_loads_and_pushovers_resume(tmp_path, monkeypatch, kind, moment, kept):
     case = tmp_path / "case.toml"
     case.write_text(ARCH + OTHERS[kind], encoding="utf-8")
     assert run_command(case, "-o", tmp_path / "whole") == 0
@@ -262,7 +262,7 @@ def test_killed_from_outside_while_it_runs(whole, tmp_path):
     _same_result(whole / "out", out)
 
 
-def test_ctrl_c_ends_cleanly_and_the_run_goes_on(whole, tmp_path, monkeypatch, capsys):
+def test_ctrl_c_ends_cleanly_and_the_run_resumes(whole, tmp_path, monkeypatch, capsys):
     added = ResultsFolder.add
 
     def stopped(self, increment):
@@ -281,7 +281,7 @@ def test_ctrl_c_ends_cleanly_and_the_run_goes_on(whole, tmp_path, monkeypatch, c
     _same_result(whole / "out", out)
 
 
-def test_finished_run_says_so_and_draws_what_is_missing(whole, tmp_path, capsys):
+def test_resuming_a_finished_run_draws_what_is_missing(whole, tmp_path, capsys):
     out = shutil.copytree(whole / "out", tmp_path / "out")
     before = (out / "response.csv").read_bytes()
     assert not (out / "mechanism.png").exists()
@@ -314,7 +314,7 @@ def test_files_that_changed_are_named_and_not_read_again(whole, tmp_path, monkey
         ([], "name a case file"),
     ],
 )
-def test_what_cannot_go_on(tmp_path, monkeypatch, capsys, arguments, words):
+def test_what_cannot_be_resumed_is_refused(tmp_path, monkeypatch, capsys, arguments, words):
     monkeypatch.chdir(tmp_path)
     assert run_command(*arguments) == 2
     assert words in capsys.readouterr().err

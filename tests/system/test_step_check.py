@@ -73,7 +73,7 @@ def run_here(folder, text, *options):
     return run_command(folder / "case.toml", "-o", folder / "out", "--no-pictures", *options)
 
 
-def test_a_run_tells_its_error_without_being_asked(tmp_path):
+def test_a_run_prints_its_step_error_by_default(tmp_path):
     done = run(tmp_path, CASE)
     assert done.returncode == 0, done.stderr
     (line,) = [line for line in done.stdout.splitlines() if line.startswith("error of the steps: reaction")]
@@ -95,7 +95,7 @@ def test_a_run_tells_its_error_without_being_asked(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_report_of_a_run_says_so_too(tmp_path):
+def test_the_report_of_a_run_has_its_step_error(tmp_path):
     done = run(tmp_path, CASE, "--check-steps", pictures=True)
     assert done.returncode == 0, done.stderr
     (line,) = [line for line in done.stdout.splitlines() if line.startswith("error of the steps")]
@@ -106,7 +106,7 @@ def row_of(line):
     return "<tr><td>{}</td><td>{}</td></tr>".format(*line.split(": "))
 
 
-def test_a_report_says_so_later_and_when_it_is_drawn_again(tmp_path, capsys):
+def test_a_report_keeps_its_step_error_when_it_is_drawn_again(tmp_path, capsys):
     assert run_here(tmp_path, SHORT, "--check-steps") == 0
     (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("error of the steps")]
     response, report = blockvis.open_results(tmp_path / "out"), tmp_path / "out" / "report.html"
@@ -156,7 +156,7 @@ def test_the_error_is_twice_the_difference_and_what_matters_is_warned_of():
     assert small.warning == ""
 
 
-def test_where_one_run_collapses_and_the_other_does_not_it_is_said():
+def test_where_one_run_collapses_and_the_other_does_not_both_ends_are_named():
     check = replace(CHECK, difference=0.001, stop_of_check="limit reached")
     assert str(check).endswith(", but with half the step tolerance it ends as 'limit reached', not 'collapsed'")
     assert check.warning

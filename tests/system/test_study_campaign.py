@@ -166,7 +166,7 @@ def test_blocks_in_space_are_studied_and_drawn(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_study_that_is_killed_and_interrupted_goes_on(arches, tmp_path):
+def test_a_study_that_is_killed_and_interrupted_resumes(arches, tmp_path):
     """Killed without warning by SIGKILL, then by Ctrl-C, each time once it has made a run of its own."""
     runs = 40
     arches.write_text(STUDY.replace("runs = 24", f"runs = {runs}"), encoding="utf-8")
@@ -208,7 +208,7 @@ def test_a_study_that_is_killed_and_interrupted_goes_on(arches, tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_study_goes_on_where_it_stopped_and_gives_what_one_go_gives(arches, tmp_path, capsys, scheduler):
+def test_a_resumed_study_has_the_rows_of_one_run_at_once(arches, tmp_path, capsys, scheduler):
     """A run kept as a folder is a run of the table."""
     out, study = tmp_path / "out", STUDY.replace("runs = 24", "runs = 8")
     arches.write_text(study, encoding="utf-8")

@@ -96,7 +96,7 @@ def _steps(arch):
 
 
 @on_linux
-def test_what_a_run_goes_on_from_is_on_the_disk_before_the_checkpoint_and_the_rest_at_the_end(tmp_path, done):
+def test_states_are_flushed_before_the_checkpoint_and_the_rest_at_the_end(tmp_path, done):
     arch = generators.arch()
     results = ResultsFolder(tmp_path / "out", arch)
     del done[:]

@@ -51,7 +51,7 @@ def said(response, path):
     return re.findall(r"<!-- (.*?) -->", draw_curve(response, path).read_text(encoding="utf-8"))
 
 
-def test_a_failed_run_says_so_in_the_curve(tmp_path):
+def test_the_curve_names_the_failure_of_a_run(tmp_path):
     response = arch_response()
     failed = replace(response, stop=solver.Status.SOLVER_FAILED, collapse=None, increments=response.path[:4])
     told = said(failed, tmp_path / "failed.svg")
@@ -116,7 +116,7 @@ def test_a_reaction_that_leaves_that_at_rest_at_once_has_no_line_from_there(tmp_
     assert not leaves_rest(replace(response, increments=(replace(rest, largest=np.nan), *others)))
 
 
-def test_small_settlements_are_told_in_millimetres():
+def test_small_settlements_are_written_in_millimetres():
     response = parted(wall(4, 3), 3, 0, settlement=0.005)
     assert parameter_text(0.0025, response) == "2.50 mm"
     assert parameter_text(0.0025, arch_response()) == "0.0025 m"

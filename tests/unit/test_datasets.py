@@ -107,7 +107,7 @@ def test_times_never_stand_still():
     assert times[: len(path)] == path
 
 
-def test_a_second_phase_goes_on_from_the_first():
+def test_a_second_phase_starts_at_the_end_of_the_first():
     from dataclasses import replace
 
     path = arch_response().path[:3]

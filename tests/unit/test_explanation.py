@@ -232,7 +232,7 @@ def test_stones_lean_to_a_side():
 
 
 @pytest.mark.slow
-def test_whoever_interrupts_does_not_wait_for_runs():
+def test_an_interrupt_does_not_wait_for_runs():
     futures = []
 
     def interrupted():

@@ -91,7 +91,7 @@ def test_a_frame_between_two_results_names_one_of_them(words):
         assert (place, title.rpartition("= ")[2]) in pairs
 
 
-def test_every_picture_of_a_failed_run_says_so(words):
+def test_every_picture_of_a_failed_run_has_a_badge(words):
     response = arch_response()
     failed = replace(response, stop=solver.Status.SOLVER_FAILED, collapse=None, increments=response.path)
     filmed(failed, fps=1.0)

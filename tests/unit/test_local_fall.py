@@ -78,7 +78,7 @@ def test_an_arch_collapses_though_its_fall_would_jam(controls):
     assert response.notes == ()
 
 
-def test_a_run_goes_on_from_a_checkpoint_before_or_after_a_snap():
+def test_a_run_resumes_from_a_checkpoint_before_or_after_a_snap():
     assembly = _bench()
     given = {
         "interfaces": solver.Interfaces(solver.InterfaceLaw(1.0)),

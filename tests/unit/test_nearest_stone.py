@@ -191,7 +191,7 @@ def test_the_joint_is_found_by_its_length_not_by_the_widest_gap():
     assert "and stay open" in proposed(stack).note
 
 
-def test_the_limit_of_the_search_is_said():
+def test_the_limit_of_the_search_is_noted():
     box = shapely.box(0, 0, 0.2, 0.2)
     apart = [ring_of(box) + np.array([0.249 * i, 0.0]) for i in range(4)]
     assert "gaps were looked for up to 0.05 m" in proposed(apart).note

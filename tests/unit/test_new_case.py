@@ -117,7 +117,7 @@ def test_a_drawing_of_which_nothing_can_move_is_asked_for_its_horizontal_capacit
     assert _ran(case, capsys)["limit_load_multiplier"] == pytest.approx(0.5, rel=1e-6)
 
 
-def test_a_case_that_is_there_stays_without_force(tmp_path, capsys):
+def test_an_existing_case_is_kept_without_force(tmp_path, capsys):
     path = tmp_path / "portal.svg"
     save_layout(generators.portal(), path)
     case, _ = _written(path)

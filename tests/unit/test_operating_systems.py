@@ -102,7 +102,7 @@ def test_a_run_holds_its_folder(windows, locks, tmp_path):
     ResultsFolder(tmp_path / "out", assembly, overwrite=True)
 
 
-def test_a_folder_that_cannot_be_flushed_is_let_be(tmp_path, monkeypatch):
+def test_a_folder_that_cannot_be_flushed_is_no_error(tmp_path, monkeypatch):
     def refused(handle):
         raise OSError(errno.EINVAL, "Invalid argument")
 
@@ -124,7 +124,7 @@ def test_macos_flushes_the_memory_of_the_disk_too(tmp_path, monkeypatch):
     assert asked == [51, 51], "the file and its folder"
 
 
-def test_a_pipe_that_nobody_reads_is_no_error_of_the_input(windows):
+def test_a_closed_pipe_is_no_error_of_the_input(windows):
     assert processes.is_broken_pipe(OSError(errno.EINVAL, "Invalid argument"))
     assert not processes.is_broken_pipe(OSError(errno.EINVAL, "Invalid argument", "a file"))
     assert not processes.is_broken_pipe(OSError(errno.ENOSPC, "No space left"))

@@ -115,7 +115,7 @@ def rotation(angle):
     return np.array([[c, -s], [s, c]])
 
 
-def test_cases_are_worth_it():
+def test_cases_collapse_slide_and_settle():
     assert original("hinging arch").stop is solver.Status.COLLAPSED
     assert original("sliding arch").stop is solver.Status.COLLAPSED
     assert any((i.states == mechanics.ContactState.SLIDING).any() for i in original("sliding arch").path)

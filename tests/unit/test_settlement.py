@@ -445,7 +445,7 @@ def test_same_input_twice_gives_the_same_arrays():
         assert equal_certificates(a.certificate, b.certificate)
 
 
-def test_increments_are_told_as_they_are_found():
+def test_increments_are_yielded_as_they_are_found():
     told = []
     response = solver.settle(two_bricks(), DOWN, controls=NO_FALL, on_increment=told.append)
     assert tuple(told) == response.increments

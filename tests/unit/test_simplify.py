@@ -55,7 +55,7 @@ def test_a_thin_block_is_not_folded():
     assert shapely.Polygon(found[0]).area > 0.8 * shapely.Polygon(arch).area
 
 
-def test_assembling_tells_it_and_the_caller_decides():
+def test_assembling_notes_it_and_the_caller_decides():
     layout = Layout(tuple(split_square(200)), ("left", "right"))
     with pytest.warns(
         UserWarning, match=r"outlines were finer than needed: 404 corners .* \(outline_tolerance; 0 keeps"

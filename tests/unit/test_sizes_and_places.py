@@ -81,7 +81,7 @@ def test_a_support_that_turns_about_a_point_of_the_grid():
     assert response.collapse.displacement == pytest.approx(np.arctan(0.5), abs=2e-5)
 
 
-def test_a_run_on_the_grid_goes_on_where_it_was_stopped():
+def test_a_run_on_the_grid_resumes_where_it_was_stopped():
     arch = _arch(place=GRID)
     setting = {"interfaces": solver.Interfaces(solver.InterfaceLaw(0.7)), "loads": solver.self_weight(arch)}
     spread = (replace(_spread(), limit=0.1),)
@@ -144,7 +144,7 @@ CRUMB = np.array([[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]])
 @pytest.mark.parametrize(
     ("place", "stands"), [((0.2, 1.1), True), ((0.96, 1.1), False), ((1.5, 2.0), False), (None, True)]
 )
-def test_a_crumb_stands_or_falls_whatever_its_share_of_the_weight(share, place, stands):
+def test_a_crumb_stands_or_falls_at_any_share_of_the_weight(share, place, stands):
     """On a block, over its edge by more than half its width, in the air; two more carry the block, of its weight."""
     block, ground = [[0, 0.1], [1, 0.1], [1, 1.1], [0, 1.1]], [[0, -1], [1, -1], [1, 0], [0, 0]]
     crumbs = [CRUMB, CRUMB + np.array([0.9, 0.0])] + ([] if place is None else [CRUMB + place])

@@ -70,7 +70,7 @@ def test_density_of_the_file_wins_with_a_note(tmp_path):
     assert assembly.density[:3].tolist() == [2400.0, 2500.0, 1800.0]
 
 
-def test_overlaps_cut_away_are_told(tmp_path):
+def test_overlaps_cut_away_are_noted(tmp_path):
     rings = tuple(np.array([[x, 0.0], [x + 0.3, 0.0], [x + 0.3, 0.3], [x, 0.3]]) for x in (0.0, 0.298, 0.597))
     write_layout(Layout(rings, ("left", "middle", "right")), tmp_path / "a.json")
     with pytest.warns(UserWarning, match=r"2 overlaps of up to 0.002 m were cut away, the deepest between 'left' and"):

@@ -37,7 +37,7 @@ def tilted(order=(0, 1, 2), mirrored=False, local_loss=0.05):
         pytest.param((1, 2, 0), True, id="mirror and shuffled"),
     ],
 )
-def test_the_path_goes_on_to_the_collapse_of_the_structure(order, mirrored):
+def test_the_path_continues_to_the_collapse_of_the_structure(order, mirrored):
     response = tilted(order, mirrored)
     assert response.stop is solver.Status.COLLAPSED
     assert response.collapse.displacement == pytest.approx(PIER, abs=2e-4)
