@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import ConvexHull
 
+import blockvis
 import solver
 from blockvis import generators
 from blockvis.cli import main
@@ -73,6 +75,74 @@ def arch_response() -> solver.Response:
     spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.5)
     controls = solver.Controls(falling_frames=12)
     return solver.settle(generators.arch(), spread, friction_coefficient=0.6, controls=controls)
+
+
+def drawn(path: Path, shapes, names=None, **words) -> Path:
+    """Write a layout file of outlines, or of (points, faces) in space, as somebody draws them: nothing is checked.
+
+    What else the file says of each block, a group, role, material, density or thickness, has one value per block.
+    """
+    blocks = []
+    for k, shape in enumerate(shapes):
+        if isinstance(shape, tuple):
+            block = {"points": np.asarray(shape[0]).tolist(), "faces": [np.asarray(face).tolist() for face in shape[1]]}
+        else:
+            block = {"outline": np.asarray(shape).tolist()}
+        block |= {"name": f"block {k}" if names is None else names[k]} | {word: words[word][k] for word in words}
+        blocks.append(block)
+    content = {"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return path
+
+
+def case_from(text: str, folder: Path | None = None) -> blockvis.Case:
+    """The case in a file with this text, in a folder or where nothing else is."""
+    with tempfile.TemporaryDirectory() as elsewhere:
+        path = Path(folder or elsewhere) / "case.toml"
+        path.write_text(text, encoding="utf-8")
+        return blockvis.read_case(path)
+
+
+class _Built(Exception):
+    """A run has its assembly, and is stopped."""
+
+
+class _Builder:
+    """An output of runs that wants no more than the assembly."""
+
+    def begin(self, case):
+        pass
+
+    def follow(self, results):
+        raise _Built(results.assembly)
+
+    def close(self):
+        pass
+
+
+def assembly_of(case: blockvis.Case | str | Path) -> solver.Assembly:
+    """The assembly with which the run of a case begins."""
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            blockvis.run_case(case, Path(folder) / "out", outputs=[_Builder()])
+        except _Built as built:
+            return built.args[0]
+    raise AssertionError("the run ended before it began")
+
+
+def layout_of(assembly: solver.Assembly):
+    """The blocks of an assembly as a layout file holds them."""
+    with tempfile.TemporaryDirectory() as folder:
+        blockvis.save_layout(assembly, Path(folder) / "layout.json")
+        return blockvis.read_layout(Path(folder) / "layout.json")
+
+
+def report_of(response: solver.Response, case_text: str = "", **options) -> str:
+    """The report of a response as text."""
+    with tempfile.TemporaryDirectory() as folder:
+        return blockvis.write_report(response, Path(folder) / "report.html", case_text, **options).read_text(
+            encoding="utf-8"
+        )
 
 
 @cache

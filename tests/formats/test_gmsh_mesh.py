@@ -89,7 +89,7 @@ def test_no_surface_cells(gmsh, tmp_path):
 
 @pytest.mark.cad
 def test_gmsh_reads_what_we_write(gmsh, tmp_path):
-    from blockvis.formats.read import save_layout
+    from blockvis import save_layout
 
     arch = read(ASSETS / "semicircular_arch.msh", roles={"right springer": "moving", "left springer": "fixed"})
     save_layout(arch, tmp_path / "a.msh")

@@ -5,10 +5,10 @@ import json
 import ezdxf
 import pytest
 import trimesh
+from structures import assembly_of
 
 import blockvis
 from blockvis import read, read_case, read_layout
-from blockvis.cases.build import case_assembly
 from blockvis.cli import main
 from blockvis.formats.files import checksum_of_files, files_of
 
@@ -85,7 +85,7 @@ def test_info_convert_and_a_case_take_them(tmp_path, capsys):
     ]
     for file in ("stones/", "stones/*.stl"):
         (tmp_path / "case.toml").write_text(CASE.format(file=file), encoding="utf-8")
-        assert case_assembly(read_case(tmp_path / "case.toml")).names == ("stone 1", "stone 2", "stone 3")
+        assert assembly_of(read_case(tmp_path / "case.toml")).names == ("stone 1", "stone 2", "stone 3")
 
 
 def test_a_run_knows_when_one_of_its_files_changes(tmp_path):

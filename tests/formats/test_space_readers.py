@@ -100,7 +100,7 @@ def test_one_stl_of_stones_that_stand_apart(dome, tmp_path):
 
 def test_a_unit_and_its_doubt(dome, tmp_path):
     pytest.importorskip("trimesh")
-    from blockvis.formats.read import write_layout
+    from blockvis import write_layout
 
     write_layout(dome, tmp_path / "a.obj")
     text = (tmp_path / "a.obj").read_text(encoding="utf-8").splitlines()

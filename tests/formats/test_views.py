@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import trimesh
+from structures import assembly_of
 
 from blockvis import read, read_case, read_layout
-from blockvis.cases.build import case_assembly
 from blockvis.cli import main
 
 
@@ -112,7 +112,7 @@ def test_the_view_of_a_case(tmp_path):
     case = tmp_path / "case.toml"
     rest = '[roles]\n"brick 0" = "moving"\n[settlement]\ndirection = [0.0, -1.0]\nincrement = 0.01\nlimit = 0.1\n'
     case.write_text('[geometry]\nfile = "row.glb"\nview = "xz"\n' + rest, encoding="utf-8")
-    assert case_assembly(read_case(case)).areas == pytest.approx([0.25] * 3)
+    assert assembly_of(read_case(case)).areas == pytest.approx([0.25] * 3)
     case.write_text('[geometry]\nfile = "row.glb"\nview = "front"\n' + rest, encoding="utf-8")
     with pytest.raises(ValueError, match=r"\[geometry\] view is 'front'; choose from xy, xz, yz"):
         read_case(case)

@@ -6,13 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import run_command
+from structures import assembly_of, case_from, run_command
 
 import blockvis
 import solver
 from blockvis import draw_still
-from blockvis.case_files.read import parse_case
-from blockvis.cases.build import case_assembly
 from blockvis.cli import _in_words, main
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.captions import parameter_label, state_text, value_label
@@ -61,8 +59,8 @@ def ran(text, tmp_path, *more, code=0, drawn=False):
 
 def solved(text, tmp_path):
     """The response of a case and what its summary says of its capacity, nothing written or drawn."""
-    case = parse_case(text, tmp_path / "case.toml")
-    plan = planned(case, case_assembly(case))
+    case = case_from(text, tmp_path)
+    plan = planned(case, assembly_of(case))
     response = plan.response(plan.steps.all(), plan.steps.ending)
     return response, KINDS[case.analysis].summary(response)
 
@@ -277,7 +275,7 @@ def test_pushover_that_snaps_says_at_which_multiplier(tmp_path, capsys):
 
 @pytest.mark.thorough
 def test_pushover_written_from_python_comes_back(tmp_path):
-    case = parse_case(PUSHED, tmp_path / "case.toml")
+    case = case_from(PUSHED, tmp_path)
     run = blockvis.run_case(replace(case, animation=None), tmp_path / "out", outputs=())
     again = blockvis.open_results(blockvis.write(run.response, tmp_path / "python"))
     assert again.control == run.response.control

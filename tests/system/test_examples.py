@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from structures import assembly_of
 
 import solver
 from blockvis import generators, read_case
-from blockvis.cases.build import case_assembly, case_interfaces
+from blockvis.cases.build import case_interfaces
 from solver import mechanics
 
 FACADE = Path(__file__).parents[2] / "examples" / "facade.toml"
@@ -16,7 +17,7 @@ pytestmark = pytest.mark.path
 
 
 def test_the_facade_is_built():
-    assembly = case_assembly(read_case(FACADE))
+    assembly = assembly_of(read_case(FACADE))
     assert assembly.n_blocks > 1400
     assert assembly.moving.any()
 

@@ -7,16 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import equal_certificates
+from structures import case_from, equal_certificates, report_of
 
 import blockvis
 import solver
 from blockvis import draw_curve, generators
-from blockvis.case_files.read import parse_case
 from blockvis.pictures.drawer import Drawer, Look
 from blockvis.pictures.film import film_of
 from blockvis.pictures.video import write_film
-from blockvis.report.page import report_html
 from blockvis.results import increments
 from blockvis.results.folder import ResultsFolder
 from blockvis.results.increments import AT_LEAST, StoredIncrements
@@ -67,7 +65,7 @@ FEW = 5
 
 def ran(text, folder):
     """The run of a case, nothing drawn."""
-    return blockvis.run_case(parse_case(ARCH + text, folder / "case.toml"), folder / "out", outputs=())
+    return blockvis.run_case(case_from(ARCH + text, folder), folder / "out", outputs=())
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +118,7 @@ def test_results_are_read_one_at_a_time(use, folder, tmp_path, monkeypatch):
     elif use == "curve":
         draw_curve(response, tmp_path / "curve.png")
     elif use == "report":
-        assert f"{response.collapse.displacement:.6g} m" in report_html(response)
+        assert f"{response.collapse.displacement:.6g} m" in report_of(response)
     else:
         drawer = Drawer(response, Look(), (320, 180), response.increments, curve=True)
         holds, pictures = film_of(drawer, 4.0, 2.0)

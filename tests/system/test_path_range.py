@@ -4,21 +4,18 @@ import csv
 import json
 from argparse import Namespace
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from structures import run_command
+from structures import case_from, report_of, run_command
 from test_step_check import CASE, LIMIT_LOAD, SHORT, run_here
 
 import blockvis
 import solver
-from blockvis.case_files.read import parse_case
 from blockvis.cli import _say_range, main
 from blockvis.pictures.curves import _draw
-from blockvis.report.page import report_html
 from blockvis.results.folder import stored_assembly
 from blockvis.results.reaction_range import ReactionRange, stored_range
 from blockvis.runs import path_range
@@ -82,7 +79,7 @@ def test_processes_give_the_range_of_all_variations(tmp_path, capsys):
 
 def test_a_variation_changes_friction_everywhere_and_the_controls():
     text = CASE + '\n[[interfaces]]\nmaterials = ["", ""]\nfriction_coefficient = 0.5\n'
-    case = Variation(0.95, 3.0, 0.0).of(parse_case(text, Path("case.toml")))
+    case = Variation(0.95, 3.0, 0.0).of(case_from(text))
     assert case.friction_coefficient == pytest.approx(1.9)
     assert [law.friction_coefficient for law in case.interfaces.values()] == [pytest.approx(0.475)]
     assert (case.controls.compliance_factor, case.controls.imperfection_factor) == (3.0, 0.0)
@@ -123,9 +120,9 @@ def test_the_band_of_a_later_phase_lies_behind_those_before():
     (drawn,) = axes.collections
     assert drawn.get_paths()[0].get_extents().x1 == pytest.approx(100.0)
     assert axes.get_ylim()[1] > drawn.get_paths()[0].get_extents().y1
-    assert '"band":[[0.0,' in report_html(response, band=band)
-    assert f"<td>1 runs: {ALL[1:-1]}</td>" in report_html(response, band=band)
-    assert '"band":[]' in report_html(response)
+    assert '"band":[[0.0,' in report_of(response, band=band)
+    assert f"<td>1 runs: {ALL[1:-1]}</td>" in report_of(response, band=band)
+    assert '"band":[]' in report_of(response)
 
 
 def test_ctrl_c_leaves_the_range(tmp_path, monkeypatch, capsys):

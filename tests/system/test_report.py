@@ -11,14 +11,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, parted, wall
+from structures import arch_response, parted, report_of, wall
 from test_capacity import ARCH, solved
 
 import solver
 from blockvis import show, write_report
 from blockvis.pictures import palette
 from blockvis.pictures.frame import framed
-from blockvis.report.page import report_html
 from solver import mechanics
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -114,7 +113,7 @@ def test_live_load_stands_where_it_acts_at_each_position(tmp_path):
     assert max(map(np.ptp, columns)) < 20
     told = '"live_words":"live load '
     assert told in page.read_text(encoding="utf-8")
-    assert told not in report_html(arch_response())
+    assert told not in report_of(arch_response())
 
 
 @browser
@@ -130,14 +129,14 @@ def test_names_from_files_cannot_break_the_page(tmp_path):
 def test_everything_from_files_is_escaped():
     response = arch_response()
     assembly = replace(response.assembly, names=(NASTY, *response.assembly.names[1:]))
-    text = report_html(replace(response, assembly=assembly, message=NASTY, collapse=None), NASTY, title=NASTY)
+    text = report_of(replace(response, assembly=assembly, message=NASTY, collapse=None), NASTY, title=NASTY)
     assert NASTY not in text
     model = re.search(r'<script id="model" type="application/json">(.*?)</script>', text, re.DOTALL).group(1)
     assert json.loads(model)["names"][0] == NASTY
 
 
 def test_page_asks_for_nothing():
-    text = report_html(arch_response())
+    text = report_of(arch_response())
     assert "default-src 'none'" in text
     assert not re.search(r"""(src|href)=["'](?!data:)""", text)
     assert "http://" not in text.replace("http://www.w3.org", "")
@@ -146,7 +145,7 @@ def test_page_asks_for_nothing():
 
 def test_page_has_the_numbers_and_the_case():
     response = arch_response()
-    text = html.unescape(report_html(response, 'file = "arch.msh"  # <&>'))
+    text = html.unescape(report_of(response, 'file = "arch.msh"  # <&>'))
     assert f"{response.collapse.displacement:.6g} m" in text
     assert 'file = "arch.msh"  # <&>' in text
     assert "14 (12 free)" in text

@@ -8,12 +8,11 @@ from dataclasses import replace
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from structures import parted, wall
+from structures import parted, report_of, wall
 from test_report import browser, visited
 
 import blockvis
 from blockvis import write_report
-from blockvis.report.page import report_html
 
 #: What each payload does if it runs: the body is marked, whatever it is marked with.
 RUN = "document.body.dataset.broken=1"
@@ -128,7 +127,7 @@ def test_hostile_names_are_shown_and_none_runs(tmp_path):
 )
 def test_the_probe_notices_what_does_run(tmp_path, there, put):
     response = named([f"block {k}" for k in range(24)], ["stone"] * 24)
-    text = report_html(response, "case", title="plain")
+    text = report_of(response, "case", title="plain")
     assert there in text
     page = tmp_path / "broken.html"
     page.write_text(text.replace(there, put), encoding="utf-8")

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, parted, wall
+from structures import arch_response, parted, report_of, wall
 from test_report import browser, visited
 
 import blockvis
@@ -20,7 +20,6 @@ from blockvis import write_report
 from blockvis.dynamics.fall import fall_of
 from blockvis.pictures import palette
 from blockvis.pictures.swing import swing_of
-from blockvis.report.page import report_html
 from blockvis.results.joints import initial_joints, joint_states
 from solver import mechanics
 
@@ -59,22 +58,22 @@ def test_title_names_case_file_date_and_version(tmp_path):
     )
     (tmp_path / "garden wall.toml").write_text(text, encoding="utf-8")
     run = blockvis.run_case(tmp_path / "garden wall.toml", tmp_path / "out", outputs=())
-    page = report_html(run.response, text)
+    page = report_of(run.response, text)
     title = re.search("<title>(.*?)</title>", page).group(1)
     assert title == "garden wall · Standing at the end of the settlement"
     about = re.search('<p id="about">(.*?)</p>', page).group(1)
     finished = run.summary["finished"].replace("T", " ").replace("Z", " UTC")
     assert about == f"garden wall.toml · {finished} · blockvis {run.summary['versions']['blockvis']}"
     # The same of a folder that is opened again, whenever that is.
-    assert report_html(blockvis.open_results(run.folder), text) == page
+    assert report_of(blockvis.open_results(run.folder), text) == page
 
 
 def test_notes_of_the_run_are_in_the_report():
     response = parted(wall(5, 4), 3, 0)
     noted = replace(response.increments[1], notes=("block <A> moved by 72 mm at once",))
-    page = report_html(replace(response, increments=(response.increments[0], noted, response.increments[2])))
+    page = report_of(replace(response, increments=(response.increments[0], noted, response.increments[2])))
     assert '<ul id="notes"><li>block &lt;A&gt; moved by 72 mm at once</li></ul>' in page
-    assert 'id="notes"' not in report_html(response)
+    assert 'id="notes"' not in report_of(response)
 
 
 def failed(response):
@@ -85,11 +84,11 @@ def failed(response):
 
 
 def test_the_failure_of_a_run_is_the_heading():
-    page = report_html(failed(arch_response()))
+    page = report_of(failed(arch_response()))
     assert "solver failed" in re.search("<h1>(.*?)</h1>", page).group(1).lower()
     banner = re.search('<p class="failed">(.*?)</p>', page).group(1)
     assert "The solver failed after settlement 0.1410 m: a point is off by 1e-7 m" in banner
-    assert 'class="failed"' not in report_html(arch_response())
+    assert 'class="failed"' not in report_of(arch_response())
 
 
 def test_the_report_of_an_example_stays_below_a_megabyte(tmp_path):
@@ -322,6 +321,6 @@ def test_axe_finds_nothing(scheme, tmp_path):
 
 
 def test_notebooks_may_save():
-    from blockvis.report.notebook import show
+    from blockvis import show
 
     assert 'sandbox="allow-scripts allow-downloads"' in show(arch_response())._repr_html_()

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from structures import run_command
+from structures import case_from, run_command
 
-from blockvis.case_files.read import parse_case
 from blockvis.cli import main
 
 CASE = """
@@ -60,7 +59,7 @@ def test_two_runs_write_the_same_bytes_and_can_be_run_again(tmp_path, drawn):
 
     summary = json.loads((one / "summary.json").read_text(encoding="utf-8"))
     assert summary["case"] == CASE
-    assert parse_case(summary["case"], tmp_path / "again.toml").settlements[0].limit == 0.5
+    assert case_from(summary["case"], tmp_path).settlements[0].limit == 0.5
     assert summary["inputs"] == {
         "case_file": "case.toml",
         "case_sha256": hashlib.sha256(CASE.encode()).hexdigest(),

@@ -9,12 +9,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from structures import run_command
+from structures import case_from, run_command
 
 import blockvis
 import solver
 from blockvis import write_report
-from blockvis.case_files.read import parse_case
 from blockvis.cli import _say_error, _write_report
 from blockvis.report.page import add_error
 from blockvis.runs import step_check
@@ -131,7 +130,7 @@ def test_no_steps_are_checked_where_none_are_to_be(tmp_path):
 
 def test_linear_programs_take_no_steps_that_could_be_compared(tmp_path, capsys):
     text = SHORT + '\n[analysis]\nincrements = "linear program"\n'
-    assert not takes_steps(parse_case(text, tmp_path / "case.toml"))
+    assert not takes_steps(case_from(text, tmp_path))
     assert run_here(tmp_path, text, "--check-steps") == 2
     error = capsys.readouterr().err
     assert "has no path whose steps could be checked (settlement, 2 increments, by linear program)" in error
@@ -213,7 +212,7 @@ class Late:
 
 def test_a_path_that_does_not_come_is_left_in_one_line_with_the_remedy(tmp_path, monkeypatch, capsys, settled):
     monkeypatch.setattr(step_check, "OnceMore", Late)
-    checking = StepChecking(parse_case(SHORT, tmp_path / "case.toml"))
+    checking = StepChecking(case_from(SHORT, tmp_path))
     left = SimpleNamespace(had_finished=False, folder=tmp_path, response=settled)
     _say_error(Namespace(check_steps=None), left, checking, 0.0)
     assert capsys.readouterr().err == (

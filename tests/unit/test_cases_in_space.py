@@ -4,12 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from structures import run_command
+from structures import assembly_of, case_from, run_command
 
 import solver
 from blockvis import generators, save_layout, write_layout
-from blockvis.case_files.read import parse_case
-from blockvis.cases.build import case_assembly, case_loads
+from blockvis.cases.build import case_loads
 from blockvis.cli import main
 from blockvis.layout.assemble import assemble
 from blockvis.layout.layout import Layout, layout_of
@@ -22,27 +21,27 @@ DOWN = "[settlement]\ndirection = [0, 0, -1]\n"
 
 
 def case(text, tmp_path):
-    return parse_case(text, tmp_path / "case.toml")
+    return case_from(text, tmp_path)
 
 
 def test_a_layout_in_space_by_its_name(tmp_path):
     found = case(DOME + "[settlement]\nradial_from = [0, 0]\n", tmp_path)
     assert found.settlements == (solver.Settlement(radial_from=(0.0, 0.0)),)
-    assembly = case_assembly(found)
+    assembly = assembly_of(found)
     assert assembly.dimension == 3
     assert assembly.n_blocks == 9
-    corner = case_assembly(case('[geometry]\nlayout = "L-corner"\n' + DOWN, tmp_path))
+    corner = assembly_of(case('[geometry]\nlayout = "L-corner"\n' + DOWN, tmp_path))
     assert corner.n_blocks == generators.l_corner().n_blocks
 
 
 def test_the_density_of_the_case_replaces_that_of_a_layout(tmp_path):
-    assembly = case_assembly(case(DOME + DOWN + "[material]\ndensity = 2400\n", tmp_path))
+    assembly = assembly_of(case(DOME + DOWN + "[material]\ndensity = 2400\n", tmp_path))
     assert (assembly.density == 2400.0).all()
 
 
 @pytest.mark.filterwarnings("ignore:.*was extruded")
 def test_a_layout_of_the_plane_in_space(tmp_path):
-    deep = case_assembly(case(ARCH.replace("\n", "\ndimension = 3\nthickness = 0.4\n", 1) + DOWN, tmp_path))
+    deep = assembly_of(case(ARCH.replace("\n", "\ndimension = 3\nthickness = 0.4\n", 1) + DOWN, tmp_path))
     assert deep.shapes.volumes == pytest.approx(0.4 * generators.arch(voussoirs=5).areas)
 
 
@@ -53,7 +52,7 @@ def test_rotations_and_loads_have_three_numbers(tmp_path):
     )
     found = case(text, tmp_path)
     assert found.settlements[0].rotation_axis == (0.0, 1.0, 0.0)
-    assembly = case_assembly(found)
+    assembly = assembly_of(found)
     load = case_loads(found, assembly).dead[assembly.index("cap")]
     weight = assembly.masses[assembly.index("cap")] * solver.GRAVITY
     assert load == pytest.approx([0, 0, -500 - weight, 1, 2 + 50, 3])
@@ -84,7 +83,7 @@ def test_rotations_and_loads_have_three_numbers(tmp_path):
 )  # fmt: skip
 def test_what_does_not_fit_is_named(text, reason, tmp_path):
     with pytest.raises(ValueError, match=reason):
-        case_assembly(case(text, tmp_path))
+        assembly_of(case(text, tmp_path))
 
 
 def test_supports_of_a_drawing_without_them(tmp_path):
@@ -100,7 +99,7 @@ outline = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
 levels = [-0.2, 0]
 role = "moving"
 {DOWN}"""
-    assembly = case_assembly(case(text, tmp_path))
+    assembly = assembly_of(case(text, tmp_path))
     assert assembly.names[-1] == "ground"
     assert assembly.shapes.volumes[-1] == pytest.approx(0.8)
     assert assembly.moving.tolist() == [False] * 4 + [True]
@@ -127,7 +126,7 @@ def test_new_writes_a_case_in_space(tmp_path, capsys):
     assert "dimension = 3" in text
     assert "direction = [0.0, 0.0, -1.0]" in text
     assert "8 blocks in space" in text
-    assembly = case_assembly(parse_case(text, tmp_path / "corner.toml"))
+    assembly = assembly_of(case_from(text, tmp_path))
     assert assembly.names[-2:] == ("ground left", "ground right")
     contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-9)
     assert (contacts.block_b == assembly.index("ground right")).any() or (
@@ -139,7 +138,7 @@ def test_new_names_the_supports_of_a_drawing(tmp_path):
     save_layout(generators.dome(lunes=4, courses=1), tmp_path / "dome.stl")
     assert main(["new", str(tmp_path / "dome.stl"), "-o", str(tmp_path / "dome.toml")]) == 0
     text = (tmp_path / "dome.toml").read_text(encoding="utf-8")
-    found = case_assembly(parse_case(text, tmp_path / "dome.toml"))
+    found = assembly_of(case_from(text, tmp_path))
     assert int((~found.free).sum()) == 4
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import structures
+from structures import report_of
 
 import blockvis
 import solver
 from blockvis.layout.layout import layout_of, standing
-from blockvis.report.page import report_html
 from blockvis.results.cracks import crack_rows, cracks_of
 
 
@@ -81,7 +81,7 @@ def test_the_cracks_of_an_arch_are_its_hinges(tmp_path):
     assert stored[0]["widest_joint"] == cracks[0].widest
     # Places are numbers that can be read: 0, not 5.66e-17.
     assert not re.search(r"\de-\d", " ".join(words for _, words in crack_rows(cracks, len(cracks))))
-    page = report_html(arch)
+    page = report_of(arch)
     assert f"{1e3 * cracks[0].width:.3g} mm at {cracks[0].widest}" in page
 
 

@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 import pyvista as pv
 import shapely
-from structures import parted, wall
+from structures import parted, report_of, wall
 
 import blockvis
 import solver
 from blockvis.cli import main
 from blockvis.dynamics import fall as fall_module
 from blockvis.dynamics.fall import CAPTION, Fall, fall_of
-from blockvis.report.page import report_html
 from blockvis.results.fall_files import stored_fall, write_fall
 from solver import mechanics
 
@@ -196,9 +195,9 @@ def test_friction_of_each_pair_of_materials():
 
 def test_the_page_plays_the_fall_in_real_time():
     response, fall = shipped_arch(), fallen(shipped_arch)
-    page = report_html(response, fall=fall)
+    page = report_of(response, fall=fall)
     assert page.count(CAPTION) == len(fall) - 1
-    assert CAPTION not in report_html(response)
+    assert CAPTION not in report_of(response)
 
 
 @pytest.mark.slow

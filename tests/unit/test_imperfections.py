@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import shapely
+from structures import assembly_of, case_from
 
 import solver
 from blockvis import generators
-from blockvis.case_files.read import parse_case
-from blockvis.cases.build import case_assembly, case_interfaces
+from blockvis.cases.build import case_interfaces
 from blockvis.cases.imperfections import Imperfection, imperfect, moved_corners, read_imperfection
 from solver import mechanics
 
@@ -103,10 +103,10 @@ seed = 3
 
 
 def test_a_case_scatters_friction_per_joint_and_density_per_block(tmp_path):
-    case = parse_case(CASE, tmp_path / "case.toml")
-    plain = parse_case(CASE[: CASE.index("[[imperfections]]")], tmp_path / "case.toml")
-    assembly, interfaces = case_assembly(case), case_interfaces(case)
-    ratio = assembly.density / case_assembly(plain).density
+    case = case_from(CASE, tmp_path)
+    plain = case_from(CASE[: CASE.index("[[imperfections]]")], tmp_path)
+    assembly, interfaces = assembly_of(case), case_interfaces(case)
+    ratio = assembly.density / assembly_of(plain).density
     assert ((ratio >= 0.8) & (ratio <= 1.2)).all()
     assert ratio[assembly.free].std() > 0.05
     assert (ratio[~assembly.free] == 1.0).all(), "supports carry no weight"
@@ -157,12 +157,9 @@ def test_bad_imperfections_are_refused(table, words):
         assert word in str(error.value)
 
 
-def test_an_imperfection_given_twice_is_refused(tmp_path):
+def test_an_imperfection_given_twice_is_refused():
     with pytest.raises(ValueError, match=r"imperfections 3\] kind 'friction' is there twice"):
-        parse_case(
-            CASE + '[[imperfections]]\nkind = "friction"\ndistribution = "lognormal"\ndeviation = 0.1\n',
-            tmp_path / "c.toml",
-        )
+        case_from(CASE + '[[imperfections]]\nkind = "friction"\ndistribution = "lognormal"\ndeviation = 0.1\n')
 
 
 def test_an_imperfection_is_a_value():

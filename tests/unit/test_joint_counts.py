@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from structures import arch_response, portal_response
+from structures import arch_response, portal_response, report_of
 
 import blockvis
 import solver
@@ -19,7 +19,7 @@ from blockvis.kinds.kinds import KINDS
 from blockvis.pictures import marks
 from blockvis.pictures.curves import events_of
 from blockvis.pictures.swing import swing_of
-from blockvis.report.page import report_html, summary_rows
+from blockvis.report.page import summary_rows
 from blockvis.results.joints import initial_joints
 from solver import mechanics
 
@@ -77,7 +77,7 @@ def test_every_increment_has_one_count(name, tmp_path):
         rows = [(int(row["hinges"]), int(row["sliding_joints"])) for row in csv.DictReader(file)]
     assert rows == path
 
-    page = report_html(response)
+    page = report_of(response)
     model = json.loads(re.search(r'<script id="model" type="application/json">(.*?)</script>', page, re.S)[1])
     packed = model["packed"]
     ends, kinds = unpacked(packed["mark_first"]).ravel(), unpacked(packed["mark_kind"]).ravel()

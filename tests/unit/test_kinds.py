@@ -12,16 +12,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from structures import case_from, report_of
 
 import blockvis
 import solver
 from blockvis import draw_curve
-from blockvis.case_files.read import parse_case
 from blockvis.cli import _in_words
 from blockvis.kinds.kind import AnalysisKind, AnalysisRun, RunInput, Steps
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.captions import state_text
-from blockvis.report.page import report_html
 from blockvis.runs.progress import Progress
 from solver import mechanics
 
@@ -120,7 +119,7 @@ tilt_step = 0.03
 def test_a_new_kind_is_an_object_of_its_own(tmp_path, monkeypatch):
     """A block of b × h on ground that tilts turns over at tan θ = b/h."""
     monkeypatch.setitem(KINDS, "tilt", TiltKind())
-    case = parse_case(TILT, tmp_path / "tilt.toml")
+    case = case_from(TILT, tmp_path)
     run = blockvis.run_case(case, tmp_path / "out", outputs=())
     low, high = run.summary["collapse_bracket"]
     assert low < np.arctan(0.2) < high == pytest.approx(low + 0.03)
@@ -136,17 +135,17 @@ def test_a_new_kind_is_an_object_of_its_own(tmp_path, monkeypatch):
     assert again.collapse.bracket == (low, high)
     assert draw_curve(again, tmp_path / "curve.png").stat().st_size > 10_000
     assert state_text(again.path[1], again) == f"Tilt 0.0300 rad   ·   Reserve r = {again.values[1]:.5g}"
-    assert "Collapse at tilt 0.195 rad" in report_html(again)
+    assert "Collapse at tilt 0.195 rad" in report_of(again)
     assert "first reserve                 0.2" in _in_words(again, tmp_path)
     assert "collapse at                 0.195 rad   between 0.18 and 0.21" in _in_words(again, tmp_path)
 
 
 def test_keys_of_a_kind_belong_to_it(tmp_path):
     with pytest.raises(ValueError, match="kind is 'tilt'"):
-        parse_case(TILT, tmp_path / "tilt.toml")
+        case_from(TILT, tmp_path)
     settling = TILT.replace('kind = "tilt"', 'kind = "settlement"') + "[settlement]\ndirection = [0, -1]\n"
     with pytest.raises(ValueError, match="tilt_step is not a key here"):
-        parse_case(settling, tmp_path / "tilt.toml")
+        case_from(settling, tmp_path)
 
 
 class Terminal(io.StringIO):
@@ -177,7 +176,7 @@ def test_the_bar_shows_the_quantities_of_the_kind(analysis, extra, line, tmp_pat
         text += '[[loads]]\nkind = "live"\nweight_fraction = [1.0, 0.0]\n'
     if analysis == "pushover":
         text += '[control]\nblock = "block 1"\n'
-    course = KINDS[analysis].course(parse_case(text, tmp_path / "case.toml"))
+    course = KINDS[analysis].course(case_from(text, tmp_path))
     stream = Terminal()
     certificate = solver.Certificate()
     nothing = np.zeros((0, 2))
@@ -191,7 +190,7 @@ def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monke
     monkeypatch.setattr("blockvis.runs.progress.REDRAW", -1.0)
     text = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
     stream, seen = Terminal(), []
-    bar = Progress(KINDS["settlement"].course(parse_case(text, tmp_path / "case.toml")), stream, ["ground", "block"])
+    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), stream, ["ground", "block"])
     outlines = [[[-1, -1], [1, -1], [1, 0], [-1, 0]], [[-0.2, 0], [0.2, 0], [0.2, 1], [-0.2, 1]]]
     assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
     steps = mechanics.settlement_increments(

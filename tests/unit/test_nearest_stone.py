@@ -210,7 +210,7 @@ def test_the_way_can_be_chosen():
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_mortar_that_is_drawn_is_given_away_however_wide_and_openings_in_it_stay(tmp_path):
-    from blockvis.formats.read import read
+    from blockvis import read
 
     stones = [shapely.Polygon(ring) for ring in rubble(3)]
     border = shapely.box(0, 0, WIDTH, HEIGHT)

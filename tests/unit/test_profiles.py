@@ -5,14 +5,11 @@ import json
 import numpy as np
 import pytest
 import structures
-from structures import run_command
+from structures import assembly_of, case_from, run_command
 
 import blockvis
 import solver
 from blockvis import cli
-from blockvis.case_files.read import parse_case
-from blockvis.cases.build import case_assembly, case_settlements
-from blockvis.cases.profiles import Profile
 
 NO_FALL = solver.Controls(falling_frames=0)
 
@@ -42,13 +39,12 @@ limit = 0.004
 
 def case_of(text, profile, *more):
     text = text.replace("[settlement]", "\n".join(["[settlement]", f"profile = {profile}", *more]))
-    return parse_case(text, structures.Path("case.toml"))
+    return case_from(text)
 
 
 def openings(response):
-    from blockvis.results.joints import initial_joints, opening_and_slip
-
-    return opening_and_slip(response.assembly, initial_joints(response.assembly), response.path[-1].pose)[:, 0]
+    joints = response.joints(len(response.path) - 1)
+    return joints["opening"][joints["initial"] == 1]
 
 
 def test_a_translation_by_a_profile_is_the_ordinary_settlement():
@@ -105,7 +101,7 @@ def test_profiles_that_are_none_are_refused(keys, words):
 
 
 def test_a_trough_goes_down_by_a_bell_and_tilts_by_its_slope():
-    trough = Profile("gaussian", centre=1.0, inflection=0.5)
+    (trough,) = case_of(PORTAL, '{ kind = "gaussian", centre = 1.0, inflection = 0.5 }').profiles
     x = np.linspace(-1.0, 3.0, 41)
     assert trough.value(np.array([1.0, 1.5])) == pytest.approx([1.0, np.exp(-0.5)])
     step = 1e-6
@@ -114,28 +110,28 @@ def test_a_trough_goes_down_by_a_bell_and_tilts_by_its_slope():
 
 
 def test_points_are_joined_by_straight_lines_and_level_beyond():
-    table = Profile("points", points=((0.0, 0.0), (2.0, 1.0)))
+    (table,) = case_of(PORTAL, "{ points = [[0.0, 0.0], [2.0, 1.0]] }").profiles
     np.testing.assert_allclose(table.value(np.array([-1.0, 0.5, 3.0])), [0.0, 0.25, 1.0])
     np.testing.assert_allclose(table.slope(np.array([-1.0, 1.0, 2.0])), [0.0, 0.5, 0.25], atol=1e-6)
 
 
-def test_each_support_of_a_case_goes_by_the_trough_at_its_centroid():
+def test_each_support_of_a_case_goes_by_the_trough_at_its_centroid(tmp_path):
     case = case_of(PORTAL, '{ kind = "gaussian", centre = 0.0, inflection = 1.0 }')
     with pytest.warns(UserWarning, match="'ground right' into 3 pieces"):
-        assembly = case_assembly(case)
-    (settlement,) = case_settlements(case, assembly)
+        response = blockvis.run_case(case, tmp_path / "out", outputs=()).response
+    assembly, (settlement,) = response.assembly, response.settlements
     assert set(settlement.profile) == {assembly.names[i] for i in np.flatnonzero(assembly.moving)}
 
 
 def test_a_ground_of_one_block_is_cut_under_the_joints_of_the_first_course():
     case = case_of(WALL, '{ kind = "gaussian", centre = 0.5, inflection = 0.2 }')
     with pytest.warns(UserWarning, match="cut under the joints of the first course, 'ground' into 5 pieces"):
-        assembly = case_assembly(case)
+        assembly = assembly_of(case)
     pieces = [i for i in range(assembly.n_blocks) if not assembly.free[i]]
     assert [assembly.names[i] for i in pieces] == [f"ground {k}" for k in range(1, 6)]
     edges = [assembly.outline(i)[:, 0] for i in pieces]
     assert [x.min() for x in edges[1:]] == pytest.approx([0.0, 0.25, 0.5, 0.75])
-    whole = case_assembly(case_of(WALL, "{ points = [[-9.0, 0.0], [9.0, 1.0]] }"))
+    whole = assembly_of(case_of(WALL, "{ points = [[-9.0, 0.0], [9.0, 1.0]] }"))
     assert "ground" in whole.names, "a straight profile tilts the ground as it is"
     assert assembly.areas[pieces].sum() == pytest.approx(whole.areas[whole.index("ground")])
 
@@ -190,9 +186,5 @@ def test_a_profile_that_names_no_support_says_which_there_are(tmp_path, capsys):
 
 
 def test_a_profile_that_moves_a_fixed_support_says_how_to_let_it_move():
-    case = case_of(PORTAL, '{ supports = { "left base" = [0, -1] } }')
-    assembly = case_assembly(case)
-    fixed = assembly.names[int(np.flatnonzero(assembly.roles == "fixed")[0])]
-    case = case_of(PORTAL, f'{{ supports = {{ "{fixed}" = [0, -1] }} }}')
-    with pytest.raises(ValueError, match=f"'{fixed}' is fixed; give it the role \"moving\""):
-        case_settlements(case, assembly)
+    with pytest.raises(ValueError, match="'ground left' is fixed; give it the role \"moving\""):
+        assembly_of(case_of(PORTAL, '{ supports = { "ground left" = [0, -1] } }'))

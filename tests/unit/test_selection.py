@@ -3,11 +3,9 @@
 import ezdxf
 import numpy as np
 import pytest
-from structures import brick
+from structures import assembly_of, brick, case_from
 
 from blockvis import inspect, read, read_case, read_layout
-from blockvis.case_files.read import parse_case
-from blockvis.cases.build import case_assembly
 from blockvis.cli import main
 from blockvis.layout.layout import Layout
 from blockvis.layout.selection import without_debris, without_surroundings
@@ -142,7 +140,7 @@ def test_what_only_names_is_not_left_out_by_itself(tmp_path):
 
 def test_what_is_asked_to_go_cannot_refuse_the_file(tmp_path):
     """A surface in pieces is refused, unless it is left out."""
-    from blockvis.formats.read import write_layout
+    from blockvis import write_layout
 
     rings = [brick(0, 0, 1, 1), brick(1, 0, 1, 1), brick(5, 5, 1, 1)]
     write_layout(Layout(tuple(rings), ("a", "b", "c"), groups=("stone", "soil", "soil")), tmp_path / "a.vtu")
@@ -165,13 +163,13 @@ def test_keys_of_the_case(tmp_path):
     case = read_case(tmp_path / "case.toml")
     assert (case.ignore, case.only, case.closing) == (("steel",), (), "faces")
     with pytest.warns(UserWarning, match="1 outline, as asked for on layer 'steel'"):
-        assert case_assembly(case).n_blocks == 16
+        assert assembly_of(case).n_blocks == 16
     with pytest.raises(ValueError, match=r"\[geometry\] ignore is 3; give texts in quotes"):
-        parse_case('[geometry]\nfile = "wall.dxf"\nignore = 3', tmp_path / "case.toml")
+        case_from('[geometry]\nfile = "wall.dxf"\nignore = 3', tmp_path)
     with pytest.raises(ValueError, match=r"\[geometry\] closing is 'voronoy' \(did you mean 'voronoi'\?\)"):
-        parse_case('[geometry]\nfile = "wall.dxf"\nclosing = "voronoy"', tmp_path / "case.toml")
+        case_from('[geometry]\nfile = "wall.dxf"\nclosing = "voronoy"', tmp_path)
     with pytest.raises(ValueError, match=r"\[geometry\] only belongs to a file"):
-        parse_case('[geometry]\nlayout = "wall"\nonly = ["a"]', tmp_path / "case.toml")
+        case_from('[geometry]\nlayout = "wall"\nonly = ["a"]', tmp_path)
 
 
 def test_on_the_command_line(tmp_path, capsys):

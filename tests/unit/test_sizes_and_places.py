@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from structures import assembly_of
 
 import solver
 from blockvis import generators, read_case
-from blockvis.cases.build import case_assembly
 from solver import mechanics
 
 #: A national grid: coordinates of five thousand kilometres are rounded to a nanometre.
@@ -131,7 +131,7 @@ def test_numbers_beyond_what_is_solved_are_named(tmp_path, scale, density, words
         '[geometry]\nfile = "a.json"\n[settlement]\ndirection = [0, -1]\n', encoding="utf-8"
     )
     with pytest.warns(UserWarning, match=words):
-        case_assembly(read_case(tmp_path / "case.toml"))
+        assembly_of(read_case(tmp_path / "case.toml"))
 
 
 CRUMB = np.array([[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]])

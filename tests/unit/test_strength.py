@@ -4,11 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from structures import run_command
+from structures import case_from, run_command
 
 import solver
 from blockvis import generators
-from blockvis.case_files.read import parse_case
 from solver import mechanics
 
 WIDTH, HEIGHT, THICKNESS = 0.8, 0.5, 0.3
@@ -149,7 +148,7 @@ def test_strength_from_the_case_file(tmp_path, capsys):
         (CASE.format("").replace("2000.0", "-1.0"), "[material] cohesion is -1; give a stress in Pa of at least 0"),
     ):
         with pytest.raises(ValueError, match=re.escape(words)):
-            parse_case(text, path)
+            case_from(text, path.parent)
 
 
 def test_what_follows_the_geometry_refuses_strength():

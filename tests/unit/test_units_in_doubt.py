@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
+from structures import assembly_of, case_from
 
 import solver
 from blockvis import read_layout, write_layout
-from blockvis.case_files.read import parse_case
-from blockvis.cases.build import case_assembly
 from blockvis.layout.layout import Layout
 from blockvis.layout.units import doubt
 
@@ -36,7 +35,7 @@ def test_masonry_is_not_doubted():
 def assembled(tmp_path, text):
     moving = '[[supports]]\nrole = "moving"\noutline = [[-9, -9], [9, -9], [9, -8]]\n'
     motion = "" if "[settlement]" in text else "[settlement]\ndirection = [0, -1]\nincrement = 1e-4\nlimit = 1e-3\n"
-    return case_assembly(parse_case(f"{text}\n{moving}{motion}", tmp_path / "case.toml"))
+    return assembly_of(case_from(f"{text}\n{moving}{motion}", tmp_path))
 
 
 COLUMN = '[geometry]\nlayout = "column"\n'

@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, dropped_brick
+from structures import arch_response, dropped_brick, report_of
 
 import blockvis
 import solver
 from blockvis import draw_curve
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.captions import lost_text
-from blockvis.report.page import report_html
 from blockvis.results.about import LOCAL, loss_of
 from blockvis.results.datasets import block_dataset
 
@@ -48,7 +47,7 @@ def test_summary_console_report_and_curve_tell_them_apart(tmp_path):
     assert summary["falling_share"] == pytest.approx(0.01235, abs=1e-5)
     assert any("local loss" in line for line in KINDS["settlement"].lines(response))
     assert not any("local loss" in line for line in KINDS["settlement"].lines(arch_response()))
-    page = report_html(response)
+    page = report_of(response)
     assert "<h1>Local loss at a settlement of" in page
     assert "1.962 kN = 0.0123 W, a local loss" in page
     said = re.findall(r"<!-- (.*?) -->", draw_curve(response, tmp_path / "curve.svg").read_text(encoding="utf-8"))
@@ -71,7 +70,7 @@ def test_a_loss_is_in_every_output_and_drawn_pale(tmp_path):
     assert loss["settlement"] == pytest.approx(response.losses[0].settlement)
     (line,) = (line for line in KINDS["settlement"].lines(response) if line.startswith("loss: "))
     assert re.fullmatch(r"loss: brick at 0\.15\d+ m, 1\.962 kN, 1\.2 % of the weight; the structure stands .*", line)
-    assert "the structure stands without" in report_html(response)
+    assert "the structure stands without" in report_of(response)
     assert blockvis.open_results(out).losses == response.losses, "the files keep what fell"
     blocks = block_dataset(response.assembly, response.path[-1])
     assert blocks.cell_data["fallen"].tolist() == [0, 1, 0, 0]

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 import shapely
 from scipy.spatial import Voronoi, cKDTree
-from structures import hull_of
+from structures import assembly_of, hull_of
 
 import solver
 from blockvis import generators, read_case
-from blockvis.cases.build import case_assembly
 from blockvis.layout.solids import extruded
 from solver import mechanics
 from solver.kinematics import moved, rotation_matrices
@@ -145,7 +144,7 @@ def test_what_touches_in_the_plane_touches_there_in_space(name):
     if name == "small facade":
         plane = generators.build("facade", SMALL_FACADE)
     else:
-        plane = generators.build(name) if name in PLANE else case_assembly(EXAMPLES[name])
+        plane = generators.build(name) if name in PLANE else assembly_of(EXAMPLES[name])
     space, reach = in_space_of(plane), 1e-6 * plane.block_size
     expected = rows(mechanics.find_contacts(plane, plane.vertices, reach), True)
     solid = mechanics.find_contacts(space, space.vertices, reach)

@@ -13,9 +13,7 @@ import pytest
 from test_space_static import box
 
 import solver
-from blockvis.generators.arches import arch
-from blockvis.generators.domes import dome
-from blockvis.generators.vaults import extruded_arch
+from blockvis.generators import arch, dome, extruded_arch
 
 pytestmark = pytest.mark.path
 

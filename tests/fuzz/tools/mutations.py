@@ -18,7 +18,7 @@ import numpy as np
 from hostile import DXF_SQUARE, _dxf, _dxf_block, _dxf_insert, _vtm
 
 import solver
-from blockvis.formats.read import save_layout
+from blockvis import save_layout
 
 #: Limits for one file: bytes of memory beside the libraries, seconds of processor time.
 MEMORY, SECONDS = 2 << 30, 20

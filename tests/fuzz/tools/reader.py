@@ -25,7 +25,7 @@ def main(memory: str, seconds: str, files: list[str]) -> None:
     # The libraries themselves map more than a gigabyte: they are loaded before the limit is set, and not counted.
     for library in ("meshio", "pyvista", "trimesh", "ezdxf", "shapely", "scipy.spatial", "blockvis.formats.solids"):
         import_module(library)
-    from blockvis.formats.read import read_layout
+    from blockvis import read_layout
     from blockvis.layout.assemble import assemble
 
     with open("/proc/self/statm", encoding="ascii") as file:
