@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
 
 import blockvis
 import solver
@@ -63,6 +64,22 @@ def hull_of(points) -> tuple[np.ndarray, list[list[int]]]:
     return hull.points, faces
 
 
+def upright(outline, first: float, last: float) -> tuple[np.ndarray, list[list[int]]]:
+    """Extrude an outline in x and z, counter-clockwise seen against y, from y = first to y = last."""
+    corners, faces = prism(outline, first, last)
+    return corners[:, [0, 2, 1]], [face[::-1] for face in faces]
+
+
+def fans(faces) -> np.ndarray:
+    """Convex faces cut into triangles from their first corners."""
+    return np.array([[face[0], face[k], face[k + 1]] for face in faces for k in range(1, len(face) - 1)])
+
+
+def turn_by(rotation) -> np.ndarray:
+    """Matrix of a rotation by a vector [rad]."""
+    return Rotation.from_rotvec(rotation).as_matrix()
+
+
 def stacked(shift=(0.0, 0.0), turn: float = 0.0) -> tuple[solver.Assembly, solver.Pose]:
     """A block of 1 m on another, and the pose with the upper one moved."""
     assembly = solver.Assembly.from_outlines([rectangle(0, 0, 1, 1), rectangle(0, 1, 1, 2)], roles=["fixed", "free"])
@@ -101,6 +118,18 @@ def case_from(text: str, folder: Path | None = None) -> blockvis.Case:
         path = Path(folder or elsewhere) / "case.toml"
         path.write_text(text, encoding="utf-8")
         return blockvis.read_case(path)
+
+
+def suffixes(verb: str) -> list[str]:
+    """Suffixes of the layout files that can be read, or written, as they are told to whoever names another."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "layout.unknown"
+        path.write_text("nothing", encoding="utf-8")
+        try:
+            blockvis.read_layout(path) if verb == "read" else blockvis.save_layout(stacked()[0], path)
+        except ValueError as refused:
+            return str(refused).partition("; use one of ")[2].split()
+    raise AssertionError(f"a file of no format can be {verb}")
 
 
 class _Built(Exception):

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 import trimesh
+from structures import fans, layout_of
 
 from blockvis import generators, read, read_layout
-from blockvis.formats.bodies import fans
-from blockvis.layout.layout import layout_of
 
 move = trimesh.transformations.translation_matrix
 

@@ -4,11 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from structures import fans, layout_of
 
 import solver
 from blockvis import generators, inspect, read, read_layout
-from blockvis.layout.layout import layout_of
-from blockvis.layout.solids import triangles_of
 
 #: Faces of a box whose corners are numbered around its bottom, then around its top.
 BOX = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
@@ -34,7 +33,7 @@ def scene_of(dome):
     trimesh = pytest.importorskip("trimesh")
     scene = trimesh.Scene()
     for (points, faces), name in zip(dome.solids, dome.names, strict=True):
-        mesh = trimesh.Trimesh(points, triangles_of(points, faces), process=False)
+        mesh = trimesh.Trimesh(points, fans(faces), process=False)
         scene.add_geometry(mesh, node_name=name, geom_name=name)
     return scene
 
@@ -91,7 +90,7 @@ def test_one_stl_of_stones_that_stand_apart(dome, tmp_path):
     lines = []
     for k, (points, faces) in enumerate(dome.solids):
         away = points + 0.3 * k
-        for triangle in away[triangles_of(points, faces)]:
+        for triangle in away[fans(faces)]:
             lines += ["facet normal 0 0 0", "outer loop", *("vertex " + " ".join(map(str, p)) for p in triangle)]
             lines += ["endloop", "endfacet"]
     (tmp_path / "a.stl").write_text("\n".join(["solid all", *lines, "endsolid all"]), encoding="utf-8")

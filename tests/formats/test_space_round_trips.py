@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from structures import layout_of
 
 import solver
 from blockvis import generators, read, read_layout, save_layout, write_layout
@@ -77,20 +78,12 @@ def test_the_same_joints_are_found(vault, suffix, tmp_path):
 def test_one_file_per_stone(tmp_path):
     dome = generators.dome(lunes=4, courses=2)
     for i, name in enumerate(dome.names):
-        layout = read_layout_of(dome).chosen([i])
+        layout = layout_of(dome).chosen([i])
         write_layout(layout, tmp_path / f"{name}.stl")
     again = read(tmp_path, roles={"springer *": "moving"}, dimension=3)
     assert sorted(again.names) == sorted(dome.names)
     assert again.shapes.volumes.sum() == pytest.approx(dome.shapes.volumes.sum())
     assert int(again.moving.sum()) == 4
-
-
-def read_layout_of(assembly):
-    from blockvis.layout.layout import layout_of
-
-    layout = layout_of(assembly)
-    assert layout.dimension == 3
-    return layout
 
 
 def test_formats_of_the_plane_refuse_blocks_in_space(vault, tmp_path):

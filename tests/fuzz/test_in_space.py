@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import pytest
 from rubble import trial
+from structures import upright
 
 import solver
-from blockvis.layout.solids import extruded
 
 pytestmark = pytest.mark.path
 
@@ -22,7 +22,7 @@ CONTROLS = solver.Controls(falling_frames=1)
 
 def in_space_of(assembly):
     """Extrude blocks along y by their size, the plane's y upwards."""
-    solids = [extruded(assembly.outline(block), 0.0, assembly.block_size) for block in range(assembly.n_blocks)]
+    solids = [upright(assembly.outline(block), 0.0, assembly.block_size) for block in range(assembly.n_blocks)]
     roles, names = list(assembly.roles), assembly.names
     return solver.Assembly.from_solids(solids, roles=roles, names=names, density=assembly.density)
 

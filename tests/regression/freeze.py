@@ -28,7 +28,6 @@ from typing import Any
 import numpy as np
 
 import blockvis
-from blockvis.runs.run import Run
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parent.parent / "examples"
@@ -91,7 +90,7 @@ STUDY_COUNTS = ("increments", "programs")
 SMALLEST_BOUND = 1e-9
 
 
-def ran(name: str, folder: Path) -> Run:
+def ran(name: str, folder: Path) -> Any:
     """The run of an example; nothing is drawn.
 
     Parameters
@@ -104,6 +103,7 @@ def ran(name: str, folder: Path) -> Run:
     Returns
     -------
     Run
+        As of :func:`blockvis.run_case`.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -132,7 +132,7 @@ def numbers_of(name: str, folder: Path) -> dict[str, Any]:
     return numbers_in(ran(name, folder))
 
 
-def numbers_in(run: Run) -> dict[str, Any]:
+def numbers_in(run: Any) -> dict[str, Any]:
     """What is to stay the same of a run, from its results folder; as :func:`numbers_of`."""
     folder = run.folder
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

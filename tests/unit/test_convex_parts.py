@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from structures import prism
+from structures import prism, turn_by
 
 import solver
 from solver import mechanics
-from solver.kinematics import rotation_matrices
 
 ANGLES = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-TURN = rotation_matrices(np.array([[0.3, -0.7, 0.4]]))[0]
+TURN = turn_by([0.3, 0.7, 0.4])
 
 OUTLINES = {
     "L": ([(0, 0), (2, 0), (2, 1), (1, 1), (1, 3), (0, 3)], 2),

@@ -8,7 +8,7 @@ import pytest
 
 import solver
 from blockvis import inspect, save_layout
-from blockvis.pictures.inspection import draw_inspection
+from blockvis.cli import main
 
 FACADE = Path(__file__).resolve().parents[3] / "shared" / "data" / "facade" / "facade.dxf"
 
@@ -43,7 +43,8 @@ def test_numbers(layout):
 
 
 def test_picture(layout, tmp_path):
-    path = draw_inspection(inspect(layout), tmp_path / "found.png")
+    path = tmp_path / "found.png"
+    assert main(["info", str(layout), "--picture", str(path)]) == 0
     from PIL import Image
 
     colours = {colour for _, colour in Image.open(path).convert("RGB").getcolors(1 << 24)}

@@ -3,13 +3,11 @@
 import ezdxf
 import numpy as np
 import pytest
+import structures
 from structures import assembly_of, brick, case_from
 
-from blockvis import inspect, read, read_case, read_layout
+from blockvis import inspect, read, read_case, read_layout, write_layout
 from blockvis.cli import main
-from blockvis.layout.layout import Layout
-from blockvis.layout.selection import without_debris, without_surroundings
-from blockvis.pictures.inspection import draw_inspection
 
 
 def wall(space, layer="brick", x=0.0, n=4):
@@ -102,11 +100,11 @@ def test_inner_lines_of_blocks_go_and_one_block_in_another_is_refused(tmp_path):
         read(drawn(tmp_path, outline(brick(10, 10, 220, 45), "brick")))
 
 
-def test_mortar_drawn_as_blocks_of_its_own_stays():
+def test_mortar_drawn_as_blocks_of_its_own_stays(tmp_path):
     bricks = [brick(0, 0, 1, 0.4), brick(1.05, 0, 1, 0.4), brick(0, 0.45, 2.05, 0.4)]
     mortar = [brick(1.0, 0, 0.05, 0.4), brick(0, 0.4, 2.05, 0.05)]
-    drawing = Layout(tuple(bricks + mortar), tuple("abcde"), groups=("stone",) * 3 + ("mortar",) * 2)
-    assert without_surroundings(without_debris(drawing)).n_blocks == 5
+    groups = ["stone"] * 3 + ["mortar"] * 2
+    assert read_layout(structures.drawn(tmp_path / "a.json", bricks + mortar, "abcde", group=groups)).n_blocks == 5
 
 
 def test_ignore_and_only(tmp_path):
@@ -140,10 +138,9 @@ def test_what_only_names_is_not_left_out_by_itself(tmp_path):
 
 def test_what_is_asked_to_go_cannot_refuse_the_file(tmp_path):
     """A surface in pieces is refused, unless it is left out."""
-    from blockvis import write_layout
-
     rings = [brick(0, 0, 1, 1), brick(1, 0, 1, 1), brick(5, 5, 1, 1)]
-    write_layout(Layout(tuple(rings), ("a", "b", "c"), groups=("stone", "soil", "soil")), tmp_path / "a.vtu")
+    plain = structures.drawn(tmp_path / "a.json", rings, "abc", group=["stone", "soil", "soil"])
+    write_layout(read_layout(plain), tmp_path / "a.vtu")
     import pyvista as pv
 
     mesh = pv.read(tmp_path / "a.vtu")
@@ -189,7 +186,8 @@ def test_info_honours_roles_of_layers_and_draws_what_was_left_out(tmp_path):
     )
     found = inspect(path)
     assert "'free' 16, 'fixed' 1, 'moving' 1" in str(found)
-    picture = draw_inspection(found, tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert main(["info", str(path), "--picture", str(tmp_path / "a.svg")]) == 0
+    picture = (tmp_path / "a.svg").read_text(encoding="utf-8")
     for words in ("left out: 1", "moving: 1", "fixed: 1", "gap between facing edges"):
         assert words in picture
 

@@ -4,11 +4,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from structures import box, hull_of
+from structures import box, hull_of, turn_by
 
 import solver
 from solver import mechanics
-from solver.kinematics import rotation_matrices
 
 
 def corner_of_walls(bricks=3, courses=4, length=0.25, height=0.08):
@@ -86,7 +85,7 @@ def test_the_same_structure_has_the_same_points(structure, change):
     assert len(expected) > 200
     number, turn, shift = np.arange(len(solids)), np.eye(3), np.zeros(3)
     if change == "turned":
-        turn = rotation_matrices(np.array([[0.3, -1.1, 0.6]]))[0]
+        turn = turn_by([0.3, -1.1, 0.6])
     if change == "mirrored":
         turn = np.diag([-1.0, 1.0, 1.0])
     if change == "far away":
@@ -125,7 +124,7 @@ def test_a_ridge_stands_on_a_plane(lean):
         ends = np.column_stack([np.zeros(2), ring[:, 1], np.zeros(2)])
         flank = np.array([np.sin(half), 0.0, np.cos(half)])
         points = np.concatenate([ends, ends + flank, ends + flank * [-1, 1, 1]])
-        turn = rotation_matrices(np.array([[0.0, lean * (np.pi / 2 - half), 0.0]]))[0]
+        turn = turn_by([0.0, lean * (np.pi / 2 - half), 0.0])
         contacts = found([box((-2, -2, -1), (2, 2, 0)), hull_of(points @ turn.T)], 1e-6)
         closed = contacts[np.abs(contacts.gaps) < 1e-9]
         np.testing.assert_allclose(closed.points[np.argsort(closed.points[:, 1])][[0, -1]], ends, atol=1e-9)
@@ -149,7 +148,7 @@ def test_a_brick_turned_on_a_brick_bears_on_all_of_both(angle, shift):
     import shapely
 
     corners, faces = box((0, 0, 0), (1, 0.4, 0.2))
-    turn = rotation_matrices(np.array([[0.0, 0.0, angle]]))[0]
+    turn = turn_by([0.0, 0.0, angle])
     above = corners @ turn.T + [shift, 0.0, 0.2]
     contacts = found([(corners, faces), (above, faces)])
     first, second = shapely.Polygon(corners[:4, :2]), shapely.Polygon(above[:4, :2])
@@ -172,7 +171,7 @@ def test_drawings_a_little_off_keep_their_joints(structure, off):
     other = []
     for corners, faces in solids:
         middle = corners.mean(axis=0)
-        turn = rotation_matrices(random.normal(size=(1, 3)) * off)[0]
+        turn = turn_by(random.normal(size=3) * off)
         grown = (corners - middle) * (1.0 + random.uniform(-off, off)) @ turn.T
         other.append((middle + grown + random.uniform(-1, 1, 3) * off * size, faces))
     contacts = found(other)

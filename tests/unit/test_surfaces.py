@@ -2,13 +2,18 @@
 
 import numpy as np
 import pytest
+from structures import drawn
 
 import solver
-from blockvis.layout.surfaces import cleaned
+from blockvis import read
 
 CORNERS = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [0, 0, 3], [2, 0, 3], [2, 1, 3], [0, 1, 3]]
 FACES = [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
 TRIANGLES = [[face[0], face[k], face[k + 1]] for face in FACES for k in (1, 2)]
+
+
+def shapes_read(corners, faces, folder):
+    return read(drawn(folder / "a.json", [(corners, faces)]), dimension=3).shapes
 
 
 def shapes_of(corners, faces):
@@ -37,19 +42,19 @@ def loose(corners, faces):
     ],
     ids=["box", "triangles", "loose triangles", "mixed senses", "spare corner", "corner in an edge", "cut face"],
 )
-def test_every_way_to_draw_a_box_is_the_same_box(surface, sense):
+def test_every_way_to_draw_a_box_is_the_same_box(surface, sense, tmp_path):
     corners, faces = surface
-    shapes = shapes_of(*cleaned(np.asarray(corners, dtype=float), [list(face)[::sense] for face in faces]))
+    shapes = shapes_read(corners, [list(face)[::sense] for face in faces], tmp_path)
     assert len(shapes.vertices) == 8
     assert np.diff(shapes.face_offsets).tolist() == [4] * 6
     assert shapes.volumes[0] == pytest.approx(6.0, rel=1e-12)
     np.testing.assert_allclose(shapes.centroids[0], [1.0, 0.5, 1.5])
 
 
-def test_single_precision_far_away_is_welded_and_flat():
+def test_single_precision_far_away_is_welded_and_flat(tmp_path):
     corners = (np.asarray(CORNERS) * 0.1 + [40.0, 50.0, 6.0]).astype(np.float32)
     corners, faces = loose(corners, TRIANGLES)
-    shapes = shapes_of(*cleaned(corners, [list(face) for face in faces]))
+    shapes = shapes_read(corners, faces, tmp_path)
     assert np.diff(shapes.face_offsets).tolist() == [4] * 6
 
 

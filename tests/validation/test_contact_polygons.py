@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 import shapely
 from scipy.spatial import Voronoi, cKDTree
-from structures import assembly_of, hull_of
+from structures import assembly_of, hull_of, turn_by, upright
 
 import solver
 from blockvis import generators, read_case
-from blockvis.layout.solids import extruded
 from solver import mechanics
-from solver.kinematics import moved, rotation_matrices
+from solver.kinematics import moved
 
 #: Here coal 3.0.3 gives a polygon of half the area, whose corners are on no edge of the faces.
 LOST_BY_COAL = 4
@@ -61,9 +60,9 @@ def same_places(first, second):
 def test_polygons_are_those_of_coal(scene):
     """Two irregular frusta, one on the other, turned as a whole: the corners of the intersection of both faces."""
     random = np.random.default_rng(scene)
-    turn = rotation_matrices(random.normal(size=(1, 3)))[0]
+    turn = turn_by(random.normal(size=3))
     first, second = random_stone(random, bottom=False), random_stone(random, bottom=True)
-    second = second @ rotation_matrices(np.array([[0.0, 0.0, random.uniform(0, 6)]]))[0].T
+    second = second @ turn_by([0.0, 0.0, random.uniform(0, 6)]).T
     second = second + np.append(random.uniform(-0.4, 0.4, 2), 0.0)
     polygons = [shapely.Polygon(stone[stone[:, 2] == 0.0, :2]) for stone in (first, second)]
     overlap = shapely.get_coordinates(polygons[0] & polygons[1])[:-1]
@@ -85,7 +84,7 @@ THICKNESS = 0.3
 
 
 def in_space_of(assembly):
-    solids = [extruded(assembly.outline(block), 0.0, THICKNESS) for block in range(assembly.n_blocks)]
+    solids = [upright(assembly.outline(block), 0.0, THICKNESS) for block in range(assembly.n_blocks)]
     return solver.Assembly.from_solids(solids, roles=list(assembly.roles), names=assembly.names)
 
 

@@ -25,8 +25,7 @@ def main(memory: str, seconds: str, files: list[str]) -> None:
     # The libraries themselves map more than a gigabyte: they are loaded before the limit is set, and not counted.
     for library in ("meshio", "pyvista", "trimesh", "ezdxf", "shapely", "scipy.spatial", "blockvis.formats.solids"):
         import_module(library)
-    from blockvis import read_layout
-    from blockvis.layout.assemble import assemble
+    from blockvis import read
 
     with open("/proc/self/statm", encoding="ascii") as file:
         mapped = int(file.read().split()[0]) * resource.getpagesize()
@@ -44,8 +43,7 @@ def main(memory: str, seconds: str, files: list[str]) -> None:
         started = time.process_time()
         signal.setitimer(signal.ITIMER_PROF, float(seconds))
         try:
-            found = read_layout(Path(name))
-            said["message"] = f"{assemble(found).n_blocks} blocks"
+            said["message"] = f"{read(Path(name)).n_blocks} blocks"
         except (ValueError, OSError) as error:
             said |= {"outcome": "refused", "message": str(error)}
         except TooLong:
