@@ -8,7 +8,7 @@ import solver
 from solver import mechanics
 
 ANGLES = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-TURN = turn_by([0.3, 0.7, 0.4])
+TURN = turn_by([0.5, 0.7, 0.4])
 
 OUTLINES = {
     "L": ([(0, 0), (2, 0), (2, 1), (1, 1), (1, 3), (0, 3)], 2),
