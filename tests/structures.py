@@ -8,7 +8,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -97,7 +97,7 @@ def arch_response() -> solver.Response:
 def drawn(path: Path, shapes, names=None, **words) -> Path:
     """Write a layout file of outlines, or of (points, faces) in space, as somebody draws them: nothing is checked.
 
-    What else the file says of each block, a group, role, material, density or thickness, has one value per block.
+    What else the file says of each block, a group, role, material, density or thickness, has one value per block, None for nothing.
     """
     blocks = []
     for k, shape in enumerate(shapes):
@@ -105,8 +105,8 @@ def drawn(path: Path, shapes, names=None, **words) -> Path:
             block = {"points": np.asarray(shape[0]).tolist(), "faces": [np.asarray(face).tolist() for face in shape[1]]}
         else:
             block = {"outline": np.asarray(shape).tolist()}
-        block |= {"name": f"block {k}" if names is None else names[k]} | {word: words[word][k] for word in words}
-        blocks.append(block)
+        block["name"] = f"block {k}" if names is None else names[k]
+        blocks.append(block | {word: said[k] for word, said in words.items() if said[k] is not None})
     content = {"format": "blockvis layout", "version": 1, "unit": "m", "blocks": blocks}
     path.write_text(json.dumps(content), encoding="utf-8")
     return path
@@ -172,6 +172,18 @@ def report_of(response: solver.Response, case_text: str = "", **options) -> str:
         return blockvis.write_report(response, Path(folder) / "report.html", case_text, **options).read_text(
             encoding="utf-8"
         )
+
+
+def posed(assembly: solver.Assembly, pose: solver.Pose, force=None) -> solver.Response:
+    """A made-up response of one increment in which blocks are at a pose.
+
+    Forces at its contact points are what a function of the contacts says, by default none.
+    """
+    contacts = mechanics.find_contacts(assembly, mechanics.moved_vertices(assembly, pose), 1e-3)
+    forces = np.zeros((len(contacts), assembly.dimension)) if force is None else force(contacts)
+    first = arch_response().path[0]
+    held = replace(first.state, pose=pose, contacts=contacts, forces=forces)
+    return replace(arch_response(), assembly=assembly, increments=(replace(first, held=held),))
 
 
 @cache

@@ -1,5 +1,6 @@
 """A folder or a pattern of files, one stone each."""
 
+import hashlib
 import json
 
 import ezdxf
@@ -8,9 +9,8 @@ import trimesh
 from structures import assembly_of
 
 import blockvis
-from blockvis import read, read_case, read_layout
+from blockvis import read, read_case, read_layout, write_layout
 from blockvis.cli import main
-from blockvis.formats.files import checksum_of_files, files_of
 
 CASE = """
 [geometry]
@@ -90,18 +90,25 @@ def test_info_convert_and_a_case_take_them(tmp_path, capsys):
 
 def test_a_run_knows_when_one_of_its_files_changes(tmp_path):
     folder = stones(tmp_path / "stones", n=3)
-    (tmp_path / "case.toml").write_text(CASE.format(file="stones/*.stl"), encoding="utf-8")
-    run = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=())
-    assert run.summary["inputs"]["layout_file"] == "*.stl"
-    assert run.summary["inputs"]["layout_sha256"] == checksum_of_files(folder / "*.stl") == checksum_of_files(folder)
+
+    def inputs(file):
+        (tmp_path / "case.toml").write_text(CASE.format(file=file), encoding="utf-8")
+        return blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", overwrite=True, outputs=()).summary["inputs"]
+
+    before = inputs("stones/*.stl")
+    assert before["layout_file"] == "*.stl"
+    assert inputs("stones/")["layout_sha256"] == before["layout_sha256"]
     at = trimesh.transformations.translation_matrix((2.5, 0.25, 0.6))
     trimesh.creation.box((1, 0.5, 1), transform=at).export(folder / "stone 3.stl")
-    assert checksum_of_files(folder) != run.summary["inputs"]["layout_sha256"]
+    assert inputs("stones/")["layout_sha256"] != before["layout_sha256"]
 
 
 def test_one_file_has_the_checksum_of_its_bytes(tmp_path):
-    (tmp_path / "a.svg").write_bytes(b"abc")
-    assert checksum_of_files(tmp_path / "a.svg").startswith("ba7816bf8f01cfea")
+    write_layout(read_layout(stones(tmp_path / "stones", n=3)), tmp_path / "wall.json")
+    (tmp_path / "case.toml").write_text(CASE.format(file="wall.json"), encoding="utf-8")
+    run = blockvis.run_case(tmp_path / "case.toml", tmp_path / "out", outputs=())
+    sha256 = hashlib.sha256((tmp_path / "wall.json").read_bytes()).hexdigest()
+    assert run.summary["inputs"]["layout_sha256"] == sha256
 
 
 def test_what_is_no_set_of_stones_is_refused(tmp_path):
@@ -123,8 +130,8 @@ def test_what_is_no_set_of_stones_is_refused(tmp_path):
 
 
 def test_a_name_with_brackets_is_a_name_where_there_is_such_a_file(tmp_path):
-    (tmp_path / "plan [1].svg").write_text("x", encoding="utf-8")
-    assert files_of(tmp_path / "plan [1].svg") == [tmp_path / "plan [1].svg"]
+    write_layout(read_layout(stones(tmp_path / "stones", n=2)), tmp_path / "plan [1].svg")
+    assert read(tmp_path / "plan [1].svg").n_blocks == 2
 
 
 def test_files_in_different_units_are_refused(tmp_path):

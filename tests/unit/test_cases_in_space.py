@@ -4,15 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from structures import assembly_of, case_from, run_command
+from structures import assembly_of, box, case_from, drawn, layout_of, run_command
 
 import solver
-from blockvis import generators, save_layout, write_layout
+from blockvis import generators, read, save_layout, write_layout
 from blockvis.cases.build import case_loads
 from blockvis.cli import main
-from blockvis.layout.assemble import assemble
-from blockvis.layout.layout import Layout, layout_of
-from blockvis.layout.solids import box
 from solver import mechanics
 
 DOME = '[geometry]\nlayout = "dome"\nparameters = {lunes = 4, courses = 1}\n'
@@ -106,14 +103,14 @@ role = "moving"
 
 
 def test_stones_that_overlap_are_refused_with_the_place(tmp_path):
-    layout = Layout((box((0, 0, 0), (1, 1, 1)), box((0, 0, 0.9), (1, 1, 2))), ("low", "high"))
+    path = drawn(tmp_path / "a.json", [box((0, 0, 0), (1, 1, 1)), box((0, 0, 0.9), (1, 1, 2))], ("low", "high"))
     with pytest.raises(
         ValueError,
         match=r"block 0 \('low'\) overlaps block 1 \('high'\) by 0.1 m near \(0.5, 0.5, 0.95\); move them apart",
     ):
-        assemble(layout)
+        read(path)
     with pytest.warns(UserWarning, match="they overlapped by up to 0.1 m"):
-        faced = assemble(layout, overlap_tolerance=0.11)
+        faced = read(path, overlap_tolerance=0.11)
     assert faced.vertices[:8, 2].max() == pytest.approx(0.95)
 
 
@@ -146,7 +143,7 @@ def test_a_pushover_counts_along_x_by_default(tmp_path):
     """A block of 0.4 by 0.4 by 1 m, pushed along x, tips when α is its slenderness."""
     solids = [box((-1, -1, -0.5), (2, 2, 0)), box((0, 0, 0), (0.4, 0.4, 1))]
     blocks = solver.Assembly.from_solids(solids, names=["ground", "block"], roles=["fixed", "free"])
-    write_layout(layout_of(blocks), tmp_path / "block.obj")
+    save_layout(blocks, tmp_path / "block.obj")
     (tmp_path / "case.toml").write_text(
         '[geometry]\nfile = "block.obj"\nunit = "m"\ndimension = 3\n[roles]\nground = "fixed"\n'
         '[analysis]\nkind = "pushover"\n[material]\nfriction_coefficient = 0.9\n'

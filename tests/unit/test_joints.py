@@ -1,70 +1,65 @@
 """Joints as lines and as a table, and the shapes and units of the datasets that viewers open."""
 
 import csv
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import pyvista as pv
-from structures import BENT, arch_response, parted, stacked, wall
+from structures import BENT, arch_response, parted, posed, stacked, wall
 
 import blockvis
 import solver
-from blockvis.results.joints import LargestMovements, initial_joints, joint_states, opening_and_slip
 from solver import mechanics
 
 
 def test_a_block_that_slides_has_slip_and_one_that_rocks_has_opening():
     assembly, slid = stacked(shift=(0.2, 0.0))
-    joints = initial_joints(assembly)
-    opening, slip = opening_and_slip(assembly, joints, slid)[0]
-    assert opening == pytest.approx(0.0, abs=1e-12)
+    joint = posed(assembly, slid).joints()
+    assert joint["opening"][0] == pytest.approx(0.0, abs=1e-12)
     # The tangent is a quarter turn from the upward normal, so to the left, whichever block is the first.
-    assert slip == pytest.approx(-0.2)
+    assert joint["slip"][0] == pytest.approx(-0.2)
     # Rocked by 0.1 about its lower left corner.
     c, s = np.cos(0.1), np.sin(0.1)
     assembly, rocked = stacked(shift=(0.5 * c - 0.5 * s - 0.5, 0.5 * s + 0.5 * c - 0.5), turn=0.1)
-    opening, slip = opening_and_slip(assembly, joints, rocked)[0]
-    assert opening == pytest.approx(np.sin(0.1), rel=1e-9)
-    assert slip == pytest.approx(0.0, abs=1e-12)
+    joint = posed(assembly, rocked).joints()
+    assert joint["opening"][0] == pytest.approx(np.sin(0.1), rel=1e-9)
+    assert joint["slip"][0] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_joints_carry_the_weight_above_them():
     response = arch_response()
-    first, last = response.path[0], response.path[-1]
-    for increment in (first, last):
-        states = joint_states(response.assembly, initial_joints(response.assembly), increment)
+    for k in (0, len(response.path) - 1):
+        joints = response.joints(k)
         free = response.assembly.free
-        at_supports = ~free[states.block_a] | ~free[states.block_b]
+        at_supports = ~free[joints["block_a"]] | ~free[joints["block_b"]]
         # The springing joints of a semicircle are horizontal.
-        assert states.normal_force[at_supports].sum() == pytest.approx(response.total_weight, rel=1e-6)
-        assert len(states.normal_force) == response.assembly.n_blocks - 1
-    mechanism = mechanics.mechanism_of(response.assembly, last)
-    wide = states.opening > 0.01
+        assert joints["normal_force"][at_supports].sum() == pytest.approx(response.total_weight, rel=1e-6)
+        assert joints.n_cells == response.assembly.n_blocks - 1
+    mechanism = mechanics.mechanism_of(response.assembly, response.path[-1])
+    wide = joints["opening"] > 0.01
     assert wide.sum() == 3
     hinged = {tuple(pair) for pair in mechanism.hinges}
-    assert {tuple(sorted(p)) for p in zip(states.block_a[wide], states.block_b[wide], strict=True)} <= hinged
+    assert {tuple(sorted(p)) for p in zip(joints["block_a"][wide], joints["block_b"][wide], strict=True)} <= hinged
 
 
 def test_blocks_that_are_not_convex_have_a_joint_on_each_face_and_keep_their_forces_apart():
     # An L that stands on a block and leans on the side of another.
     outlines = [BENT["L"], [[0, -1], [2, -1], [2, 0], [0, 0]], [[1, 1], [3, 1], [3, 3], [1, 3]]]
     assembly = solver.Assembly.from_outlines(outlines, roles=["free", "fixed", "free"], names=["L", "base", "tooth"])
-    joints = initial_joints(assembly)
-    pairs = {tuple(sorted(p)) for p in zip(joints.block_a, joints.block_b, strict=True)}
+    drawn = posed(
+        assembly,
+        solver.Pose.initial(assembly),
+        lambda contacts: np.where(np.abs(contacts.frames[:, 0, 1:]) > 0.5, [[10.0, 0.0]], [[1.0, 0.0]]),
+    )
+    joints = drawn.joints()
+    pairs = {tuple(sorted(p)) for p in zip(joints["block_a"], joints["block_b"], strict=True)}
     assert pairs == {(0, 1), (0, 2)}
-    assert len(joints.block_a) == 3, "the tooth touches the L below and at its side"
-    contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-3)
-    forces = np.where(np.abs(contacts.frames[:, 0, 1:]) > 0.5, [[10.0, 0.0]], [[1.0, 0.0]])
-    path = arch_response().path[0]
-    pose = solver.Pose.initial(assembly)
-    increment = replace(path, held=replace(path.state, pose=pose, contacts=contacts, forces=forces))
-    states = joint_states(assembly, joints, increment)
-    level = np.abs(joints.normals[:, 1]) > 0.5
-    per_point = np.where(level, 10.0, 1.0)
-    assert np.all(states.normal_force % per_point == 0.0)
-    assert np.all(states.normal_force >= per_point)
-    assert states.normal_force.sum() == pytest.approx(forces[:, 0].sum())
+    assert joints.n_cells == 3, "the tooth touches the L below and at its side"
+    along = np.diff(joints.points.reshape(-1, 2, 3), axis=1)[:, 0]
+    per_point = np.where(np.abs(along[:, 0]) > np.abs(along[:, 1]), 10.0, 1.0)
+    assert np.all(joints["normal_force"] % per_point == 0.0)
+    assert np.all(joints["normal_force"] >= per_point)
+    assert joints["normal_force"].sum() == pytest.approx(drawn.path[0].forces[:, 0].sum())
 
 
 def test_blocks_that_come_to_touch_later_have_a_joint_that_carries_their_force():
@@ -73,16 +68,12 @@ def test_blocks_that_come_to_touch_later_have_a_joint_that_carries_their_force()
         [assembly.outline(0), assembly.outline(1) + np.array([0.0, 0.5])], roles=["fixed", "free"]
     )
     landed = solver.Pose(apart.centroids - np.array([(0, 0), (0, 0.5)]), np.zeros((2, 1)))
-    contacts = mechanics.find_contacts(apart, mechanics.moved_vertices(apart, landed), 1e-3)
-    path = arch_response().path[0]
-    forces = np.tile([5.0, 0.0], (len(contacts), 1))
-    increment = replace(path, held=replace(path.state, pose=landed, contacts=contacts, forces=forces))
-    joints = initial_joints(apart)
-    assert len(joints.block_a) == 0
-    states = joint_states(apart, joints, increment)
-    assert states.initial.tolist() == [False]
-    assert states.normal_force[0] == pytest.approx(5.0 * len(contacts))
-    np.testing.assert_allclose(np.sort(states.ends[0], axis=0), [[0, 1], [1, 1]], atol=1e-12)
+    assert posed(apart, solver.Pose.initial(apart)).joints().n_cells == 0
+    response = posed(apart, landed, lambda contacts: np.tile([5.0, 0.0], (len(contacts), 1)))
+    joint = response.joints()
+    assert joint["initial"].tolist() == [0]
+    assert joint["normal_force"][0] == pytest.approx(5.0 * len(response.path[0].contacts))
+    np.testing.assert_allclose(np.sort(joint.points[:, :2], axis=0), [[0, 1], [1, 1]], atol=1e-12)
 
 
 def test_frames_of_a_fall_have_no_forces():
@@ -91,13 +82,11 @@ def test_frames_of_a_fall_have_no_forces():
     assert str(fall.field_data["status"][0]) == "falling"
     assert not fall["normal_force"].any()
     assert not fall["shear_force"].any()
-    from blockvis.results.datasets import contact_dataset
-
-    points = contact_dataset(response.assembly, response.increments[-1])
+    points = response.contacts(-1)
     assert response.increments[-1].forces.any(), "the solver has forces there"
     for name in ("force", "normal_force", "shear_force"):
         assert not np.any(points[name])
-    assert contact_dataset(response.assembly, response.path[-1])["normal_force"].any()
+    assert response.contacts(len(response.path) - 1)["normal_force"].any()
 
 
 @pytest.mark.parametrize("shape", ["moved", "undeformed"])
@@ -146,10 +135,7 @@ def test_joints_csv_names_the_widest_crack_first(tmp_path):
     rows = list(csv.DictReader((out / "joints.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == response.assembly.n_blocks - 1
     assert rows[0]["joint"] == "voussoir 6 | voussoir 7"
-    widest = max(
-        opening_and_slip(response.assembly, initial_joints(response.assembly), i.pose)[:, 0].max()
-        for i in response.path
-    )
+    widest = max(response.joints(k)["opening"].max() for k in range(len(response.path)))
     assert float(rows[0]["largest opening [m]"]) == pytest.approx(widest, rel=1e-5)
     assert float(rows[0]["settlement at largest opening [m]"]) == pytest.approx(response.path[-1].parameter, rel=1e-5)
     assert float(rows[0]["length [m]"]) == pytest.approx(0.15, rel=0.02)
@@ -159,14 +145,10 @@ def test_joints_csv_names_the_widest_crack_first(tmp_path):
     assert openings[3] == 0.0, "what a step leaves is no opening"
 
 
-def test_the_table_is_the_same_after_a_run_has_gone_on(tmp_path):
-    response = parted(wall(6, 4), 6, 2)
-    whole, reopened = (LargestMovements(response.assembly, response.parameter) for _ in range(2))
-    for increment in response.path:
-        whole.add(increment)
-    out = blockvis.write(response, tmp_path / "out")
-    for increment in blockvis.open_results(out).path:
-        reopened.add(increment)
-    assert whole.table() == reopened.table() == (out / "joints.csv").read_text(encoding="utf-8")
-    first = next(csv.DictReader(whole.table().splitlines()))
+def test_the_table_is_the_same_of_reopened_results(tmp_path):
+    out = blockvis.write(parted(wall(6, 4), 6, 2), tmp_path / "out")
+    again = blockvis.write(blockvis.open_results(out), tmp_path / "again")
+    table = (out / "joints.csv").read_text(encoding="utf-8")
+    assert (again / "joints.csv").read_text(encoding="utf-8") == table
+    first = next(csv.DictReader(table.splitlines()))
     assert float(first["largest opening [m]"]) + float(first["largest slip [m]"]) >= 0.1

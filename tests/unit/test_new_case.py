@@ -12,7 +12,6 @@ import pytest
 from structures import run_command
 
 from blockvis import generators, read, read_case, save_layout
-from blockvis.case_files.new_case import relative_to
 from blockvis.cli import main
 
 ROOT = Path(__file__).parents[2]
@@ -137,11 +136,8 @@ def test_the_name_comes_from_the_drawing_and_the_path_leads_back(tmp_path, monke
     assert main(["new", '../drawings/façade "west".svg']) == 0
     case = read_case('façade "west".toml')
     assert case.file.read_bytes()
+    assert tomllib.loads(case.text)["geometry"]["file"] == '../drawings/façade "west".svg', "with slashes everywhere"
     assert os.fspath(case.file.as_posix()).endswith('../drawings/façade "west".svg')
-
-
-def test_paths_have_slashes_on_every_system(tmp_path):
-    assert relative_to(tmp_path / "a" / "b", tmp_path / "c" / "d.svg") == "../../c/d.svg"
 
 
 def test_what_is_chosen_of_a_drawing_is_written(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 import pyvista as pv
 
 import solver
-from blockvis import pyvista_plugin, read
+from blockvis import generators, pyvista_plugin, read, save_layout
 
 
 def polygons(outlines):
@@ -138,13 +138,10 @@ def test_a_block_in_pieces_is_refused_and_one_with_a_hole_is_left_out_with_a_not
         mesh([(0, 0), (2, 2), (3, 0)], [0, 0, 1]).blockvis.assembly()
 
 
-def test_closed_surfaces_in_space_are_blocks_in_space():
-    from blockvis.formats.pyvista_files import dataset_of
-    from blockvis.generators import dome
-    from blockvis.layout.layout import layout_of
-
-    built = dome(lunes=4, courses=1)
-    assembly = dataset_of(layout_of(built)).blockvis.assembly()
+def test_closed_surfaces_in_space_are_blocks_in_space(tmp_path):
+    built = generators.dome(lunes=4, courses=1)
+    save_layout(built, tmp_path / "dome.vtu")
+    assembly = pv.read(tmp_path / "dome.vtu").blockvis.assembly()
     assert assembly.dimension == 3
     assert assembly.roles.tolist() == built.roles.tolist()
     assert assembly.shapes.volumes == pytest.approx(built.shapes.volumes)

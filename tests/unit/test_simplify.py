@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 import shapely
+from structures import drawn
 
-from blockvis.layout.assemble import assemble
-from blockvis.layout.layout import Layout
-from blockvis.layout.simplify import default_tolerance, simplified
+from blockvis import read
 from solver import mechanics
 
 
@@ -19,49 +18,58 @@ def split_square(n, amplitude=0.004, seed=1):
     return [left, right]
 
 
-def test_within_the_tolerance_and_shared():
+def simplified(folder, outlines, tolerance=None):
+    """Outlines as they are read, and the corners that are left of them."""
+    assembly = read(drawn(folder / "a.json", outlines), outline_tolerance=tolerance)
+    return [assembly.outline(block) for block in range(assembly.n_blocks)], len(assembly.vertices)
+
+
+def test_within_the_tolerance_and_shared(tmp_path):
     halves = split_square(200)
-    found, note = simplified(halves, 0.01)
-    assert "404 corners of 2 blocks were simplified to 8 within 0.01 m" in note
+    with pytest.warns(UserWarning, match="404 corners of 2 blocks were simplified to 8 within 0.01 m"):
+        found, _ = simplified(tmp_path, halves, 0.01)
     assert shapely.union_all([shapely.Polygon(ring) for ring in found]).area == pytest.approx(1.0, abs=1e-12)
     assert sum(shapely.Polygon(ring).area for ring in found) == pytest.approx(1.0, abs=1e-12)
-    for drawn, ring in zip(halves, found, strict=True):
-        assert shapely.Polygon(ring).exterior.hausdorff_distance(shapely.Polygon(drawn).exterior) <= 0.01
+    for rough, ring in zip(halves, found, strict=True):
+        assert shapely.Polygon(ring).exterior.hausdorff_distance(shapely.Polygon(rough).exterior) <= 0.01
 
 
-def test_a_corner_of_one_block_on_the_edge_of_another_stays_there():
+def test_a_corner_of_one_block_on_the_edge_of_another_stays_there(tmp_path):
     base = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
     rough = [ring + np.array([0.0, 1.0]) for ring in split_square(100)]
-    found, note = simplified([base, *rough], 0.01)
-    assert note
+    with pytest.warns(UserWarning, match="were simplified"):
+        found, _ = simplified(tmp_path, [base, *rough], 0.01)
     assert len(mechanics.overlap_depths(np.concatenate(found), np.cumsum([0, *map(len, found)]), 1e-9)[0]) == 0
     assert min(found[1][:, 1]) == min(found[2][:, 1]) == 1.0
 
 
-def test_a_few_corners_are_left_alone_and_many_are_not():
-    halves = split_square(12)
-    assert default_tolerance(halves) == 0.0
-    assert simplified(halves, 0.0) == (halves, "")
-    assert default_tolerance(split_square(60)) == pytest.approx(0.01 * np.sqrt(0.5), rel=0.05)
+@pytest.mark.filterwarnings("error")
+def test_a_few_corners_are_left_alone(tmp_path):
+    assert simplified(tmp_path, split_square(12))[1] == 28
 
 
-def test_a_thin_block_is_not_folded():
+def test_many_corners_are_simplified_within_a_hundredth_of_a_block(tmp_path):
+    with pytest.warns(UserWarning, match=r"corners of 2 blocks were simplified to \d+ within 0.00(6|7)\d* m"):
+        assert simplified(tmp_path, split_square(60))[1] < 60
+
+
+def test_a_thin_block_is_not_folded(tmp_path):
     x = np.linspace(0.0, 1.0, 60)
     arch = np.vstack(
         [np.stack([x, 0.05 * np.sin(np.pi * x)], 1), np.stack([x, 0.05 * np.sin(np.pi * x) + 0.01], 1)[::-1]]
     )
-    found, _ = simplified([arch], 0.1)
+    found, _ = simplified(tmp_path, [arch], 0.1)
     assert shapely.Polygon(found[0]).is_valid
     assert shapely.Polygon(found[0]).area > 0.8 * shapely.Polygon(arch).area
 
 
-def test_assembling_notes_it_and_the_caller_decides():
-    layout = Layout(tuple(split_square(200)), ("left", "right"))
+def test_assembling_notes_it_and_the_caller_decides(tmp_path):
+    path = drawn(tmp_path / "a.json", split_square(200))
     with pytest.warns(
         UserWarning, match=r"outlines were finer than needed: 404 corners .* \(outline_tolerance; 0 keeps"
     ):
-        few = assemble(layout)
+        few = read(path)
     assert len(few.vertices) < 60
-    assert len(assemble(layout, outline_tolerance=0.0).vertices) == 404
+    assert len(read(path, outline_tolerance=0.0).vertices) == 404
     with pytest.raises(ValueError, match="outline_tolerance is -1 m"):
-        assemble(layout, outline_tolerance=-1.0)
+        read(path, outline_tolerance=-1.0)

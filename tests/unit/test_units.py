@@ -1,17 +1,29 @@
 """Units of drawings."""
 
+import json
+
 import numpy as np
 import pytest
 
-from blockvis.layout.units import chosen_unit, metres_per
+from blockvis import read, read_layout
 
 
-def test_names_of_units():
-    assert metres_per("mm") == 1e-3
-    assert metres_per("Inches") == 0.0254
-    assert metres_per(" m ") == 1.0
+def square(folder, size, stated=""):
+    """A file of one square block that states a unit, or none."""
+    outline = (size * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])).tolist()
+    content = {"unit": stated, "blocks": [{"outline": outline}]}
+    (folder / "a.json").write_text(json.dumps(content), encoding="utf-8")
+    return folder / "a.json"
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("mm", 1e-3), ("Inches", 0.0254), (" m ", 1.0)])
+def test_names_of_units(tmp_path, unit, metres):
+    assert read(square(tmp_path, 1.0), unit=unit).areas == pytest.approx([metres**2])
+
+
+def test_a_unit_that_is_none_is_refused(tmp_path):
     with pytest.raises(ValueError, match="unit 'ell' is not known; the units of length are m, mm"):
-        metres_per("ell")
+        read(square(tmp_path, 1.0), unit="ell")
 
 
 @pytest.mark.parametrize(
@@ -26,8 +38,9 @@ def test_names_of_units():
         ("cm", "cm", 25.0, "cm", ""),
     ],
 )
-def test_choice(given, stated, size, unit, word):
-    chosen, note = chosen_unit(given, stated, np.array([size]))
-    assert chosen == unit
-    assert word in note
-    assert bool(word) == bool(note)
+def test_choice(tmp_path, given, stated, size, unit, word):
+    layout = read_layout(square(tmp_path, size, stated), unit=given)
+    notes = [note for note in layout.notes if " in doubt: " not in note]
+    assert layout.unit == unit
+    assert word in " ".join(notes)
+    assert bool(word) == bool(notes)

@@ -15,7 +15,6 @@ from blockvis import draw_curve
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures.captions import lost_text
 from blockvis.results.about import LOCAL, loss_of
-from blockvis.results.datasets import block_dataset
 
 
 def test_a_brick_that_drops_is_a_local_loss():
@@ -72,7 +71,7 @@ def test_a_loss_is_in_every_output_and_drawn_pale(tmp_path):
     assert re.fullmatch(r"loss: brick at 0\.15\d+ m, 1\.962 kN, 1\.2 % of the weight; the structure stands .*", line)
     assert "the structure stands without" in report_of(response)
     assert blockvis.open_results(out).losses == response.losses, "the files keep what fell"
-    blocks = block_dataset(response.assembly, response.path[-1])
+    blocks = response.mesh(len(response.path) - 1)
     assert blocks.cell_data["fallen"].tolist() == [0, 1, 0, 0]
     still = Image.open(blockvis.draw_still(response, -1, path=tmp_path / "last.png")).convert("RGB")
     standing = Image.open(blockvis.draw_still(response, 0, path=tmp_path / "first.png")).convert("RGB")
