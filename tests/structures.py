@@ -97,7 +97,8 @@ def arch_response() -> solver.Response:
 def drawn(path: Path, shapes, names=None, **words) -> Path:
     """Write a layout file of outlines, or of (points, faces) in space, as somebody draws them: nothing is checked.
 
-    What else the file says of each block, a group, role, material, density or thickness, has one value per block, None for nothing.
+    What else the file says of each block, a group, role, material, density or thickness, has a value per block,
+    None for nothing.
     """
     blocks = []
     for k, shape in enumerate(shapes):

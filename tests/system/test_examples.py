@@ -8,7 +8,6 @@ from structures import assembly_of
 
 import solver
 from blockvis import generators, read_case
-from blockvis.cases.build import case_interfaces
 from solver import mechanics
 
 FACADE = Path(__file__).parents[2] / "examples" / "facade.toml"
@@ -58,7 +57,8 @@ def test_the_key_of_a_small_facade_with_the_friction_of_the_large_one_sinks():
         settling_from=1.5,
     )
     settlement = solver.Settlement(direction=(0, -1), increment=0.025, limit=0.1)
-    response = solver.settle(assembly, settlement, interfaces=case_interfaces(case))
+    interfaces = solver.Interfaces(solver.InterfaceLaw(case.friction_coefficient), case.interfaces)
+    response = solver.settle(assembly, settlement, interfaces=interfaces)
     assert response.stop is solver.Status.LIMIT_REACHED
     assert key_sinks(assembly, response.path[0].pose, 1) == pytest.approx([0.0, 0.0], abs=1e-6)
     # Measured: 12 mm below one, level with the other. The wall stands in equilibrium, the key wedged lower down.

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from structures import assembly_of, box, case_from, drawn, layout_of, run_command
 
+import blockvis
 import solver
 from blockvis import generators, read, save_layout, write_layout
-from blockvis.cases.build import case_loads
 from blockvis.cli import main
 from solver import mechanics
 
@@ -45,12 +45,14 @@ def test_a_layout_of_the_plane_in_space(tmp_path):
 def test_rotations_and_loads_have_three_numbers(tmp_path):
     text = DOME + (
         "[settlement]\nrotation_centre = [1, 0, 0]\nrotation_axis = [0, 2, 0]\nrotation = -1\n"
+        "increment = 1e-6\nlimit = 1e-6\n"
         '[[loads]]\nblocks = "cap"\nforce = [0, 0, -500]\npoint = [0.1, 0, 1]\nmoment = [1, 2, 3]\n'
     )
     found = case(text, tmp_path)
     assert found.settlements[0].rotation_axis == (0.0, 1.0, 0.0)
-    assembly = assembly_of(found)
-    load = case_loads(found, assembly).dead[assembly.index("cap")]
+    response = blockvis.run_case(found, tmp_path / "out", outputs=()).response
+    assembly = response.assembly
+    load = response.loads.dead[assembly.index("cap")]
     weight = assembly.masses[assembly.index("cap")] * solver.GRAVITY
     assert load == pytest.approx([0, 0, -500 - weight, 1, 2 + 50, 3])
 

@@ -11,7 +11,6 @@ from structures import assembly_of, hull_of, turn_by, upright
 import solver
 from blockvis import generators, read_case
 from solver import mechanics
-from solver.kinematics import moved
 
 #: Here coal 3.0.3 gives a polygon of half the area, whose corners are on no edge of the faces.
 LOST_BY_COAL = 4
@@ -88,6 +87,12 @@ def in_space_of(assembly):
     return solver.Assembly.from_solids(solids, roles=list(assembly.roles), names=assembly.names)
 
 
+def moved(assembly, by):
+    """The pose in which blocks have moved and turned as far as this."""
+    d = assembly.dimension
+    return solver.Pose(assembly.centroids + by[:, :d], by[:, d:])
+
+
 def rows(contacts, plane):
     """Blocks, place, normal into the lower number and gap of contact points, sorted; of those in space x and z."""
     flat = slice(None) if plane else [0, 2]
@@ -117,7 +122,7 @@ def test_extruded_structures_have_the_points_of_the_plane(name, size):
     in_space[:, 0], in_space[:, 2], in_space[:, 4] = motion[:, 0], motion[:, 1], -motion[:, 2]
     reach = 0.05 * plane.block_size
     flat, solid = (
-        mechanics.find_contacts(one, mechanics.moved_vertices(one, moved(solver.Pose.initial(one), by)), reach)
+        mechanics.find_contacts(one, mechanics.moved_vertices(one, moved(one, by)), reach)
         for one, by in ((plane, motion), (space, in_space))
     )
     expected = rows(flat, True)

@@ -1,0 +1,102 @@
+"""Tests use what users use: the names of `solver`, `solver.mechanics` and `blockvis`; those that do not are listed."""
+
+import ast
+from pathlib import Path
+
+import blockvis
+import solver
+from solver import mechanics
+
+TESTS = Path(__file__).parents[1]
+
+#: Modules that are faces, with their names; of the generators and the command line all of them.
+FACES = {
+    "solver": {*solver.__all__, "mechanics"},
+    "solver.mechanics": {*mechanics.__all__},
+    "blockvis": {*blockvis.__all__, "generators", "cli", "pyvista_plugin"},
+    "blockvis.generators": None,
+    "blockvis.cli": None,
+}
+
+#: Files that look inside, each with how many names it takes from there. None may come to it and no number may grow;
+#: a number that has become smaller is made smaller here.
+WHITE_BOX = {
+    "formats/test_gmsh_cad.py": 2,
+    "formats/test_loose_lines.py": 2,
+    "fuzz/test_cases.py": 4,
+    "fuzz/test_files.py": 1,
+    "system/test_capacity.py": 6,
+    "system/test_cli.py": 1,
+    "system/test_docs.py": 2,
+    "system/test_drawing.py": 6,
+    "system/test_explain.py": 3,
+    "system/test_memory.py": 8,
+    "system/test_paraview.py": 1,
+    "system/test_path_range.py": 11,
+    "system/test_report.py": 2,
+    "system/test_report_use.py": 5,
+    "system/test_results_in_space.py": 16,
+    "system/test_resume.py": 4,
+    "system/test_step_check.py": 8,
+    "system/test_study_campaign.py": 7,
+    "unit/test_atomic_files.py": 6,
+    "unit/test_band.py": 8,
+    "unit/test_case_keys.py": 6,
+    "unit/test_closed_joints.py": 4,
+    "unit/test_cones.py": 6,
+    "unit/test_cracks.py": 4,
+    "unit/test_curves.py": 9,
+    "unit/test_dimensions.py": 9,
+    "unit/test_distributions.py": 1,
+    "unit/test_explanation.py": 21,
+    "unit/test_facing.py": 8,
+    "unit/test_fall.py": 6,
+    "unit/test_imperfections.py": 5,
+    "unit/test_import_graph.py": 1,
+    "unit/test_joint_counts.py": 6,
+    "unit/test_key_pages.py": 4,
+    "unit/test_kinds.py": 7,
+    "unit/test_labels.py": 13,
+    "unit/test_lp.py": 9,
+    "unit/test_marks.py": 4,
+    "unit/test_nearest_stone.py": 6,
+    "unit/test_observations.py": 2,
+    "unit/test_operating_systems.py": 5,
+    "unit/test_outlines.py": 5,
+    "unit/test_path_factors.py": 3,
+    "unit/test_planar_contacts.py": 2,
+    "unit/test_polyhedra.py": 7,
+    "unit/test_render.py": 10,
+    "unit/test_settlement.py": 2,
+    "unit/test_study_file.py": 7,
+    "unit/test_study_statistics.py": 10,
+    "unit/test_swinging.py": 3,
+    "unit/test_tolerances.py": 1,
+    "unit/test_triangulation.py": 3,
+    "unit/test_video.py": 3,
+    "unit/test_words_of_local_loss.py": 4,
+    "validation/test_space_static.py": 3,
+}
+
+
+def _inner(file: Path) -> list[str]:
+    """Names that a file imports from modules that are no faces."""
+    found = []
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in ("solver", "blockvis"):
+            names = FACES.get(node.module, set())
+            found += [
+                f"{node.module}.{alias.name}" for alias in node.names if names is not None and alias.name not in names
+            ]
+        elif isinstance(node, ast.Import):
+            roots = [alias.name for alias in node.names if alias.name.split(".")[0] in ("solver", "blockvis")]
+            found += [name for name in roots if name not in FACES]
+    return found
+
+
+def test_what_looks_inside_is_listed():
+    found = {str(file.relative_to(TESTS).as_posix()): _inner(file) for file in sorted(TESTS.rglob("*.py"))}
+    more = {file: names for file, names in found.items() if len(names) > WHITE_BOX.get(file, 0)}
+    assert not more, "import what the faces have, or set it up with what structures.py has"
+    fewer = {file: len(found.get(file, ())) for file, number in WHITE_BOX.items() if len(found.get(file, ())) < number}
+    assert not fewer, "write the smaller number into the list, or take the file off it"
