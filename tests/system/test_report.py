@@ -162,3 +162,4 @@ def test_notebook_player_is_a_frame_with_the_page():
     page = html.unescape(re.search(r'srcdoc="(.*?)" style', shown, re.DOTALL).group(1))
     assert page.startswith("<!DOCTYPE html>")
     assert "height:500px" in shown
+    assert 'sandbox="allow-scripts allow-downloads"' in shown, "a notebook may save"

@@ -318,9 +318,3 @@ def test_axe_finds_nothing(scheme, tmp_path):
     found = told(page, tmp_path, script, *options)
     assert found["wrong"] == []
     assert found["rules"] > 20
-
-
-def test_notebooks_may_save():
-    from blockvis import show
-
-    assert 'sandbox="allow-scripts allow-downloads"' in show(arch_response())._repr_html_()

@@ -1,30 +1,23 @@
 """Layouts: dimensions, no overlaps, no gaps, and that they stand."""
 
 import math
-import tomllib
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from structures import small_layout
 
 import solver
 from blockvis import generators
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
 
 #: Layouts in the plane; those in space have tests of their own.
 PLANE = [name for name in generators.LAYOUTS if generators.dimension_of(name) == 2]
 
 #: The façade at a size at which a program takes a fraction of a second.
-SMALL = {"facade": {"bricks": 14, "courses": 24, "storeys": 1, "windows": 1}}
-
-
-def _small(name: str) -> solver.Assembly:
-    return generators.build(name, SMALL.get(name))
+SMALL = {"bricks": 14, "courses": 24, "storeys": 1, "windows": 1}
 
 
 def _shapes(assembly: solver.Assembly) -> list[shapely.Polygon]:
@@ -42,7 +35,7 @@ def _block(assembly: solver.Assembly, name: str) -> np.ndarray:
 
 @pytest.mark.parametrize("name", PLANE)
 def test_no_block_overlaps_another_and_all_hang_together(name):
-    assembly = _small(name)
+    assembly = small_layout(name)
     _assert_no_overlap(assembly)
     shapes = _shapes(assembly)
     whole = shapely.union_all(shapes, grid_size=1e-9)
@@ -50,14 +43,16 @@ def test_no_block_overlaps_another_and_all_hang_together(name):
     assert whole.area == pytest.approx(sum(shape.area for shape in shapes), rel=1e-8)
 
 
-@pytest.mark.parametrize("name", PLANE)
+@pytest.mark.parametrize("name", generators.LAYOUTS)
 def test_every_layout_has_named_blocks_a_material_and_a_ground(name):
-    assembly = _small(name)
+    assembly = small_layout(name)
     assert (assembly.roles != "free").any()
     for kind, role in zip(assembly.materials, assembly.roles, strict=True):
         assert (kind == "ground") == (role != "free")
         assert kind in ("brick", "stone", "ground")
     assert not any(label.startswith("block ") for label in assembly.names) or name == "column"
+    assert len(set(assembly.names)) == assembly.n_blocks
+    assert assembly.moving.any() or assembly.dimension == 2
 
 
 @pytest.mark.parametrize(
@@ -65,7 +60,7 @@ def test_every_layout_has_named_blocks_a_material_and_a_ground(name):
 )
 def test_every_layout_stands(name):
     wall = {"bricks": 6, "courses": 12, "settling": [0.75, 1.5]}
-    assembly = generators.build("wall", wall) if name == "wall" else _small(name)
+    assembly = generators.build("wall", wall) if name == "wall" else small_layout(name)
     down = solver.Settlement(direction=(0, -1), increment=1e-7, limit=1e-7)
     response = solver.settle(assembly, down, friction_coefficient=0.6)
     assert response.stop == solver.Status.LIMIT_REACHED, response.message
@@ -241,8 +236,10 @@ def _open_area(wall: solver.Assembly, number: int, opening: dict) -> float:
     return rectangle + radius**2 / 2.0 * (n * math.sin(angle / n) - math.sin(angle))
 
 
-def _assert_filled(sample) -> None:
-    """Bricks fill a wall around its openings without overlap, and none is a sliver."""
+@settings(deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow], max_examples=10)
+@given(walls())
+@example(({"bricks": 16, "courses": 16, "bond": "running", "openings": [CORNER]}, 4.0, 1.6))
+def test_bricks_fill_any_wall_around_its_openings_without_overlap(sample):
     parameters, length, height = sample
     wall = generators.build("wall", parameters)
     _assert_no_overlap(wall)
@@ -257,23 +254,6 @@ def _assert_filled(sample) -> None:
     # No slivers: a piece too low or too short has been joined to a neighbour.
     bricks = [shape for shape, kind in zip(shapes, wall.materials, strict=False) if kind == "brick"]
     assert min(shape.area for shape in bricks) > 0.02 * 0.25 * 0.1
-
-
-FILLING = settings(deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
-
-
-@settings(FILLING, max_examples=10)
-@given(walls())
-@example(({"bricks": 16, "courses": 16, "bond": "running", "openings": [CORNER]}, 4.0, 1.6))
-def test_bricks_fill_any_wall_around_its_openings_without_overlap(sample):
-    _assert_filled(sample)
-
-
-@pytest.mark.slow
-@settings(FILLING, max_examples=200)
-@given(walls())
-def test_bricks_fill_two_hundred_walls(sample):
-    _assert_filled(sample)
 
 
 def test_facade_has_about_1500_bricks_in_regular_courses():
@@ -293,7 +273,7 @@ def test_facade_has_about_1500_bricks_in_regular_courses():
 
 
 def test_facade_arches_rise_by_the_courses_asked_for():
-    facade = generators.facade(**SMALL["facade"], voussoirs=3, rise_courses=1.5)
+    facade = generators.facade(**SMALL, voussoirs=3, rise_courses=1.5)
     key = _block(facade, "voussoir 1-2")
     # Of three equal voussoirs the key's intrados is a chord about the crown, below it by its sagitta.
     radius = (1.0**2 + 0.1875**2) / (2 * 0.1875)
@@ -303,7 +283,7 @@ def test_facade_arches_rise_by_the_courses_asked_for():
 
 def test_layouts_are_found_by_name_however_it_is_written():
     assert generators.build("Basket_handle arch", {"voussoirs": 7.0}).n_blocks == 9
-    assert generators.build("façade", SMALL["facade"]).n_blocks == generators.facade(**SMALL["facade"]).n_blocks
+    assert generators.build("façade", SMALL).n_blocks == generators.facade(**SMALL).n_blocks
 
 
 WALL = {"bricks": 12, "courses": 12}
@@ -376,32 +356,3 @@ def test_openings_that_overlap_with_their_heads_are_both_named():
     openings = [{"x": x, "y": 0.1, "width": 0.5, "height": 0.3} for x in (1.0, 1.6)]
     with pytest.raises(ValueError, match=r"opening 1 and opening 2 overlap by 0\.03 m², heads included; move them"):
         generators.wall(**WALL, openings=openings)
-
-
-def _generated() -> list[str]:
-    return [
-        path.name
-        for path in sorted(EXAMPLES.glob("*.toml"))
-        if "layout" in tomllib.loads(path.read_text(encoding="utf-8"))["geometry"]
-    ]
-
-
-@pytest.mark.parametrize("file", _generated())
-def test_examples_of_layouts_build_and_their_loads_find_their_blocks(file):
-    case = tomllib.loads((EXAMPLES / file).read_text(encoding="utf-8"))
-    assembly = generators.build(case["geometry"]["layout"], case["geometry"].get("parameters"))
-    assert assembly.moving.any() or "settlement" not in case
-    _assert_no_overlap(assembly)
-    for load in case.get("loads", ()):
-        if "blocks" not in load:
-            # On every block, or moving over the structure.
-            continue
-        prefix = load["blocks"].removesuffix("*")
-        carrying = [i for i, name in enumerate(assembly.names) if name.startswith(prefix)]
-        top = assembly.vertices[assembly.free[assembly.block_of_vertex], 1].max()
-        assert carrying
-        assert all(assembly.outline(i)[:, 1].max() == pytest.approx(top) for i in carrying)
-
-
-def test_there_are_examples_of_layouts():
-    assert len(_generated()) >= 5

@@ -1,39 +1,20 @@
 """Layouts in space: dimensions, no overlaps, faces that meet, and the blocks of the references."""
 
-import functools
-
 import numpy as np
 import pytest
 import trimesh
-from structures import fans, layout_of
+from structures import fans, layout_of, small_layout
 
 import solver
 from blockvis import generators
 from solver import mechanics
-
-#: Sizes at which they take a fraction of a second.
-SMALL = {
-    "cross vault": {"voussoirs": 5},
-    "pavilion vault": {"voussoirs": 5},
-    "church bay": {"voussoirs": 5, "pier_stones": 1},
-    "L corner": {"courses": 3},
-    "T corner": {"courses": 3},
-    "two-leaf wall": {"courses": 4},
-}
-
-
-@functools.cache
-def built(name):
-    """Build a layout once."""
-    return generators.build(name, SMALL.get(name))
-
 
 IN_SPACE = [name for name in generators.LAYOUTS if generators.dimension_of(name) == 3]
 
 
 @pytest.mark.parametrize("name", IN_SPACE)
 def test_no_block_overlaps_another_and_each_touches_others(name):
-    assembly = built(name)
+    assembly = small_layout(name)
     assert assembly.dimension == 3
     assert not len(assembly.shapes.overlaps(assembly.vertices, 1e-9)[0])
     contacts = mechanics.find_contacts(assembly, assembly.vertices, 1e-9)
@@ -43,19 +24,8 @@ def test_no_block_overlaps_another_and_each_touches_others(name):
 
 
 @pytest.mark.parametrize("name", IN_SPACE)
-def test_every_layout_has_named_blocks_a_material_and_a_ground(name):
-    assembly = built(name)
-    assert assembly.moving.any()
-    for kind, role in zip(assembly.materials, assembly.roles, strict=True):
-        assert (kind == "ground") == (role != "free")
-        assert kind in ("brick", "stone", "ground")
-    assert not any(label.startswith("block ") for label in assembly.names)
-    assert len(set(assembly.names)) == assembly.n_blocks
-
-
-@pytest.mark.parametrize("name", IN_SPACE)
 def test_faces_are_plane_and_seen_counter_clockwise(name):
-    for points, faces in layout_of(built(name)).solids:
+    for points, faces in layout_of(small_layout(name)).solids:
         assert trimesh.Trimesh(points, fans(faces), process=False).volume > 0
         for face in faces:
             ring = points[face] - points[face].mean(axis=0)

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import blockvis
 from blockvis.case_files.read import case_of
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.cli import main
@@ -233,7 +232,3 @@ def test_an_unreachable_scheduler_is_one_message_and_nothing_started(study_file,
 def test_shipped_studies_are_studies(name, runs):
     study = read_study(Path(__file__).parents[2] / "examples" / "studies" / f"{name}.toml")
     assert study.n_runs == runs
-
-
-def test_the_study_is_public():
-    assert "study" in dir(blockvis)
