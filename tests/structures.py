@@ -14,6 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
@@ -78,6 +79,16 @@ def fans(faces) -> np.ndarray:
 def turn_by(rotation) -> np.ndarray:
     """Matrix of a rotation by a vector [rad]."""
     return Rotation.from_rotvec(rotation).as_matrix()
+
+
+def pixels(path) -> np.ndarray:
+    """(height, width, 3) array of the colours of a picture."""
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+def alike(colours, wanted, tolerance: int = 12) -> np.ndarray:
+    """Whether colours are a wanted one, but for what drawing blurs."""
+    return (np.abs(np.asarray(colours, dtype=int) - np.array(wanted)) <= tolerance).all(axis=-1)
 
 
 def stacked(shift=(0.0, 0.0), turn: float = 0.0) -> tuple[solver.Assembly, solver.Pose]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structures import assembly_of, case_from, run_command
+from structures import assembly_of, case_from, pixels, run_command
 
 import blockvis
 import solver
@@ -134,7 +134,6 @@ def test_envelope_of_a_load_that_moves_over_an_arch(tmp_path, capsys):
 
 def test_live_load_is_drawn_where_it_acts_at_each_position(tmp_path):
     """The arrow stands over the place of the load, whichever position is drawn."""
-    from PIL import Image
 
     from blockvis.pictures import palette
 
@@ -143,7 +142,7 @@ def test_live_load_is_drawn_where_it_acts_at_each_position(tmp_path):
     places = []
     for number in (1, 3):
         path = draw_still(response, number, tmp_path / f"{number}.png", size=(800, 600))
-        picture = np.asarray(Image.open(path).convert("RGB")).astype(int)[:520]
+        picture = pixels(path)[:520]
         _, columns = np.nonzero((np.abs(picture - np.array(palette.LIVE)) < 30).all(axis=2))
         places.append(columns.mean())
     assert places[1] - places[0] > 100

@@ -10,8 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PIL import Image
-from structures import arch_response, parted, report_of, wall
+from structures import arch_response, parted, pixels, report_of, wall
 from test_capacity import ARCH, solved
 
 import solver
@@ -92,7 +91,7 @@ def test_pictures_differ_between_frames(tmp_path):
     pictures = []
     for name, anchor in (("start", "#frame=0"), ("end", f"#frame={len(response.path) - 1}"), ("forces", "#forces=1")):
         visited(page, tmp_path, f"--screenshot={tmp_path / name}.png", anchor=anchor)
-        pictures.append(np.asarray(Image.open(tmp_path / f"{name}.png").convert("RGB")).astype(int))
+        pictures.append(pixels(tmp_path / f"{name}.png"))
     start, end, forces = pictures
     assert (np.abs(start - end).max(axis=2) > 40).sum() > 2000
     assert (np.abs(start - forces).max(axis=2) > 40).sum() > 200
@@ -106,7 +105,7 @@ def test_live_load_stands_where_it_acts_at_each_position(tmp_path):
     for k in (1, 3):
         visited(page, tmp_path, f"--screenshot={tmp_path / str(k)}.png", anchor=f"#frame={k}")
         # Without the legend.
-        picture = np.asarray(Image.open(tmp_path / f"{k}.png").convert("RGB")).astype(int)[:630]
+        picture = pixels(tmp_path / f"{k}.png")[:630]
         columns.append(np.nonzero((np.abs(picture - np.array(palette.LIVE)) < 30).all(axis=2))[1])
     assert min(map(len, columns)) > 80
     assert columns[1].mean() - columns[0].mean() > 100

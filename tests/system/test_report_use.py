@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from structures import arch_response, parted, report_of, wall
+from structures import arch_response, parted, pixels, report_of, wall
 from test_report import browser, visited
 
 import blockvis
@@ -162,9 +162,9 @@ def test_the_mechanism_has_the_colours_of_its_picture(tmp_path):
     page = write_report(response, tmp_path / "report.html")
     anchor = f"#frame={len(response.path) - 1}&colours=mechanism"
     visited(page, tmp_path, f"--screenshot={tmp_path / 'page.png'}", anchor=anchor)
-    picture = np.asarray(Image.open(tmp_path / "page.png").convert("RGB")).astype(int)
+    picture = pixels(tmp_path / "page.png")
     blockvis.draw_mechanism(response, tmp_path / "mechanism.png")
-    drawn = np.asarray(Image.open(tmp_path / "mechanism.png").convert("RGB")).astype(int)
+    drawn = pixels(tmp_path / "mechanism.png")
     parts = swing_of(response).parts
     fill = palette.block_colours(response.assembly.materials, response.assembly.free)
     for colour in np.unique(palette.part_colours(fill, parts)[parts >= 0], axis=0).astype(int):

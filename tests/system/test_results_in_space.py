@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from PIL import Image
-from structures import arch_response, vault_response
+from structures import alike, arch_response, pixels, vault_response
 from test_paraview import PVPYTHON, READ
 from test_report import browser, visited
 
@@ -229,10 +229,6 @@ def test_the_view_shows_the_motion_across_it():
     assert np.linalg.det(axes) == pytest.approx(1.0)
 
 
-def alike(colour, wanted, tolerance=12):
-    return np.abs(np.asarray(colour, dtype=int) - np.array(wanted)).max() <= tolerance
-
-
 def test_what_is_where():
     """Hinge, crack, moving support and paper stand at their places, in their colours."""
     response = vault_response()
@@ -348,7 +344,7 @@ def test_page_draws_blocks_cracks_and_supports(tmp_path):
     page, shot = write_report(vault_response(), tmp_path / "report.html"), tmp_path / "shot.png"
     options = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", f"--screenshot={shot}")
     visited(page, tmp_path, *options, anchor="#frame=4", quiet=False)
-    stage = np.asarray(Image.open(shot).convert("RGB")).astype(int)[110:700, 20:780]
+    stage = pixels(shot)[110:700, 20:780]
     hue = stage / np.maximum(stage.sum(axis=2, keepdims=True), 1)
     for colour, least in ((palette.MOVING, 4000), (palette.STONES[0], 20_000), (palette.OPEN, 150)):
         assert (np.abs(hue - np.array(colour) / sum(colour)).max(axis=2) < 0.02).sum() > least
@@ -405,7 +401,7 @@ def test_what_a_layout_in_space_holds_is_drawn(tmp_path, capsys):
     file = tmp_path / "arch.obj"
     blockvis.save_layout(vault_response().assembly, file)
     assert main(["info", str(file), "--picture", str(tmp_path / "arch.png"), "--dimension", "3"]) == 0
-    picture = np.asarray(Image.open(tmp_path / "arch.png").convert("RGB")).astype(int)
+    picture = pixels(tmp_path / "arch.png")
     hue = picture / np.maximum(picture.sum(axis=2, keepdims=True), 1)
     for colour in (palette.MOVING, palette.SUPPORT):
         assert (np.abs(hue - np.array(colour) / sum(colour)).max(axis=2) < 0.012).sum() > 3000

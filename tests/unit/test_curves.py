@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PIL import Image
-from structures import arch_response, parted, wall
+from structures import arch_response, parted, pixels, wall
 
 import blockvis
 import solver
@@ -19,7 +18,7 @@ from blockvis.pictures.curves import CurvePanel, Event, events_of
 
 def test_png_has_a_curve_and_the_collapse(tmp_path):
     path = draw_curve(arch_response(), tmp_path / "new" / "curve.png")
-    picture = np.asarray(Image.open(path).convert("RGB")).astype(int)
+    picture = pixels(path)
     assert picture.shape == (1000, 1600, 3)
     for colour in (palette.FORCE, palette.WARNING):
         assert ((np.abs(picture - np.array(colour)) < 20).all(axis=2)).sum() > 300

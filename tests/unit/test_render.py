@@ -10,7 +10,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from structures import BENT, arch_response, parted, wall
+from structures import BENT, alike, arch_response, parted, pixels, wall
 
 import solver
 from blockvis import animate, draw_mechanism, draw_still
@@ -23,14 +23,6 @@ from blockvis.pictures.swing import swing_of
 from solver import mechanics
 
 SMALL = (640, 360)
-
-
-def pixels(path):
-    return np.asarray(Image.open(path).convert("RGB")).astype(int)
-
-
-def alike(colours, wanted, tolerance=12):
-    return (np.abs(np.asarray(colours, dtype=int) - np.array(wanted)) <= tolerance).all(axis=-1)
 
 
 def test_what_is_where(tmp_path):

@@ -51,7 +51,6 @@ WHITE_BOX = {
     "unit/test_explanation.py": 21,
     "unit/test_facing.py": 8,
     "unit/test_fall.py": 6,
-    "unit/test_imperfections.py": 5,
     "unit/test_import_graph.py": 1,
     "unit/test_joint_counts.py": 6,
     "unit/test_key_pages.py": 4,

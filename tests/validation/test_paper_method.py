@@ -5,6 +5,7 @@ Arches: the references of ``test_arches``; panels: those of ``test_panels``; the
 
 import numpy as np
 import pytest
+from structures import rectangle
 from test_panels import panel
 
 import solver
@@ -19,10 +20,6 @@ PAPER = solver.Controls(increments="linear program", falling_frames=0)
 def settle(assembly, friction_coefficient, controls=PAPER, **settlement):
     sinks = solver.Settlement(**({"direction": (0, -1)} | settlement))
     return solver.settle(assembly, sinks, friction_coefficient=friction_coefficient, controls=controls)
-
-
-def rectangle(left, low, right, high):
-    return [[left, low], [right, low], [right, high], [left, high]]
 
 
 def opening():
