@@ -5,10 +5,10 @@ import time
 
 import numpy as np
 import pytest
+import shapely
 
 from blockvis import read, read_layout
 from blockvis.formats import gmsh_cad
-from blockvis.layout.outlines import ring_area
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is an extra", exc_type=(ImportError, OSError))
 pytestmark = pytest.mark.cad
@@ -135,7 +135,7 @@ def test_curves_of_the_built_in_kernel_in_a_second(tmp_path):
     layout = read_layout(tmp_path / "a.geo")
     assert time.perf_counter() - start < 10.0
     assert layout.groups == ("stone",) * 4
-    areas = [ring_area(ring) for ring in layout.outlines]
+    areas = [shapely.Polygon(ring).area for ring in layout.outlines]
     # A quarter circle, a quarter ellipse, a square and the segment of a parabola: two thirds of 1 × 0.25.
     assert areas[:3] == pytest.approx([math.pi / 4, math.pi / 2, 1 + 2 / 3 * 0.25], rel=2e-3)
     assert all(10 < len(ring) < 200 for ring in layout.outlines)

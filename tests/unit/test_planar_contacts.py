@@ -9,8 +9,9 @@ from structures import rectangle
 
 import solver
 from solver import mechanics
-from solver.equilibrium import wrench_matrix
-from solver.geometry.planar_contacts import ON_CORNER
+
+#: Kind of a contact point at which a corner meets a corner.
+ON_CORNER = 1
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -224,12 +225,15 @@ def test_gaps_follow_the_moved_block():
     q = 1e-6 * random.normal(size=(assembly.n_blocks, 3))
     pose = solver.Pose(assembly.centroids + q[:, :2], q[:, 2:])
     after = mechanics.measure_contacts(assembly, mechanics.moved_vertices(assembly, pose), before)
-    relative = wrench_matrix(before, solver.Pose.initial(assembly)).T @ q.ravel()
+    # Work of a unit force at each contact point.
+    units = np.eye(2 * len(before)).reshape(-1, len(before), 2)
+    start = solver.Pose.initial(assembly)
+    relative = np.array([(mechanics.block_forces(before, start, unit) * q).sum() for unit in units])
     assert np.abs(after.gaps - before.gaps - relative[0::2]).max() < 1e-10
     assert np.abs(after.slip[:, 0] - before.slip[:, 0] - relative[1::2]).max() < 1e-10
 
 
-def test_wrench_matrix_gives_resultants():
+def test_forces_of_contact_points_give_resultants():
     """Forces on a block and its neighbours cancel in sum, moments about any point included."""
     assembly, contacts = find(LAYOUTS["running bond"])
     forces = np.random.default_rng(4).normal(size=(len(contacts), 2))
