@@ -3,11 +3,21 @@
 import numpy as np
 import pytest
 import scipy.stats as st
-
-from blockvis.cases.distributions import read_distribution
+import tomli_w
+from structures import case_from
 
 P = np.array([1e-6, 0.01, 0.2, 0.5, 0.77, 0.999])
 SIGMA = np.sqrt(np.log1p(0.25))
+
+
+def distribution(table):
+    """The distribution of how far corners are off, in a case."""
+    case = {
+        "geometry": {"layout": "arch"},
+        "settlement": {"direction": [1, 0]},
+        "imperfections": {"kind": "vertices", **table},
+    }
+    return case_from(tomli_w.dumps(case)).imperfections[0].distribution
 
 
 @pytest.mark.parametrize(
@@ -29,13 +39,13 @@ SIGMA = np.sqrt(np.log1p(0.25))
     ],
 )
 def test_quantiles_are_those_of_scipy(table, reference):
-    found = read_distribution(table, "here").quantile(P)
+    found = distribution(table).quantile(P)
     np.testing.assert_allclose(found, reference.ppf(P), rtol=1e-9)
 
 
 def test_mean_and_deviation_of_a_lognormal_are_its_own():
     p = (np.arange(200_000) + 0.5) / 200_000
-    values = read_distribution({"distribution": "lognormal", "mean": 2.0, "deviation": 0.3}, "here").quantile(p)
+    values = distribution({"distribution": "lognormal", "mean": 2.0, "deviation": 0.3}).quantile(p)
     assert values.mean() == pytest.approx(2.0, rel=1e-4)
     assert values.std() == pytest.approx(0.3, rel=1e-3)
 
@@ -59,6 +69,6 @@ def test_mean_and_deviation_of_a_lognormal_are_its_own():
 )
 def test_impossible_distributions_are_refused(table, words):
     with pytest.raises(ValueError) as error:
-        read_distribution(table, "[parameters] friction")
-    for word in ("[parameters] friction", *words):
+        distribution(table)
+    for word in ("[imperfections", *words):
         assert word in str(error.value)

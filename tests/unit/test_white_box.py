@@ -47,7 +47,6 @@ WHITE_BOX = {
     "unit/test_cracks.py": 4,
     "unit/test_curves.py": 9,
     "unit/test_dimensions.py": 9,
-    "unit/test_distributions.py": 1,
     "unit/test_explanation.py": 21,
     "unit/test_facing.py": 1,
     "unit/test_fall.py": 6,
