@@ -132,18 +132,6 @@ def case_from(text: str, folder: Path | None = None) -> blockvis.Case:
         return blockvis.read_case(path)
 
 
-def suffixes(verb: str) -> list[str]:
-    """Suffixes of the layout files that can be read, or written, as they are told to whoever names another."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "layout.unknown"
-        path.write_text("nothing", encoding="utf-8")
-        try:
-            blockvis.read_layout(path) if verb == "read" else blockvis.save_layout(stacked()[0], path)
-        except ValueError as refused:
-            return str(refused).partition("; use one of ")[2].split()
-    raise AssertionError(f"a file of no format can be {verb}")
-
-
 class _Built(Exception):
     """A run has its assembly, and is stopped."""
 

@@ -4,11 +4,11 @@ import time
 
 import numpy as np
 import pytest
-from structures import suffixes
 
 from blockvis import read, save_layout
+from blockvis.formats import FORMATS
 
-READ = suffixes("read")
+READ = sorted(suffix for suffix, known in FORMATS.items() if known.reads)
 
 #: Read by gmsh in a process of its own; without it all of them are refused.
 CAD = {".geo", ".geo_unrolled", ".step", ".stp", ".brep"}

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from structures import suffixes
 
 import solver
 from blockvis import read, read_layout, save_layout
+from blockvis.formats import FORMATS
 
 #: All but single precision, which test_space_round_trips looks at.
-WRITTEN = [suffix for suffix in suffixes("write") if suffix != ".glb"]
+WRITTEN = sorted(suffix for suffix, known in FORMATS.items() if known.writes and suffix != ".glb")
 #: What a file cannot say of a block.
 SILENT = {".stl": ("roles", "materials", "density")}
 

@@ -11,6 +11,7 @@ import pytest
 
 import blockvis
 from blockvis.cli import main
+from blockvis.system.extras import EXTRAS, MissingExtra, require
 
 ROOT = Path(__file__).parents[2]
 
@@ -31,9 +32,6 @@ direction = [1, 0]
 increment = 0.03
 limit = 0.1
 """
-
-#: Packages of the extra of studies, by the names under which they are imported.
-STUDIES = ("dask", "distributed", "pandas", "pyarrow", "SALib", "tomli_w")
 
 #: Runs the command line as if these packages were not installed.
 WITHOUT = """
@@ -59,7 +57,7 @@ def without(hidden, *arguments):
 
 
 def test_sweep_without_its_packages_names_the_command(study, tmp_path):
-    done = without(STUDIES, "sweep", study, "-o", tmp_path / "out")
+    done = without(EXTRAS["studies"], "sweep", study, "-o", tmp_path / "out")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
         "blockvis: studies need dask, distributed, pandas, pyarrow, SALib, tomli_w, which this environment lacks; "
@@ -69,15 +67,15 @@ def test_sweep_without_its_packages_names_the_command(study, tmp_path):
 
 
 def test_all_but_studies_runs_without_their_packages(study, tmp_path):
-    done = without(STUDIES, "run", tmp_path / "case.toml", "-o", tmp_path / "out", "--no-film")
+    done = without(EXTRAS["studies"], "run", tmp_path / "case.toml", "-o", tmp_path / "out", "--no-film")
     assert done.returncode in (0, 4), done.stderr
     assert {"summary.json", "curve.png", "report.html"} <= {p.name for p in (tmp_path / "out").iterdir()}
 
 
-@pytest.mark.parametrize("name", STUDIES)
+@pytest.mark.parametrize("name", EXTRAS["studies"])
 def test_each_package_of_studies_is_missed_by_name(name, study, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(ImportError, match=rf"^studies need {name}, which .*pip install 'blockvis\[studies\]'$"):
+    with pytest.raises(MissingExtra, match=rf"^studies need {name}, which .*pip install 'blockvis\[studies\]'$"):
         blockvis.study(study, tmp_path / "out")
     assert main(["sweep", str(study), "-o", str(tmp_path / "out")]) == 2
     assert f"studies need {name}," in capsys.readouterr().err
@@ -97,11 +95,13 @@ def test_reading_geometry_without_gmsh_names_the_command(tmp_path, monkeypatch, 
 def test_extras_are_those_of_the_project_file():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     core = {re.match(r"[\w-]+", line)[0] for line in project["dependencies"]}
-    extras = {
-        extra: {re.match(r"[\w-]+", line)[0] for line in project["optional-dependencies"][extra]}
-        for extra in ("studies", "cad")
-    }
-    assert extras == {"studies": {name.replace("_", "-") for name in STUDIES}, "cad": {"gmsh"}}
-    assert not (extras["studies"] | extras["cad"]) & core
+    for extra, modules in EXTRAS.items():
+        packages = {re.match(r"[\w-]+", line)[0] for line in project["optional-dependencies"][extra]}
+        assert packages == {name.replace("_", "-") for name in modules}
+        assert not packages & core
     assert "pymunk" in core, "a film whose fall lands needs no extra"
     assert "blockvis[studies]" in project["optional-dependencies"]["test"], "the README's test command tests studies"
+
+
+def test_what_is_installed_is_not_missed():
+    require("studies", "studies")

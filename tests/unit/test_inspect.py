@@ -8,7 +8,7 @@ import pytest
 
 import solver
 from blockvis import inspect, save_layout
-from blockvis.cli import main
+from blockvis.pictures.inspection import draw_inspection
 
 FACADE = Path(__file__).resolve().parents[3] / "shared" / "data" / "facade" / "facade.dxf"
 
@@ -43,8 +43,7 @@ def test_numbers(layout):
 
 
 def test_picture(layout, tmp_path):
-    path = tmp_path / "found.png"
-    assert main(["info", str(layout), "--picture", str(path)]) == 0
+    path = draw_inspection(inspect(layout), tmp_path / "found.png")
     from PIL import Image
 
     colours = {colour for _, colour in Image.open(path).convert("RGB").getcolors(1 << 24)}
