@@ -27,6 +27,7 @@ WHITE_BOX = {
     "formats/test_round_trips.py": 1,
     "fuzz/test_cases.py": 4,
     "fuzz/test_files.py": 1,
+    "fuzz/tools/judge.py": 1,
     "system/test_capacity.py": 6,
     "system/test_cli.py": 1,
     "system/test_docs.py": 2,

@@ -12,6 +12,7 @@ from oracle import GRAVITY, Touching, judged, moved_on, support_velocities, touc
 from rubble import Trial, trial
 
 import solver
+from blockvis.runs.run import AS_DRAWN
 from solver import mechanics
 
 #: Distance at which corners touch, in block sizes: above what the solver leaves open, below every real gap.
@@ -20,9 +21,6 @@ NEAR = 1e-5
 #: Distance up to which a corner outside, or beyond the end of an edge, touches where a collapse is judged, in block
 #: sizes: what has just slipped off an edge falls, and it is enclosed in steps that leave no more.
 APART_AT_COLLAPSE = 1e-7
-
-#: Movement until blocks come to rest, in block sizes, above which a run says that they do not stand as drawn.
-AS_DRAWN = 0.002
 
 #: Part of an increment's movement that may stay open at a joint that carries force: twice what the solver aims at.
 LEFT = 0.02
