@@ -30,6 +30,9 @@ CLASSES = 8
 #: Gaps between faces that cover each other are joints drawn open between these parts of the width of a typical block.
 SMALLEST_JOINT, WIDEST_JOINT = 1e-3, 0.2
 
+#: Gaps below this part of the width of a typical block are no joints but rounding of coordinates.
+NO_JOINT = 1e-4
+
 #: Density of blocks for which the layout has none [kg/m³], as of a run.
 DENSITY = 2000.0
 
@@ -193,15 +196,20 @@ def _in_the_plane(layout: Layout) -> dict[str, Any]:
         "joint_thickness": proposal.thickness,
         "joints": proposal.stretches,
         "rows": (("corners", f"{sum(map(len, layout.outlines))}" + (f"; in a run {finer}" if finer else "")),),
-        "joint_rows": _mortar_rows(proposal),
+        "joint_rows": _mortar_rows(proposal, NO_JOINT * width),
     }
 
 
-def _mortar_rows(proposal: Proposal) -> tuple[Row, ...]:
-    """Report mortar joints by their thickness, and how they can be closed."""
+def _mortar_rows(proposal: Proposal, rounding: float) -> tuple[Row, ...]:
+    """Report mortar joints by their thickness, and how they can be closed; thinner ones than rounding [m] are none."""
     joints = proposal.stretches
     if not len(joints):
         return (("mortar joints", "none: no gaps between facing edges"),)
+    if proposal.thickness < rounding:
+        gaps = joints.gaps.max(axis=1) <= 1.0001 * proposal.thickness
+        said = f"none: {int(gaps.sum())} gaps of up to {proposal.thickness:.1g} m are the rounding of coordinates"
+        rows = [("mortar joints", f'{said}; joint_thickness = "auto" closes them')]
+        return (*rows, ("", proposal.note)) if proposal.note else tuple(rows)
     widest = joints.gaps.max(axis=1) * 1e3
     edges = np.linspace(0.0, max(proposal.thickness * 1e3, widest.max()), CLASSES + 1)
     edges[-1] *= 1.0 + 1e-6

@@ -19,6 +19,7 @@ KINDS = {
     "no outline": ("face without outline", "faces without outline"),
     "no area": ("outline without area", "outlines without area"),
     "sliver": ("sliver", "slivers"),
+    "crossing": ("outline that crosses itself", "outlines that cross themselves"),
     "background": ("frame or background around other blocks", "frames or backgrounds around other blocks"),
     "inner": ("inner line of a block", "inner lines of blocks"),
     "title": ("cell of a title block", "cells of a title block"),

@@ -11,6 +11,7 @@ import numpy as np
 
 from blockvis.text import by_similarity
 
+from .crossings import uncrossed
 from .layout import Layout
 from .left_out import LeftOut, in_words, matches
 from .linked import linked
@@ -29,6 +30,9 @@ SLIVER_SHAPE = 20.0
 
 #: A frame or background holds at least this share of all other outlines.
 BACKGROUND = 0.5
+
+#: Kinds of what was drawn as outlines, but cannot be blocks as it is.
+UNREAD = ("hole", "pieces", "no outline", "crossing", "across")
 
 #: Inner lines of blocks are left out from this many on; a single outline within another is refused by name.
 INNER = 3
@@ -66,7 +70,7 @@ def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] =
     """
     where = f"'{layout.source}'" if layout.source else "the drawing"
     layout = as_asked(layout, ignore, only)
-    layout = without_surroundings(without_debris(layout), only)
+    layout = without_surroundings(without_debris(uncrossed(layout)), only)
     for item in layout.left_out:
         if item.serious:
             raise ValueError(f"{where}: {item.message}; or leave it out (ignore)")
@@ -74,6 +78,10 @@ def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] =
         first = next((item for item in layout.left_out if item.message), None)
         asked = "all that it draws is left out as asked (ignore, only)"
         counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
+        ground = next((item for item in layout.left_out if item.kind == "background"), None)
+        if ground is not None and any(item.kind in UNREAD for item in layout.left_out):
+            why = f"{first.message if first else asked}{counted}"
+            raise ValueError(f"{where}: nothing but a background is left, '{ground.name}': {why}")
         raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}")
     return noted(layout)
 
@@ -194,8 +202,8 @@ def _around_others(layout: Layout) -> dict[int, LeftOut]:
     """Frames and backgrounds around other blocks, title blocks on a frame, inner lines of blocks."""
     import shapely
 
-    n = layout.n_blocks
-    if n < 2:
+    n, (beside, of_outlines) = layout.n_blocks, _unread(layout)
+    if n + len(beside) < 2 or n == 0:
         return {}
     shapes = np.array([shapely.Polygon(ring) for ring in layout.outlines])
     shapes[~shapely.is_valid(shapes)] = shapely.Polygon()
@@ -204,10 +212,15 @@ def _around_others(layout: Layout) -> dict[int, LeftOut]:
     # Of two outlines drawn twice neither lies within the other.
     nested = (inner != outer) & (areas[inner] < (1.0 - 1e-6) * areas[outer]) & (areas[inner] > 0)
     inner, outer = inner[nested], outer[nested]
-    if len(inner) == 0:
-        return {}
     held = np.bincount(outer, minlength=n)
-    frames = [int(i) for i in np.flatnonzero((held >= 2) & (held >= BACKGROUND * (n - 1)))]
+    # What was left out counts, too: a background stays one where the drawing upon it cannot be read.
+    within, around = shapely.STRtree(shapes).query(beside, "covered_by")
+    smaller = shapely.area(beside)[within] < 0.99 * areas[around]
+    held += np.bincount(around[smaller], of_outlines[within[smaller]], n).astype(int)
+    others = n - 1 + of_outlines.sum()
+    frames = [int(i) for i in np.flatnonzero((held >= 2) & (held >= BACKGROUND * others))]
+    if len(inner) == 0 and not frames:
+        return {}
     reasons = {}
     for i in frames:
         kind = "mortar" if MORTAR.search(" ".join(labels_of(layout, i))) else "background"
@@ -221,6 +234,15 @@ def _around_others(layout: Layout) -> dict[int, LeftOut]:
         for i in lines:
             reasons[i] = LeftOut("inner", layout.outlines[i], f"block '{layout.names[i]}' lies within another")
     return reasons
+
+
+def _unread(layout: Layout) -> tuple[Any, np.ndarray]:
+    """Shapes that could not be read as blocks, and (n,) int array: of how many outlines each was drawn."""
+    import shapely
+
+    items = [item for item in layout.left_out if item.kind in UNREAD and len(item.points) > 2]
+    shapes = np.array([shapely.Polygon(item.points).convex_hull for item in items], dtype=object)
+    return shapes, np.array([1 + len(item.holes) for item in items], dtype=int)
 
 
 def _title_cells(layout: Layout, shapes: Any, frames: list[int]) -> dict[int, LeftOut]:
