@@ -174,6 +174,7 @@ def _case_layout(case: Case) -> layout.Layout:
             view=case.view,
             ignore=case.ignore,
             only=case.only,
+            window=case.window,
             dimension=case.dimension,
             thickness=thickness,
         )

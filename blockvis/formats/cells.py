@@ -221,6 +221,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
         unit=named[0].unit,
         notes=tuple(dict.fromkeys(joined("notes"))),
         left_out=joined("left_out"),
+        looks=joined("looks"),
     )
 
 

@@ -119,6 +119,7 @@ class Inspection:
             ),
             *self.rows,
             *((what, self._counted(of)) for what, of in (("groups", layout.groups), ("materials", layout.materials))),
+            *self._look_rows(),
             ("roles", self._counted(self.roles)),
             ("names", f"{', '.join(names[:4])}{' ...' if len(names) > 4 else ''}"),
             *self.joint_rows,
@@ -136,6 +137,17 @@ class Inspection:
         counted = Counter(words[i] for i in self.kept)
         listed = [f"'{word}' {n}" if word else f"none {n}" for word, n in counted.most_common(12)]
         return ", ".join(listed) + (f", {len(counted) - 12} more" if len(counted) > 12 else "")
+
+    def _look_rows(self) -> list[Row]:
+        """Kinds and colours of the outlines of a drawing that has several, by which some can be left out."""
+        kinds = Counter(own[0] for own in (self.layout.looks[i] for i in self.kept) if own)
+        colours = Counter(" = ".join(own[1:]) for own in (self.layout.looks[i] for i in self.kept) if own[1:])
+        titled = (("drawn as", kinds), ("colours", colours))
+        return [
+            (title, ", ".join(f"{word} {n}" for word, n in counted.most_common(12)))
+            for title, counted in titled
+            if len(counted) > 1
+        ]
 
     def _overlap_rows(self) -> list[Row]:
         if not self.overlapping:

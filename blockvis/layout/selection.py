@@ -11,6 +11,7 @@ import numpy as np
 
 from blockvis.text import by_similarity
 
+from .choice import KINDS, Choice, look_of
 from .crossings import uncrossed
 from .layout import Layout
 from .left_out import LeftOut, in_words, matches
@@ -18,6 +19,7 @@ from .linked import linked
 from .notes import LEFT_OUT, UNIT, Note
 from .outlines import ring_area, ring_width
 from .units import doubt
+from .window import within_window
 
 #: An outline with less area than this times its perimeter squared is a line: the solver takes no block of less.
 LINE = 1e-9
@@ -53,7 +55,13 @@ def labels_of(layout: Layout, block: int) -> tuple[str, ...]:
     return layout.groups[block], layout.materials[block], layout.names[block]
 
 
-def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] = ()) -> Layout:
+def _words(layout: Layout, block: int) -> tuple[str, ...]:
+    return (*labels_of(layout, block), *layout.looks[block])
+
+
+def sorted_out(
+    layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] = (), window: Sequence[float] = ()
+) -> Layout:
     """Leave out what is no block, with a note per kind and layer, and doubt the unit.
 
     Parameters
@@ -61,7 +69,9 @@ def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] =
     layout : Layout
         As a format's reader gives it, lengths in m.
     ignore, only : sequences of str
-        Layers, groups, materials and names of blocks, or patterns of them.
+        Layers, groups, materials and names of blocks, or patterns of them; kinds of entities and colours.
+    window : sequence of float
+        x0, y0, x1, y1 [m] of what is read, or none.
 
     Raises
     ------
@@ -69,7 +79,7 @@ def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] =
         If a pattern of ``only`` matches nothing, no block is left, or something cannot be left out unasked.
     """
     where = f"'{layout.source}'" if layout.source else "the drawing"
-    layout = as_asked(layout, ignore, only)
+    layout = within_window(as_asked(layout, ignore, only), window)
     layout = without_surroundings(without_debris(uncrossed(layout)), only)
     for item in layout.left_out:
         if item.serious:
@@ -112,23 +122,30 @@ def as_asked(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layo
     known = [labels_of(layout, i) for i in range(layout.n_blocks)]
     beside = [(item.layer, item.name) for item in layout.left_out]
     every = [label for labels in (*known, *beside) for label in labels if label]
+    looks = {look for own in (*layout.looks, *(item.looks for item in layout.left_out)) for look in own}
     notes = list(layout.notes)
     for pattern in (*only, *ignore):
-        if matches(every, [pattern]):
+        if matches(every, [pattern]) or look_of(pattern) in looks or (pattern in ignore and look_of(pattern) in KINDS):
             continue
         listed = ", ".join(f"'{label}'" for label in by_similarity(pattern, list(dict.fromkeys(every))[:2000])[:12])
         message = f"'{pattern}' matches no layer, group or name; the drawing has {listed or 'none'}"
+        message += f"; its kinds and colours are {', '.join(sorted(looks)[:12])}" if looks else ""
         if pattern in only:
             raise ValueError(f"{layout.source or 'the drawing'}: only: {message}; correct it")
         notes.append(Note(LEFT_OUT, f"ignore: {message}"))
+    unwanted, wanted = Choice(ignore, (*every, "")), Choice(only, (*every, ""))
+
+    def dropped(labels: tuple[str, ...], own: tuple[str, ...]) -> bool:
+        return unwanted.takes(labels, own) or (bool(only) and not wanted.takes(labels, own))
+
     reasons = {
         i: LeftOut("asked", layout.outlines[i], "")
         for i, labels in enumerate(known)
-        if matches(labels, ignore) or (only and not matches(labels, only))
+        if dropped(labels, layout.looks[i])
     }
     asked = tuple(
         replace(item, kind="asked" if item.closed else "asked line", serious=False)
-        if matches((item.layer, item.name), ignore) or (only and not matches((item.layer, item.name), only))
+        if dropped((item.layer, item.name), item.looks)
         else item
         for item in layout.left_out
     )
@@ -177,7 +194,7 @@ def without_surroundings(layout: Layout, only: Sequence[str] = ()) -> Layout:
     by_name = {
         i: LeftOut("annotation", layout.outlines[i], f"block '{layout.names[i]}' is on layer '{layout.groups[i]}'")
         for i in range(layout.n_blocks)
-        if ANNOTATIONS.fullmatch(layout.groups[i].strip()) and not matches(labels_of(layout, i), only)
+        if ANNOTATIONS.fullmatch(layout.groups[i].strip()) and not matches(_words(layout, i), only)
     }
     if len(by_name) < layout.n_blocks:
         layout = layout.leaving_out(by_name)
@@ -189,7 +206,7 @@ def without_surroundings(layout: Layout, only: Sequence[str] = ()) -> Layout:
     )
     layout = replace(layout, left_out=mortar)
     reasons = _around_others(layout)
-    reasons = {i: item for i, item in reasons.items() if not matches(labels_of(layout, i), only)}
+    reasons = {i: item for i, item in reasons.items() if not matches(_words(layout, i), only)}
     return layout.leaving_out(reasons)
 
 

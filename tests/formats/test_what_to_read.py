@@ -50,3 +50,56 @@ def test_a_background_alone_is_no_block(tmp_path, capsys):
 def test_only_gaps_that_are_joints_are_proposed_as_such(tmp_path, capsys, gap, says):
     drawn(tmp_path / "wall.dxf", *(brick(k * (1.0 + gap), 0.0) for k in range(4)))
     assert says in info(capsys, tmp_path / "wall.dxf")
+
+
+def test_a_window_reads_what_lies_within_it_and_tells_what_it_cuts(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    drawn("wall.dxf", *(brick(x, y) for x in (0, 1, 2) for y in (0, 0.5)), brick(10, 0), brick(12, 0))
+    said = info(capsys, "wall.dxf", "--window", 0, -1, 2.5, 1)
+    assert "outlines        4" in said
+    assert "window: 2 outlines beyond it were left out" in said
+    assert "left out: 2 outlines across the edge of the window" in said
+    assert main(["new", "wall.dxf", "--window", "0", "0", "3", "1"]) == 0
+    assert "window = [0.0, 0.0, 3.0, 1.0]" in (tmp_path / "wall.toml").read_text()
+    assert "written for 6 blocks" in capsys.readouterr().out
+    assert main(["convert", "wall.dxf", "cut.svg", "--window", "9", "0", "14", "1"]) == 0
+    assert "2 blocks written" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("window", "says"),
+    [
+        ((5, 5, 6, 6), "no block lies within the window [5, 5, 6, 6] m; the drawing goes from (0, 0) to (1, 0.5) m"),
+        ((3, 0, 1, 1), "give [x0, y0, x1, y1] in m, with x0 < x1 and y0 < y1"),
+    ],
+)
+def test_a_window_without_blocks_is_refused(tmp_path, capsys, window, says):
+    drawn(tmp_path / "wall.dxf", brick(0, 0))
+    assert says in info(capsys, tmp_path / "wall.dxf", "--window", *window)
+
+
+def test_a_kind_of_entity_or_a_colour_is_left_out_where_no_layer_is_called_so(tmp_path, capsys):
+    document = drawn(tmp_path / "wall.dxf", brick(0, 0), brick(1, 0), brick(2, 0))
+    space = document.modelspace()
+    space.add_circle((0.5, 0.25), 0.1)
+    space.add_circle((1.5, 0.25), 0.1, dxfattribs={"color": 1})
+    space.add_lwpolyline(brick(4, 0), close=True, dxfattribs={"color": 1, "layer": "1"})
+    document.saveas(tmp_path / "wall.dxf")
+    file = tmp_path / "wall.dxf"
+    assert "drawn as        polyline 4, circle 2" in info(capsys, file)
+    assert "colours         #ffffff = 7 4, #ff0000 = 1 2" in info(capsys, file)
+    assert "outlines        4" in info(capsys, file, "--ignore", "circle")
+    assert "outlines        4" in info(capsys, file, "--ignore", "#F00")
+    # A layer of that name is what is meant.
+    assert "outlines        5" in info(capsys, file, "--ignore", "1")
+    assert "outlines        3" in info(capsys, file, "--only", "polyline", "--ignore", "#ff0000")
+    assert "its kinds and colours are #ff0000, #ffffff, 1, 7, circle, polyline" in info(capsys, file, "--ignore", "arcs")
+
+
+def test_shapes_of_an_svg_are_left_out_by_kind_and_colour(tmp_path, capsys):
+    (tmp_path / "wall.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg"><g fill="#fc0"><rect id="a" width="9" height="5"/>'
+        '<rect id="b" x="9" width="9" height="5"/><circle id="c" cx="30" cy="3" r="3" style="fill: red"/></g></svg>'
+    )
+    assert "names           a, b\n" in info(capsys, tmp_path / "wall.svg", "--ignore", "circle")
+    assert "names           c\n" in info(capsys, tmp_path / "wall.svg", "--ignore", "#ffcc00")
