@@ -17,6 +17,8 @@ from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of, standing
 from blockvis.layout.outlines import without_collinear
+from blockvis.layout.remedies import deep_overlaps, proposed_ignore
+from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.selection import noted, sorted_out
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
@@ -220,17 +222,24 @@ def read(
     if chord_tolerance is not None and outline_tolerance is None:
         # Who says how fine arcs are wants their chords.
         outline_tolerance = 0.0
-    return assemble(
-        layout,
-        roles=roles,
-        supports=supports,
-        density=density,
-        thickness=thickness,
-        joint_thickness=joint_thickness,
-        overlap_tolerance=overlap_tolerance,
-        closing=closing,
-        outline_tolerance=outline_tolerance,
-    )
+    try:
+        return assemble(
+            layout,
+            roles=roles,
+            supports=supports,
+            density=density,
+            thickness=thickness,
+            joint_thickness=joint_thickness,
+            overlap_tolerance=overlap_tolerance,
+            closing=closing,
+            outline_tolerance=outline_tolerance,
+        )
+    except DeepOverlap as error:
+        chosen = {"view": view, "only": only, "window": window, "dimension": dimension, "thickness": thickness}
+        remedy = overlap_remedy(layout, ignore, **chosen)
+        if not remedy:
+            raise
+        raise ValueError(f"{error}; {remedy}") from None
 
 
 def from_compas(model: Any, **options: Any) -> solver.Assembly:
@@ -291,8 +300,25 @@ def inspect(
     dimension : {"auto", 2, 3}
         As of :func:`read_layout`.
     """
-    layout = read_layout(path, unit=unit, view=view, ignore=ignore, only=only, window=window, dimension=dimension)
-    return inspected(layout)
+    chosen: dict[str, Any] = {"unit": unit, "view": view, "only": only, "window": window, "dimension": dimension}
+    layout = read_layout(path, ignore=ignore, **chosen)
+    found = inspected(layout)
+    deep = [(i, j) for i, j, depth in found.overlapping if depth > found.overlap_tolerance]
+    return replace(found, remedy=_remedy(layout, deep, ignore, chosen)) if deep else found
+
+
+def overlap_remedy(layout: Layout, ignore: str | Sequence[str], **chosen: Any) -> str:
+    """Propose what to leave out of a layout whose blocks overlap, by the options with which it was read; or ""."""
+    return _remedy(layout, deep_overlaps(layout), ignore, chosen)
+
+
+def _remedy(
+    layout: Layout, deep: Sequence[tuple[int, int]], ignore: str | Sequence[str], chosen: Mapping[str, Any]
+) -> str:
+    """Propose what to leave out so that no blocks overlap, having tried it."""
+    before = (ignore,) if isinstance(ignore, str) else tuple(ignore)
+    chosen = {**chosen, "unit": layout.unit}
+    return proposed_ignore(layout, deep, lambda more: read_layout(layout.source, ignore=(*before, *more), **chosen))
 
 
 def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:

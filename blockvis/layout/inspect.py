@@ -76,6 +76,8 @@ class Inspection:
         In space, pairs of blocks of which faces cover each other across a gap, and the gap [m], widest first.
     refused : str
         Why a run would refuse the blocks, or "".
+    remedy : str
+        What to leave out where blocks overlap, or "".
     """
 
     layout: Layout
@@ -94,6 +96,7 @@ class Inspection:
     facing: FacedJoints = field(default_factory=lambda: FacedJoints(()))
     open_joints: tuple[tuple[int, int, float], ...] = ()
     refused: str = ""
+    remedy: str = ""
 
     @property
     def unit_clash(self) -> str:
@@ -159,7 +162,7 @@ class Inspection:
                 "resolved to the midline" if resolved else "refused: move the blocks apart or raise overlap_tolerance"
             )
             rows.append(("", f"{self.layout.names[i]} and {self.layout.names[j]}: {depth:.3g} m, {verdict}"))
-        return rows
+        return [*rows, ("remedy", self.remedy)] if self.remedy else rows
 
 
 def inspected(layout: Layout) -> Inspection:
