@@ -57,10 +57,11 @@ def uncrossed(layout: Layout) -> Layout:
         first = next(iter(reduced))
         x, y = _crossing(shapes[first])
         words = "1 outline crosses" if len(reduced) == 1 else f"{len(reduced)} outlines cross"
+        gone = f", with up to {100.0 * lost:.2g} % of the area gone" if lost > 1e-6 else ""
         said = (
             f"repaired: {words} or touch{'es' * (len(reduced) == 1)} {'itself' if len(reduced) == 1 else 'themselves'}"
             f", {'' if len(reduced) == 1 else 'the first '}'{layout.names[first]}' at ({x:.6g}, {y:.6g}); the largest "
-            f"piece was kept, with up to {100.0 * lost:.2g} % of the area gone"
+            f"piece was kept{gone}"
         )
         blocks = tuple(reduced.get(i, ring) for i, ring in enumerate(layout.outlines))
         layout = replace(layout, blocks=blocks, notes=(*layout.notes, Note(CHANGED, said)))

@@ -87,7 +87,8 @@ def sorted_out(
     if layout.n_blocks == 0:
         first = next((item for item in layout.left_out if item.message), None)
         asked = "all that it draws is left out as asked (ignore, only)"
-        counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
+        more = len(layout.left_out) - 1
+        counted = f"; {more} more {'is' if more == 1 else 'are'} left out" if first and more > 0 else ""
         ground = next((item for item in layout.left_out if item.kind == "background"), None)
         if ground is not None and any(item.kind in UNREAD for item in layout.left_out):
             why = f"{first.message if first else asked}{counted}"
