@@ -41,9 +41,20 @@ def uncrossed(layout: Layout) -> Layout:
         area = float(sum(part.area for part in pieces))
         if not area > 0.0:
             continue
-        largest = shapely.Polygon(max(pieces, key=lambda part: part.area).exterior)
+        piece = max(pieces, key=lambda part: part.area)
+        largest = shapely.Polygon(piece.exterior)
         share = min(largest.area, area) / max(largest.area, area)
         x, y = _crossing(shapes[i])
+        if share < WHOLE and largest.area > area:
+            # An outline that goes in along a line, around a hole and back.
+            holes = tuple(np.array(inner.coords)[:-1] for inner in piece.interiors)
+            x, y = holes[0].mean(axis=0)
+            message = (
+                f"block '{layout.names[i]}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole "
+                "with a block"
+            )
+            reasons[i] = LeftOut("hole", np.array(piece.exterior.coords)[:-1], message, holes=holes)
+            continue
         if share < WHOLE:
             message = (
                 f"block '{layout.names[i]}' crosses itself at ({x:.6g}, {y:.6g}), and its largest piece has only "
@@ -56,13 +67,11 @@ def uncrossed(layout: Layout) -> Layout:
     if reduced:
         first = next(iter(reduced))
         x, y = _crossing(shapes[first])
-        words = "1 outline crosses" if len(reduced) == 1 else f"{len(reduced)} outlines cross"
+        words, the = "1 outline crosses or touches itself, ", ""
+        if len(reduced) > 1:
+            words, the = f"{len(reduced)} outlines cross or touch themselves, ", "the first "
         gone = f", with up to {100.0 * lost:.2g} % of the area gone" if lost > 1e-6 else ""
-        said = (
-            f"repaired: {words} or touch{'es' * (len(reduced) == 1)} {'itself' if len(reduced) == 1 else 'themselves'}"
-            f", {'' if len(reduced) == 1 else 'the first '}'{layout.names[first]}' at ({x:.6g}, {y:.6g}); the largest "
-            f"piece was kept{gone}"
-        )
+        said = f"repaired: {words}{the}'{layout.names[first]}' at ({x:.6g}, {y:.6g}); the largest piece was kept{gone}"
         blocks = tuple(reduced.get(i, ring) for i, ring in enumerate(layout.outlines))
         layout = replace(layout, blocks=blocks, notes=(*layout.notes, Note(CHANGED, said)))
     return layout.leaving_out(reasons)

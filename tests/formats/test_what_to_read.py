@@ -125,3 +125,9 @@ def test_overlaps_name_the_smallest_set_to_leave_out_having_tried_it(tmp_path, c
     assert '--ignore "circle" leaves out 1 of 9 blocks' in info(capsys, "discs.dxf")
     drawn("bands.dxf", *bricks, *(brick(0.1, y, 3.7, 0.2) for y in (0.1, 0.4)))
     assert '--ignore "block 37" --ignore "block 38" leaves out 2 of 10 blocks' in info(capsys, "bands.dxf")
+
+
+def test_an_outline_around_a_hole_and_back_is_one_with_a_hole(tmp_path, capsys):
+    ring = [(0, 0), (3, 0), (3, 2), (0, 2), (0, 1), (1, 1), (1, 1.5), (2, 1.5), (2, 0.5), (1, 0.5), (1, 1), (0, 1)]
+    drawn(tmp_path / "wall.dxf", ring, brick(3, 0))
+    assert "left out: 1 face with a hole on layer '0', 'block 2F' at (1.5, 1)" in info(capsys, tmp_path / "wall.dxf")
