@@ -50,8 +50,8 @@ def uncrossed(layout: Layout) -> Layout:
             holes = tuple(np.array(inner.coords)[:-1] for inner in piece.interiors)
             x, y = holes[0].mean(axis=0)
             message = (
-                f"block '{layout.names[i]}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole "
-                "with a block"
+                f"block '{layout.names[i]}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the "
+                "hole with a block"
             )
             reasons[i] = LeftOut("hole", np.array(piece.exterior.coords)[:-1], message, holes=holes)
             continue
