@@ -37,7 +37,9 @@ def uncrossed(layout: Layout) -> Layout:
     reduced: dict[int, np.ndarray] = {}
     lost = 0.0
     for i in np.flatnonzero(~shapely.is_valid(shapes)).tolist():
-        pieces = [part for part in shapely.get_parts(shapely.make_valid(shapes[i])) if part.area > 0.0]
+        # Beside lines, pieces lie in a collection within the collection.
+        parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(shapes[i])))
+        pieces = [part for part in parts if part.area > 0.0]
         area = float(sum(part.area for part in pieces))
         if not area > 0.0:
             continue

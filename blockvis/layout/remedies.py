@@ -24,8 +24,8 @@ TRIES = 4
 #: Blocks that are named one by one.
 NAMED = 3
 
-#: Drawings of more blocks are not read again.
-MOST_BLOCKS = 20_000
+#: Drawings of more blocks, or pairs that overlap, are not read again.
+MOST = 20_000
 
 
 def deep_overlaps(layout: Layout, tolerance: float | None = None) -> list[tuple[int, int]]:
@@ -68,7 +68,7 @@ def proposed_ignore(
     str
         With the options and what they do, "" where no small set has a name.
     """
-    if not pairs or layout.n_blocks > MOST_BLOCKS:
+    if not pairs or max(len(pairs), layout.n_blocks) > MOST:
         return ""
     known: dict[tuple[str, ...], set[int]] = {}
     for patterns, blocks in _candidates(layout, pairs):

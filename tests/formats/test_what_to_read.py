@@ -28,7 +28,7 @@ def info(capsys, *arguments):
 
 
 def test_an_outline_that_crosses_itself_keeps_its_largest_piece_or_is_left_out(tmp_path, capsys):
-    spur = [(1, 0), (2, 0), (2, 0.5), (1.001, 0.5), (1, 0.5), (1.01, 0.51)]
+    spur = [(1, 0), (2, 0), (2, 0.5), (2, 0.7), (2, 0.5), (1.001, 0.5), (1, 0.5), (1.01, 0.51)]
     bow = [(2, 0), (3, 0.5), (3, 0), (2, 0.5)]
     drawn(tmp_path / "wall.dxf", brick(0, 0), spur, bow, brick(0, 0.5, 3.0))
     said = info(capsys, tmp_path / "wall.dxf")
