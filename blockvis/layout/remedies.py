@@ -21,8 +21,8 @@ LESS = 0.5
 #: Proposals that are tried, the smallest first.
 TRIES = 4
 
-#: Blocks that are named one by one.
-NAMED = 3
+#: Blocks that are named one by one where their names do not begin alike.
+NAMED = 6
 
 #: Drawings of more blocks, or pairs that overlap, are not read again.
 MOST = 20_000
@@ -105,10 +105,10 @@ def _candidates(layout: Layout, pairs: Sequence[tuple[int, int]]) -> Iterator[tu
     # What the first and the last have in common, all between them have.
     same = [a == b for a, b in zip(min(names), max(names), strict=False)]
     begins = min(names)[: [*same, False].index(False)]
+    if begins and len(cover) > 1:
+        yield (f"{begins}*",), {i for i, name in enumerate(layout.names) if matches([name], [f"{begins}*"])}
     if len(cover) <= NAMED:
         yield tuple(dict.fromkeys(names)), {i for i, name in enumerate(layout.names) if name in names}
-    elif begins:
-        yield (f"{begins}*",), {i for i, name in enumerate(layout.names) if matches([name], [f"{begins}*"])}
 
 
 def _cover(pairs: Sequence[tuple[int, int]]) -> list[int]:
