@@ -266,8 +266,20 @@ def _add_choice(verb: argparse.ArgumentParser) -> None:
             action="append",
             default=[],
             metavar="PATTERN",
-            help=f"{what} this layer, group or name; may be given again",
+            help=f"{what} this layer, group or name, kind of entity (circle) or colour (#rrggbb); may be given again",
         )
+    verb.add_argument(
+        "--window",
+        nargs=4,
+        type=float,
+        metavar=("X0", "Y0", "X1", "Y1"),
+        help="read what lies within this rectangle of the plane, in m, as info prints coordinates",
+    )
+
+
+def _choice(options: argparse.Namespace) -> dict[str, Any]:
+    """Take what is to be read of a drawing from the options."""
+    return {key: getattr(options, key) for key in ("view", "ignore", "only", "window")}
 
 
 def _add_explain(verbs: Any) -> None:
@@ -395,7 +407,7 @@ def _new(options: argparse.Namespace) -> int:
     drawing = Path(options.drawing)
     stem = drawing.parent.name if glob.has_magic(drawing.name) else drawing.resolve().stem
     target = _new_file(options.output or f"{stem}.toml", options.force)
-    choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
+    choice = _choice(options)
     found = inspect(drawing, unit=options.unit, dimension=_dimension(options), **choice)
     text = case_text(found, relative_to(target.parent, drawing), **choice)
     write_whole(target, text)
@@ -589,7 +601,7 @@ def _info(options: argparse.Namespace) -> int:
     from .formats.read import inspect
     from .pictures.inspection import draw_inspection
 
-    choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
+    choice = _choice(options)
     found = inspect(options.file, unit=options.unit, dimension=_dimension(options), **choice)
     print(found)
     if options.picture:
@@ -602,7 +614,7 @@ def _convert(options: argparse.Namespace) -> int:
     from .layout.assemble import assemble
 
     target = _new_file(options.target, options.force)
-    choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
+    choice = _choice(options)
     layout = read_layout(options.source, unit=options.unit, dimension=_dimension(options), **choice)
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)

@@ -32,12 +32,13 @@ from blockvis.cases.key import (
     whole,
 )
 from blockvis.cases.profiles import read_profile
-from blockvis.cases.toml_table import Table, shortened
+from blockvis.cases.toml_table import Table, is_number, shortened
 from blockvis.generators import LAYOUTS
 from blockvis.kinds.kinds import KINDS
 from blockvis.layout.joints.close import WAYS
 from blockvis.layout.units import UNITS
 from blockvis.layout.views import VIEWS
+from blockvis.layout.window import checked_window
 from blockvis.results.folder import VIDEO_SUFFIXES
 from solver import mechanics
 
@@ -118,6 +119,18 @@ def _places(table: Table, key: Key) -> tuple[float, ...] | None:
     return tuple(np.linspace(given[0], given[1], int(given[2])).tolist())
 
 
+def _read_window(table: Table, key: Key) -> tuple[float, ...] | None:
+    corners = table.take(key.name)
+    if corners is None:
+        return None
+    if not isinstance(corners, list) or len(corners) != 4 or not all(map(is_number, corners)):
+        raise table.error(key.name, f"is {shortened(corners)}; give [x0, y0, x1, y1] in m")
+    try:
+        return checked_window(corners)
+    except ValueError as error:
+        raise table.error(key.name, str(error).removeprefix("window ")) from None
+
+
 def _support_names(table: Table, key: Key) -> tuple[str, ...] | None:
     given = table.take(key.name)
     if given is None:
@@ -181,6 +194,9 @@ _LEVELS = replace(PAIR, read=lambda table, key: table.pair(key.name, words="[bot
 _KIND = replace(one_of(tuple(KINDS)), read=lambda table, key: table.text(key.name, among=tuple(KINDS)))
 _TABLE = ValueKind("table", {"type": "object"}, lambda table, key: table.table(key.name).values)
 _PUSHES = replace(PAIR, read=_direction_of_pressure)
+_WINDOW = ValueKind(
+    "four numbers", {"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4}, _read_window
+)
 _SUPPORT_NAMES = replace(TEXTS, read=_support_names)
 
 _NEEDED, _UNLIMITED = "required where the distribution has it", "; normal and lognormal have none"
@@ -256,10 +272,13 @@ GEOMETRY = Section(
             otherwise="those in which the bodies lie side by side"),
         Key("dimension", _DIMENSION, "Whether blocks are in the plane or in space, where gravity acts along -z", 3,
             otherwise="in space where bodies are not prisms side by side", default="auto"),
-        Key("ignore", TEXTS, "Layers, groups, materials and names, or patterns of them, to leave out",
+        Key("ignore", TEXTS, "Layers, groups, materials and names, or patterns of them, to leave out; of drawings also "
+            "kinds of entities, as circle or hatch, and colours, #rrggbb or a number of AutoCAD's",
             ["axes", "dim*"], default=()),
         Key("only", TEXTS, "Layers, groups, materials and names, or patterns of them, beside which all is left out",
             ["stones"], default=()),
+        Key("window", _WINDOW, "What is read of a drawing in the plane: [x0, y0, x1, y1], as blockvis info prints them",
+            [0.0, 0.0, 6.0, 3.5], "m", otherwise="all of it"),
         Key("thickness", POSITIVE, "Thickness out of plane of blocks for which the file has none", 0.25, "m",
             THICKNESS, elsewhere=True),
         Key("joint_thickness", _THICKNESS_OR_AUTO,

@@ -29,7 +29,7 @@ FRICTION = 0.6
 SUPPORT_WORDS = ("springer", "support", "ground", "foundation", "footing", "abutment", "bearing")
 
 #: Keys of a drawing in the plane, which one in space does not have.
-_IN_THE_PLANE = ("thickness", "closing", "outline_tolerance")
+_IN_THE_PLANE = ("window", "thickness", "closing", "outline_tolerance")
 
 #: Characters of a line of comment.
 WIDTH = 100
@@ -64,6 +64,7 @@ def case_text(
     view: str | None = None,
     ignore: Sequence[str] = (),
     only: Sequence[str] = (),
+    window: Sequence[float] = (),
 ) -> str:
     """Write the text of a case file for a drawing.
 
@@ -73,7 +74,7 @@ def case_text(
         Of the drawing.
     file : str
         The drawing, relative to the case file.
-    view, ignore, only
+    view, ignore, only, window
         With which the drawing was read.
 
     Returns
@@ -92,6 +93,7 @@ def case_text(
         "view": view,
         "ignore": list(ignore) or None,
         "only": list(only) or None,
+        "window": list(window or ()) or None,
         "dimension": 3 if in_space else None,
         "joint_thickness": "auto" if found.joint_thickness > 0.0 else None,
     }

@@ -172,7 +172,7 @@ def _geometry(table: Table) -> dict[str, Any]:
         raise table.error(
             "unit", f"is {shortened(values['unit'])}, but is of a file's lengths; a layout is in m: leave it out"
         )
-    for key in ("view", "ignore", "only"):
+    for key in ("view", "ignore", "only", "window"):
         if file is None and values[key]:
             raise table.error(key, "belongs to a file, not to a layout")
     return values | {"parameters": dict(values["parameters"])}

@@ -11,9 +11,10 @@ import numpy as np
 
 import solver
 from blockvis import generators
-from blockvis.formats.read import read_layout
+from blockvis.formats.read import overlap_remedy, read_layout
 from blockvis.layout import layout
 from blockvis.layout.assemble import assemble
+from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.units import doubt
 from blockvis.text import nearest
 
@@ -58,17 +59,24 @@ def case_assembly(case: Case) -> solver.Assembly:
     _note_density(case, sketch)
     if case.densities:
         sketch = _with_densities(case, sketch)
-    assembly = assemble(
-        sketch,
-        roles=case.roles,
-        supports=case.supports,
-        density=case.density or DENSITY,
-        thickness=case.thickness or THICKNESS,
-        joint_thickness=case.joint_thickness,
-        overlap_tolerance=case.overlap_tolerance,
-        closing=case.closing,
-        outline_tolerance=case.outline_tolerance,
-    )
+    try:
+        assembly = assemble(
+            sketch,
+            roles=case.roles,
+            supports=case.supports,
+            density=case.density or DENSITY,
+            thickness=case.thickness or THICKNESS,
+            joint_thickness=case.joint_thickness,
+            overlap_tolerance=case.overlap_tolerance,
+            closing=case.closing,
+            outline_tolerance=case.outline_tolerance,
+        )
+    except DeepOverlap as error:
+        chosen = {"view": case.view, "only": case.only, "window": case.window, "dimension": case.dimension}
+        remedy = overlap_remedy(sketch, case.ignore, **chosen) if case.file is not None else ""
+        if not remedy:
+            raise
+        raise ValueError(f"{error}; {remedy}") from None
     _refuse_unknown_materials(case, assembly)
     if case.settlements and not assembly.moving.any():
         groups = sorted({g for g in sketch.groups if g} | {s["name"] for s in case.supports}) or list(sketch.names[:12])
@@ -174,6 +182,7 @@ def _case_layout(case: Case) -> layout.Layout:
             view=case.view,
             ignore=case.ignore,
             only=case.only,
+            window=case.window,
             dimension=case.dimension,
             thickness=thickness,
         )

@@ -48,6 +48,7 @@ class Case:
     dimension: int | str = "auto"
     ignore: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
+    window: tuple[float, ...] | None = None
     thickness: float | None = None
     joint_thickness: float | str = 0.0
     closing: str = "auto"

@@ -16,6 +16,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import outlines_of_cells, rectangle
+from blockvis.layout.selection import MORTAR
 from blockvis.layout.solids import volume
 from blockvis.layout.views import VIEWS, axis_across, view_along
 from solver import mechanics
@@ -276,22 +277,22 @@ def in_dimension(
 
 @dataclass(frozen=True)
 class _Asked:
-    """The bodies that are asked for, with their rows, the size of the drawing, and the numbers of the others."""
+    """The bodies that are asked for, with their rows, the size of the drawing, and the others: number and kind."""
 
     bodies: list[Body]
     rows: list[dict[str, Any]]
     size: float
-    dropped: list[int]
+    dropped: dict[int, str]
 
     def left_out(self, found: Bodies, view: str, ignore: Sequence[str]) -> tuple[LeftOut, ...]:
-        """Say what is left out as asked, by its box in a view."""
+        """Say what is left out, by its box in a view."""
         items = []
-        for k in self.dropped:
+        for k, kind in self.dropped.items():
             points = found.bodies[k].points[:, VIEWS[view]]
             labels = _labels(found.rows[k])
             layer = next((word for word in labels[1:] if matches([word], ignore)), labels[1])
             box = rectangle(*points.min(axis=0), *points.max(axis=0))
-            items.append(LeftOut("asked", box, "", layer, labels[0]))
+            items.append(LeftOut(kind, box, "", layer, labels[0]))
         return tuple(items)
 
 
@@ -305,7 +306,9 @@ def _asked(found: Bodies, path: Path | str, ignore: Sequence[str], only: Sequenc
         raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
     labels = [_labels(row) for row in found.rows]
     wanted = [not matches(words, ignore) and (not only or matches(words, only)) for words in labels]
-    kept = [k for k, keep in enumerate(wanted) if keep]
+    dropped = {k: "asked" for k, keep in enumerate(wanted) if not keep}
+    dropped |= {k: "mortar" for k in _mortar(found, labels, only) if k not in dropped}
+    kept = [k for k in range(len(labels)) if k not in dropped]
     if not kept:
         raise ValueError(f"'{path}' draws no block: all that it draws is left out as asked (ignore, only)")
     bodies = [found.bodies[k] for k in kept]
@@ -316,8 +319,25 @@ def _asked(found: Bodies, path: Path | str, ignore: Sequence[str], only: Sequenc
     size = float(np.ptp(every, axis=0).max())
     if not 0.0 < size < LARGEST_SIZE:
         raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
-    dropped = [k for k, keep in enumerate(wanted) if not keep]
     return _Asked(bodies, [_with_role(found.rows[k]) for k in kept], size, dropped)
+
+
+def _mortar(found: Bodies, labels: Sequence[Sequence[str]], only: Sequence[str]) -> list[int]:
+    """Find bodies that by name and place are the mortar around stones, not mortar drawn as blocks of its own."""
+    named = [bool(MORTAR.search(" ".join(words))) for words in labels]
+    if not any(named) or all(named):
+        return []
+    low, high = (np.array([pick(body.points[np.unique(body.faces)], axis=0) for body in found.bodies])
+                 for pick in (np.min, np.max))  # fmt: skip
+    stones = ~np.array(named)
+    around = []
+    for k in np.flatnonzero(named).tolist():
+        # A bed may end with its stones.
+        near = LEVEL * float((high[k] - low[k]).max())
+        held = ((low >= low[k] - near) & (high <= high[k] + near)).all(axis=1) & stones
+        if held.sum() >= 2 and not (only and matches(labels[k], only)):
+            around.append(k)
+    return around
 
 
 def _with_role(row: dict[str, Any]) -> dict[str, Any]:

@@ -95,7 +95,7 @@ def _enclosed(
     values, owner = np.unique(data[key] if key else np.zeros(len(rings), dtype=np.int64), return_inverse=True)
     names = [f"block {value}" for value in values.tolist()] if key else ["block"]
     try:
-        bodies, owners = bodies_of_surfaces(points, rings, owner, names, path)
+        closed = bodies_of_surfaces(points, rings, owner, names, path)
     except OpenSurface:
         # A drawing that is meant to be flat: the error says how far it is not.
         flattened(points, f"'{path}'")
@@ -106,11 +106,14 @@ def _enclosed(
         names = [f"block {k}" for k in range(int(owner.max()) + 1)]
         if key or len(names) < 2 or len(rings) < 4 * len(names):
             raise
-        bodies, owners = bodies_of_surfaces(points, rings, owner, names, path)
+        closed = bodies_of_surfaces(points, rings, owner, names, path)
+    bodies = closed.bodies
     first = np.unique(owner, return_index=True)[1]
-    rows = [row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, owners.tolist(), strict=True)]
+    rows = [
+        row_of(data, int(first[whose]), body.name) for body, whose in zip(bodies, closed.owners.tolist(), strict=True)
+    ]
     how = f"one per value of the cell array '{key}'" if key else "one per closed surface"
-    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, {how}",))
+    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, {how}", *closed.notes))
 
 
 def row_of(data: Mapping[str, np.ndarray], cell: int, name: str) -> dict[str, Any]:
@@ -221,6 +224,7 @@ def _merged_layouts(parts: Sequence[tuple[Layout, str]], path: Path | str) -> La
         unit=named[0].unit,
         notes=tuple(dict.fromkeys(joined("notes"))),
         left_out=joined("left_out"),
+        looks=joined("looks"),
     )
 
 

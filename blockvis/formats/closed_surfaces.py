@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from blockvis.layout.linked import linked
+from blockvis.layout.notes import LEFT_OUT, Note
+from blockvis.layout.outlines import FLAT
 from blockvis.layout.surfaces import same_points, turned_faces
 
 from .bodies import Body, fans
+from .reading import Reading
 
 #: Points closer than this fraction of the size of the drawing are one: single precision is accurate to 6e-8.
 SAME_POINT = 2e-6
@@ -78,7 +82,7 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
         x, y, z = points[unique[counts == 1][0]].mean(axis=0)
         raise OpenSurface(
             f"'{path}': body '{name}' is not closed: {int((counts == 1).sum())} edges belong to one face only, "
-            f"one around ({x:.6g}, {y:.6g}, {z:.6g}); export closed bodies"
+            f"one around ({x:.6g}, {y:.6g}, {z:.6g}); export closed bodies, or leave it out (ignore)"
         )
     if (counts > 2).any():
         x, y, z = points[unique[counts > 2][0]].mean(axis=0)
@@ -155,9 +159,87 @@ def _volumes(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.asarray((a * np.cross(b, c)).sum(axis=1) / 6.0)
 
 
+@dataclass(frozen=True)
+class Enclosed:
+    """Closed bodies of a file, the number of the part from which each is, and notes on parts that enclose nothing."""
+
+    bodies: list[Body]
+    owners: np.ndarray
+    notes: list[Note]
+
+
+def enclosed(
+    parts: Iterable[tuple[str, np.ndarray, np.ndarray]], size: float, path: Path | str, reading: Reading | None = None
+) -> Enclosed:
+    """Find the closed bodies of the parts of a file; plane ones, and open ones that nobody wants, are left out.
+
+    Parameters
+    ----------
+    parts : iterable of (name, (n, 3) points, (m, 3) faces)
+    size : float
+        Of the drawing, in the unit of the points.
+    path : Path or str
+        Named in messages.
+    reading : Reading, optional
+
+    Raises
+    ------
+    OpenSurface
+        For a part that is wanted and neither closed nor plane, and where none is closed.
+    ValueError
+        As of :func:`closed_bodies`.
+    """
+    bodies: list[Body] = []
+    owners: list[int] = []
+    plane, unwanted = [], []
+    first: OpenSurface | None = None
+    for number, (name, points, faces) in enumerate(parts):
+        try:
+            found = closed_bodies(name, points, faces, size, path)
+        except ValueError as error:
+            if reading is not None and not reading.wants([name]):
+                unwanted.append(name)
+            elif isinstance(error, OpenSurface) and _is_plane(points[np.unique(faces)], size):
+                plane.append(name)
+            else:
+                raise
+            first = first or (error if isinstance(error, OpenSurface) else None)
+            continue
+        bodies += found
+        owners += [number] * len(found)
+    if not bodies and first is not None:
+        raise first
+    notes = [without_volume(plane)] if plane else []
+    if unwanted:
+        notes.append(Note(LEFT_OUT, f"left out: {_listed(unwanted)}, no closed body, as asked for"))
+    return Enclosed(bodies, np.array(owners, dtype=int), notes)
+
+
+def without_volume(names: Sequence[str], supports: Sequence[str] = ()) -> Note:
+    """Say that faces without volume among the bodies are left out."""
+    remedy = "draw a support that it stands for by [[supports]]"
+    return Note(LEFT_OUT, f"left out: {_listed(names, supports)}, a single face without volume; {remedy}")
+
+
+def _listed(names: Sequence[str], supports: Sequence[str] = ()) -> str:
+    more = f" and {len(names) - 6} more" if len(names) > 6 else ""
+    return ", ".join(f"'{name}'" + " (a support)" * (name in supports) for name in names[:6]) + more
+
+
+def _is_plane(points: np.ndarray, size: float) -> bool:
+    """Whether points lie in a plane, within what is nothing in a drawing of this size."""
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(spread[-1] <= FLAT * size * np.sqrt(len(points)))
+
+
 def bodies_of_surfaces(
-    points: np.ndarray, rings: Sequence[np.ndarray], owner: np.ndarray, names: Sequence[str], path: Path | str
-) -> tuple[list[Body], np.ndarray]:
+    points: np.ndarray,
+    rings: Sequence[np.ndarray],
+    owner: np.ndarray,
+    names: Sequence[str],
+    path: Path | str,
+    reading: Reading | None = None,
+) -> Enclosed:
     """Find the bodies that surface cells enclose, of each owner by itself.
 
     Parameters
@@ -171,19 +253,10 @@ def bodies_of_surfaces(
         One per owner.
     path : Path or str
         Named in messages.
-
-    Returns
-    -------
-    bodies : list of Body
-    owners : (n_bodies,) int array
+    reading : Reading, optional
     """
-    size = float(np.ptp(points, axis=0).max())
-    bodies: list[Body] = []
-    owners: list[int] = []
-    for whose, name in enumerate(names):
-        found = closed_bodies(
-            name, points, fans([rings[k].tolist() for k in np.flatnonzero(owner == whose).tolist()]), size, path
-        )
-        bodies += found
-        owners += [whose] * len(found)
-    return bodies, np.array(owners)
+    parts = (
+        (name, points, fans([rings[k].tolist() for k in np.flatnonzero(owner == whose).tolist()]))
+        for whose, name in enumerate(names)
+    )
+    return enclosed(parts, float(np.ptp(points, axis=0).max()), path, reading)

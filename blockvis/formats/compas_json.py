@@ -17,13 +17,13 @@ import numpy as np
 
 from blockvis.layout.block_table import rows_of
 from blockvis.layout.layout import Layout
-from blockvis.layout.notes import LEFT_OUT, Note
+from blockvis.layout.notes import Note
 from blockvis.layout.outlines import FLAT
 from solver import mechanics
 
 from .bodies import Bodies, fans
 from .cells import layout_of_cells
-from .closed_surfaces import closed_bodies
+from .closed_surfaces import closed_bodies, without_volume
 
 #: Objects nested deeper than this are not looked into.
 DEEPEST = 40
@@ -94,7 +94,7 @@ def read_content(content: Any, path: Path, view: str | None) -> Layout | Bodies 
     if len(planes) < len(meshes):
         # A single face among bodies is a ground without depth.
         meshes = [mesh for mesh in meshes if len(mesh.faces) > 1]
-    bodies, rows, notes = [], [], [] if len(planes) == 0 else [_left_out(planes)]
+    bodies, rows, notes = [], [], [] if len(planes) == 0 else [_without_volume(planes)]
     for mesh in meshes:
         row = {key: value for key, value in mesh.row.items() if key != "key"}
         for body in closed_bodies(str(row["name"]), mesh.points, fans(mesh.faces), size, path):
@@ -103,11 +103,9 @@ def read_content(content: Any, path: Path, view: str | None) -> Layout | Bodies 
     return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} blocks of COMPAS", *notes))
 
 
-def _left_out(planes: Sequence[_Mesh]) -> Note:
-    listed = ", ".join(f"'{mesh.row['name']}'" + " (a support)" * ("role" in mesh.row) for mesh in planes[:6])
-    more = f" and {len(planes) - 6} more" if len(planes) > 6 else ""
-    remedy = "draw a support that it stands for by [[supports]]"
-    return Note(LEFT_OUT, f"left out: {listed}{more}, a single face without volume; {remedy}")
+def _without_volume(planes: Sequence[_Mesh]) -> Note:
+    supports = [str(mesh.row["name"]) for mesh in planes if "role" in mesh.row]
+    return without_volume([str(mesh.row["name"]) for mesh in planes], supports)
 
 
 def _flat(meshes: Sequence[_Mesh], path: Path, view: str | None) -> Layout | Bodies:

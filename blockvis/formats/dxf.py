@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
+from blockvis.layout.choice import Choice, look_of
 from blockvis.layout.layout import Layout
-from blockvis.layout.left_out import LeftOut, matches
+from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import CHANGED, LEFT_OUT, UPRIGHT, Note, kind_of
 from blockvis.layout.outlines import FLAT, arc_points
 from blockvis.layout.units import metres_per
@@ -39,6 +40,9 @@ NEVER_DRAWN = "Defpoints"
 #: Outlines closer than this fraction of their size are the same.
 CLOSES = 1e-6
 
+#: Colours of an entity that stand for that of its layer or of the inserted block, and what nobody gave a colour.
+BY_LAYER, BY_BLOCK, WHITE = 256, 0, 7
+
 _CURVES = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE", "ARC", "LINE", "SOLID", "TRACE", "3DFACE"}
 
 
@@ -50,6 +54,7 @@ class _Found:
     names: list[str] = field(default_factory=list)
     layers: list[str] = field(default_factory=list)
     rows: list[dict[str, Any]] = field(default_factory=list)
+    looks: list[tuple[str, ...]] = field(default_factory=list)
     loose: list[Line] = field(default_factory=list)
     skipped: Counter[str] = field(default_factory=Counter)
     hidden: Counter[str] = field(default_factory=Counter)
@@ -62,6 +67,7 @@ class _Found:
         self.layers.append(str(entity.dxf.layer))
         self.names.append(f"block {handle}")
         self.rows.append(_own_data(entity))
+        self.looks.append(_looks(entity))
 
 
 def read(path: Path, reading: Reading) -> Layout:
@@ -138,6 +144,7 @@ def _layout(found: _Found, faces: Faces, stated: str) -> Layout:
         unit=stated,
         notes=tuple(notes),
         left_out=tuple(item.seen([0, 1]) for item in found.left_out),
+        looks=tuple(found.looks),
     )
     rows = [
         {"group": layer, **({"material": layer} if layer != "0" else {}), "name": name, **row}
@@ -186,7 +193,13 @@ def _turned(found: _Found, view: str | None, path: Path) -> list[str]:
 
 
 def _flat(
-    entities: Any, depth: int, path: Path, frozen: Set[str], parent: str = "", layer: str = "0"
+    entities: Any,
+    depth: int,
+    path: Path,
+    frozen: Set[str],
+    parent: str = "",
+    layer: str = "0",
+    colour: int = WHITE,
 ) -> Iterator[tuple[Any, str]]:
     """Yield all entities, inserted blocks resolved, each with a handle that names it.
 
@@ -198,6 +211,8 @@ def _flat(
         handle = f"{parent}.{number}" if parent else str(entity.dxf.handle or number)
         if parent and entity.dxf.layer == "0":
             entity.dxf.layer = layer
+        if parent and entity.dxf.get("color", BY_LAYER) == BY_BLOCK:
+            entity.dxf.color = colour
         if entity.dxftype() != "INSERT" or entity.dxf.layer in frozen:
             yield entity, handle
             continue
@@ -205,7 +220,8 @@ def _flat(
         for k, copy in enumerate(copies):
             inner = _inserted(copy, path)
             number_of = f"{handle}.{k}" if entity.mcount > 1 else handle
-            yield from _flat(inner, depth + 1, path, frozen, number_of, entity.dxf.layer)
+            own = int(entity.dxf.get("color", BY_LAYER))
+            yield from _flat(inner, depth + 1, path, frozen, number_of, entity.dxf.layer, own)
 
 
 def _inserted(insert: Any, path: Path) -> Iterator[Any]:
@@ -264,7 +280,7 @@ def _add_curve(entity: Any, handle: str, found: _Found, tolerance: float | None)
     if closes and kind not in ("LINE", "ARC") and len(points) > 3:
         found.add(points, entity, handle)
         return
-    found.loose.append(Line(points, str(entity.dxf.layer), handle, must_close=kind not in ("LINE", "ARC")))
+    found.loose.append(Line(points, str(entity.dxf.layer), handle, kind not in ("LINE", "ARC"), _looks(entity)))
 
 
 def _circular(entity: Any, tolerance: float | None) -> np.ndarray | None:
@@ -313,6 +329,21 @@ def _with_bulges(corners: list[tuple[float, float, float]], closed: bool, tolera
     return np.array(points).reshape(-1, 2)
 
 
+def _looks(entity: Any) -> tuple[str, ...]:
+    """Kind of an entity and its colour: as #rrggbb and, where it has one, its number."""
+    from ezdxf.colors import DXF_DEFAULT_COLORS, int2rgb
+
+    kind, number = look_of(entity.dxftype()), int(entity.dxf.get("color", BY_LAYER))
+    exact = entity.dxf.get("true_color")
+    if exact is None and number == BY_LAYER and entity.doc is not None and entity.dxf.layer in entity.doc.layers:
+        drawn = entity.doc.layers.get(entity.dxf.layer)
+        number, exact = abs(int(drawn.dxf.get("color", WHITE))), drawn.dxf.get("true_color")
+    if exact is not None:
+        return (kind, "#{:02x}{:02x}{:02x}".format(*int2rgb(int(exact))))
+    number = number if 0 < number < BY_LAYER else WHITE
+    return (kind, "#{:02x}{:02x}{:02x}".format(*int2rgb(DXF_DEFAULT_COLORS[number])), str(number))
+
+
 def _hatch_rings(entity: Any, tolerance: float | None) -> list[np.ndarray]:
     """(n, 3) arrays: boundaries of a hatch."""
     from ezdxf.path import from_hatch
@@ -347,7 +378,7 @@ def _add_hatch(entity: Any, handle: str, found: _Found, tolerance: float | None)
         )
         holes = tuple(rings[k] for k in inside)
         layer, name = str(entity.dxf.layer), f"hatch {handle}"
-        found.left_out.append(LeftOut("hole", outer, message, layer, name, holes=holes))
+        found.left_out.append(LeftOut("hole", outer, message, layer, name, holes=holes, looks=_looks(entity)))
         return
     outlined = [ring for ring in rings if not _drawn_already(ring, found)]
     for k, ring in enumerate(outlined):
@@ -370,15 +401,22 @@ def _drawn_already(ring: np.ndarray, found: _Found) -> bool:
 def _with_loose(found: _Found, reading: Reading) -> Faces:
     """Add the faces between loose lines, and cut outlines along the lines within them."""
     wanted = []
-    chosen = any(matches([layer], reading.only) for layer in {*found.layers, *(line.layer for line in found.loose)})
+    layers = {*found.layers, *(line.layer for line in found.loose)}
+    names = {*layers, *found.names, *(f"line {line.handle}" for line in found.loose)}
+    names |= {str(row.get(key, "")) for row in found.rows for key in ("name", "group", "material")}
+    unwanted, asked = Choice(reading.ignore, names), Choice(reading.only, names)
+    looks = {look for own in (*found.looks, *(line.looks for line in found.loose)) for look in own}
+    chosen = any(asked.takes([layer]) for layer in layers) or asked.takes((), looks)
     for line in found.loose:
-        if matches([line.layer], reading.ignore) or (chosen and not reading.wants([line.layer])):
+        own = [line.layer], line.looks
+        if unwanted.takes(*own) or (chosen and not asked.takes(*own)):
             name = f"line {line.handle}"
-            found.left_out.append(LeftOut("asked line", line.points[:, :2], "", line.layer, name, closed=False))
+            left = LeftOut("asked line", line.points[:, :2], "", line.layer, name, closed=False, looks=line.looks)
+            found.left_out.append(left)
         else:
             wanted.append(line)
     # Outlines that will be left out are not cut.
-    able = [i for i, layer in enumerate(found.layers) if not matches([layer], reading.ignore)]
+    able = [i for i, layer in enumerate(found.layers) if not unwanted.takes([layer], found.looks[i])]
     faces = faces_of_lines(wanted, [found.rings[i][:, :2] for i in able])
     found.left_out += faces.left_out
     for k, pieces in sorted(faces.pieces.items(), reverse=True):
@@ -389,13 +427,15 @@ def _with_loose(found: _Found, reading: Reading) -> Faces:
             found.layers.append(found.layers[i])
             found.names.append(f"{found.names[i]}.{number}")
             found.rows.append({})
-        for values in (found.rings, found.layers, found.names, found.rows):
+            found.looks.append(found.looks[i])
+        for values in (found.rings, found.layers, found.names, found.rows, found.looks):
             del values[i]
     for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
         found.rings.append(np.column_stack([ring, np.zeros(len(ring))]))
         found.layers.append(layer)
         found.names.append(f"face {number}")
         found.rows.append({})
+        found.looks.append(("face",))
     if faces.rings:
         faces.notes.append(faces_note(faces, wanted))
     return faces

@@ -122,7 +122,7 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
     rings = [ring for block in mesh.rings for ring in block]
     groups = _group_names(mesh, 2, tags, path)
     if not is_flat(mesh.coordinates):
-        return _enclosed(mesh, rings, [groups[k] for k in owner], path)
+        return _enclosed(mesh, rings, [groups[k] for k in owner], path, reading)
     names = _entity_names(groups, tags, "surface")
     flat, note = flattened(mesh.coordinates, f"'{path}'", reading.view)
     unusable: dict[int, LeftOut] = {}
@@ -142,25 +142,26 @@ def layout_of_mesh(data: bytes, path: Path, reading: Reading) -> Layout | Bodies
     return _with_table(layout, table, tags).leaving_out(unusable)
 
 
-def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Path) -> Bodies:
+def _enclosed(mesh: _Mesh, rings: list[np.ndarray], groups: list[str], path: Path, reading: Reading) -> Bodies:
     """Find the bodies that surfaces in space enclose: those of each physical group, or else of all together."""
     named, owner = np.unique(groups, return_inverse=True)
     names = [str(name) or "body" for name in named]
     try:
-        bodies, owners = bodies_of_surfaces(mesh.coordinates, rings, owner, names, path)
+        closed = bodies_of_surfaces(mesh.coordinates, rings, owner, names, path, reading)
     except ValueError:
         try:
             names = ["body"]
-            bodies, owners = bodies_of_surfaces(mesh.coordinates, rings, np.zeros_like(owner), names, path)
+            closed = bodies_of_surfaces(mesh.coordinates, rings, np.zeros_like(owner), names, path)
         except OpenSurface:
             # A drawing that is meant to be flat: the error says how far it is not.
             flattened(mesh.coordinates, f"'{path}'")
             raise
     rows = []
-    for body, whose in zip(bodies, owners.tolist(), strict=True):
+    for body, whose in zip(closed.bodies, closed.owners.tolist(), strict=True):
         group = str(named[whose]) if len(names) > 1 else ""
         rows.append({"name": body.name, **({"group": group, "material": group} if group else {})})
-    return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} bodies, one per closed surface",))
+    notes = (f"{len(closed.bodies)} bodies, one per closed surface", *closed.notes)
+    return Bodies(tuple(closed.bodies), tuple(rows), notes=notes)
 
 
 def holds_flat_blocks(path: Path) -> bool:

@@ -33,12 +33,15 @@ class Line:
     layer, handle : str
     must_close : bool
         Whether it is a polyline, and so part of an outline; a single line may also be a dimension or an axis.
+    looks : tuple of str
+        Kind of entity and colour.
     """
 
     points: np.ndarray
     layer: str
     handle: str
     must_close: bool
+    looks: tuple[str, ...] = ()
 
 
 @dataclass
@@ -251,11 +254,9 @@ def _add_faces(
     shapely.prepare(loose)
     for line, segment in zip(lines, segments, strict=True):
         if shapely.covers(loose, segment):
-            found.left_out.append(
-                LeftOut(
-                    "open", line.points[:, :2], _open_message(line), line.layer, f"line {line.handle}", closed=False
-                )
-            )
+            said, name = _open_message(line), f"line {line.handle}"
+            left = LeftOut("open", line.points[:, :2], said, line.layer, name, closed=False, looks=line.looks)
+            found.left_out.append(left)
     tree = shapely.STRtree(segments)
     drawn = shapely.STRtree([shapely.Polygon(ring).buffer(0) for ring in outlines])
     for face in faces.geoms:

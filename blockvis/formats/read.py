@@ -17,9 +17,12 @@ from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of, standing
 from blockvis.layout.outlines import without_collinear
+from blockvis.layout.remedies import deep_overlaps, proposed_ignore
+from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.selection import noted, sorted_out
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
+from blockvis.layout.window import checked_window
 from blockvis.system.atomic_files import whole_file, write_whole
 
 from .bodies import Bodies, in_dimension
@@ -43,6 +46,7 @@ def read_layout(
     view: str | None = None,
     ignore: str | Sequence[str] = (),
     only: str | Sequence[str] = (),
+    window: Sequence[float] | None = None,
     dimension: int | str = "auto",
     thickness: float = 1.0,
 ) -> Layout:
@@ -61,7 +65,12 @@ def read_layout(
         Coordinates that become x and y, of drawings in space; by default those in which the blocks lie side by side.
     ignore, only : str or sequence of str, optional
         Layers, groups, materials and names, or patterns of them (``"dim*"``), that are left out, and beside which all
-        others are left out. What ``only`` names is not left out for looking like a frame, a title block or mortar.
+        others are left out. What ``only`` names is not left out for looking like a frame, a title block or mortar. Of
+        drawings also kinds of entities (``"circle"``, ``"hatch"``) and colours (``"#ff0000"``; of .dxf also a number of
+        AutoCAD's), where no layer or name is called so.
+    window : sequence of float, optional [m]
+        x0, y0, x1, y1 of what is read of a drawing in the plane, in the coordinates of the layout. What crosses its
+        edge is left out.
     dimension : {"auto", 2, 3}
         Whether blocks are read in the plane or in space; "auto" takes space where bodies are not prisms side by side.
         In space a drawing in the plane stands upright, extruded along y by its thickness.
@@ -82,6 +91,7 @@ def read_layout(
     path = Path(path)
     if unit is not None:
         metres_per(unit)
+    corners = checked_window(window)
     ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
     reading = Reading(unit=unit, chord_tolerance=chord_tolerance, view=checked_view(view), ignore=ignore, only=only)
     files = files_of(path)
@@ -90,6 +100,8 @@ def read_layout(
     layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
     layout = replace(layout, source=str(path))
     if layout.dimension == 3:
+        if corners:
+            raise ValueError(f"'{path}' was read in space, and window is of the plane; choose blocks by ignore or only")
         return noted(_in_metres(layout, unit))
     if layout.n_blocks == 0 and not layout.left_out:
         raise ValueError(f"'{path}' draws no block; draw each block as one closed outline or meshed surface")
@@ -101,7 +113,7 @@ def read_layout(
                 "coordinates must be finite numbers: repair the file"
             )
     layout = _in_metres(layout, unit)
-    layout = sorted_out(layout, ignore, only)
+    layout = sorted_out(layout, ignore, only, corners)
     for name, ring in zip(layout.names, layout.outlines, strict=True):
         if len(ring) > MOST_CORNERS:
             raise ValueError(
@@ -177,6 +189,7 @@ def read(
     view: str | None = None,
     ignore: str | Sequence[str] = (),
     only: str | Sequence[str] = (),
+    window: Sequence[float] | None = None,
     closing: str = "auto",
     outline_tolerance: float | None = None,
     dimension: int | str = "auto",
@@ -188,7 +201,7 @@ def read(
     path : str or Path
     roles, supports, density, thickness, joint_thickness, overlap_tolerance, closing, outline_tolerance
         As of :func:`blockvis.layout.assemble.assemble`.
-    unit, chord_tolerance, view, ignore, only, dimension
+    unit, chord_tolerance, view, ignore, only, window, dimension
         As of :func:`read_layout`.
 
     Returns
@@ -202,23 +215,31 @@ def read(
         view=view,
         ignore=ignore,
         only=only,
+        window=window,
         dimension=dimension,
         thickness=thickness,
     )
     if chord_tolerance is not None and outline_tolerance is None:
         # Who says how fine arcs are wants their chords.
         outline_tolerance = 0.0
-    return assemble(
-        layout,
-        roles=roles,
-        supports=supports,
-        density=density,
-        thickness=thickness,
-        joint_thickness=joint_thickness,
-        overlap_tolerance=overlap_tolerance,
-        closing=closing,
-        outline_tolerance=outline_tolerance,
-    )
+    try:
+        return assemble(
+            layout,
+            roles=roles,
+            supports=supports,
+            density=density,
+            thickness=thickness,
+            joint_thickness=joint_thickness,
+            overlap_tolerance=overlap_tolerance,
+            closing=closing,
+            outline_tolerance=outline_tolerance,
+        )
+    except DeepOverlap as error:
+        chosen = {"view": view, "only": only, "window": window, "dimension": dimension, "thickness": thickness}
+        remedy = overlap_remedy(layout, ignore, **chosen)
+        if not remedy:
+            raise
+        raise ValueError(f"{error}; {remedy}") from None
 
 
 def from_compas(model: Any, **options: Any) -> solver.Assembly:
@@ -263,6 +284,7 @@ def inspect(
     view: str | None = None,
     ignore: str | Sequence[str] = (),
     only: str | Sequence[str] = (),
+    window: Sequence[float] | None = None,
     dimension: int | str = "auto",
 ) -> Inspection:
     """Read a layout file and measure it.
@@ -274,11 +296,29 @@ def inspect(
         Unit of the file's lengths; it replaces the one that the file states.
     view : {"xy", "xz", "yz"}, optional
     ignore, only : str or sequence of str, optional
+    window : sequence of float, optional [m]
     dimension : {"auto", 2, 3}
         As of :func:`read_layout`.
     """
-    layout = read_layout(path, unit=unit, view=view, ignore=ignore, only=only, dimension=dimension)
-    return inspected(layout)
+    chosen: dict[str, Any] = {"unit": unit, "view": view, "only": only, "window": window, "dimension": dimension}
+    layout = read_layout(path, ignore=ignore, **chosen)
+    found = inspected(layout)
+    deep = [(i, j) for i, j, depth in found.overlapping if depth > found.overlap_tolerance]
+    return replace(found, remedy=_remedy(layout, deep, ignore, chosen)) if deep else found
+
+
+def overlap_remedy(layout: Layout, ignore: str | Sequence[str], **chosen: Any) -> str:
+    """Propose what to leave out of a layout whose blocks overlap, by the options with which it was read; or ""."""
+    return _remedy(layout, deep_overlaps(layout), ignore, chosen)
+
+
+def _remedy(
+    layout: Layout, deep: Sequence[tuple[int, int]], ignore: str | Sequence[str], chosen: Mapping[str, Any]
+) -> str:
+    """Propose what to leave out so that no blocks overlap, having tried it."""
+    before = (ignore,) if isinstance(ignore, str) else tuple(ignore)
+    chosen = {**chosen, "unit": layout.unit}
+    return proposed_ignore(layout, deep, lambda more: read_layout(layout.source, ignore=(*before, *more), **chosen))
 
 
 def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:

@@ -16,7 +16,7 @@ from blockvis.layout.solids import Solid, area_vectors, prism, triangles_of
 
 from .bodies import Bodies
 from .cells import layout_of_cells, merged
-from .closed_surfaces import closed_bodies
+from .closed_surfaces import enclosed
 from .reading import Reading
 
 #: Programs that write coordinates to .glb as they are, with z up, in small letters.
@@ -66,7 +66,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     rows = _own_rows(path)
     if float(np.ptp(every, axis=0).min()) <= FLAT * size:
         return replace(_flat(parts, path, rows, reading.view), unit=unit)
-    bodies = [body for part in parts for body in closed_bodies(*part, size, path)]
+    closed = enclosed(parts, size, path, reading)
+    bodies = closed.bodies
     if suffix == ".obj":
         # The reader returns the objects in an order of its own: rows are matched to them by name.
         by_name = {row.get("name"): row for row in rows}
@@ -76,7 +77,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         rows = found if len(found) == len(bodies) and all(isinstance(row, dict) for row in found) else []
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
     up, says = _up(path) if suffix == ".glb" else ("z", "")
-    return Bodies(tuple(bodies), tuple(known), unit, up=up, up_says=says)
+    return Bodies(tuple(bodies), tuple(known), unit, tuple(closed.notes), up=up, up_says=says)
 
 
 def _description(path: Path) -> dict[str, Any]:

@@ -19,8 +19,9 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from blockvis.layout.block_table import layers_of, rows_of, with_rows
+from blockvis.layout.choice import Choice
 from blockvis.layout.layout import Layout
-from blockvis.layout.left_out import LeftOut, matches
+from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import LARGEST_CHORD
 from blockvis.layout.units import UNITS, metres_per
@@ -55,6 +56,7 @@ class _Found:
     rings: list[np.ndarray] = field(default_factory=list)
     rows: list[dict[str, Any]] = field(default_factory=list)
     labels: list[tuple[str, ...]] = field(default_factory=list)
+    looks: list[tuple[str, ...]] = field(default_factory=list)
     loose: list[Line] = field(default_factory=list)
     loose_labels: list[tuple[str, ...]] = field(default_factory=list)
     misses: list[float] = field(default_factory=list)
@@ -71,6 +73,8 @@ class _Where:
     tolerance: float | None
     path: Path
     depth: int = 0
+    fill: str = "black"
+    stroke: str = "none"
 
     @property
     def layer(self) -> str:
@@ -111,36 +115,47 @@ def read(path: Path, reading: Reading) -> Layout:
     names = tuple(row.get("name", f"block {k}") for k, row in enumerate(found.rows))
     left_out = tuple(item.mapped((1.0, -1.0)) for item in found.left_out)
     notes = tuple(dict.fromkeys(found.notes))
-    layout = Layout(blocks=turned, names=names, unit=stated, notes=notes, left_out=left_out)
+    looks = tuple(found.looks)
+    layout = Layout(blocks=turned, names=names, unit=stated, notes=notes, left_out=left_out, looks=looks)
     return with_rows(layout, found.rows)
 
 
 def _with_loose(found: _Found, reading: Reading) -> Faces:
     """Leave out what is not wanted, add the faces between loose lines, cut outlines along the lines within them."""
-    every = [*found.labels, *found.loose_labels]
-    chosen = any(matches(labels, reading.only) for labels in every)
-    asked = replace(reading, only=reading.only if chosen else ())
-    for k in reversed([k for k, labels in enumerate(found.labels) if not asked.wants(labels)]):
-        ring, row, labels = found.rings.pop(k), found.rows.pop(k), found.labels.pop(k)
-        found.left_out.append(LeftOut("asked", ring, "", row.get("group", ""), row.get("name", "")))
+    every = [*zip(found.labels, found.looks, strict=True)]
+    lines = [(labels, line.looks) for line, labels in zip(found.loose, found.loose_labels, strict=True)]
+    names = {label for labels, _ in (*every, *lines) for label in labels}
+    names |= {str(row.get(key, "")) for row in found.rows for key in ("name", "group", "material")}
+    unwanted, asked = Choice(reading.ignore, names), Choice(reading.only, names)
+    chosen = any(asked.takes(*own) for own in (*every, *lines))
+
+    def wants(labels: tuple[str, ...], looks: tuple[str, ...]) -> bool:
+        return not unwanted.takes(labels, looks) and (not chosen or asked.takes(labels, looks))
+
+    for k in reversed([k for k, own in enumerate(every) if not wants(*own)]):
+        ring, row, looks = found.rings.pop(k), found.rows.pop(k), found.looks.pop(k)
+        found.left_out.append(LeftOut("asked", ring, "", row.get("group", ""), row.get("name", ""), looks=looks))
+        del found.labels[k]
     wanted = []
-    for line, labels in zip(found.loose, found.loose_labels, strict=True):
-        if asked.wants(labels):
+    for line, own in zip(found.loose, lines, strict=True):
+        if wants(*own):
             wanted.append(line)
         else:
-            left = LeftOut("asked line", line.points, "", line.layer, line.handle, closed=False)
+            left = LeftOut("asked line", line.points, "", line.layer, line.handle, closed=False, looks=line.looks)
             found.left_out.append(left)
     faces = faces_of_lines(wanted, found.rings)
     found.left_out += faces.left_out
     for k, pieces in sorted(faces.pieces.items(), reverse=True):
-        row = found.rows[k]
-        del found.rings[k], found.rows[k]
+        row, looks = found.rows[k], found.looks[k]
+        del found.rings[k], found.rows[k], found.looks[k]
         for number, piece in enumerate(pieces):
             found.rings.append(piece)
             found.rows.append({**row, "name": f"{row.get('name', 'block')} {number + 1}"})
+            found.looks.append(looks)
     for number, (ring, layer) in enumerate(zip(faces.rings, faces.layers, strict=True)):
         found.rings.append(ring)
         found.rows.append(_row(layer, f"face {number}"))
+        found.looks.append(("face",))
     if faces.rings:
         faces.notes.append(faces_note(faces, wanted))
     return faces
@@ -177,6 +192,8 @@ def _walk(element: ElementTree.Element, where: _Where, found: _Found) -> None:
     where = replace(
         where, matrix=where.matrix @ _matrix(element.get("transform", ""), where.path), depth=where.depth + 1
     )
+    fill, stroke = _style(element, "fill") or where.fill, _style(element, "stroke") or where.stroke
+    where = replace(where, fill=fill, stroke=stroke)
     if tag == "g":
         label = element.get(f"{_INKSCAPE}label") or element.get("id") or ""
         where = replace(where, layers=(*where.layers, label) if label else where.layers)
@@ -203,6 +220,7 @@ def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], whe
         kept = {}
     title = next((child.text or "" for child in element if _tag(child) == "title"), "")
     name = title.strip() or element.get(f"{_INKSCAPE}label") or element.get("id") or ""
+    looks = (_tag(element), *_colour(where))
     labels = (*where.layers, *(x for x in (title.strip(), element.get(f"{_INKSCAPE}label"), element.get("id")) if x))
     rings = []
     for points, closed in parts:
@@ -214,7 +232,7 @@ def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], whe
         joined = joined_ends(placed)
         if joined is None and not (closed and len(placed) > 2):
             handle = name or f"<{_tag(element)}>"
-            found.loose.append(Line(placed, where.layer, handle, must_close=len(placed) > 2))
+            found.loose.append(Line(placed, where.layer, handle, len(placed) > 2, looks))
             found.loose_labels.append(labels)
             continue
         # A closed path may have a short last edge: it stays.
@@ -230,13 +248,32 @@ def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], whe
         )
         outer = max(range(len(rings)), key=lambda k: float(np.ptp(rings[k], axis=0).max()))
         holes = tuple(ring for k, ring in enumerate(rings) if k != outer)
-        found.left_out.append(LeftOut("hole", rings[outer], message, where.layer, name, holes=holes))
+        found.left_out.append(LeftOut("hole", rings[outer], message, where.layer, name, holes=holes, looks=looks))
         return
     for k, ring in enumerate(rings):
         row = _row(where.layer, "" if not name else name if len(rings) == 1 else f"{name} {k + 1}")
         found.rings.append(ring)
         found.rows.append(kept if isinstance(kept, dict) and kept else row)
         found.labels.append(labels)
+        found.looks.append(looks)
+
+
+def _style(element: ElementTree.Element, key: str) -> str:
+    """Value of a property of an element, of its style or an attribute; "" where it is that of its parent."""
+    styled = re.findall(rf"(?:^|;)\s*{key}\s*:\s*([^;]+)", element.get("style", ""))
+    word = (styled[-1] if styled else element.get(key, "")).strip()
+    return "" if word == "inherit" else word
+
+
+def _colour(where: _Where) -> tuple[str, ...]:
+    """Give the colour of a shape as #rrggbb, that of its fill or else of its stroke; none where it has none."""
+    from PIL import ImageColor
+
+    word = where.stroke if where.fill in ("none", "transparent") else where.fill
+    try:
+        return ("#{:02x}{:02x}{:02x}".format(*ImageColor.getrgb(word)[:3]),)
+    except ValueError:
+        return ()
 
 
 def _row(layer: str, name: str) -> dict[str, Any]:

@@ -30,6 +30,9 @@ CLASSES = 8
 #: Gaps between faces that cover each other are joints drawn open between these parts of the width of a typical block.
 SMALLEST_JOINT, WIDEST_JOINT = 1e-3, 0.2
 
+#: Gaps below this part of the width of a typical block are no joints but rounding of coordinates.
+NO_JOINT = 1e-4
+
 #: Density of blocks for which the layout has none [kg/m³], as of a run.
 DENSITY = 2000.0
 
@@ -73,6 +76,8 @@ class Inspection:
         In space, pairs of blocks of which faces cover each other across a gap, and the gap [m], widest first.
     refused : str
         Why a run would refuse the blocks, or "".
+    remedy : str
+        What to leave out where blocks overlap, or "".
     """
 
     layout: Layout
@@ -91,6 +96,7 @@ class Inspection:
     facing: FacedJoints = field(default_factory=lambda: FacedJoints(()))
     open_joints: tuple[tuple[int, int, float], ...] = ()
     refused: str = ""
+    remedy: str = ""
 
     @property
     def unit_clash(self) -> str:
@@ -116,6 +122,7 @@ class Inspection:
             ),
             *self.rows,
             *((what, self._counted(of)) for what, of in (("groups", layout.groups), ("materials", layout.materials))),
+            *self._look_rows(),
             ("roles", self._counted(self.roles)),
             ("names", f"{', '.join(names[:4])}{' ...' if len(names) > 4 else ''}"),
             *self.joint_rows,
@@ -134,6 +141,17 @@ class Inspection:
         listed = [f"'{word}' {n}" if word else f"none {n}" for word, n in counted.most_common(12)]
         return ", ".join(listed) + (f", {len(counted) - 12} more" if len(counted) > 12 else "")
 
+    def _look_rows(self) -> list[Row]:
+        """Kinds and colours of the outlines of a drawing that has several, by which some can be left out."""
+        kinds = Counter(own[0] for own in (self.layout.looks[i] for i in self.kept) if own)
+        colours = Counter(" = ".join(own[1:]) for own in (self.layout.looks[i] for i in self.kept) if own[1:])
+        titled = (("drawn as", kinds), ("colours", colours))
+        return [
+            (title, ", ".join(f"{word} {n}" for word, n in counted.most_common(12)))
+            for title, counted in titled
+            if len(counted) > 1
+        ]
+
     def _overlap_rows(self) -> list[Row]:
         if not self.overlapping:
             return [] if self.refused else [("overlaps", "none")]
@@ -144,7 +162,7 @@ class Inspection:
                 "resolved to the midline" if resolved else "refused: move the blocks apart or raise overlap_tolerance"
             )
             rows.append(("", f"{self.layout.names[i]} and {self.layout.names[j]}: {depth:.3g} m, {verdict}"))
-        return rows
+        return [*rows, ("remedy", self.remedy)] if self.remedy else rows
 
 
 def inspected(layout: Layout) -> Inspection:
@@ -193,15 +211,20 @@ def _in_the_plane(layout: Layout) -> dict[str, Any]:
         "joint_thickness": proposal.thickness,
         "joints": proposal.stretches,
         "rows": (("corners", f"{sum(map(len, layout.outlines))}" + (f"; in a run {finer}" if finer else "")),),
-        "joint_rows": _mortar_rows(proposal),
+        "joint_rows": _mortar_rows(proposal, NO_JOINT * width),
     }
 
 
-def _mortar_rows(proposal: Proposal) -> tuple[Row, ...]:
-    """Report mortar joints by their thickness, and how they can be closed."""
+def _mortar_rows(proposal: Proposal, rounding: float) -> tuple[Row, ...]:
+    """Report mortar joints by their thickness, and how they can be closed; thinner ones than rounding [m] are none."""
     joints = proposal.stretches
     if not len(joints):
         return (("mortar joints", "none: no gaps between facing edges"),)
+    if proposal.thickness < rounding:
+        gaps = joints.gaps.max(axis=1) <= 1.0001 * proposal.thickness
+        said = f"none: {int(gaps.sum())} gaps of up to {proposal.thickness:.1g} m are the rounding of coordinates"
+        rows = [("mortar joints", f'{said}; joint_thickness = "auto" closes them')]
+        return (*rows, ("", proposal.note)) if proposal.note else tuple(rows)
     widest = joints.gaps.max(axis=1) * 1e3
     edges = np.linspace(0.0, max(proposal.thickness * 1e3, widest.max()), CLASSES + 1)
     edges[-1] *= 1.0 + 1e-6

@@ -56,6 +56,8 @@ class Layout:
         The file, "" for a layout that was not read from a file.
     left_out : tuple of LeftOut
         What the file draws beside its blocks.
+    looks : tuple of tuples of str
+        Kind of entity and colour of each block in a drawing, by which it can be left out.
     """
 
     blocks: tuple[Outline | Solid, ...]
@@ -69,6 +71,7 @@ class Layout:
     notes: tuple[str, ...] = ()
     source: str = ""
     left_out: tuple[LeftOut, ...] = ()
+    looks: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self) -> None:
         """Check that there is one word of each kind per block, and replace broken characters."""
@@ -77,6 +80,8 @@ class Layout:
                 object.__setattr__(self, kind, ("",) * self.n_blocks)
             if len(getattr(self, kind)) != self.n_blocks:
                 raise ValueError(f"{self.n_blocks} blocks but {len(getattr(self, kind))} {kind}; give one per block")
+        if not self.looks:
+            object.__setattr__(self, "looks", ((),) * self.n_blocks)
         # A file in another encoding than it states leaves halves of characters, which cannot be written to a file.
         note = "characters that the file's encoding does not have are shown as \ufffd"
         for kind in _WORDS:
@@ -137,14 +142,14 @@ class Layout:
         """Take only these blocks, in this order."""
         keep = [int(i) for i in blocks]
         taken: dict[str, Any] = {}
-        for kind in ("blocks", *_WORDS, "thickness", "density"):
+        for kind in ("blocks", *_WORDS, "looks", "thickness", "density"):
             of = getattr(self, kind)
             taken[kind] = tuple(of[i] for i in keep) if isinstance(of, tuple) else of if of is None else of[keep]
         return replace(self, **taken)
 
     def with_more(self, blocks: Sequence[Outline | Solid], **of_blocks: Sequence[Any]) -> Layout:
         """Add blocks, with what is known of them: names, roles, materials, density, thickness."""
-        taken: dict[str, Any] = {"blocks": self.blocks + tuple(blocks)}
+        taken: dict[str, Any] = {"blocks": self.blocks + tuple(blocks), "looks": self.looks + ((),) * len(blocks)}
         for kind in _WORDS:
             taken[kind] = getattr(self, kind) + tuple(of_blocks.get(kind, ("",) * len(blocks)))
         for kind in ("density",) if self.dimension == 3 else ("density", "thickness"):
@@ -158,7 +163,8 @@ class Layout:
         if not reasons:
             return self
         named = [
-            replace(item, name=self.names[i], layer=self.groups[i] or self.materials[i]) for i, item in reasons.items()
+            replace(item, name=self.names[i], layer=self.groups[i] or self.materials[i], looks=self.looks[i])
+            for i, item in reasons.items()
         ]
         others = self.chosen([i for i in range(self.n_blocks) if i not in reasons])
         return replace(others, left_out=(*self.left_out, *named))

@@ -19,6 +19,8 @@ KINDS = {
     "no outline": ("face without outline", "faces without outline"),
     "no area": ("outline without area", "outlines without area"),
     "sliver": ("sliver", "slivers"),
+    "crossing": ("outline that crosses itself", "outlines that cross themselves"),
+    "edge": ("outline across the edge of the window", "outlines across the edge of the window"),
     "background": ("frame or background around other blocks", "frames or backgrounds around other blocks"),
     "inner": ("inner line of a block", "inner lines of blocks"),
     "title": ("cell of a title block", "cells of a title block"),
@@ -48,6 +50,8 @@ class LeftOut:
         Whether it refuses the file unless the caller asks to leave it out.
     holes : tuple of (n, 2) arrays [m]
         Outlines of its holes.
+    looks : tuple of str
+        Kind of entity and colour; see :mod:`blockvis.layout.choice`.
     """
 
     kind: str
@@ -58,6 +62,7 @@ class LeftOut:
     closed: bool = True
     serious: bool = False
     holes: tuple[np.ndarray, ...] = ()
+    looks: tuple[str, ...] = ()
 
     def mapped(self, factors: float | Sequence[float]) -> LeftOut:
         """Multiply its coordinates."""

@@ -76,6 +76,10 @@ def overlaps(assembly: solver.Assembly, tolerance: float) -> list[tuple[int, int
     return [(int(i[k]), int(j[k]), float(depth[k])) for k in np.argsort(-depth)]
 
 
+class DeepOverlap(ValueError):
+    """Blocks that overlap more than a run resolves."""
+
+
 def refuse_overlaps(assembly: solver.Assembly, found: Sequence[tuple[int, int, float]], tolerance: float) -> None:
     """Refuse the deepest of some overlaps if it is deeper than a tolerance [m], with the place and the remedy."""
     deep = [pair for pair in found if pair[2] > tolerance]
@@ -86,7 +90,7 @@ def refuse_overlaps(assembly: solver.Assembly, found: Sequence[tuple[int, int, f
     low, high = np.max([c.min(axis=0) for c in corners], axis=0), np.min([c.max(axis=0) for c in corners], axis=0)
     place = ", ".join(f"{x:.6g}" for x in (low + high) / 2.0)
     others = f"; {len(deep) - 1} more pairs overlap" if len(deep) > 1 else ""
-    raise ValueError(
+    raise DeepOverlap(
         f"block {i} ('{assembly.names[i]}') overlaps block {j} ('{assembly.names[j]}') by {depth:.3g} m near "
         f"({place}); move them apart or raise overlap_tolerance ({tolerance:.3g} m){others}"
     )

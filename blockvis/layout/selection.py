@@ -11,12 +11,15 @@ import numpy as np
 
 from blockvis.text import by_similarity
 
+from .choice import KINDS, Choice, look_of
+from .crossings import uncrossed
 from .layout import Layout
 from .left_out import LeftOut, in_words, matches
 from .linked import linked
 from .notes import LEFT_OUT, UNIT, Note
 from .outlines import ring_area, ring_width
 from .units import doubt
+from .window import within_window
 
 #: An outline with less area than this times its perimeter squared is a line: the solver takes no block of less.
 LINE = 1e-9
@@ -29,6 +32,9 @@ SLIVER_SHAPE = 20.0
 
 #: A frame or background holds at least this share of all other outlines.
 BACKGROUND = 0.5
+
+#: Kinds of what was drawn as outlines, but cannot be blocks as it is.
+UNREAD = ("hole", "pieces", "no outline", "crossing", "across")
 
 #: Inner lines of blocks are left out from this many on; a single outline within another is refused by name.
 INNER = 3
@@ -49,7 +55,13 @@ def labels_of(layout: Layout, block: int) -> tuple[str, ...]:
     return layout.groups[block], layout.materials[block], layout.names[block]
 
 
-def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] = ()) -> Layout:
+def _words(layout: Layout, block: int) -> tuple[str, ...]:
+    return (*labels_of(layout, block), *layout.looks[block])
+
+
+def sorted_out(
+    layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] = (), window: Sequence[float] = ()
+) -> Layout:
     """Leave out what is no block, with a note per kind and layer, and doubt the unit.
 
     Parameters
@@ -57,7 +69,9 @@ def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] =
     layout : Layout
         As a format's reader gives it, lengths in m.
     ignore, only : sequences of str
-        Layers, groups, materials and names of blocks, or patterns of them.
+        Layers, groups, materials and names of blocks, or patterns of them; kinds of entities and colours.
+    window : sequence of float
+        x0, y0, x1, y1 [m] of what is read, or none.
 
     Raises
     ------
@@ -65,15 +79,20 @@ def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] =
         If a pattern of ``only`` matches nothing, no block is left, or something cannot be left out unasked.
     """
     where = f"'{layout.source}'" if layout.source else "the drawing"
-    layout = as_asked(layout, ignore, only)
-    layout = without_surroundings(without_debris(layout), only)
+    layout = within_window(as_asked(layout, ignore, only), window)
+    layout = without_surroundings(without_debris(uncrossed(layout)), only)
     for item in layout.left_out:
         if item.serious:
             raise ValueError(f"{where}: {item.message}; or leave it out (ignore)")
     if layout.n_blocks == 0:
         first = next((item for item in layout.left_out if item.message), None)
         asked = "all that it draws is left out as asked (ignore, only)"
-        counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
+        more = len(layout.left_out) - 1
+        counted = f"; {more} more {'is' if more == 1 else 'are'} left out" if first and more > 0 else ""
+        ground = next((item for item in layout.left_out if item.kind == "background"), None)
+        if ground is not None and any(item.kind in UNREAD for item in layout.left_out):
+            why = f"{first.message if first else asked}{counted}"
+            raise ValueError(f"{where}: nothing but a background is left, '{ground.name}': {why}")
         raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}")
     return noted(layout)
 
@@ -104,23 +123,30 @@ def as_asked(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layo
     known = [labels_of(layout, i) for i in range(layout.n_blocks)]
     beside = [(item.layer, item.name) for item in layout.left_out]
     every = [label for labels in (*known, *beside) for label in labels if label]
+    looks = {look for own in (*layout.looks, *(item.looks for item in layout.left_out)) for look in own}
     notes = list(layout.notes)
     for pattern in (*only, *ignore):
-        if matches(every, [pattern]):
+        if matches(every, [pattern]) or look_of(pattern) in looks or (pattern in ignore and look_of(pattern) in KINDS):
             continue
         listed = ", ".join(f"'{label}'" for label in by_similarity(pattern, list(dict.fromkeys(every))[:2000])[:12])
         message = f"'{pattern}' matches no layer, group or name; the drawing has {listed or 'none'}"
+        message += f"; its kinds and colours are {', '.join(sorted(looks)[:12])}" if looks else ""
         if pattern in only:
             raise ValueError(f"{layout.source or 'the drawing'}: only: {message}; correct it")
         notes.append(Note(LEFT_OUT, f"ignore: {message}"))
+    unwanted, wanted = Choice(ignore, (*every, "")), Choice(only, (*every, ""))
+
+    def dropped(labels: tuple[str, ...], own: tuple[str, ...]) -> bool:
+        return unwanted.takes(labels, own) or (bool(only) and not wanted.takes(labels, own))
+
     reasons = {
         i: LeftOut("asked", layout.outlines[i], "")
         for i, labels in enumerate(known)
-        if matches(labels, ignore) or (only and not matches(labels, only))
+        if dropped(labels, layout.looks[i])
     }
     asked = tuple(
         replace(item, kind="asked" if item.closed else "asked line", serious=False)
-        if matches((item.layer, item.name), ignore) or (only and not matches((item.layer, item.name), only))
+        if dropped((item.layer, item.name), item.looks)
         else item
         for item in layout.left_out
     )
@@ -169,7 +195,7 @@ def without_surroundings(layout: Layout, only: Sequence[str] = ()) -> Layout:
     by_name = {
         i: LeftOut("annotation", layout.outlines[i], f"block '{layout.names[i]}' is on layer '{layout.groups[i]}'")
         for i in range(layout.n_blocks)
-        if ANNOTATIONS.fullmatch(layout.groups[i].strip()) and not matches(labels_of(layout, i), only)
+        if ANNOTATIONS.fullmatch(layout.groups[i].strip()) and not matches(_words(layout, i), only)
     }
     if len(by_name) < layout.n_blocks:
         layout = layout.leaving_out(by_name)
@@ -181,7 +207,7 @@ def without_surroundings(layout: Layout, only: Sequence[str] = ()) -> Layout:
     )
     layout = replace(layout, left_out=mortar)
     reasons = _around_others(layout)
-    reasons = {i: item for i, item in reasons.items() if not matches(labels_of(layout, i), only)}
+    reasons = {i: item for i, item in reasons.items() if not matches(_words(layout, i), only)}
     return layout.leaving_out(reasons)
 
 
@@ -194,8 +220,8 @@ def _around_others(layout: Layout) -> dict[int, LeftOut]:
     """Frames and backgrounds around other blocks, title blocks on a frame, inner lines of blocks."""
     import shapely
 
-    n = layout.n_blocks
-    if n < 2:
+    n, (beside, of_outlines) = layout.n_blocks, _unread(layout)
+    if n + len(beside) < 2 or n == 0:
         return {}
     shapes = np.array([shapely.Polygon(ring) for ring in layout.outlines])
     shapes[~shapely.is_valid(shapes)] = shapely.Polygon()
@@ -204,10 +230,15 @@ def _around_others(layout: Layout) -> dict[int, LeftOut]:
     # Of two outlines drawn twice neither lies within the other.
     nested = (inner != outer) & (areas[inner] < (1.0 - 1e-6) * areas[outer]) & (areas[inner] > 0)
     inner, outer = inner[nested], outer[nested]
-    if len(inner) == 0:
-        return {}
     held = np.bincount(outer, minlength=n)
-    frames = [int(i) for i in np.flatnonzero((held >= 2) & (held >= BACKGROUND * (n - 1)))]
+    # What was left out counts, too: a background stays one where the drawing upon it cannot be read.
+    within, around = shapely.STRtree(shapes).query(beside, "covered_by")
+    smaller = shapely.area(beside)[within] < 0.99 * areas[around]
+    held += np.bincount(around[smaller], of_outlines[within[smaller]], n).astype(int)
+    others = n - 1 + of_outlines.sum()
+    frames = [int(i) for i in np.flatnonzero((held >= 2) & (held >= BACKGROUND * others))]
+    if len(inner) == 0 and not frames:
+        return {}
     reasons = {}
     for i in frames:
         kind = "mortar" if MORTAR.search(" ".join(labels_of(layout, i))) else "background"
@@ -221,6 +252,15 @@ def _around_others(layout: Layout) -> dict[int, LeftOut]:
         for i in lines:
             reasons[i] = LeftOut("inner", layout.outlines[i], f"block '{layout.names[i]}' lies within another")
     return reasons
+
+
+def _unread(layout: Layout) -> tuple[Any, np.ndarray]:
+    """Shapes that could not be read as blocks, and (n,) int array: of how many outlines each was drawn."""
+    import shapely
+
+    items = [item for item in layout.left_out if item.kind in UNREAD and len(item.points) > 2]
+    shapes = np.array([shapely.Polygon(item.points).convex_hull for item in items], dtype=object)
+    return shapes, np.array([1 + len(item.holes) for item in items], dtype=int)
 
 
 def _title_cells(layout: Layout, shapes: Any, frames: list[int]) -> dict[int, LeftOut]:

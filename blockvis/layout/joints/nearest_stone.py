@@ -113,7 +113,7 @@ def share_out(
     # A power of ten, from a round origin: round coordinates stay what they are.
     grid = float(10.0 ** np.floor(np.log10(GRID * scale)))
     origin = np.round(np.concatenate(outlines).mean(axis=0) / (1e6 * grid)) * (1e6 * grid)
-    shapes = np.array([shapely.Polygon(ring - origin).buffer(0) for ring in outlines])
+    shapes = np.array([_shape(ring - origin) for ring in outlines])
     growing = np.flatnonzero(~anchored) if not anchored.all() else np.arange(len(shapes))
     gaps = gaps_between(shapes, SPACING * thickness)
     masonry = _with_mortar(shapes, gaps, thickness, growing)
@@ -134,6 +134,13 @@ def share_out(
     return [np.asarray(outlines[i]) if anchored[i] else ring for i, ring in enumerate(found)]
 
 
+def _shape(ring: np.ndarray) -> Any:
+    """Polygon of a ring; of one that touches itself its largest piece."""
+    import shapely
+
+    return max(shapely.get_parts(shapely.Polygon(ring).buffer(0)), key=lambda part: part.area)
+
+
 def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
     """Propose the joint thickness that closes the joints between stones of any shape.
 
@@ -152,7 +159,7 @@ def proposed_gap(outlines: Sequence[np.ndarray]) -> tuple[float, float]:
     import shapely
 
     origin = np.concatenate(outlines).mean(axis=0)
-    shapes = np.array([shapely.Polygon(ring - origin).buffer(0) for ring in outlines])
+    shapes = np.array([_shape(ring - origin) for ring in outlines])
     size = float(np.median(np.sqrt(shapely.area(shapes))))
     gaps = gaps_between(shapes, 0.03 * size)
     local = gaps.local

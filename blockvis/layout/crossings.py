@@ -1,0 +1,87 @@
+"""Outlines that cross or touch themselves: reduced to their largest piece where it is nearly all of them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from .layout import Layout
+from .left_out import LeftOut
+from .notes import CHANGED, Note
+from .outlines import without_collinear
+
+#: The largest piece of an outline that crosses itself is the block if it holds at least this share of its area.
+WHOLE = 0.98
+
+
+def uncrossed(layout: Layout) -> Layout:
+    """Reduce outlines that cross or touch themselves to their largest piece, or leave them out.
+
+    Parameters
+    ----------
+    layout : Layout
+        Lengths in m.
+
+    Returns
+    -------
+    Layout
+        With a note on what was reduced. An outline without area stays: it is no crossing.
+    """
+    import shapely
+
+    rings = [ring if len(ring) > 2 else np.zeros((3, 2)) for ring in layout.outlines]
+    shapes = np.array([shapely.Polygon(ring) for ring in rings])
+    reasons: dict[int, LeftOut] = {}
+    reduced: dict[int, np.ndarray] = {}
+    lost = 0.0
+    for i in np.flatnonzero(~shapely.is_valid(shapes)).tolist():
+        # Beside lines, pieces lie in a collection within the collection.
+        parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(shapes[i])))
+        pieces = [part for part in parts if part.area > 0.0]
+        area = float(sum(part.area for part in pieces))
+        if not area > 0.0:
+            continue
+        piece = max(pieces, key=lambda part: part.area)
+        largest = shapely.Polygon(piece.exterior)
+        share = min(largest.area, area) / max(largest.area, area)
+        x, y = _crossing(shapes[i])
+        if share < WHOLE and largest.area > area:
+            # An outline that goes in along a line, around a hole and back.
+            holes = tuple(np.array(inner.coords)[:-1] for inner in piece.interiors)
+            x, y = holes[0].mean(axis=0)
+            message = (
+                f"block '{layout.names[i]}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the "
+                "hole with a block"
+            )
+            reasons[i] = LeftOut("hole", np.array(piece.exterior.coords)[:-1], message, holes=holes)
+            continue
+        if share < WHOLE:
+            message = (
+                f"block '{layout.names[i]}' crosses itself at ({x:.6g}, {y:.6g}), and its largest piece has only "
+                f"{100.0 * share:.3g} % of its area; redraw it as one outline, or as several"
+            )
+            reasons[i] = LeftOut("crossing", layout.outlines[i], message)
+            continue
+        reduced[i] = without_collinear(np.array(shapely.orient_polygons(largest).exterior.coords)[:-1])
+        lost = max(lost, 1.0 - share)
+    if reduced:
+        first = next(iter(reduced))
+        x, y = _crossing(shapes[first])
+        words, the = "1 outline crosses or touches itself, ", ""
+        if len(reduced) > 1:
+            words, the = f"{len(reduced)} outlines cross or touch themselves, ", "the first "
+        gone = f", with up to {100.0 * lost:.2g} % of the area gone" if lost > 1e-6 else ""
+        said = f"repaired: {words}{the}'{layout.names[first]}' at ({x:.6g}, {y:.6g}); the largest piece was kept{gone}"
+        blocks = tuple(reduced.get(i, ring) for i, ring in enumerate(layout.outlines))
+        layout = replace(layout, blocks=blocks, notes=(*layout.notes, Note(CHANGED, said)))
+    return layout.leaving_out(reasons)
+
+
+def _crossing(shape: object) -> np.ndarray:
+    """(2,) array [m]: where an invalid polygon crosses itself; its first corner where that is not known."""
+    import shapely
+
+    found = re.findall(r"-?\d+\.?\d*(?:[eE][-+]?\d+)?", str(shapely.is_valid_reason(shape)))
+    return np.array([float(x) for x in found[-2:]]) if len(found) > 1 else shapely.get_coordinates(shape)[0]

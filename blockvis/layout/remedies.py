@@ -1,0 +1,121 @@
+"""What to leave out of a drawing whose blocks overlap: the smallest set with a name, tried before it is proposed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+import solver
+
+from .facing import faced, facing_tolerance
+from .layout import Layout
+from .left_out import matches
+from .repair import DEFAULT_OVERLAP, duplicates, overlaps
+from .roles import dropped_twins
+
+#: What is left out is less than this part of the blocks: else it is the others that are the drawing.
+LESS = 0.5
+
+#: Proposals that are tried, the smallest first.
+TRIES = 4
+
+#: Blocks that are named one by one where their names do not begin alike.
+NAMED = 6
+
+#: Drawings of more blocks, or pairs that overlap, are not read again.
+MOST = 20_000
+
+
+def deep_overlaps(layout: Layout, tolerance: float | None = None) -> list[tuple[int, int]]:
+    """Find the pairs of blocks of which a run refuses the overlap, drawn twice or not.
+
+    Parameters
+    ----------
+    layout : Layout
+    tolerance : float, optional [m]
+        Depth that is resolved; by default that of a run.
+    """
+    dropped = dropped_twins(layout, duplicates(layout.every_corner), {})
+    kept = [i for i in range(layout.n_blocks) if i not in dropped]
+    drawn = layout.chosen(kept)
+    if layout.dimension == 3:
+        assembly = solver.Assembly.from_solids(faced(drawn.solids, drawn.names).solids, names=drawn.names)
+        allowed = facing_tolerance(drawn.solids)
+    else:
+        assembly = solver.Assembly.from_outlines(drawn.outlines, names=drawn.names)
+        allowed = DEFAULT_OVERLAP * float(np.median(assembly.widths))
+    return [(kept[i], kept[j]) for i, j, _ in overlaps(assembly, allowed if tolerance is None else tolerance)]
+
+
+def proposed_ignore(
+    layout: Layout, pairs: Sequence[tuple[int, int]], read_without: Callable[[Sequence[str]], Layout]
+) -> str:
+    """Propose what to leave out so that no blocks overlap.
+
+    Parameters
+    ----------
+    layout : Layout
+        As read.
+    pairs : sequence of (int, int)
+        Its blocks that overlap.
+    read_without : function of patterns
+        Reads the same drawing without what they name.
+
+    Returns
+    -------
+    str
+        With the options and what they do, "" where no small set has a name.
+    """
+    if not pairs or max(len(pairs), layout.n_blocks) > MOST:
+        return ""
+    known: dict[tuple[str, ...], set[int]] = {}
+    for patterns, blocks in _candidates(layout, pairs):
+        covers = all(i in blocks or j in blocks for i, j in pairs)
+        if covers and len(blocks) < LESS * layout.n_blocks:
+            known.setdefault(patterns, blocks)
+    for patterns, blocks in sorted(known.items(), key=lambda item: len(item[1]))[:TRIES]:
+        try:
+            without = read_without(patterns)
+            if without.n_blocks < (1.0 - LESS) * layout.n_blocks or deep_overlaps(without):
+                continue
+        except ValueError:
+            continue
+        options = " ".join(f'--ignore "{pattern}"' for pattern in patterns)
+        listed = ", ".join(f'"{pattern}"' for pattern in patterns)
+        return (
+            f"{options} leaves out {len(blocks)} of {layout.n_blocks} blocks, and then none overlap (tried; in a case "
+            f"ignore = [{listed}])"
+        )
+    return ""
+
+
+def _candidates(layout: Layout, pairs: Sequence[tuple[int, int]]) -> Iterator[tuple[tuple[str, ...], set[int]]]:
+    """Names of sets of blocks, and their numbers: layers, materials, kinds and colours, names and how they begin."""
+    concerned = sorted({block for pair in pairs for block in pair})
+    for values in (layout.groups, layout.materials):
+        for word in dict.fromkeys(values[i] for i in concerned):
+            if word:
+                yield (word,), {i for i, other in enumerate(values) if other == word}
+    for look in dict.fromkeys(look for i in concerned for look in layout.looks[i]):
+        yield (look,), {i for i, own in enumerate(layout.looks) if look in own}
+    cover = _cover(pairs)
+    names = [layout.names[i] for i in cover]
+    # What the first and the last have in common, all between them have.
+    same = [a == b for a, b in zip(min(names), max(names), strict=False)]
+    begins = min(names)[: [*same, False].index(False)]
+    if begins and len(cover) > 1:
+        yield (f"{begins}*",), {i for i, name in enumerate(layout.names) if matches([name], [f"{begins}*"])}
+    if len(cover) <= NAMED:
+        yield tuple(dict.fromkeys(names)), {i for i, name in enumerate(layout.names) if name in names}
+
+
+def _cover(pairs: Sequence[tuple[int, int]]) -> list[int]:
+    """Blocks of which every pair has one: again and again the one with most overlaps that are left."""
+    left, cover = list(pairs), []
+    while left:
+        block = Counter(block for pair in left for block in pair).most_common(1)[0][0]
+        cover.append(block)
+        left = [pair for pair in left if block not in pair]
+    return sorted(cover)
