@@ -268,6 +268,16 @@ def _add_choice(verb: argparse.ArgumentParser) -> None:
             metavar="PATTERN",
             help=f"{what} this layer, group or name; may be given again",
         )
+    _add_image(verb)
+
+
+def _add_image(verb: argparse.ArgumentParser) -> None:
+    what = "of an image, or of that of annotations"
+    for flag in ("--width", "--height"):
+        verb.add_argument(flag, type=float, metavar="M", help=f"{flag[2:]} {what}, in m")
+    verb.add_argument("--pixel", type=float, metavar="M", help=f"size of a pixel {what}, in m, instead")
+    verb.add_argument("--background", metavar="VALUE", help='value, or colour such as "white", of what is no stone')
+    verb.add_argument("--smallest", type=float, metavar="M", help="less of an image than this across is a speck")
 
 
 def _add_explain(verbs: Any) -> None:
@@ -395,7 +405,7 @@ def _new(options: argparse.Namespace) -> int:
     drawing = Path(options.drawing)
     stem = drawing.parent.name if glob.has_magic(drawing.name) else drawing.resolve().stem
     target = _new_file(options.output or f"{stem}.toml", options.force)
-    choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
+    choice = _choice(options)
     found = inspect(drawing, unit=options.unit, dimension=_dimension(options), **choice)
     text = case_text(found, relative_to(target.parent, drawing), **choice)
     write_whole(target, text)
@@ -589,7 +599,7 @@ def _info(options: argparse.Namespace) -> int:
     from .formats.read import inspect
     from .pictures.inspection import draw_inspection
 
-    choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
+    choice = _choice(options)
     found = inspect(options.file, unit=options.unit, dimension=_dimension(options), **choice)
     print(found)
     if options.picture:
@@ -602,7 +612,7 @@ def _convert(options: argparse.Namespace) -> int:
     from .layout.assemble import assemble
 
     target = _new_file(options.target, options.force)
-    choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
+    choice = _choice(options)
     layout = read_layout(options.source, unit=options.unit, dimension=_dimension(options), **choice)
     for note in layout.notes:
         print(f"blockvis: note: {note}", file=sys.stderr)
@@ -659,6 +669,14 @@ def _render(options: argparse.Namespace) -> int:
         drawn.append(options.animation)
     print(f"drawn in {folder}/: {', '.join(drawn)}")
     return 0
+
+
+def _choice(options: argparse.Namespace) -> dict[str, Any]:
+    """Take what is read of a drawing, and the scale of an image."""
+    keys = ("view", "ignore", "only", "width", "height", "pixel", "smallest")
+    background = options.background
+    given = int(background) if background is not None and background.isdecimal() else background
+    return {key: getattr(options, key) for key in keys} | {"background": given}
 
 
 def _new_file(path: str, force: bool) -> Path:

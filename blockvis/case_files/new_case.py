@@ -64,6 +64,7 @@ def case_text(
     view: str | None = None,
     ignore: Sequence[str] = (),
     only: Sequence[str] = (),
+    **image: Any,
 ) -> str:
     """Write the text of a case file for a drawing.
 
@@ -73,7 +74,7 @@ def case_text(
         Of the drawing.
     file : str
         The drawing, relative to the case file.
-    view, ignore, only
+    view, ignore, only, **image
         With which the drawing was read.
 
     Returns
@@ -94,14 +95,16 @@ def case_text(
         "only": list(only) or None,
         "dimension": 3 if in_space else None,
         "joint_thickness": "auto" if found.joint_thickness > 0.0 else None,
+        **image,
     }
+    hidden = (*(_IN_THE_PLANE if in_space else ()), *(() if any(image.values()) else case_keys.OF_IMAGES))
     known = found.layout.density is not None and bool(np.isfinite(found.layout.density[found.kept]).all())
     parts = [
         _comment(f"Case of {Path(file).name}, written by blockvis new. Lengths in m, forces in N, angles in rad."),
         _comment(_counted(found)),
         *(_comment(f"Note: {note}") for note in found.layout.notes),
         "",
-        _table(case_keys.GEOMETRY, geometry, leaving=("layout", "parameters", *(_IN_THE_PLANE if in_space else ()))),
+        _table(case_keys.GEOMETRY, geometry, leaving=("layout", "parameters", *hidden)),
         _roles(found, ground),
         *(
             _table(case_keys.SUPPORTS, support, leaving=("material",) if in_space else ("material", "levels"))

@@ -176,6 +176,7 @@ def _case_layout(case: Case) -> layout.Layout:
             only=case.only,
             dimension=case.dimension,
             thickness=thickness,
+            **case.image,
         )
     assert case.layout is not None
     try:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import solver
+from blockvis.formats.image_scale import ImageKeys
 
 from .explain_settings import ExplainSettings
 from .imperfections import Imperfection
@@ -34,6 +35,8 @@ class Case:
         Of the settlements along x; :func:`blockvis.cases.build.case_settlements` makes motions of supports of them.
     explain : ExplainSettings
         What ``blockvis explain`` looks for; other analyses leave it alone.
+    image : ImageKeys
+        Scale and labels of a layout file that is an image.
     vtu : {"moved", "undeformed"}
         Shape of the blocks in the VTU files.
     """
@@ -48,6 +51,7 @@ class Case:
     dimension: int | str = "auto"
     ignore: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
+    image: ImageKeys = field(default_factory=ImageKeys)
     thickness: float | None = None
     joint_thickness: float | str = 0.0
     closing: str = "auto"

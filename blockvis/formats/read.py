@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -26,10 +26,14 @@ from .bodies import Bodies, in_dimension
 from .cells import of_files
 from .files import MissingFile as MissingFile
 from .files import files_of
+from .image_scale import ImageKeys
 from .reading import Reading
 
 #: Largest coordinate [m], larger than the Earth; double precision resolves 1e-8 m there.
 LARGEST_COORDINATE = 1e8
+
+#: Modules whose files may be images, or annotations of one.
+HOLD_IMAGES = ("images", "layout_json")
 
 #: Most corners of one block: more indicate a bad export, and some checks take the square of their number.
 MOST_CORNERS = 2000
@@ -45,6 +49,7 @@ def read_layout(
     only: str | Sequence[str] = (),
     dimension: int | str = "auto",
     thickness: float = 1.0,
+    **image: Unpack[ImageKeys],
 ) -> Layout:
     """Read the blocks of a layout file.
 
@@ -67,6 +72,9 @@ def read_layout(
         In space a drawing in the plane stands upright, extruded along y by its thickness.
     thickness : float [m]
         For that, of blocks for which the file has none.
+    **image
+        ``width``, ``height`` or ``pixel`` [m], ``background``, ``smallest`` and ``outline_tolerance`` [m] of an image;
+        see :class:`blockvis.formats.image_scale.ImageKeys`.
 
     Returns
     -------
@@ -83,7 +91,7 @@ def read_layout(
     if unit is not None:
         metres_per(unit)
     ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
-    reading = Reading(unit=unit, chord_tolerance=chord_tolerance, view=checked_view(view), ignore=ignore, only=only)
+    reading = Reading(unit, chord_tolerance, checked_view(view), ignore, only, {**image})
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
     content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)
@@ -180,6 +188,11 @@ def read(
     closing: str = "auto",
     outline_tolerance: float | None = None,
     dimension: int | str = "auto",
+    width: float | None = None,
+    height: float | None = None,
+    pixel: float | None = None,
+    background: int | str | None = None,
+    smallest: float | None = None,
 ) -> solver.Assembly:
     """Read a layout file into an assembly.
 
@@ -190,6 +203,8 @@ def read(
         As of :func:`blockvis.layout.assemble.assemble`.
     unit, chord_tolerance, view, ignore, only, dimension
         As of :func:`read_layout`.
+    width, height, pixel, background, smallest
+        Of an image; as of :class:`blockvis.formats.image_scale.ImageKeys`.
 
     Returns
     -------
@@ -204,6 +219,12 @@ def read(
         only=only,
         dimension=dimension,
         thickness=thickness,
+        width=width,
+        height=height,
+        pixel=pixel,
+        background=background,
+        smallest=smallest,
+        outline_tolerance=outline_tolerance,
     )
     if chord_tolerance is not None and outline_tolerance is None:
         # Who says how fine arcs are wants their chords.
@@ -264,6 +285,7 @@ def inspect(
     ignore: str | Sequence[str] = (),
     only: str | Sequence[str] = (),
     dimension: int | str = "auto",
+    **image: Unpack[ImageKeys],
 ) -> Inspection:
     """Read a layout file and measure it.
 
@@ -275,9 +297,10 @@ def inspect(
     view : {"xy", "xz", "yz"}, optional
     ignore, only : str or sequence of str, optional
     dimension : {"auto", 2, 3}
+    **image
         As of :func:`read_layout`.
     """
-    layout = read_layout(path, unit=unit, view=view, ignore=ignore, only=only, dimension=dimension)
+    layout = read_layout(path, unit=unit, view=view, ignore=ignore, only=only, dimension=dimension, **image)
     return inspected(layout)
 
 
@@ -285,7 +308,10 @@ def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a file with the module of its suffix."""
     if path.stat().st_size == 0:
         raise ValueError(f"'{path}' is empty (0 bytes); export it again")
-    found: Layout | Bodies = _module_of(path, "read").read(path, reading)
+    module = _module_of(path, "read")
+    if _format(path, "read").module not in HOLD_IMAGES:
+        reading.refuse_image_keys(path)
+    found: Layout | Bodies = module.read(path, reading)
     return found
 
 
