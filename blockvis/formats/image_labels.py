@@ -7,6 +7,7 @@ borders of an antialiased image, have none, and their pixels go to the nearest l
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageColor
@@ -25,6 +26,18 @@ THIN = 0.005
 
 #: Two values are those of a mask where the others hold no more than this share.
 MOST_BETWEEN = 0.15
+
+#: Channels of grey differ by no more, of 255.
+GREY = 8
+
+#: A flat place of a noisy image is so many pixels from its border.
+WIDE = 3.0
+
+#: Pixels so near to the background may be of its border [pixels].
+BORDER = 3.0
+
+#: Value that stands for what is transparent.
+TRANSPARENT = -1
 
 #: The background is on the rim: at least this share of it, and on three of its four sides.
 RIM = 0.5
@@ -77,37 +90,87 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
     opaque, image = _opaque(image)
     values, words = _values(image)
     wanted = None if background is None else _value(background, image, words)
-    if _alike(values) >= EXACT and image.format != "JPEG":
-        numbers, known, moved = _of_values(values, image)
-        pieces = None
-    else:
-        numbers, colours, moved, pieces = _of_noise(image)
-        known = np.arange(len(colours))
-        words = {k: _colour(rgb) for k, rgb in enumerate(colours)}
-        wanted = None if wanted is None else _nearest_colour(wanted, colours, str(background))
+    exact = _alike(values) >= EXACT and image.format != "JPEG"
+    found = _of_values(values, image) if exact else _of_noise(image)
+    known = list(found.values)
+    if not exact:
+        words = {k: _colour(rgb) for k, rgb in enumerate(found.colours)}
+        wanted = None if wanted is None else _nearest_colour(wanted, found.colours, str(background))
+    called = [words.get(value, str(value)) for value in known]
+    numbers = found.numbers
     if not opaque.all():
         numbers = np.where(opaque, numbers, len(known))
-        known = np.append(known, -1)
-        words = {**words, -1: "transparent"}
-        wanted = -1 if wanted is None else wanted
-    called = [words.get(int(value), str(value)) for value in known]
+        known, called = [*known, TRANSPARENT], [*called, "transparent"]
+        wanted = TRANSPARENT if wanted is None else wanted
     if wanted is not None and wanted not in known:
         raise ValueError(f"has no background {background!r}; its values are {', '.join(called[:8])}")
     mask = len(known) == 2
+    outer: int | None
     if wanted is not None:
-        found: int | None = int(np.flatnonzero(known == wanted)[0])
+        outer = known.index(wanted)
+    elif mask:
+        outer = _background_of_mask(_filled(numbers, found, 0, np.inf)[0])
     else:
-        found = _background_of_mask(numbers) if mask else _background(numbers, known, words)
-    said = "" if found is None else called[found]
-    if pieces is not None and not mask:
+        outer = _background(numbers, known, words)
+    numbers, nearest = _filled(numbers, found, outer, np.inf if mask else BORDER)
+    moved, said = int((found.numbers < 0).sum()), "" if outer is None else called[outer]
+    if not exact and not mask:
         # Of what is noisy, what hangs together is a stone: of two in one colour the line between may be lost.
-        return Labels(pieces if found is None else np.where(numbers == found, 0, pieces), (), said, moved, False)
+        return Labels(np.where(numbers == outer, 0, found.pieces[nearest]), (), said, moved, False)
     order = np.arange(1, len(known) + 1)
-    if found is not None:
-        order[found:] -= 1
-        order[found] = 0
-    names = () if mask else tuple(word for k, word in enumerate(called) if k != found)
+    if outer is not None:
+        order[outer:] -= 1
+        order[outer] = 0
+    names = () if mask else tuple(word for k, word in enumerate(called) if k != outer)
     return Labels(order[numbers], names, said, moved, mask)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Values that are labels, before the pixels between them go to one.
+
+    Attributes
+    ----------
+    numbers : (height, width) int array
+        The value of each pixel by its number, from 0; -1 for none.
+    values : tuple of int
+    colours : (n, 1 or 3) array
+        Of the values.
+    shown : (height, width, 1 or 3) array
+        Colour of each pixel.
+    pieces : (height, width) int array
+        In a noisy image what hangs together, from 1.
+    """
+
+    numbers: np.ndarray
+    values: tuple[int, ...]
+    colours: np.ndarray
+    shown: np.ndarray
+    pieces: np.ndarray
+
+
+def _filled(numbers: np.ndarray, found: _Found, outer: int | None, reach: float) -> tuple[np.ndarray, Any]:
+    """Give the pixels between labels to the nearest one, or to the background if that is near and more alike.
+
+    Returns
+    -------
+    numbers : (height, width) int array
+    nearest : (row, column) arrays
+        The nearest pixel of a label that is no background, of each pixel.
+    """
+    from scipy import ndimage
+
+    between, ground = numbers < 0, numbers == (-1 if outer is None else outer)
+    nearest = tuple(ndimage.distance_transform_edt(between | ground, return_distances=False, return_indices=True))
+    stone = numbers[nearest]
+    if outer is None or outer >= len(found.colours) or not between.any():
+        return np.where(between, stone, numbers), nearest
+    near = between & (ndimage.distance_transform_edt(~ground) <= reach)
+    shown = found.shown[near]
+    away = [np.abs(shown - colour).sum(axis=1) for colour in (found.colours[outer], found.colours[stone[near]])]
+    result = np.where(between, stone, numbers)
+    result[near] = np.where(away[0] < away[1], outer, stone[near])
+    return result, nearest
 
 
 def _opaque(image: Image.Image) -> tuple[np.ndarray, Image.Image]:
@@ -133,8 +196,8 @@ def _values(image: Image.Image) -> tuple[np.ndarray, dict[int, str]]:
     if image.mode in ("1", "L", "P", "I") or image.mode.startswith("I;16"):
         return np.asarray(image).astype(np.int64), {}
     rgb = np.asarray(image.convert("RGB")).astype(np.int64)
-    if (rgb == rgb[..., :1]).all():
-        return rgb[..., 0], {}
+    if np.ptp(rgb, axis=2).max() <= GREY:
+        return rgb[..., 1], {}
     packed = rgb @ [65536, 256, 1]
     return packed, {int(v): f"#{v:06x}" for v in np.unique(packed)[:100_000]}
 
@@ -177,83 +240,67 @@ def _alike(values: np.ndarray) -> float:
     return float(((first == values[1:, :-1]) & (first == values[:-1, 1:])).mean())
 
 
-def _of_values(values: np.ndarray, image: Image.Image) -> tuple[np.ndarray, np.ndarray, int]:
-    """Find the labels of an exact image: the number of each pixel, their values, and how many pixels were moved."""
+def _of_values(values: np.ndarray, image: Image.Image) -> _Found:
+    """Find the labels of an exact image."""
     from scipy import ndimage
 
-    known, place = np.unique(values, return_inverse=True)
-    place = place.reshape(values.shape).astype(np.int32)
-    if len(known) <= 2:
-        return place, known, 0
-    core = ndimage.minimum_filter(place, 3) == ndimage.maximum_filter(place, 3)
-    label = np.bincount(place[core], minlength=len(known)) > 0
+    known, inverse = np.unique(values, return_inverse=True)
+    place = inverse.reshape(values.shape).astype(np.int32)
     share = np.bincount(place.ravel(), minlength=len(known)) / place.size
-    thin = ~label & (share >= THIN)
-    # Many values of some share each are a blur, not lines between stones.
-    label |= thin & (thin.sum() <= max(2, label.sum()))
+    label = np.ones(len(known), dtype=bool)
+    if len(known) > 2:
+        core = ndimage.minimum_filter(place, 3) == ndimage.maximum_filter(place, 3)
+        label = np.bincount(place[core], minlength=len(known)) > 0
+        thin = ~label & (share >= THIN)
+        # Many values of some share each are a blur, not lines between stones.
+        label |= thin & (thin.sum() <= max(2, label.sum()))
     if not label.any():
         raise ValueError("has no region of one value three pixels wide; give an image of more pixels")
-    order = np.cumsum(label) - 1
-    if label.all():
-        return place, known, 0
-    between = ~label[place]
-    if label.sum() == 2:
-        rgb = np.asarray(image.convert("RGB")).astype(float) if image.mode not in ("I", "F") else values[..., None]
-        middle = [np.median(rgb[place == k], axis=0) for k in np.flatnonzero(label)]
-        away = [np.abs(rgb - colour).sum(axis=2) for colour in middle]
-        numbers = np.where(between, (away[1] < away[0]).astype(np.int32), order[place])
-    else:
-        row, column = ndimage.distance_transform_edt(between, return_distances=False, return_indices=True)
-        numbers = order[place[row, column]]
-    return numbers, known[label], int(between.sum())
+    unlike = np.abs(known - known[label][0]) > 2 * FLAT
+    if label.sum() == 1 < len(known) and image.mode != "P" and known[-1] <= 255 and share[unlike].sum() >= THIN:
+        # Lines of many values on one ground: the commonest of what is unlike the ground stands for them.
+        label[np.flatnonzero(unlike)[share[unlike].argmax()]] = True
+    numbers = np.where(label[place], (np.cumsum(label) - 1)[place], -1).astype(np.int32)
+    several = image.mode in ("P", "RGB") and (image.mode == "P" or known[-1] > 255)
+    shown = np.asarray(image.convert("RGB")).astype(float) if several else values[..., None].astype(float)
+    first = np.unique(numbers.ravel(), return_index=True)[1][-int(label.sum()) :]
+    colours = shown.reshape(-1, shown.shape[2])[first]
+    return _Found(numbers, tuple(map(int, known[label])), colours, shown, np.zeros((0, 0), dtype=int))
 
 
-def _of_noise(image: Image.Image) -> tuple[np.ndarray, np.ndarray, int, np.ndarray]:
-    """Find the colours of a noisy image.
-
-    Returns
-    -------
-    numbers : (height, width) int array
-        The colour of each pixel.
-    colours : (n, 3) array
-    moved : int
-        Pixels of none of them.
-    pieces : (height, width) int array
-        What hangs together, from 1.
-    """
+def _of_noise(image: Image.Image) -> _Found:
+    """Find the colours of a noisy image."""
     from scipy import ndimage
 
     rgb = np.asarray(image.convert("RGB")).astype(np.int16)
-    spread = (ndimage.maximum_filter(rgb, (3, 3, 1)) - ndimage.minimum_filter(rgb, (3, 3, 1))).max(axis=2)
-    flat = spread <= FLAT
+    flat = (ndimage.maximum_filter(rgb, (3, 3, 1)) - ndimage.minimum_filter(rgb, (3, 3, 1))).max(axis=2) <= FLAT
     pieces, n = ndimage.label(flat)
-    count = np.bincount(pieces.ravel(), minlength=n + 1)
-    large = np.flatnonzero(count[1:] >= 9) + 1
-    if n == 0 or len(large) == 0 or flat.mean() < LEAST_FLAT:
+    # What is flat along a border, where the noise is, is narrow.
+    wide = ndimage.maximum(ndimage.distance_transform_edt(flat), pieces, np.arange(1, n + 1)) if n else np.zeros(0)
+    large = np.flatnonzero(np.asarray(wide) >= WIDE) + 1
+    if len(large) == 0 or flat.mean() < LEAST_FLAT:
         raise Photograph
+    weight = np.bincount(pieces.ravel(), minlength=n + 1)[large]
     deviation = np.sqrt(sum(ndimage.variance(rgb[..., c], pieces, large) for c in range(3)))
-    if float(np.average(deviation, weights=count[large])) > NOISE:
+    if float(np.average(deviation, weights=weight)) > NOISE:
         raise Photograph
     colour = np.stack([ndimage.mean(rgb[..., c], pieces, large) for c in range(3)], axis=1)
-    two = _two_colours(rgb, colour, count[large])
+    two = _two_colours(rgb, colour, weight)
     if two is not None:
-        away = [np.abs(rgb - one).sum(axis=2) for one in two]
-        numbers = (away[1] < away[0]).astype(np.int32)
-        return numbers, two, int((np.minimum(*away) > 3 * FLAT).sum()), numbers + 1
-    alike = _alike_colours(colour, count[large])
+        away = np.stack([np.abs(rgb - one).max(axis=2) for one in two])
+        numbers = np.where(away.min(axis=0) <= 3 * FLAT, away.argmin(axis=0), -1)
+        return _Found(numbers, (0, 1), two, rgb, np.zeros((0, 0), dtype=int))
+    alike = _alike_colours(colour, weight)
     order, piece = np.full((2, n + 1), -1, dtype=np.int32)
     order[large], piece[large] = alike, np.arange(1, len(large) + 1)
-    weight = count[large]
-    known = np.stack(
-        [np.average(colour[alike == k], axis=0, weights=weight[alike == k]) for k in range(alike.max() + 1)]
-    )
+    share = [np.where(alike == k, weight, 0) for k in range(alike.max() + 1)]
+    colours = np.stack([np.average(colour, axis=0, weights=own) for own in share])
     numbers, own = order[pieces], piece[pieces]
     # Joints too thin to be flat have the colour of the background.
     outer = _outer(numbers)
-    thin = (numbers < 0) & (np.abs(rgb - known[outer]).max(axis=2) <= FLAT)
+    thin = (numbers < 0) & (np.abs(rgb - colours[outer]).max(axis=2) <= FLAT)
     numbers[thin], own[thin] = outer, len(large) + 1
-    row, column = ndimage.distance_transform_edt(numbers < 0, return_distances=False, return_indices=True)
-    return numbers[row, column], known, int((numbers < 0).sum()), own[row, column]
+    return _Found(numbers, tuple(range(len(colours))), colours, rgb, own)
 
 
 def _outer(numbers: np.ndarray) -> int:
@@ -296,14 +343,14 @@ def _background_of_mask(numbers: np.ndarray) -> int:
     return _outer(numbers) if pieces[0] == pieces[1] else int(pieces[1] > pieces[0])
 
 
-def _background(numbers: np.ndarray, known: np.ndarray, words: dict[int, str]) -> int | None:
+def _background(numbers: np.ndarray, known: list[int], words: dict[int, str]) -> int | None:
     """Find the background of a label image: the value 0, or what is on most of the rim; None if there is none."""
-    zero = np.flatnonzero(known == 0)
-    if len(zero) and not words:
-        return int(zero[0])
+    zero = known.index(0) if 0 in known else None
+    if zero is not None and not words:
+        return zero
     outer = _outer(numbers)
     sides = [numbers[0], numbers[-1], numbers[:, 0], numbers[:, -1]]
     share = np.concatenate([side == outer for side in sides]).mean()
     if share >= RIM and sum((side == outer).any() for side in sides) >= 3:
         return outer
-    return int(zero[0]) if len(zero) else None
+    return zero if words.get(0) == "#000000" else None

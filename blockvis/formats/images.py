@@ -17,7 +17,7 @@ from blockvis.layout.outlines import ring_area
 
 from .image_labels import Labels, Photograph, labels_of
 from .image_scale import Placement, placement_of
-from .pixels import STAIRS, Outlined, Regions, outlined, regions_of
+from .pixels import SPECK, SPECK_OF_NOISE, STAIRS, Outlined, Regions, outlined, regions_of
 from .reading import Reading
 
 #: More pixels than this are refused before they fill the memory.
@@ -86,7 +86,9 @@ def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: 
     reading : Reading
     """
     smallest, tolerance = reading.image.get("smallest"), reading.image.get("outline_tolerance")
-    regions = regions_of(labels.numbers, None if smallest is None else smallest / placement.pixel)
+    noisy = not labels.is_mask and not labels.names
+    speck = SPECK_OF_NOISE if noisy else SPECK
+    regions = regions_of(labels.numbers, None if smallest is None else smallest / placement.pixel, speck)
     n = len(regions.labels)
     if n == 0:
         what = f"all of it is background ({labels.background})" if labels.background else "it is of one value"
@@ -136,7 +138,7 @@ def _named(labels: Labels, regions: Regions) -> tuple[tuple[str, ...], tuple[str
 def _notes(labels: Labels, regions: Regions, found: Outlined, placement: Placement) -> tuple[str, ...]:
     """Say how the image was read, and what was dropped."""
     height, width = labels.numbers.shape
-    of = f"{len(labels.names)} labels" if labels.names else "labels of a noisy image"
+    of = f"{len(set(regions.labels.tolist()))} labels" if labels.names else "labels of a noisy image"
     what = "a mask of stones" if labels.is_mask else of
     share = f"{100.0 * np.mean(labels.numbers == 0):.3g} % ({labels.background})" if labels.background else "none"
     notes: list[str] = [

@@ -12,11 +12,17 @@ from blockvis.layout.outlines import ring_area
 #: Regions less than this fraction of the typical one across (root of the area) are specks, unless the caller says else.
 SPECK = 0.05
 
+#: The same of a noisy image, of which borders break into pieces.
+SPECK_OF_NOISE = 0.1
+
 #: A region of fewer pixels across says nothing of its shape.
 FEWEST = 3.0
 
 #: Corners of the staircase of pixels go within this distance of a simpler outline [pixels].
 STAIRS = 1.0
+
+#: ... and of a stone alone within this fraction of its size across.
+OF_SIZE = 0.02
 
 #: A corner of the staircase between edges of so many pixels is one of the stone; others are cut at half a pixel.
 LONG_EDGE = 4.0
@@ -65,7 +71,7 @@ class Outlined:
     corners: int
 
 
-def regions_of(labels: np.ndarray, smallest: float | None = None) -> Regions:
+def regions_of(labels: np.ndarray, smallest: float | None = None, speck: float = SPECK) -> Regions:
     """Find the regions that hang together along edges of pixels.
 
     Parameters
@@ -74,6 +80,8 @@ def regions_of(labels: np.ndarray, smallest: float | None = None) -> Regions:
         0 for the background.
     smallest : float, optional [pixels]
         Regions less than this across (root of the area) are specks.
+    speck : float
+        By default those less than this fraction of the typical region across.
 
     Notes
     -----
@@ -85,7 +93,7 @@ def regions_of(labels: np.ndarray, smallest: float | None = None) -> Regions:
     areas = np.bincount(numbers.ravel(), minlength=len(of_region))
     stones = np.flatnonzero(of_region > 0)
     if smallest is None:
-        smallest = max(FEWEST, SPECK * _typical(areas[stones]))
+        smallest = max(FEWEST, speck * _typical(areas[stones]))
     small = areas < smallest**2
     small[0] = False
     specks = stones[small[stones]]
@@ -171,7 +179,7 @@ def outlined(regions: Regions, tolerance: float = STAIRS) -> Outlined:
     }
     rings = [shapely.get_coordinates(face.exterior)[:-1] for face in faces]
     corners = int(shapely.get_num_coordinates(drawn).sum()) - len(rings)
-    return Outlined(_as_large(rings, shapely.area(drawn), set(holes)) if tolerance else rings, holes, corners)
+    return Outlined(rings, holes, corners)
 
 
 def _faces(chains: Any, regions: Regions) -> Any | None:
@@ -211,7 +219,9 @@ def _without_stairs(chains: Any, tolerance: float) -> Any:
 
     lines = [_cut(shapely.get_coordinates(chain)) for chain in chains]
     cut = shapely.linestrings(np.concatenate(lines), indices=np.repeat(np.arange(len(lines)), [*map(len, lines)]))
-    simple = shapely.simplify(cut, tolerance, preserve_topology=False)
+    # Chords cut some off round stones: of small ones it would be felt.
+    across = np.sqrt([abs(ring_area(line)) if (line[0] == line[-1]).all() else np.inf for line in lines])
+    simple = shapely.simplify(cut, np.minimum(tolerance, OF_SIZE * across), preserve_topology=False)
     for _ in range(8):
         one, other = shapely.STRtree(simple).query(simple, "intersects")
         pair = one < other
@@ -243,26 +253,3 @@ def _cut(chain: np.ndarray) -> np.ndarray:
     points = np.stack([corners - half * ahead[:-1], corners + half * ahead[1:]], axis=1).reshape(-1, 2)
     points = np.vstack([chain[:1], points, chain[-1:]])
     return points[np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))]
-
-
-def _as_large(rings: list[np.ndarray], areas: np.ndarray, holed: set[int]) -> list[np.ndarray]:
-    """Make outlines that share no line as large as their pixels, of which chords of arcs cut some off.
-
-    Those that would then reach into another stay as they are.
-    """
-    import shapely
-
-    grown = list(rings)
-    ends = np.concatenate([np.concatenate([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings])
-    swap = (ends[:, 0] > ends[:, 2]) | ((ends[:, 0] == ends[:, 2]) & (ends[:, 1] > ends[:, 3]))
-    ends[swap] = ends[swap][:, [2, 3, 0, 1]]
-    _, edge, uses = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
-    shared = np.bincount(np.repeat(np.arange(len(rings)), [len(r) for r in rings]), uses[edge.ravel()] > 1) > 0
-    for k in set(np.flatnonzero(~shared).tolist()) - holed:
-        middle = rings[k].mean(axis=0)
-        grown[k] = middle + (rings[k] - middle) * np.sqrt(areas[k] / ring_area(rings[k]))
-    shapes = np.array([shapely.Polygon(ring) for ring in grown])
-    one, other = shapely.STRtree(shapes).query(shapes, "intersects")
-    for k in one[one != other].tolist():
-        grown[k] = rings[k]
-    return grown
