@@ -640,10 +640,12 @@ def _render(options: argparse.Namespace) -> int:
     from .pictures.render import animate, draw_mechanism, draw_still
     from .runs.progress import DrawingProgress
     from .runs.reopen import open_results
+    from .runs.underlay import stored_underlay
 
     folder = Path(options.results)
     response = open_results(folder)
     size = _size(options.size)
+    underlay = stored_underlay(folder)
     fall = _write_report(response, folder)
     drawn = ["report.html"]
     if response.path:
@@ -655,10 +657,11 @@ def _render(options: argparse.Namespace) -> int:
         "colour_by": options.colour_by,
         "forces": options.forces,
         "curve": options.curve,
+        "underlay": underlay,
     }
     last = response.path[-1] if response.path else response.increments[-1]
     draw_still(response, last, folder / "last.png", size=size, **look)
-    draw_mechanism(response, folder / "mechanism.png")
+    draw_mechanism(response, folder / "mechanism.png", underlay=underlay)
     drawn += ["last.png", "mechanism.png"]
     if options.animation != "none":
         progress = DrawingProgress()

@@ -458,7 +458,9 @@ OUTPUT = Section(
     (Key("animation", _FILM, "Name of the film in the results folder; false for none", "collapse.gif",
          default="collapse.mp4"),
      Key("vtu", one_of(("moved", "undeformed")), "Where the points of the VTU files are: where the blocks have moved "
-         "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved")),
+         "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved"),
+     Key("underlay", TEXT, "Photograph under pictures and film in the plane, relative to the case file, of what the "
+         "image of the blocks shows, or with a world file", "photo.jpg", otherwise="none")),
 )  # fmt: skip
 
 #: Every table of the case file with its keys.

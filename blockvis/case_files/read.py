@@ -154,6 +154,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         explain=read_explain(top.table("explain")),
         animation=output["animation"] or None,
         vtu=output["vtu"],
+        underlay=output["underlay"],
     )
     top.finish()
     return _checked(case, settings)

@@ -39,6 +39,8 @@ class Case:
         Scale and labels of a layout file that is an image.
     vtu : {"moved", "undeformed"}
         Shape of the blocks in the VTU files.
+    underlay : str or None
+        Photograph under the pictures, relative to the case file.
     """
 
     source: Path
@@ -75,3 +77,4 @@ class Case:
     explain: ExplainSettings = field(default_factory=ExplainSettings)
     animation: str | None = "collapse.mp4"
     vtu: str = "moved"
+    underlay: str | None = None
