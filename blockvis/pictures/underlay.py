@@ -10,10 +10,10 @@ from PIL import Image
 from . import palette
 
 #: How much of a photograph is paper, so that what is drawn on it stands out.
-PALE = 0.3
+PALE = 0.4
 
 #: How much of the colour of blocks covers it.
-COVER = 0.3
+COVER = 0.45
 
 
 @dataclass(frozen=True)
