@@ -275,11 +275,16 @@ def _add_choice(verb: argparse.ArgumentParser) -> None:
         metavar=("X0", "Y0", "X1", "Y1"),
         help="read what lies within this rectangle of the plane, in m, as info prints coordinates",
     )
+    _add_image(verb)
 
 
-def _choice(options: argparse.Namespace) -> dict[str, Any]:
-    """Take what is to be read of a drawing from the options."""
-    return {key: getattr(options, key) for key in ("view", "ignore", "only", "window")}
+def _add_image(verb: argparse.ArgumentParser) -> None:
+    what = "of an image, or of that of annotations"
+    for flag in ("--width", "--height"):
+        verb.add_argument(flag, type=float, metavar="M", help=f"{flag[2:]} {what}, in m")
+    verb.add_argument("--pixel", type=float, metavar="M", help=f"size of a pixel {what}, in m, instead")
+    verb.add_argument("--background", metavar="VALUE", help='value, or colour such as "white", of what is no stone')
+    verb.add_argument("--smallest", type=float, metavar="M", help="less of an image than this across is a speck")
 
 
 def _add_explain(verbs: Any) -> None:
@@ -642,10 +647,12 @@ def _render(options: argparse.Namespace) -> int:
     from .pictures.render import animate, draw_mechanism, draw_still
     from .runs.progress import DrawingProgress
     from .runs.reopen import open_results
+    from .runs.underlay import stored_underlay
 
     folder = Path(options.results)
     response = open_results(folder)
     size = _size(options.size)
+    underlay = stored_underlay(folder)
     fall = _write_report(response, folder)
     drawn = ["report.html"]
     if response.path:
@@ -657,10 +664,11 @@ def _render(options: argparse.Namespace) -> int:
         "colour_by": options.colour_by,
         "forces": options.forces,
         "curve": options.curve,
+        "underlay": underlay,
     }
     last = response.path[-1] if response.path else response.increments[-1]
     draw_still(response, last, folder / "last.png", size=size, **look)
-    draw_mechanism(response, folder / "mechanism.png")
+    draw_mechanism(response, folder / "mechanism.png", underlay=underlay)
     drawn += ["last.png", "mechanism.png"]
     if options.animation != "none":
         progress = DrawingProgress()
@@ -671,6 +679,14 @@ def _render(options: argparse.Namespace) -> int:
         drawn.append(options.animation)
     print(f"drawn in {folder}/: {', '.join(drawn)}")
     return 0
+
+
+def _choice(options: argparse.Namespace) -> dict[str, Any]:
+    """Take what is read of a drawing, and the scale of an image."""
+    keys = ("view", "ignore", "only", "window", "width", "height", "pixel", "smallest")
+    background = options.background
+    given = int(background) if background is not None and background.isdecimal() else background
+    return {key: getattr(options, key) for key in keys} | {"background": given}
 
 
 def _new_file(path: str, force: bool) -> Path:

@@ -90,6 +90,13 @@ def _dimension(table: Table, key: Key) -> int | str | None:
     return value
 
 
+def _background(table: Table, key: Key) -> int | str | None:
+    value: int | str | None = table.take(key.name)
+    if value is not None and (isinstance(value, bool) or not isinstance(value, int | str)):
+        raise table.error(key.name, f'is {shortened(value)}; give a whole number, or a colour such as "white"')
+    return value
+
+
 def _moment(table: Table, key: Key) -> float | tuple[float, float, float] | None:
     kind = TRIPLE if isinstance(table.take(key.name), list | tuple) else NUMBER
     found: float | tuple[float, float, float] | None = kind.read(table, key)
@@ -180,6 +187,7 @@ _FILM = ValueKind(
     _film,
 )
 _DIMENSION = ValueKind('2, 3 or "auto"', {"anyOf": [{"enum": [2, 3]}, {"const": "auto"}]}, _dimension)
+_BACKGROUND = ValueKind("whole number or colour", {"anyOf": [{"type": "integer"}, {"type": "string"}]}, _background)
 _MOMENT = ValueKind("number, in space three", {"anyOf": [NUMBER.schema, TRIPLE.schema]}, _moment)
 _TWO_NAMES = ValueKind(
     "two texts", {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}, _two_names
@@ -279,6 +287,15 @@ GEOMETRY = Section(
             ["stones"], default=()),
         Key("window", _WINDOW, "What is read of a drawing in the plane: [x0, y0, x1, y1], as blockvis info prints them",
             [0.0, 0.0, 6.0, 3.5], "m", otherwise="all of it"),
+        Key("width", POSITIVE, "Width of an image, or of that of annotations", 1.2, "m",
+            otherwise="height, pixel or a world file says its scale"),
+        Key("height", POSITIVE, "Height of the image, instead", 0.9, "m", otherwise="width, pixel or a world file"),
+        Key("pixel", POSITIVE, "Size of a pixel of the image, instead", 0.002, "m",
+            otherwise="width, height or a world file"),
+        Key("background", _BACKGROUND, "Value of an image, or colour, of what is no stone", 0,
+            otherwise="0, or what is on most of the rim; of a mask that between more stones"),
+        Key("smallest", POSITIVE, "Regions of an image less than this across (root of the area) are specks", 0.01, "m",
+            otherwise="a twentieth of the typical stone"),
         Key("thickness", POSITIVE, "Thickness out of plane of blocks for which the file has none", 0.25, "m",
             THICKNESS, elsewhere=True),
         Key("joint_thickness", _THICKNESS_OR_AUTO,
@@ -294,6 +311,9 @@ GEOMETRY = Section(
     ),
     required=True,
 )  # fmt: skip
+
+#: Keys of [geometry] of an image.
+OF_IMAGES = ("width", "height", "pixel", "background", "smallest")
 
 PARAMETERS = Section(
     "geometry.parameters",
@@ -457,7 +477,9 @@ OUTPUT = Section(
     (Key("animation", _FILM, "Name of the film in the results folder; false for none", "collapse.gif",
          default="collapse.mp4"),
      Key("vtu", one_of(("moved", "undeformed")), "Where the points of the VTU files are: where the blocks have moved "
-         "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved")),
+         "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved"),
+     Key("underlay", TEXT, "Photograph under pictures and film in the plane, relative to the case file, of what the "
+         "image of the blocks shows, or with a world file", "photo.jpg", otherwise="none")),
 )  # fmt: skip
 
 #: Every table of the case file with its keys.

@@ -65,6 +65,7 @@ def case_text(
     ignore: Sequence[str] = (),
     only: Sequence[str] = (),
     window: Sequence[float] = (),
+    **image: Any,
 ) -> str:
     """Write the text of a case file for a drawing.
 
@@ -74,7 +75,7 @@ def case_text(
         Of the drawing.
     file : str
         The drawing, relative to the case file.
-    view, ignore, only, window
+    view, ignore, only, window, **image
         With which the drawing was read.
 
     Returns
@@ -96,14 +97,16 @@ def case_text(
         "window": list(window or ()) or None,
         "dimension": 3 if in_space else None,
         "joint_thickness": "auto" if found.joint_thickness > 0.0 else None,
+        **image,
     }
+    hidden = (*(_IN_THE_PLANE if in_space else ()), *(() if any(image.values()) else case_keys.OF_IMAGES))
     known = found.layout.density is not None and bool(np.isfinite(found.layout.density[found.kept]).all())
     parts = [
         _comment(f"Case of {Path(file).name}, written by blockvis new. Lengths in m, forces in N, angles in rad."),
         _comment(_counted(found)),
         *(_comment(f"Note: {note}") for note in found.layout.notes),
         "",
-        _table(case_keys.GEOMETRY, geometry, leaving=("layout", "parameters", *(_IN_THE_PLANE if in_space else ()))),
+        _table(case_keys.GEOMETRY, geometry, leaving=("layout", "parameters", *hidden)),
         _roles(found, ground),
         *(
             _table(case_keys.SUPPORTS, support, leaving=("material",) if in_space else ("material", "levels"))
@@ -128,7 +131,8 @@ def case_text(
         leaving = _all_but("kind", "blocks", "weight_fraction", section=case_keys.LOADS)
         push = [1.0, *[0.0] * (found.layout.dimension - 1)]
         parts.append(_table(case_keys.LOADS, {"kind": "live", "weight_fraction": push}, leaving=leaving))
-    parts.append(_table(case_keys.OUTPUT, {"animation": "collapse.mp4"}))
+    beside = () if any(image.values()) else ("underlay",)
+    parts.append(_table(case_keys.OUTPUT, {"animation": "collapse.mp4"}, leaving=beside))
     parts.append(_comment("There are more tables and keys: blockvis schema lists them."))
     return "\n".join(parts) + "\n"
 

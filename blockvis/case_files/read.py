@@ -154,6 +154,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         explain=read_explain(top.table("explain")),
         animation=output["animation"] or None,
         vtu=output["vtu"],
+        underlay=output["underlay"],
     )
     top.finish()
     return _checked(case, settings)
@@ -172,10 +173,11 @@ def _geometry(table: Table) -> dict[str, Any]:
         raise table.error(
             "unit", f"is {shortened(values['unit'])}, but is of a file's lengths; a layout is in m: leave it out"
         )
-    for key in ("view", "ignore", "only", "window"):
-        if file is None and values[key]:
+    for key in ("view", "ignore", "only", "window", *keys.OF_IMAGES):
+        if file is None and values[key] is not None and values[key] != ():
             raise table.error(key, "belongs to a file, not to a layout")
-    return values | {"parameters": dict(values["parameters"])}
+    image = {key: values.pop(key) for key in keys.OF_IMAGES} | {"outline_tolerance": values["outline_tolerance"]}
+    return values | {"parameters": dict(values["parameters"]), "image": image}
 
 
 def _checked(case: Case, settings: Mapping[str, Any]) -> Case:

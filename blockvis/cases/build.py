@@ -72,7 +72,13 @@ def case_assembly(case: Case) -> solver.Assembly:
             outline_tolerance=case.outline_tolerance,
         )
     except DeepOverlap as error:
-        chosen = {"view": case.view, "only": case.only, "window": case.window, "dimension": case.dimension}
+        chosen = {
+            "view": case.view,
+            "only": case.only,
+            "window": case.window,
+            "dimension": case.dimension,
+            **case.image,
+        }
         remedy = overlap_remedy(sketch, case.ignore, **chosen) if case.file is not None else ""
         if not remedy:
             raise
@@ -185,6 +191,7 @@ def _case_layout(case: Case) -> layout.Layout:
             window=case.window,
             dimension=case.dimension,
             thickness=thickness,
+            **case.image,
         )
     assert case.layout is not None
     try:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import solver
+from blockvis.formats.image_scale import ImageKeys
 
 from .explain_settings import ExplainSettings
 from .imperfections import Imperfection
@@ -34,8 +35,12 @@ class Case:
         Of the settlements along x; :func:`blockvis.cases.build.case_settlements` makes motions of supports of them.
     explain : ExplainSettings
         What ``blockvis explain`` looks for; other analyses leave it alone.
+    image : ImageKeys
+        Scale and labels of a layout file that is an image.
     vtu : {"moved", "undeformed"}
         Shape of the blocks in the VTU files.
+    underlay : str or None
+        Photograph under the pictures, relative to the case file.
     """
 
     source: Path
@@ -49,6 +54,7 @@ class Case:
     ignore: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
     window: tuple[float, ...] | None = None
+    image: ImageKeys = field(default_factory=ImageKeys)
     thickness: float | None = None
     joint_thickness: float | str = 0.0
     closing: str = "auto"
@@ -72,3 +78,4 @@ class Case:
     explain: ExplainSettings = field(default_factory=ExplainSettings)
     animation: str | None = "collapse.mp4"
     vtu: str = "moved"
+    underlay: str | None = None

@@ -14,18 +14,30 @@ __all__ = ["FORMATS", "Format"]
 
 @dataclass(frozen=True)
 class Format:
-    """One family of files: its module in this room, and whether it reads and writes them, also blocks in space."""
+    """One family of files.
+
+    Attributes
+    ----------
+    module : str
+        In this room.
+    reads, writes, writes_space : bool
+        Whether it reads and writes them, also blocks in space.
+    alone : bool
+        Whether a file holds all blocks: in a folder of one file per stone it is something else, such as a picture.
+    """
 
     module: str
     reads: bool = True
     writes: bool = False
     writes_space: bool = False
+    alone: bool = False
 
 
 _CAD = Format("gmsh_cad")
 _PYVISTA = Format("pyvista_files")
 _SOLID = Format("solids", writes=True, writes_space=True)
 _MESHIO = Format("meshio_files")
+_IMAGE = Format("images", alone=True)
 
 #: By suffix. Every other suffix that meshio knows goes to meshio.
 FORMATS = {
@@ -49,6 +61,11 @@ FORMATS = {
     ".step": _CAD,
     ".stp": _CAD,
     ".brep": _CAD,
+    ".png": _IMAGE,
+    ".tif": _IMAGE,
+    ".tiff": _IMAGE,
+    ".jpg": _IMAGE,
+    ".jpeg": _IMAGE,
     ".inp": _MESHIO,
     ".bdf": _MESHIO,
     ".fem": _MESHIO,

@@ -11,6 +11,7 @@ the points around each face, counter-clockwise seen from outside; z is up.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,28 +23,39 @@ from blockvis.layout.solids import Solid
 from blockvis.layout.surfaces import cleaned
 
 from . import compas_json
+from .annotations import program_of
+from .annotations import read_content as read_annotations
 from .bodies import Bodies
 from .reading import Reading
 
 FORMAT = "blockvis layout"
+
+#: What reads the parsed JSON of other programs; each returns None for what it does not know.
+KINDS: tuple[Callable[[Any, Path, Reading], Layout | Bodies | None], ...] = (
+    read_annotations,
+    compas_json.read_content,
+)
 
 #: In the name of a file for COMPAS, before its suffix.
 COMPAS = ".compas."
 
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
-    """Read a .json layout, or the blocks of a file of COMPAS."""
+    """Read a .json layout, or what other programs write as JSON."""
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise ValueError(f"'{path}' is not a JSON file: {error}; export it again") from None
-    if not _is_own(content):
-        found = compas_json.read_content(content, path, reading.view)
+    if not program_of(content):
+        reading.refuse_image_keys(path)
+    for read_content in () if _is_own(content) else KINDS:
+        found = read_content(content, path, reading)
         if found is not None:
             return found
     if not isinstance(content, dict) or not isinstance(content.get("blocks"), list):
         raise ValueError(
-            f"'{path}' is JSON but no layout; it needs a list \"blocks\" of {{name, outline}}, or meshes of COMPAS"
+            f"'{path}' is JSON but no layout; it needs a list \"blocks\" of {{name, outline}}, annotations of COCO, "
+            "LabelMe or VIA, or meshes of COMPAS"
         )
     if reading.view not in (None, "xy"):
         raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -29,10 +29,14 @@ from .bodies import Bodies, in_dimension
 from .cells import of_files
 from .files import MissingFile as MissingFile
 from .files import files_of
+from .image_scale import ImageKeys
 from .reading import Reading
 
 #: Largest coordinate [m], larger than the Earth; double precision resolves 1e-8 m there.
 LARGEST_COORDINATE = 1e8
+
+#: Modules whose files may be images, or annotations of one.
+HOLD_IMAGES = ("images", "layout_json")
 
 #: Most corners of one block: more indicate a bad export, and some checks take the square of their number.
 MOST_CORNERS = 2000
@@ -49,6 +53,7 @@ def read_layout(
     window: Sequence[float] | None = None,
     dimension: int | str = "auto",
     thickness: float = 1.0,
+    **image: Unpack[ImageKeys],
 ) -> Layout:
     """Read the blocks of a layout file.
 
@@ -76,6 +81,9 @@ def read_layout(
         In space a drawing in the plane stands upright, extruded along y by its thickness.
     thickness : float [m]
         For that, of blocks for which the file has none.
+    **image
+        ``width``, ``height`` or ``pixel`` [m], ``background``, ``smallest`` and ``outline_tolerance`` [m] of an image;
+        see :class:`blockvis.formats.image_scale.ImageKeys`.
 
     Returns
     -------
@@ -93,7 +101,7 @@ def read_layout(
         metres_per(unit)
     corners = checked_window(window)
     ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
-    reading = Reading(unit=unit, chord_tolerance=chord_tolerance, view=checked_view(view), ignore=ignore, only=only)
+    reading = Reading(unit, chord_tolerance, checked_view(view), ignore, only, {**image})
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
     content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)
@@ -193,6 +201,11 @@ def read(
     closing: str = "auto",
     outline_tolerance: float | None = None,
     dimension: int | str = "auto",
+    width: float | None = None,
+    height: float | None = None,
+    pixel: float | None = None,
+    background: int | str | None = None,
+    smallest: float | None = None,
 ) -> solver.Assembly:
     """Read a layout file into an assembly.
 
@@ -203,6 +216,8 @@ def read(
         As of :func:`blockvis.layout.assemble.assemble`.
     unit, chord_tolerance, view, ignore, only, window, dimension
         As of :func:`read_layout`.
+    width, height, pixel, background, smallest
+        Of an image; as of :class:`blockvis.formats.image_scale.ImageKeys`.
 
     Returns
     -------
@@ -218,6 +233,12 @@ def read(
         window=window,
         dimension=dimension,
         thickness=thickness,
+        width=width,
+        height=height,
+        pixel=pixel,
+        background=background,
+        smallest=smallest,
+        outline_tolerance=outline_tolerance,
     )
     if chord_tolerance is not None and outline_tolerance is None:
         # Who says how fine arcs are wants their chords.
@@ -286,6 +307,7 @@ def inspect(
     only: str | Sequence[str] = (),
     window: Sequence[float] | None = None,
     dimension: int | str = "auto",
+    **image: Unpack[ImageKeys],
 ) -> Inspection:
     """Read a layout file and measure it.
 
@@ -298,9 +320,11 @@ def inspect(
     ignore, only : str or sequence of str, optional
     window : sequence of float, optional [m]
     dimension : {"auto", 2, 3}
+    **image
         As of :func:`read_layout`.
     """
     chosen: dict[str, Any] = {"unit": unit, "view": view, "only": only, "window": window, "dimension": dimension}
+    chosen |= image
     layout = read_layout(path, ignore=ignore, **chosen)
     found = inspected(layout)
     deep = [(i, j) for i, j, depth in found.overlapping if depth > found.overlap_tolerance]
@@ -325,7 +349,10 @@ def _read_by_suffix(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a file with the module of its suffix."""
     if path.stat().st_size == 0:
         raise ValueError(f"'{path}' is empty (0 bytes); export it again")
-    found: Layout | Bodies = _module_of(path, "read").read(path, reading)
+    module = _module_of(path, "read")
+    if _format(path, "read").module not in HOLD_IMAGES:
+        reading.refuse_image_keys(path)
+    found: Layout | Bodies = module.read(path, reading)
     return found
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 from blockvis.layout.left_out import matches
 
@@ -24,6 +26,8 @@ class Reading:
         Layers, groups, materials and names, or patterns of them, that are left out, and beside which all others are.
         Readers of drawings ask :meth:`wants` for loose lines, which later are no lines any more; of outlines it is
         asked when all are read.
+    image : mapping
+        What is said of an image; see :class:`blockvis.formats.image_scale.ImageKeys`.
     """
 
     unit: str | None = None
@@ -31,8 +35,17 @@ class Reading:
     view: str | None = None
     ignore: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
+    image: Mapping[str, Any] = field(default_factory=dict)
 
     def wants(self, labels: Iterable[str]) -> bool:
         """Whether what has these labels is wanted."""
         labels = [label for label in labels if label]
         return not matches(labels, self.ignore) and (not self.only or matches(labels, self.only))
+
+    def refuse_image_keys(self, path: Path) -> None:
+        """Refuse what is said of an image where a file is none; ``outline_tolerance`` is of every drawing."""
+        given = [key for key, value in self.image.items() if value is not None and key != "outline_tolerance"]
+        if given:
+            raise ValueError(
+                f"'{path}' is no image: {given[0]} is of images and annotations of them; leave it out, or give the unit"
+            )

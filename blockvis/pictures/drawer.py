@@ -33,6 +33,7 @@ from .marks import (
 from .scene import OF_STATICS, Scene
 from .solid_view import View, chosen_view
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
+from .underlay import Underlay
 
 if TYPE_CHECKING:
     from .curves import CurvePanel
@@ -140,6 +141,8 @@ class Drawer:
         Poses that the frame has to hold, too.
     fall : Fall, optional
         What comes after the last equilibrium; its frames are drawn beside those of the increments.
+    underlay : Underlay, optional
+        A photograph under blocks in the plane.
     """
 
     def __init__(
@@ -152,9 +155,11 @@ class Drawer:
         curve: bool = False,
         extra: tuple[solver.Pose, ...] = (),
         fall: Fall | None = None,
+        underlay: Underlay | None = None,
     ) -> None:
         assembly = self.assembly = response.assembly
         self._flat = assembly.dimension == 2
+        self._underlay = underlay
         few = self._flat and assembly.n_blocks <= FEW_BLOCKS
         self._forces_hidden = look.forces == "auto" and self._flat and not few
         self.look = look = replace(look, forces="thrust" if few else "none") if look.forces == "auto" else look
@@ -202,7 +207,7 @@ class Drawer:
     def _scene(self, frame: Frame) -> Scene:
         """Set up what draws blocks in the plane, or in space."""
         if self._view is None:
-            scene = FlatScene(self.assembly, frame, self.sheet.inside_size, self.fill)
+            scene = FlatScene(self.assembly, frame, self.sheet.inside_size, self.fill, self._underlay)
             scene.show_start()
             if self.fall is not None:
                 scene.show_ground(self.fall.ground)

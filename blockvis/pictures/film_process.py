@@ -16,6 +16,7 @@ from blockvis.results.viewer_files import ViewerFiles
 from blockvis.system.atomic_files import partial_of, remove
 from blockvis.system.worker import Say, Worker, WorkerEnded, serve
 
+from .underlay import Underlay
 from .video import find_encoder
 
 #: Seconds that a process has to remove its half-written film.
@@ -80,7 +81,15 @@ class FilmProcess:
             return False
         return True
 
-    def draw(self, response: solver.Response, path: Path, fall: Fall | None = None, *, falls: bool = False) -> None:
+    def draw(
+        self,
+        response: solver.Response,
+        path: Path,
+        fall: Fall | None = None,
+        *,
+        falls: bool = False,
+        underlay: Underlay | None = None,
+    ) -> None:
         """Begin to draw the curve, where there is one, as ``curve.png`` beside the film, and the film; returns at once.
 
         Parameters
@@ -90,9 +99,11 @@ class FilmProcess:
         fall : Fall, optional
         falls : bool
             Whether the process works out the fall; :meth:`fall` waits for it.
+        underlay : Underlay, optional
+            A photograph under blocks in the plane.
         """
         self._path = path
-        self._worker.say("draw", (response, path, fall, falls))
+        self._worker.say("draw", (response, path, fall, falls, underlay))
 
     def fall(self, progress: Callable[[float], None]) -> Fall | None:
         """Wait for the fall.
@@ -212,7 +223,9 @@ class _Followed:
             raise self._failed
 
 
-def _draw(say: Say, response: solver.Response, path: Path, fall: Fall | None, falls: bool) -> None:
+def _draw(
+    say: Say, response: solver.Response, path: Path, fall: Fall | None, falls: bool, underlay: Underlay | None
+) -> None:
     """Draw a film, its fall worked out here where it is asked for."""
     from .curves import draw_curve
     from .render import animate
@@ -222,5 +235,5 @@ def _draw(say: Say, response: solver.Response, path: Path, fall: Fall | None, fa
         say("fall", fall)
     if response.path:
         draw_curve(response, path.with_name("curve.png"))
-    animate(response, path, fall=fall, progress=lambda done, total: say("drawing", (done, total)))
+    animate(response, path, fall=fall, underlay=underlay, progress=lambda done, total: say("drawing", (done, total)))
     say("drawn", None)

@@ -19,6 +19,7 @@ from .frame import Frame
 from .hatching import hatch_lines
 from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes, part_outlines
 from .swing import MOST_PARTS, Swing
+from .underlay import COVER, Underlay
 
 #: The layers, back to front.
 ORDER = (
@@ -49,13 +50,23 @@ class FlatScene:
         Width and height of the pictures in pixels.
     block_fill : (n_blocks, 3) uint8 array
         Colours of the blocks.
+    underlay : Underlay, optional
+        A photograph, which is seen through the blocks.
     """
 
-    def __init__(self, assembly: solver.Assembly, frame: Frame, size: tuple[int, int], block_fill: np.ndarray) -> None:
+    def __init__(
+        self,
+        assembly: solver.Assembly,
+        frame: Frame,
+        size: tuple[int, int],
+        block_fill: np.ndarray,
+        underlay: Underlay | None = None,
+    ) -> None:
         self.assembly, self.size = assembly, size
         self.frame = frame.fitted(*size)
         #: Size of a pixel in the world [m].
         self.pixel = float(self.frame.size[0]) / size[0]
+        self._ground = None if underlay is None else underlay.seen(self.frame.low, self.pixel, size)
         self._layers: dict[str, _Layer] = {}
         self._fills: list[_Layer] = []
         self._renderer: RendererAgg | None = None
@@ -216,10 +227,13 @@ class FlatScene:
         renderer = self._renderer
         pixels = renderer.buffer_rgba()
         np.asarray(pixels).view(np.uint32)[...] = np.array([*palette.PAPER, 255], np.uint8).view(np.uint32)
+        if self._ground is not None:
+            np.asarray(pixels)[..., :3] = self._ground[top : top + rows]
         below = self.size[1] - top - rows
         place = Affine2D().translate(*-self.frame.low).scale(1.0 / self.pixel).translate(0.0, -below)
-        for colour, width, path in self._paths():
+        for colour, width, cover, path in self._paths():
             pen = renderer.new_gc()
+            pen.set_alpha(cover)
             pen.set_snap(False)
             pen.set_linewidth(width)
             pen.set_joinstyle("miter")
@@ -230,8 +244,8 @@ class FlatScene:
         # Nothing is transparent: the fourth byte of a pixel says nothing.
         return Image.frombytes("RGB", (self.size[0], rows), pixels, "raw", "RGBX")
 
-    def _paths(self) -> Iterator[tuple[Colour, float, Path]]:
-        """Colour, width of the line (0 where it is filled) and outlines, back to front.
+    def _paths(self) -> Iterator[tuple[Colour, float, float, Path]]:
+        """Colour, width of the line (0 where it is filled), opacity and outlines, back to front.
 
         What is filled alike, layer upon layer, is one path: between two that share an edge the background would shine
         through.
@@ -239,18 +253,19 @@ class FlatScene:
         # Parts of one layer come in the order in which they were first drawn: a set's order would change with the run.
         names = sorted([*self._layers, "fill"], key=lambda name: ORDER.index(name.split("/")[0]))
         layers = [layer for name in names for layer in (self._fills if name == "fill" else [self._layers[name]])]
-        for (colour, width), alike in groupby(layers, key=lambda layer: (layer.colour, layer.width)):
+        for (colour, width, cover), alike in groupby(layers, key=lambda one: (one.colour, one.width, one.cover)):
             drawn = [layer.path for layer in alike if len(layer.corners)]
             if drawn:
-                yield colour, width, drawn[0] if len(drawn) == 1 else Path.make_compound_path(*drawn)
+                yield colour, width, cover, drawn[0] if len(drawn) == 1 else Path.make_compound_path(*drawn)
 
     def _paint(self, block_fill: np.ndarray) -> None:
         """Set the colours of the blocks: one layer for each colour."""
         colours, which = np.unique(block_fill, axis=0, return_inverse=True)
         corners, codes = self._outlines
         owner = np.repeat(which.ravel(), np.diff(self.assembly.offsets) + 1)
+        cover = 1.0 if self._ground is None else COVER
         self._fills = [
-            _Layer((int(r), int(g), int(b)), corners[owner == k], codes[owner == k])
+            _Layer((int(r), int(g), int(b)), corners[owner == k], codes[owner == k], cover=cover)
             for k, (r, g, b) in enumerate(colours)
         ]
 
@@ -285,10 +300,14 @@ class _Layer:
         What matplotlib's Path does there.
     width : float
         Of the lines in pixels; 0 where the outlines are filled.
+    cover : float
+        Opacity.
     """
 
-    def __init__(self, colour: Colour, corners: np.ndarray, codes: np.ndarray, width: float = 0.0) -> None:
-        self.colour, self.width, self.corners = colour, width, corners
+    def __init__(
+        self, colour: Colour, corners: np.ndarray, codes: np.ndarray, width: float = 0.0, cover: float = 1.0
+    ) -> None:
+        self.colour, self.width, self.corners, self.cover = colour, width, corners, cover
         self.points = np.zeros((len(corners), 2))
         # The path looks at the points, which move.
         self.path = Path(self.points, codes)

@@ -17,6 +17,7 @@ from blockvis.system.atomic_files import whole_file
 from .drawer import Drawer, Look
 from .film import film_of
 from .swing import MOST_PARTS, shown_increments, swing_of
+from .underlay import Underlay
 from .video import write_film
 
 STILL_SIZE = (1920, 1080)
@@ -34,6 +35,7 @@ def draw_still(
     forces: str = "auto",
     joints: bool = True,
     curve: bool = False,
+    underlay: Underlay | None = None,
 ) -> Path:
     """Draw one increment.
 
@@ -57,6 +59,8 @@ def draw_still(
         Mark open and sliding joints and hinges, and write the widths of the widest cracks [mm].
     curve : bool
         Put the reaction curve beside the blocks.
+    underlay : Underlay, optional
+        A photograph under blocks in the plane.
 
     Returns
     -------
@@ -65,11 +69,17 @@ def draw_still(
     _check_response(response)
     chosen = response.increments[increment] if isinstance(increment, int) else increment
     look = Look(magnification, colour_by, forces, joints)
-    return _save(Drawer(response, look, size, (chosen,), curve=curve).picture(chosen, widths=True), path)
+    return _save(
+        Drawer(response, look, size, (chosen,), curve=curve, underlay=underlay).picture(chosen, widths=True), path
+    )
 
 
 def draw_mechanism(
-    response: solver.Response | solver.LimitLoad, path: str | os.PathLike[str], *, size: tuple[int, int] = STILL_SIZE
+    response: solver.Response | solver.LimitLoad,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[int, int] = STILL_SIZE,
+    underlay: Underlay | None = None,
 ) -> Path:
     """Draw the last equilibrium, its hinges and sliding joints, and the motion that follows.
 
@@ -82,6 +92,8 @@ def draw_mechanism(
     path : path
     size : (int, int)
         Width and height in pixels.
+    underlay : Underlay, optional
+        A photograph under blocks in the plane.
 
     Returns
     -------
@@ -90,7 +102,8 @@ def draw_mechanism(
     response = response.response if isinstance(response, solver.LimitLoad) else response
     _check_response(response)
     swing = swing_of(response)
-    drawer = Drawer(response, Look(forces="none"), size, (swing.increment,), extra=(swing.displaced,))
+    look, extra = Look(forces="none"), (swing.displaced,)
+    drawer = Drawer(response, look, size, (swing.increment,), extra=extra, underlay=underlay)
     if swing.moves:
         drawer.show_motion(swing)
     note = _mechanism_note(response, swing.parts)
@@ -110,6 +123,7 @@ def animate(
     joints: bool = True,
     curve: bool = False,
     fall: Fall | None = None,
+    underlay: Underlay | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write the settlement and the fall as a film.
@@ -133,6 +147,8 @@ def animate(
         As in :func:`draw_still`.
     fall : Fall, optional
         Worked out already.
+    underlay : Underlay, optional
+        A photograph under blocks in the plane.
     progress : callable, optional
         Called with the frames drawn and their number.
 
@@ -147,7 +163,7 @@ def animate(
     elif fall is None:
         fall = fall_of(response)
     shown = shown_increments(response) if fall is None else response.path
-    drawer = Drawer(response, look, size, shown, curve=curve, fall=fall)
+    drawer = Drawer(response, look, size, shown, curve=curve, fall=fall, underlay=underlay)
     holds, pictures = film_of(drawer, fps, seconds, progress)
     return write_film(pictures, path, size=size, fps=fps, holds=holds)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,6 +20,7 @@ from .progress import DrawingProgress
 
 if TYPE_CHECKING:
     from blockvis.pictures.film_process import FilmProcess
+    from blockvis.pictures.underlay import Underlay
 
 
 class Clock:
@@ -83,12 +85,14 @@ class Drawing(Output):
     def __init__(self, *, film: bool = True, pictures: bool = True) -> None:
         self._film, self._pictures = film, pictures
         self._process: FilmProcess | None = None
+        self._underlay: Underlay | None = None
 
     def _animation(self, case: Case) -> str | None:
         return case.animation if self._film and self._pictures else None
 
     def begin(self, case: Case) -> None:
-        """Start the process that draws the film, if there is one to draw."""
+        """Read the photograph under the pictures, and start the process that draws the film, if there is one."""
+        self._underlay = _underlay(case) if self._pictures else None
         if self._animation(case) is not None:
             from blockvis.pictures.film_process import FilmProcess
 
@@ -106,6 +110,17 @@ class Drawing(Output):
         names = ["report.html", "mechanism.png", *([animation] if animation else [])] if self._pictures else []
         return all((folder / name).is_file() for name in names)
 
+    def _shown_underlay(self, case: Case, response: solver.Response) -> Underlay | None:
+        """Find the photograph of a run; where there is none to be had, its pictures are drawn all the same."""
+        try:
+            underlay = self._underlay or _underlay(case)
+        except ValueError as error:
+            warnings.warn(f"{error}; drawn without", stacklevel=2)
+            return None
+        if underlay is not None and response.assembly.dimension == 3:
+            warnings.warn(f"{case.source}: [output] underlay: blocks in space are drawn without", stacklevel=2)
+        return underlay
+
     def close(self) -> None:
         """End the process, drawn or not."""
         if self._process is not None:
@@ -115,17 +130,18 @@ class Drawing(Output):
         """Write the fall, the pictures, the report and the film of a results folder."""
         if not response.increments:
             return ()
+        underlay = self._shown_underlay(case, response) if self._pictures else None
         progress = DrawingProgress()
         stored = stored_fall(folder)
         animation, apart = self._animation(case), self._process
         if apart is not None:
             # It works out the fall as well, and what needs none is drawn here meanwhile.
-            apart.draw(response, folder / str(animation), stored, falls=stored is None)
+            apart.draw(response, folder / str(animation), stored, falls=stored is None, underlay=underlay)
         if self._pictures:
             with clock.counting("mechanism"):
                 from blockvis.pictures.render import draw_mechanism
 
-                draw_mechanism(response, folder / "mechanism.png")
+                draw_mechanism(response, folder / "mechanism.png", underlay=underlay)
         with clock.counting("fall"):
             fall = _fall(response, apart, progress) if stored is None else stored
             progress.done()
@@ -152,10 +168,19 @@ class Drawing(Output):
                 from blockvis.pictures.render import animate
 
                 try:
-                    animate(response, folder / animation, fall=fall, progress=progress.frame)
+                    animate(response, folder / animation, fall=fall, underlay=underlay, progress=progress.frame)
                 finally:
                     progress.done()
         return (problem,) if problem else ()
+
+
+def _underlay(case: Case) -> Underlay | None:
+    """Read the photograph under the pictures of a case, if it names one."""
+    if case.underlay is None:
+        return None
+    from .underlay import underlay_of
+
+    return underlay_of(case)
 
 
 def _awaited(film: FilmProcess, progress: DrawingProgress, clock: Clock) -> str:

@@ -1,0 +1,356 @@
+"""From the colours of an image to labels: masks, label images, also antialiased or of a lossy format; photographs not.
+
+A label has a value that lies flat somewhere: a square of three pixels of nothing else. Values in between, at the
+borders of an antialiased image, have none, and their pixels go to the nearest label.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageColor
+
+#: An image is exact where at least this share of pixels is like those right of it and below: less is noise or blur.
+EXACT = 0.6
+
+#: Pixels that differ by no more from those around them, of 255, lie flat in a noisy image ...
+FLAT = 30
+
+#: ... which is of labels where at least this share is flat, and what hangs together there deviates by no more.
+LEAST_FLAT, NOISE = 0.5, 12.0
+
+#: A value without a flat place is a label, such as a line between stones, from this share of the image on.
+THIN = 0.005
+
+#: Two values are those of a mask where the others hold no more than this share.
+MOST_BETWEEN = 0.15
+
+#: Channels of grey differ by no more, of 255.
+GREY = 8
+
+#: A flat place of a noisy image is so many pixels from its border.
+WIDE = 3.0
+
+#: Pixels so near to the background may be of its border [pixels].
+BORDER = 3.0
+
+#: Value that stands for what is transparent.
+TRANSPARENT = -1
+
+#: The background is on the rim: at least this share of it, and on three of its four sides.
+RIM = 0.5
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Labels of the pixels of an image.
+
+    Attributes
+    ----------
+    numbers : (height, width) int array
+        From 1; 0 for the background.
+    names : tuple of str
+        Of the labels from 1 on; empty where each region is a stone of its own, as in a mask.
+    background : str
+        What it is, in words; "" for none.
+    moved : int
+        Pixels of no label's value, which went to the nearest label.
+    is_mask : bool
+        Whether all stones have one value.
+    """
+
+    numbers: np.ndarray
+    names: tuple[str, ...]
+    background: str
+    moved: int
+    is_mask: bool
+
+
+class Photograph(ValueError):
+    """The image has no labels."""
+
+
+def labels_of(image: Image.Image, background: int | str | None = None) -> Labels:
+    """Find the labels of an image.
+
+    Parameters
+    ----------
+    image : PIL.Image.Image
+    background : int or str, optional
+        Value, or colour, of what is no stone.
+
+    Raises
+    ------
+    Photograph
+    ValueError
+        For values that are no labels, and a background that the image does not have.
+    """
+    opaque, image = _opaque(image)
+    values, words = _values(image)
+    wanted = None if background is None else _value(background, image, words)
+    exact = _alike(values) >= EXACT and image.format != "JPEG"
+    found = _of_values(values, image) if exact else _of_noise(image)
+    known = list(found.values)
+    if not exact:
+        words = {k: _colour(rgb) for k, rgb in enumerate(found.colours)}
+        wanted = None if wanted is None else _nearest_colour(wanted, found.colours, str(background))
+    called = [words.get(value, str(value)) for value in known]
+    numbers = found.numbers
+    if not opaque.all():
+        numbers = np.where(opaque, numbers, len(known))
+        known, called = [*known, TRANSPARENT], [*called, "transparent"]
+        wanted = TRANSPARENT if wanted is None else wanted
+    if wanted is not None and wanted not in known:
+        raise ValueError(f"has no background {background!r}; its values are {', '.join(called[:8])}")
+    mask = len(known) == 2
+    outer: int | None
+    if wanted is not None:
+        outer = known.index(wanted)
+    elif mask:
+        outer = _background_of_mask(_filled(numbers, found, 0, np.inf)[0])
+    else:
+        outer = _background(numbers, known, words)
+    numbers, nearest = _filled(numbers, found, outer, np.inf if mask else BORDER)
+    moved, said = int((found.numbers < 0).sum()), "" if outer is None else called[outer]
+    if not exact and not mask:
+        # Of what is noisy, what hangs together is a stone: of two in one colour the line between may be lost.
+        return Labels(np.where(numbers == outer, 0, found.pieces[nearest]), (), said, moved, False)
+    order = np.arange(1, len(known) + 1)
+    if outer is not None:
+        order[outer:] -= 1
+        order[outer] = 0
+    names = () if mask else tuple(word for k, word in enumerate(called) if k != outer)
+    return Labels(order[numbers], names, said, moved, mask)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Values that are labels, before the pixels between them go to one.
+
+    Attributes
+    ----------
+    numbers : (height, width) int array
+        The value of each pixel by its number, from 0; -1 for none.
+    values : tuple of int
+    colours : (n, 1 or 3) array
+        Of the values.
+    shown : (height, width, 1 or 3) array
+        Colour of each pixel.
+    pieces : (height, width) int array
+        In a noisy image what hangs together, from 1.
+    """
+
+    numbers: np.ndarray
+    values: tuple[int, ...]
+    colours: np.ndarray
+    shown: np.ndarray
+    pieces: np.ndarray
+
+
+def _filled(numbers: np.ndarray, found: _Found, outer: int | None, reach: float) -> tuple[np.ndarray, Any]:
+    """Give the pixels between labels to the nearest one, or to the background if that is near and more alike.
+
+    Returns
+    -------
+    numbers : (height, width) int array
+    nearest : (row, column) arrays
+        The nearest pixel of a label that is no background, of each pixel.
+    """
+    from scipy import ndimage
+
+    between, ground = numbers < 0, numbers == (-1 if outer is None else outer)
+    nearest = tuple(ndimage.distance_transform_edt(between | ground, return_distances=False, return_indices=True))
+    stone = numbers[nearest]
+    if outer is None or outer >= len(found.colours) or not between.any():
+        return np.where(between, stone, numbers), nearest
+    near = between & (ndimage.distance_transform_edt(~ground) <= reach)
+    shown = found.shown[near]
+    away = [np.abs(shown - colour).sum(axis=1) for colour in (found.colours[outer], found.colours[stone[near]])]
+    result = np.where(between, stone, numbers)
+    result[near] = np.where(away[0] < away[1], outer, stone[near])
+    return result, nearest
+
+
+def _opaque(image: Image.Image) -> tuple[np.ndarray, Image.Image]:
+    """(height, width) bool array: where an image is to be seen; and the image without its transparency."""
+    form = image.format
+    if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
+        seen = np.asarray(image.convert("RGBA"))[..., 3] >= 128
+        image = image.convert("RGB")
+    else:
+        seen = np.ones((image.height, image.width), dtype=bool)
+    image.format = form
+    return seen, image
+
+
+def _values(image: Image.Image) -> tuple[np.ndarray, dict[int, str]]:
+    """(height, width) int array: the value of each pixel; and the words for those that are colours."""
+    if image.mode == "F":
+        real = np.asarray(image)
+        if not np.isfinite(real).all() or (real != np.round(real)).any():
+            bad = real[~(np.isfinite(real) & (real == np.round(real)))][0]
+            raise ValueError(f"has the value {bad:g}; labels are whole numbers: joints 0, stones 1, 2, ...")
+        return real.astype(np.int64), {}
+    if image.mode in ("1", "L", "P", "I") or image.mode.startswith("I;16"):
+        return np.asarray(image).astype(np.int64), {}
+    rgb = np.asarray(image.convert("RGB")).astype(np.int64)
+    if np.ptp(rgb, axis=2).max() <= GREY:
+        return rgb[..., 1], {}
+    packed = rgb @ [65536, 256, 1]
+    return packed, {int(v): f"#{v:06x}" for v in np.unique(packed)[:100_000]}
+
+
+def _value(background: int | str, image: Image.Image, words: dict[int, str]) -> int:
+    """Find the value of a background: a number, or a colour."""
+    if isinstance(background, int) or background.strip().isdecimal():
+        return int(background)
+    try:
+        r, g, b = ImageColor.getrgb(background)[:3]
+    except ValueError:
+        raise ValueError(
+            f'has no background {background!r}; give a value, or a colour such as "white" or "#ff8000"'
+        ) from None
+    if words or image.format == "JPEG":
+        return (r << 16) + (g << 8) + b
+    if image.mode == "P":
+        near = np.abs(np.array(image.getpalette("RGB")).reshape(-1, 3) - [r, g, b]).sum(axis=1)
+        return int(near.argmin())
+    return r
+
+
+def _nearest_colour(wanted: int, known: np.ndarray, word: str) -> int:
+    rgb = np.array([wanted >> 16, wanted >> 8 & 255, wanted & 255] if wanted > 255 else [wanted] * 3)
+    apart = np.abs(known - rgb).max(axis=1)
+    if apart.min() > 2 * FLAT:
+        raise ValueError(f"has no background {word!r}; its colours are {', '.join(map(_colour, known[:8]))}")
+    return int(apart.argmin())
+
+
+def _colour(rgb: np.ndarray) -> str:
+    return "#" + "".join(f"{round(float(c)):02x}" for c in np.clip(rgb, 0, 255))
+
+
+def _alike(values: np.ndarray) -> float:
+    """Share of the pixels that are like those right of them and below."""
+    if min(values.shape) < 2:
+        return 1.0
+    first = values[:-1, :-1]
+    return float(((first == values[1:, :-1]) & (first == values[:-1, 1:])).mean())
+
+
+def _of_values(values: np.ndarray, image: Image.Image) -> _Found:
+    """Find the labels of an exact image."""
+    from scipy import ndimage
+
+    known, inverse = np.unique(values, return_inverse=True)
+    place = inverse.reshape(values.shape).astype(np.int32)
+    share = np.bincount(place.ravel(), minlength=len(known)) / place.size
+    label = np.ones(len(known), dtype=bool)
+    if len(known) > 2:
+        core = ndimage.minimum_filter(place, 3) == ndimage.maximum_filter(place, 3)
+        label = np.bincount(place[core], minlength=len(known)) > 0
+        thin = ~label & (share >= THIN)
+        # Many values of some share each are a blur, not lines between stones.
+        label |= thin & (thin.sum() <= max(2, label.sum()))
+    if not label.any():
+        raise ValueError("has no region of one value three pixels wide; give an image of more pixels")
+    unlike = np.abs(known - known[label][0]) > 2 * FLAT
+    if label.sum() == 1 < len(known) and image.mode != "P" and known[-1] <= 255 and share[unlike].sum() >= THIN:
+        # Lines of many values on one ground: the commonest of what is unlike the ground stands for them.
+        label[np.flatnonzero(unlike)[share[unlike].argmax()]] = True
+    numbers = np.where(label[place], (np.cumsum(label) - 1)[place], -1).astype(np.int32)
+    several = image.mode in ("P", "RGB") and (image.mode == "P" or known[-1] > 255)
+    shown = np.asarray(image.convert("RGB")).astype(float) if several else values[..., None].astype(float)
+    first = np.unique(numbers.ravel(), return_index=True)[1][-int(label.sum()) :]
+    colours = shown.reshape(-1, shown.shape[2])[first]
+    return _Found(numbers, tuple(map(int, known[label])), colours, shown, np.zeros((0, 0), dtype=int))
+
+
+def _of_noise(image: Image.Image) -> _Found:
+    """Find the colours of a noisy image."""
+    from scipy import ndimage
+
+    rgb = np.asarray(image.convert("RGB")).astype(np.int16)
+    flat = (ndimage.maximum_filter(rgb, (3, 3, 1)) - ndimage.minimum_filter(rgb, (3, 3, 1))).max(axis=2) <= FLAT
+    pieces, n = ndimage.label(flat)
+    # What is flat along a border, where the noise is, is narrow.
+    wide = ndimage.maximum(ndimage.distance_transform_edt(flat), pieces, np.arange(1, n + 1)) if n else np.zeros(0)
+    large = np.flatnonzero(np.asarray(wide) >= WIDE) + 1
+    if len(large) == 0 or flat.mean() < LEAST_FLAT:
+        raise Photograph
+    weight = np.bincount(pieces.ravel(), minlength=n + 1)[large]
+    deviation = np.sqrt(sum(ndimage.variance(rgb[..., c], pieces, large) for c in range(3)))
+    if float(np.average(deviation, weights=weight)) > NOISE:
+        raise Photograph
+    colour = np.stack([ndimage.mean(rgb[..., c], pieces, large) for c in range(3)], axis=1)
+    two = _two_colours(rgb, colour, weight)
+    if two is not None:
+        away = np.stack([np.abs(rgb - one).max(axis=2) for one in two])
+        numbers = np.where(away.min(axis=0) <= 3 * FLAT, away.argmin(axis=0), -1)
+        return _Found(numbers, (0, 1), two, rgb, np.zeros((0, 0), dtype=int))
+    alike = _alike_colours(colour, weight)
+    order, piece = np.full((2, n + 1), -1, dtype=np.int32)
+    order[large], piece[large] = alike, np.arange(1, len(large) + 1)
+    share = [np.where(alike == k, weight, 0) for k in range(alike.max() + 1)]
+    colours = np.stack([np.average(colour, axis=0, weights=own) for own in share])
+    numbers, own = order[pieces], piece[pieces]
+    # Joints too thin to be flat have the colour of the background.
+    outer = _outer(numbers)
+    thin = (numbers < 0) & (np.abs(rgb - colours[outer]).max(axis=2) <= FLAT)
+    numbers[thin], own[thin] = outer, len(large) + 1
+    return _Found(numbers, tuple(range(len(colours))), colours, rgb, own)
+
+
+def _outer(numbers: np.ndarray) -> int:
+    """Find the commonest number on the rim."""
+    rim = np.concatenate([numbers[0], numbers[-1], numbers[:, 0], numbers[:, -1]])
+    return int(np.bincount(rim[rim >= 0], minlength=1).argmax())
+
+
+def _alike_colours(colour: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """(n,) int array: the number of each colour, near ones alike, the most frequent first."""
+    numbers = np.full(len(colour), -1)
+    n = 0
+    for k in np.argsort(-weight):
+        if numbers[k] < 0:
+            near = (np.abs(colour - colour[k]).max(axis=1) <= FLAT / 2) & (numbers < 0)
+            numbers[near] = n
+            n += 1
+    return numbers
+
+
+def _two_colours(rgb: np.ndarray, colour: np.ndarray, weight: np.ndarray) -> np.ndarray | None:
+    """Find the two colours of a noisy mask; None if it has more."""
+    first = colour[weight.argmax()]
+    second = colour[(np.abs(colour - first).sum(axis=1) * np.sqrt(weight)).argmax()]
+    if np.abs(first - second).max() < 3 * FLAT:
+        return None
+    far = np.minimum(*(np.abs(rgb - one).max(axis=2) for one in (first, second))) > 2 * FLAT
+    stray = np.minimum(*(np.abs(colour - one).max(axis=1) for one in (first, second))) > 2 * FLAT
+    return None if far.mean() > MOST_BETWEEN or weight[stray].sum() > 0.01 * weight.sum() else np.stack([first, second])
+
+
+def _background_of_mask(numbers: np.ndarray) -> int:
+    """Choose which of two values is that of joints: that between more stones; of both alike, that on the rim."""
+    from scipy import ndimage
+
+    pieces = []
+    for k in (0, 1):
+        found, n = ndimage.label(numbers != k)
+        pieces.append(int((np.bincount(found.ravel(), minlength=n + 1)[1:] >= 9).sum()))
+    return _outer(numbers) if pieces[0] == pieces[1] else int(pieces[1] > pieces[0])
+
+
+def _background(numbers: np.ndarray, known: list[int], words: dict[int, str]) -> int | None:
+    """Find the background of a label image: the value 0, or what is on most of the rim; None if there is none."""
+    zero = known.index(0) if 0 in known else None
+    if zero is not None and not words:
+        return zero
+    outer = _outer(numbers)
+    sides = [numbers[0], numbers[-1], numbers[:, 0], numbers[:, -1]]
+    share = np.concatenate([side == outer for side in sides]).mean()
+    if share >= RIM and sum((side == outer).any() for side in sides) >= 3:
+        return outer
+    return zero if words.get(0) == "#000000" else None

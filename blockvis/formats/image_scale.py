@@ -1,0 +1,196 @@
+"""Where the pixels of an image lie: by the keys of the case, a world file beside it, or the tags of a GeoTIFF."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypedDict
+
+import numpy as np
+
+from .reading import Reading
+
+
+class ImageKeys(TypedDict, total=False):
+    """What may be said of an image, or of annotations of one; each may be None.
+
+    Attributes
+    ----------
+    width, height : float [m]
+        Of the whole image; one of them.
+    pixel : float [m]
+        Size of a pixel, instead.
+    background : int or str
+        Value, or colour such as "white" or "#ff8000", of what is no stone.
+    smallest : float [m]
+        Regions less than this across are specks.
+    outline_tolerance : float [m]
+        Within which staircases of pixels are simplified.
+    """
+
+    width: float | None
+    height: float | None
+    pixel: float | None
+    background: int | str | None
+    smallest: float | None
+    outline_tolerance: float | None
+
+
+#: Names of world files end in these letters, by the suffix of the image, or in .wld.
+_WORLD = {
+    ".png": (".pgw", ".pngw"),
+    ".tif": (".tfw", ".tifw"),
+    ".tiff": (".tfw", ".tiffw"),
+    ".jpg": (".jgw", ".jpgw"),
+    ".jpeg": (".jgw", ".jpegw"),
+}
+
+#: Tags of GeoTIFF: size of a pixel, tie point, matrix, keys.
+_SIZE, _TIE, _MATRIX, _KEYS = 33550, 33922, 34264, 34735
+
+#: Keys of GeoTIFF: kind of model (2 is in degrees), where a pixel is named (2: its middle), unit of length.
+_MODEL, _RASTER, _LENGTH = 1024, 1025, 3076
+
+#: Units of length of GeoTIFF, in m.
+_LENGTHS = {9001: 1.0, 9002: 0.3048, 9003: 1200.0 / 3937.0}
+
+#: Height and width agree within this: both may be given where they say the same.
+SAME_SCALE = 0.01
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the pixels of an image lie.
+
+    Attributes
+    ----------
+    matrix : (2, 3) array
+        From column and row, (0, 0) the upper left corner of the image, and 1 to x and y.
+    unit : str
+        Of x and y, "" where the file does not say.
+    source : str
+        What says so, in words.
+    """
+
+    matrix: np.ndarray
+    unit: str
+    source: str
+
+    @property
+    def pixel(self) -> float:
+        """Size of a pixel."""
+        return float(np.sqrt(abs(np.linalg.det(self.matrix[:, :2]))))
+
+    def placed(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2) array: x and y of points in columns and rows, the rows counted down."""
+        return points @ self.matrix[:, :2].T + self.matrix[:, 2]
+
+
+def placement_of(
+    path: Path,
+    size: tuple[float, float] | None,
+    reading: Reading,
+    image: Path | None = None,
+    tags: Mapping[int, Any] | None = None,
+) -> Placement:
+    """Find where the pixels of an image lie.
+
+    Parameters
+    ----------
+    path : Path
+        The image, or the file of annotations, named in messages.
+    size : (float, float) or None [pixels]
+        Width and height, if they are known.
+    reading : Reading
+    image : Path, optional
+        The image of annotations.
+    tags : mapping, optional
+        Of a TIFF.
+
+    Raises
+    ------
+    ValueError
+        Where nothing, or more than one thing, says how large a pixel is.
+    """
+    given = reading.image
+    keys = {key: given.get(key) for key in ("width", "height", "pixel")}
+    said = {key: float(value) for key, value in keys.items() if isinstance(value, int | float)}
+    drawn = _of_world_file(image or path) or _of_tags(path, tags or {}, said)
+    if said:
+        return _of_keys(path, size, said, reading.unit, drawn)
+    if drawn is not None:
+        return drawn
+    wide = f" of the {size[0]:g} pixels" if size else ""
+    suffix = _WORLD.get((image or path).suffix.lower(), (".pgw",))[0]
+    raise ValueError(
+        f"'{path}' has no scale; give the width{wide} in m, --width 1.2 or [geometry] width = 1.2, or height, or the "
+        f"size of a pixel, pixel = 0.002; or a world file {(image or path).with_suffix(suffix).name} beside it"
+    )
+
+
+def _of_keys(
+    path: Path, size: tuple[float, float] | None, said: dict[str, float], unit: str | None, drawn: Placement | None
+) -> Placement:
+    """Place an image by its width, its height or the size of a pixel, its lower left corner at (0, 0)."""
+    if unit not in (None, "m"):
+        raise ValueError(f"'{path}': unit is {unit}, but {' and '.join(said)} are in m; leave out the unit")
+    for key, value in said.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise ValueError(f"'{path}': {key} is {value:g}; give a length in m above 0")
+    if size is None and "pixel" not in said:
+        raise ValueError(
+            f"'{path}' does not say how many pixels its image has; give pixel = ... in m, or put the image beside it"
+        )
+    width, height = size or (1.0, 0.0)
+    pixels = {"width": width, "height": height, "pixel": 1.0}
+    sizes = {key: value / pixels[key] for key, value in said.items()}
+    if max(sizes.values()) > (1.0 + SAME_SCALE) * min(sizes.values()):
+        listed = ", ".join(f"{key} = {said[key]:g} makes it {1e3 * value:.4g} mm" for key, value in sizes.items())
+        raise ValueError(f"'{path}': the size of a pixel is given twice: {listed}; give one of them")
+    first = next(iter(said))
+    pixel = sizes[first]
+    words = f"{first} = {said[first]:g} m" + (f" instead of {drawn.source}" if drawn else "")
+    return Placement(np.array([[pixel, 0.0, 0.0], [0.0, -pixel, pixel * height]]), "m", words)
+
+
+def _of_world_file(image: Path) -> Placement | None:
+    """Read the world file beside an image; None if there is none."""
+    suffixes = (*_WORLD.get(image.suffix.lower(), ()), ".wld")
+    names = [image.with_suffix(end) for suffix in suffixes for end in (suffix, suffix.upper())]
+    file = next((name for name in [*names, image.with_name(image.name + "w")] if name.is_file()), None)
+    if file is None:
+        return None
+    try:
+        a, d, b, e, c, f = (float(word.replace(",", ".")) for word in file.read_text(encoding="utf-8").split())
+    except (ValueError, UnicodeDecodeError):
+        raise ValueError(f"'{file}' is no world file; it has six numbers, one a line: A, D, B, E, C, F") from None
+    matrix = np.array([[a, b, c], [d, e, f]])
+    if not np.isfinite(matrix).all() or a * e - b * d == 0.0:
+        raise ValueError(f"'{file}' gives pixels no size (A = {a:g}, D = {d:g}, B = {b:g}, E = {e:g}); repair it")
+    # It names the middle of the first pixel.
+    matrix[:, 2] -= 0.5 * (matrix[:, 0] + matrix[:, 1])
+    return Placement(matrix, "", f"world file {file.name}")
+
+
+def _of_tags(path: Path, tags: Mapping[int, Any], said: Mapping[str, float]) -> Placement | None:
+    """Read the tags of a GeoTIFF; None if it has none."""
+    if _MATRIX in tags:
+        matrix = np.array(tags[_MATRIX], dtype=float).reshape(4, 4)[:2, [0, 1, 3]]
+    elif _SIZE in tags and _TIE in tags:
+        sx, sy = (float(value) for value in tags[_SIZE][:2])
+        column, row, _, x, y, *_ = (float(value) for value in tags[_TIE][:6])
+        matrix = np.array([[sx, 0.0, x - column * sx], [0.0, -sy, y + row * sy]])
+    else:
+        return None
+    directory = np.array(tags.get(_KEYS, (1, 1, 0, 0)), dtype=int)[4:]
+    keys = {int(key): int(value) for key, where, _, value in directory[: len(directory) // 4 * 4].reshape(-1, 4)
+            if where == 0}  # fmt: skip
+    if keys.get(_MODEL) == 2:
+        if said:
+            return None
+        raise ValueError(f"'{path}' is georeferenced in degrees; write it in metres, or give pixel = ... in m")
+    if keys.get(_RASTER) == 2:
+        matrix[:, 2] -= 0.5 * (matrix[:, 0] + matrix[:, 1])
+    factor = _LENGTHS.get(keys.get(_LENGTH, 0), 0.0)
+    return Placement(matrix * (factor or 1.0), "m" if factor else "", "tags of the GeoTIFF")

@@ -1,0 +1,157 @@
+"""Pictures of stones, .png, .tif and .jpg: masks of stones against joints, and label images with a value per stone."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageOps, UnidentifiedImageError
+
+from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import LeftOut
+from blockvis.layout.notes import LEFT_OUT, Note
+from blockvis.layout.outlines import ring_area
+
+from .image_labels import Labels, Photograph, labels_of
+from .image_scale import Placement, placement_of
+from .pixels import SPECK, SPECK_OF_NOISE, STAIRS, Outlined, Regions, outlined, regions_of
+from .reading import Reading
+
+#: More pixels than this are refused before they fill the memory.
+MOST_PIXELS = 60_000_000
+
+#: What makes masks of photographs.
+MASK_MAKERS = "by hand GIMP, labelme or CVAT, by a model SAM"
+
+
+def read(path: Path, reading: Reading) -> Layout:
+    """Read the stones of an image."""
+    if reading.view not in (None, "xy"):
+        raise ValueError(f"'{path}' is an image in the plane xy; it has no view {reading.view}")
+    image, tags = opened(path)
+    placement = placement_of(path, image.size, reading, tags=tags)
+    try:
+        labels = labels_of(image, reading.image.get("background"))
+    except Photograph:
+        raise ValueError(
+            f"'{path}' is a photograph: its colours are no labels, and blockvis does not find stones in one; make a "
+            f"mask of it ({MASK_MAKERS}), and put the photograph under the pictures: [output] underlay"
+        ) from None
+    except ValueError as error:
+        raise ValueError(f"'{path}' {error}") from None
+    return layout_of_labels(path, labels, placement, reading)
+
+
+def opened(path: Path) -> tuple[Image.Image, Mapping[int, Any]]:
+    """Open an image, upright, and read its tags, if it is a TIFF.
+
+    Raises
+    ------
+    ValueError
+        For what is no image, is damaged, or has too many pixels.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(path)
+        width, height = image.size
+        if width * height > MOST_PIXELS:
+            raise ValueError(
+                f"'{path}' has {width} × {height} pixels, more than {MOST_PIXELS}; scale it down, or cut it"
+            )
+        tags = dict(getattr(image, "tag_v2", {}))
+        form = image.format
+        image.load()
+        upright = ImageOps.exif_transpose(image)
+    except (UnidentifiedImageError, Image.DecompressionBombError):
+        raise ValueError(f"'{path}' is no image that can be read, or too large a one; write it as PNG") from None
+    except (OSError, SyntaxError, EOFError, IndexError, TypeError) as error:
+        raise ValueError(f"'{path}' is a damaged image ({error}); write it again as PNG") from None
+    upright.format = form
+    return upright, tags
+
+
+def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: Reading) -> Layout:
+    """Make a layout of the regions of labels.
+
+    Parameters
+    ----------
+    path : Path
+        Named in messages.
+    labels : Labels
+    placement : Placement
+    reading : Reading
+    """
+    smallest, tolerance = reading.image.get("smallest"), reading.image.get("outline_tolerance")
+    noisy = not labels.is_mask and not labels.names
+    speck = SPECK_OF_NOISE if noisy else SPECK
+    regions = regions_of(labels.numbers, None if smallest is None else smallest / placement.pixel, speck)
+    n = len(regions.labels)
+    if n == 0:
+        what = f"all of it is background ({labels.background})" if labels.background else "it is of one value"
+        raise ValueError(
+            f"'{path}' shows no stone: {what}, or smaller than {regions.smallest:.3g} pixels across (smallest); stones "
+            "need another value than joints, see background"
+        )
+    if labels.is_mask and n == 1:
+        raise ValueError(
+            f"'{path}' shows one region of {regions.areas[0] * placement.pixel**2:.4g} m²: in a mask stones that touch "
+            "are one; leave a joint of at least a pixel between them, or give each stone a value of its own"
+        )
+    found = outlined(regions, STAIRS if tolerance is None else tolerance / placement.pixel)
+    names, groups = _named(labels, regions)
+    rings = tuple(_turned(placement.placed(ring * [1.0, -1.0])) for ring in found.rings)
+    layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit,
+                    notes=_notes(labels, regions, found, placement))  # fmt: skip
+    around = {}
+    for k, inner in found.holes.items():
+        holes = tuple(placement.placed(hole * [1.0, -1.0]) for hole in inner)
+        message = f"'{names[k]}' has {len(holes)} holes; fill them, or give what lies around the stones as background"
+        around[k] = LeftOut("hole", rings[k], message, holes=holes)
+    return layout.leaving_out(around)
+
+
+def _turned(ring: np.ndarray) -> np.ndarray:
+    """Turn an outline counter-clockwise: a world file may mirror the image."""
+    return ring if ring_area(ring) > 0.0 else ring[::-1]
+
+
+def _named(labels: Labels, regions: Regions) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Name each region after its label, numbered where there are several; these are a group."""
+    if not labels.names:
+        return tuple(f"stone {k + 1}" for k in range(len(regions.labels))), ()
+    of_label = np.bincount(regions.labels, minlength=len(labels.names) + 1)
+    seen = np.zeros_like(of_label)
+    names, groups = [], []
+    for label in regions.labels.tolist():
+        seen[label] += 1
+        word = labels.names[label - 1]
+        word = word if word.startswith("#") else f"label {word}"
+        names.append(word if of_label[label] == 1 else f"{word}-{seen[label]}")
+        groups.append(word if of_label[label] > 1 else "")
+    return tuple(names), tuple(groups)
+
+
+def _notes(labels: Labels, regions: Regions, found: Outlined, placement: Placement) -> tuple[str, ...]:
+    """Say how the image was read, and what was dropped."""
+    height, width = labels.numbers.shape
+    of = f"{len(set(regions.labels.tolist()))} labels" if labels.names else "labels of a noisy image"
+    what = "a mask of stones" if labels.is_mask else of
+    share = f"{100.0 * np.mean(labels.numbers == 0):.3g} % ({labels.background})" if labels.background else "none"
+    notes: list[str] = [
+        f"{what} in {width} × {height} pixels of {1e3 * placement.pixel:.4g} mm ({placement.source}); background: "
+        f"{share}; {found.corners} corners of pixels were simplified to {sum(map(len, found.rings))}"
+    ]
+    if labels.moved:
+        share = f"{100.0 * labels.moved / labels.numbers.size:.2g} %"
+        text = f"{labels.moved} pixels ({share}) have no label's value, as at antialiased or lossy borders; "
+        notes.append(Note(LEFT_OUT, text + "they went to the nearest label"))
+    count, area = regions.specks
+    if count:
+        size = regions.smallest * placement.pixel
+        text = f"{count} specks of {area} pixels in all, each less than {size:.3g} m across (smallest), "
+        notes.append(Note(LEFT_OUT, text + "went to what is around them"))
+    return tuple(notes)

@@ -1,0 +1,308 @@
+"""Pictures of stones and annotations, through the command line: masks, label images, scale, what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw
+
+import blockvis
+from blockvis.cli import main
+from blockvis.formats.read import read_layout
+from blockvis.pictures.underlay import Underlay
+
+WALL = (300, 160)
+
+
+def drawn_wall(gap=4, value=lambda k: 255, mode="L", size=WALL):
+    """Three courses of stones, 50 × 40 pixels with their joints, of which every second begins with a half."""
+    image = Image.new(mode, size)
+    draw, k = ImageDraw.Draw(image), 0
+    for course in range(3):
+        for column in range(6):
+            left = max(25, 25 + 50 * column - 25 * (course % 2))
+            right = min(275, 25 + 50 * (column + 1) - 25 * (course % 2))
+            if right - left > 10:
+                k += 1
+                low, high = 20 + 40 * course, 60 + 40 * course
+                draw.rectangle((left + gap // 2, low, right - gap // 2 - 1, high - gap - 1), fill=value(k))
+    return image, k
+
+
+def informed(capsys, *arguments):
+    """Exit code, output and messages of ``blockvis info``."""
+    code = main(["info", *map(str, arguments)])
+    return code, *capsys.readouterr()
+
+
+def test_a_mask_becomes_a_run_that_ends_in_a_curve_over_its_photograph(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    image, n = drawn_wall()
+    image.save("wall.png")
+    Image.new("RGB", (600, 320), (20, 20, 250)).save("photo.jpg")
+    assert main(["info", "wall.png", "--width", "3", "--picture", "found.png"]) == 0
+    out = capsys.readouterr().out
+    assert f"outlines        {n}" in out
+    assert f"sum {(np.asarray(image) > 0).sum() * 1e-4:.6g} m²" in out
+    assert main(["new", "wall.png", "--width", "3"]) == 0
+    assert "\nwidth = 3.0\n" in (tmp_path / "wall.toml").read_text(encoding="utf-8")
+    run = ["run", "wall.toml", "--no-check-steps", "--no-film", "--set", "settlement.limit=0.01"]
+    assert main([*run, "--set", "output.underlay=photo.jpg"]) == 0
+    assert (tmp_path / "wall-results" / "curve.png").is_file()
+    picture = np.asarray(Image.open("wall-results/mechanism.png").convert("RGB")).astype(int)
+    assert (picture[..., 2] - picture[..., 0] > 60).mean() > 0.2
+
+
+def test_a_photograph_lies_where_its_pixels_are():
+    photograph = np.zeros((20, 40, 3), dtype=np.uint8)
+    photograph[:10, 30:] = 255, 0, 0
+    # Pixels of 0.1 m from (1, 2) on: red is from 4 to 5 m and 3 to 4 m, and a picture of 6 by 6 m has 60 pixels.
+    seen = Underlay(photograph, np.array([[0.1, 0.0, 1.0], [0.0, -0.1, 4.0]])).seen(np.zeros(2), 0.1, (60, 60))
+    rows, columns = np.nonzero(seen[..., 0].astype(int) - seen[..., 1] > 60)
+    assert (columns.min(), columns.max(), rows.min(), rows.max()) == (40, 49, 20, 29)
+    assert (seen[0, 0] == 255).all()
+
+
+def test_a_photograph_of_another_shape_or_place_goes_under_nothing(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    drawn_wall()[0].save("wall.png")
+    Image.new("RGB", (600, 400)).save("photo.jpg")
+    assert main(["new", "wall.png", "--width", "3"]) == 0
+    for name, says in (("photo.jpg", "has 600 × 400 pixels, the image of the blocks 300 × 160"), ("x.jpg", "no file")):
+        capsys.readouterr()
+        assert main(["run", "wall.toml", "--no-film", "--set", f"output.underlay={name}"]) == 2
+        assert says in capsys.readouterr().err
+
+
+def test_round_stones_keep_their_area_within_one_per_cent(tmp_path):
+    y, x = np.mgrid[0:200, 0:400]
+    mask = np.zeros((200, 400), dtype=np.uint8)
+    for middle, radius in ((20, 8), (60, 20), (140, 45), (290, 80)):
+        mask[(x - middle) ** 2 + (y - 100.3) ** 2 < radius**2] = 255
+    Image.fromarray(mask).save(tmp_path / "round.png")
+    areas = np.sort(read_layout(tmp_path / "round.png", pixel=1.0).sizes ** 2)
+    assert areas == pytest.approx(np.pi * np.array([8, 20, 45, 80]) ** 2, rel=0.02)
+    assert areas.sum() == pytest.approx((mask > 0).sum(), rel=0.01)
+
+
+@pytest.mark.parametrize("turn", [0, 7])
+def test_labels_that_share_borders_leave_no_gap(tmp_path, turn):
+    import shapely
+
+    image, n = drawn_wall(gap=0, value=lambda k: k)
+    image.rotate(turn, expand=True).save(tmp_path / "wall.png")
+    layout = read_layout(tmp_path / "wall.png", width=3.0)
+    shapes = [shapely.Polygon(ring) for ring in layout.outlines]
+    whole = shapely.union_all(shapes)
+    assert layout.n_blocks == n
+    assert whole.geom_type == "Polygon"
+    assert sum(shapely.Polygon(hole).area for hole in whole.interiors) < 1e-12
+    assert sum(shape.area for shape in shapes) == pytest.approx(whole.area, rel=1e-12)
+    assert layout.names[0] == "label 1"
+
+
+@pytest.mark.parametrize("lossy", ["a.jpg", "noisy.jpg", "small.png", "turned.png"])
+def test_antialiased_and_lossy_labels_are_those_of_the_exact_image(tmp_path, lossy, capsys):
+    colours = np.random.default_rng(4).integers(70, 255, (40, 3))
+    image, n = drawn_wall(gap=6, value=lambda k: tuple(colours[k].tolist()), mode="RGB")
+    area = (np.asarray(image).max(axis=2) > 0).sum()
+    if lossy == "small.png":
+        image, area = image.resize((225, 120), Image.Resampling.LANCZOS), area * 0.75**2
+    if lossy == "turned.png":
+        image = image.rotate(5, Image.Resampling.BICUBIC, expand=True)
+    image.save(tmp_path / lossy, **({"quality": 40 if lossy[0] == "n" else 85} if "jpg" in lossy else {}))
+    code, out, _ = informed(capsys, tmp_path / lossy, "--pixel", 1)
+    assert code == 0
+    assert f"outlines        {n}\n" in out
+    total = float(out.split("sum ")[1].split()[0])
+    assert total == pytest.approx(area, rel=0.02)
+    assert "have no label's value, as at antialiased or lossy borders" in out
+
+
+def test_a_noisy_mask_is_that_of_the_exact_image(tmp_path):
+    image, n = drawn_wall(gap=4)
+    image.save(tmp_path / "wall.jpg", quality=50)
+    layout = read_layout(tmp_path / "wall.jpg", width=3.0)
+    assert layout.n_blocks == n
+    assert float((layout.sizes**2).sum()) == pytest.approx((np.asarray(image) > 0).sum() * 1e-4, rel=0.01)
+
+
+def test_specks_go_to_what_is_around_them_and_are_told(tmp_path, capsys):
+    image, n = drawn_wall()
+    draw = ImageDraw.Draw(image)
+    draw.point([(5, 5), (290, 150)], 255)
+    draw.rectangle((40, 30, 41, 31), fill=0)
+    image.save(tmp_path / "wall.png")
+    code, out, _ = informed(capsys, tmp_path / "wall.png", "--width", 3)
+    assert (code, f"outlines        {n}\n" in out) == (0, True)
+    assert "2 specks of 2 pixels in all" in out
+    assert read_layout(tmp_path / "wall.png", width=3.0, smallest=0.3).n_blocks < n
+
+
+def test_black_joints_on_white_and_white_joints_on_black_are_the_same_stones(tmp_path):
+    image, n = drawn_wall()
+    crop = image.crop((25, 20, 275, 136))
+    for k, one in enumerate((crop, crop.point(lambda v: 255 - v))):
+        one.save(tmp_path / f"{k}.png")
+        assert read_layout(tmp_path / f"{k}.png", width=2.5).n_blocks == n
+
+
+def test_a_world_file_says_where_the_pixels_are(tmp_path, capsys):
+    image, _ = drawn_wall()
+    image.save(tmp_path / "wall.png")
+    (tmp_path / "wall.pgw").write_text("0.02\n0\n0\n-0.02\n100.01\n53.19\n", encoding="utf-8")
+    layout = read_layout(tmp_path / "wall.png")
+    assert layout.points.min(axis=0) == pytest.approx([100 + 27 * 0.02, 53.2 - 136 * 0.02])
+    assert "world file wall.pgw" in layout.notes[0]
+    assert read_layout(tmp_path / "wall.png", pixel=0.01).points.min(axis=0) == pytest.approx([0.27, 0.24])
+    (tmp_path / "wall.pgw").write_text("0.02\n0\n", encoding="utf-8")
+    assert "is no world file; it has six numbers" in informed(capsys, tmp_path / "wall.png")[2]
+
+
+def test_tags_of_a_geotiff_say_where_the_pixels_are(tmp_path, capsys):
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    image, _ = drawn_wall()
+    tags = ImageFileDirectory_v2()
+    for tag, values in ((33550, (0.01, 0.01, 0.0)), (33922, (0.0, 0.0, 0.0, 5.0, 7.0, 0.0))):
+        tags.tagtype[tag] = 12
+        tags[tag] = values
+    image.save(tmp_path / "wall.tif", tiffinfo=tags)
+    assert read_layout(tmp_path / "wall.tif").points.min(axis=0) == pytest.approx([5.27, 7 - 1.36])
+    tags.tagtype[34735] = 3
+    tags[34735] = (1, 1, 0, 1, 1024, 0, 1, 2)
+    image.save(tmp_path / "wall.tif", tiffinfo=tags)
+    assert "is georeferenced in degrees" in informed(capsys, tmp_path / "wall.tif")[2]
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ((), "has no scale; give the width of the 300 pixels in m, --width 1.2"),
+        (("--width", 3, "--pixel", 0.02), "the size of a pixel is given twice: width = 3 makes it 10 mm, pixel = 0.02"),
+        (("--width", 3, "--height", 3), "the size of a pixel is given twice"),
+        (("--width", -3), "width is -3; give a length in m above 0"),
+        (("--width", 3, "--unit", "mm"), "unit is mm, but width are in m"),
+        (("--width", 3, "--background", "7"), "has no background 7; its values are 0, 255"),
+        (("--width", 3, "--background", "sky"), "has no background 'sky'; give a value, or a colour"),
+        (("--width", 3, "--smallest", 2), "shows no stone"),
+    ],
+)
+def test_what_cannot_be_read_says_what_to_write(tmp_path, capsys, options, says):
+    drawn_wall()[0].save(tmp_path / "wall.png")
+    code, out, error = informed(capsys, tmp_path / "wall.png", *options)
+    assert (code, out) == (2, "")
+    assert says in error
+    assert error.count("\n") == 1
+
+
+def test_a_blob_an_empty_image_and_a_photograph_are_refused(tmp_path, capsys):
+    blob = Image.new("L", WALL)
+    ImageDraw.Draw(blob).rectangle((20, 20, 280, 140), fill=255)
+    noise = np.random.default_rng(1).integers(0, 256, (80, 80, 3)).astype(np.uint8)
+    images = {
+        "in a mask stones that touch are one": blob,
+        "shows no stone: all of it is background (9)": Image.new("L", WALL, 9),
+        "is a photograph: its colours are no labels": Image.fromarray(noise).resize(WALL, Image.Resampling.BICUBIC),
+        "has the value 0.5; labels are whole numbers": Image.fromarray(np.full((9, 9), 0.5, dtype=np.float32)),
+    }
+    for says, image in images.items():
+        image.save(tmp_path / "wall.tif")
+        code, _, error = informed(capsys, tmp_path / "wall.tif", "--width", 3)
+        assert (code, says in error) == (2, True), error
+    (tmp_path / "wall.tif").write_bytes(b"II*\0 and nothing more")
+    assert "is no image that can be read" in informed(capsys, tmp_path / "wall.tif", "--width", 3)[2]
+    (tmp_path / "wall.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", encoding="utf-8")
+    assert "is no image: width is of images" in informed(capsys, tmp_path / "wall.obj", "--width", 3)[2]
+
+
+def test_pictures_beside_files_of_stones_are_no_stones(tmp_path):
+    for k in range(2):
+        text = f"v {k} 0 0\nv {k + 1} 0 0\nv {k + 1} 1 0\nv {k} 1 0\nf 1 2 3 4\n"
+        (tmp_path / f"stone {k}.obj").write_text(text, encoding="utf-8")
+    drawn_wall()[0].save(tmp_path / "preview.png")
+    assert blockvis.read(tmp_path).n_blocks == 2
+
+
+RINGS = {
+    "brick": [[20, 20], [120, 20], [120, 100], [20, 100]],
+    "stone": [[120, 20], [220, 20], [220, 100], [120, 100]],
+}
+RUNS = [200 * 230 + 20, *[80, 120] * 49, 80, 20 * 200 + 100]
+
+
+def _coco(**changes):
+    flat = [[float(x) for point in ring for x in point] for ring in RINGS.values()]
+    shapes = [*([ring] for ring in flat), {"size": [200, 300], "counts": RUNS}]
+    return {
+        "images": [{"id": 7, "file_name": "w.jpg", "width": 300, "height": 200}],
+        "categories": [{"id": 1, "name": "brick"}, {"id": 2, "name": "stone"}],
+        "annotations": [
+            {"id": k, "image_id": 7, "category_id": min(k + 1, 2), "segmentation": shape}
+            for k, shape in enumerate(shapes)
+        ],
+    } | changes
+
+
+def _labelme():
+    shapes = [{"label": label, "points": ring, "shape_type": "polygon"} for label, ring in RINGS.items()]
+    shapes.append({"label": "stone", "points": [[230, 20], [280, 100]], "shape_type": "rectangle"})
+    shapes.append({"label": "crack", "points": [[0, 0], [9, 9]], "shape_type": "linestrip"})
+    return {"shapes": shapes, "imagePath": "w.jpg", "imageWidth": 300, "imageHeight": 200}
+
+
+def _via():
+    regions = [
+        {
+            "shape_attributes": {"name": "polygon", "all_points_x": xs, "all_points_y": ys},
+            "region_attributes": {"class": label},
+        }
+        for label, (xs, ys) in ((label, np.transpose(ring).tolist()) for label, ring in RINGS.items())
+    ]
+    box = {"name": "rect", "x": 230, "y": 20, "width": 50, "height": 80}
+    regions.append({"shape_attributes": box, "region_attributes": {"class": "stone"}})
+    return {"_via_img_metadata": {"w.jpg1": {"filename": "w.jpg", "size": 1, "regions": regions}}}
+
+
+@pytest.mark.parametrize("content", [_coco(), _labelme(), _via()], ids=["COCO", "LabelMe", "VIA"])
+def test_annotations_are_blocks_with_their_label_as_group(tmp_path, capsys, content):
+    (tmp_path / "w.json").write_text(json.dumps(content), encoding="utf-8")
+    Image.new("L", (300, 200)).save(tmp_path / "w.jpg")
+    code, out, _ = informed(capsys, tmp_path / "w.json", "--width", 3)
+    assert code == 0
+    assert "size            2.6 m × 0.8 m, from (0.2, 1) m" in out
+    assert "areas           0.4 to 0.8 m², median 0.8, sum 2 m²" in out
+    assert "groups          'stone' 2, 'brick' 1" in out
+    assert ("left out: 1 shapes of kind linestrip" in out) == ("shapes" in content)
+
+
+def test_packed_runs_and_several_pieces_of_coco_are_read(tmp_path):
+    packed = _coco()
+    packed["annotations"] = packed["annotations"][:1]
+    packed["annotations"][0]["segmentation"] = {"size": [4, 4], "counts": "54O1N"}
+    (tmp_path / "w.json").write_text(json.dumps(packed), encoding="utf-8")
+    with pytest.raises(ValueError, match="runs make"):
+        read_layout(tmp_path / "w.json", pixel=1.0)
+    pieces = _coco()
+    pieces["annotations"] = [
+        {"image_id": 7, "category_id": 2, "segmentation": [[0, 0, 9, 0, 9, 9], [20, 0, 29, 0, 29, 9]]}
+    ]
+    (tmp_path / "w.json").write_text(json.dumps(pieces), encoding="utf-8")
+    layout = read_layout(tmp_path / "w.json", pixel=1.0)
+    assert layout.names == ("stone 1-1", "stone 1-2")
+    assert "1 annotations are in several pieces" in layout.notes[1]
+
+
+def test_annotations_that_cannot_be_read_say_why(tmp_path, capsys):
+    two = _coco(images=[{"id": 7, "file_name": "a.jpg"}, {"id": 8, "file_name": "b.jpg"}])
+    two["annotations"][0] = two["annotations"][0] | {"image_id": 8}
+    boxes = _coco(annotations=[{"image_id": 7, "bbox": [0, 0, 5, 5], "segmentation": []}])
+    cases = {
+        "annotates 2 images (a.jpg, b.jpg); export one of them alone": two,
+        "outlines no stone, it has 1 boxes without an outline": boxes,
+        "does not say how many pixels its image has; give pixel": _via(),
+    }
+    for says, content in cases.items():
+        (tmp_path / "w.json").write_text(json.dumps(content), encoding="utf-8")
+        code, _, error = informed(capsys, tmp_path / "w.json", "--width", 3)
+        assert (code, says in error) == (2, True), error
