@@ -31,6 +31,9 @@ _MESHIO = Format("meshio_files")
 FORMATS = {
     ".msh": Format("gmsh_mesh", writes=True),
     ".json": Format("layout_json", writes=True, writes_space=True),
+    ".geojson": Format("layout_json", writes=True),
+    ".gpkg": Format("geodata"),
+    ".shp": Format("geodata"),
     ".dxf": Format("dxf", writes=True),
     ".svg": Format("svg", writes=True),
     ".vtu": Format("pyvista_files", writes=True, writes_space=True),

@@ -24,6 +24,7 @@ from solver import mechanics
 from .bodies import Bodies, fans
 from .cells import layout_of_cells
 from .closed_surfaces import closed_bodies
+from .reading import Reading
 
 #: Objects nested deeper than this are not looked into.
 DEEPEST = 40
@@ -53,7 +54,7 @@ class _Mesh:
     row: dict[str, Any]
 
 
-def read_content(content: Any, path: Path, view: str | None) -> Layout | Bodies | None:
+def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies | None:
     """Read the blocks of a parsed .json file; None if it holds no mesh.
 
     Parameters
@@ -62,7 +63,7 @@ def read_content(content: Any, path: Path, view: str | None) -> Layout | Bodies 
         Of the parser.
     path : Path
         Named in messages.
-    view : {"xy", "xz", "yz"} or None
+    reading : Reading
 
     Raises
     ------
@@ -89,7 +90,7 @@ def read_content(content: Any, path: Path, view: str | None) -> Layout | Bodies 
         meshes = [replace(mesh, row={**mesh.row, "name": f"block {mesh.row['key']}"}) for mesh in meshes]
     size = float(np.ptp(every, axis=0).max())
     if float(np.ptp(every, axis=0).min()) <= FLAT * size:
-        return _flat(meshes, path, view)
+        return _flat(meshes, path, reading.view)
     planes = [mesh for mesh in meshes if len(mesh.faces) == 1]
     if len(planes) < len(meshes):
         # A single face among bodies is a ground without depth.

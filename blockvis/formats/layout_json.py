@@ -11,6 +11,7 @@ the points around each face, counter-clockwise seen from outside; z is up.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,29 +22,36 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.solids import Solid
 from blockvis.layout.surfaces import cleaned
 
-from . import compas_json
+from . import compas_json, geodata
 from .bodies import Bodies
 from .reading import Reading
 
 FORMAT = "blockvis layout"
+
+#: What reads the parsed JSON of other programs; each returns None for what it does not know.
+KINDS: tuple[Callable[[Any, Path, Reading], Layout | Bodies | None], ...] = (
+    geodata.read_content,
+    compas_json.read_content,
+)
 
 #: In the name of a file for COMPAS, before its suffix.
 COMPAS = ".compas."
 
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
-    """Read a .json layout, or the blocks of a file of COMPAS."""
+    """Read a .json layout, or what other programs write as JSON."""
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise ValueError(f"'{path}' is not a JSON file: {error}; export it again") from None
-    if not _is_own(content):
-        found = compas_json.read_content(content, path, reading.view)
+    for read_content in () if _is_own(content) else KINDS:
+        found = read_content(content, path, reading)
         if found is not None:
             return found
     if not isinstance(content, dict) or not isinstance(content.get("blocks"), list):
         raise ValueError(
-            f"'{path}' is JSON but no layout; it needs a list \"blocks\" of {{name, outline}}, or meshes of COMPAS"
+            f"'{path}' is JSON but no layout; it needs a list \"blocks\" of {{name, outline}}, features "
+            "of GeoJSON, or meshes of COMPAS"
         )
     if reading.view not in (None, "xy"):
         raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
@@ -104,6 +112,9 @@ def _read_solids(content: dict[str, Any], path: Path) -> Layout:
 
 def write(layout: Layout, path: Path) -> None:
     """Write a .json layout; of blocks in space to a name that ends in .compas.json meshes of COMPAS."""
+    if path.suffix.lower() == ".geojson":
+        geodata.write(layout, path)
+        return
     if COMPAS in path.name.lower():
         if layout.dimension == 2:
             raise ValueError(f"'{path}': COMPAS knows blocks in space only; give dimension 3, or write to .json")
