@@ -14,12 +14,16 @@ __all__ = ["FORMATS", "Format"]
 
 @dataclass(frozen=True)
 class Format:
-    """One family of files: its module in this room, and whether it reads and writes them, also blocks in space."""
+    """One family of files: its module in this room, and whether it reads and writes them, also blocks in space.
+
+    ``looked_for`` says whether a file of a folder is taken for a stone by this suffix alone.
+    """
 
     module: str
     reads: bool = True
     writes: bool = False
     writes_space: bool = False
+    looked_for: bool = True
 
 
 _CAD = Format("gmsh_cad")
@@ -47,6 +51,9 @@ FORMATS = {
     ".ply": _SOLID,
     ".off": Format("solids"),
     ".glb": _SOLID,
+    ".3ddat": Format("threedec"),
+    ".3dec": Format("threedec"),
+    ".txt": Format("threedec", looked_for=False),
     ".geo": _CAD,
     ".geo_unrolled": _CAD,
     ".step": _CAD,
@@ -71,7 +78,7 @@ FORMATS = {
     ".exo": _MESHIO,
     ".f3grid": _MESHIO,
     ".tec": _MESHIO,
-    ".dat": _MESHIO,
+    ".dat": Format("threedec"),
     ".wkt": _MESHIO,
     ".h5m": _MESHIO,
     ".xml": _MESHIO,
