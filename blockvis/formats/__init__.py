@@ -50,6 +50,7 @@ FORMATS = {
     ".obj": _SOLID,
     ".ply": _SOLID,
     ".off": Format("solids"),
+    ".dae": Format("solids"),
     ".glb": _SOLID,
     ".3ddat": Format("threedec"),
     ".3dec": Format("threedec"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import re
 import sqlite3
@@ -128,6 +129,8 @@ def _read_shapefile(path: Path, reading: Reading) -> Layout:
     beside = {entry.suffix.lower(): entry for entry in path.parent.glob(f"{_escaped(path.stem)}.*")}
     table, projection = beside.get(".dbf"), beside.get(".prj")
     features, skipped = [], Counter[str]()
+    # What pyshp would print of rings that turn the wrong way is no fault of a drawing.
+    logging.getLogger("shapefile").setLevel(logging.CRITICAL + 1)
     try:
         with path.open("rb") as shapes, (table or path).open("rb") as rows, warnings.catch_warnings():
             warnings.simplefilter("ignore")
