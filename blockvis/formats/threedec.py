@@ -1,7 +1,7 @@
-"""Blocks of 3DEC's command files, .3ddat .3dec .dat .txt: ``poly brick``, ``poly prism``, ``block create brick`` ...
+"""Blocks of 3DEC's command files, .3ddat .3dec .dat .txt: ``poly brick``, ``poly prism``, ``block create ... face`` ...
 
-Of the other commands those are followed that say which blocks are fixed and which way gravity acts. What cuts or
-deletes blocks, and what makes them by FISH, is refused: only 3DEC runs it.
+Of the other commands those are followed that call a file beside this one, that fix blocks or give their density, and
+that say which way gravity acts. What cuts or deletes blocks, or makes them by FISH, is refused: only 3DEC runs it.
 """
 
 from __future__ import annotations
@@ -26,6 +26,10 @@ from .reading import Reading
 
 #: What tells a command file from a mesh of the same suffix.
 MAKES = re.compile(r"^\s*(poly(hedron)?\s+\S|block\s+create\s)", re.IGNORECASE | re.MULTILINE)
+CALLS = re.compile(r"^\s*(program\s+)?call\s+\S", re.IGNORECASE | re.MULTILINE)
+
+#: Files that call each other deeper than this call themselves.
+DEEPEST_CALL = 8
 
 #: Commands that change blocks made before them, the first words of each.
 CHANGES = (
@@ -46,7 +50,12 @@ CHANGES = (
 )
 
 #: Words that say something of a block by the number after them.
-ABOUT = ("region", "mat", "material", "con", "cons", "constitutive", "join", "joint", "id")
+ABOUT = ("region", "reg", "r", "mat", "material", "con", "cons", "constitutive", "join", "joint", "id")
+
+REGION = {"reg": "region", "r": "region"}
+
+#: Words of the shapes of blocks, before the numbers of their corners.
+SHAPES = ("brick", "prism", "a", "b", "face-1", "face-2", "face")
 
 #: Faces of a brick by its corners, x fastest.
 BRICK = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
@@ -61,6 +70,7 @@ class _Block:
     faces: list[list[int]]
     words: dict[str, str] = field(default_factory=dict)
     fixed: bool = False
+    density: float | None = None
 
     @property
     def middle(self) -> np.ndarray:
@@ -83,25 +93,46 @@ class _Model:
 def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read the blocks of a command file; a .dat file that makes none is a mesh of Tecplot."""
     text = path.read_text(encoding="utf-8", errors="replace")
-    if not MAKES.search(text):
+    if not MAKES.search(text) and not CALLS.search(text):
         if path.suffix.lower() == ".dat":
             return meshio_files.read(path, reading)
         raise ValueError(
             f"'{path}' makes no block by 3DEC's commands (poly brick, poly prism, block create ...); give a drawing"
         )
     model = _Model(path)
+    _run(path, text, model, 0)
+    if not model.blocks:
+        raise ValueError(f"'{path}' and the files that it calls make no block; give the file of the geometry")
+    return _bodies(model)
+
+
+def _run(path: Path, text: str, model: _Model, depth: int) -> None:
+    """Carry out the commands of a file, and of those beside it that it calls."""
     inside_fish = False
     for line, words in _commands(text):
-        first = words[0].lower()
-        if first in ("def", "define") or (first == "fish" and words[1:2] and words[1].lower() in ("def", "define")):
+        small = [word.lower() for word in words]
+        model.path = path
+        if small[0] in ("def", "define") or (small[0] == "fish" and small[1:2] in (["def"], ["define"])):
             inside_fish = True
-        elif inside_fish and first == "end":
+        elif inside_fish and small[0] == "end":
             inside_fish = False
         elif inside_fish and MAKES.match(" ".join(words)):
             raise ValueError(_by_fish(path, line, words))
+        elif not inside_fish and (small[0] == "call" or small[:2] == ["program", "call"]):
+            for word in words[1 if small[0] == "call" else 2 :]:
+                _call(_plain(word), path, model, depth)
         elif not inside_fish:
             _follow(line, words, model)
-    return _bodies(model)
+
+
+def _call(name: str, path: Path, model: _Model, depth: int) -> None:
+    """Carry out a file beside another; others are counted as passed over."""
+    called = path.parent / name
+    beside = called.resolve().is_relative_to(path.parent.resolve()) and called.is_file()
+    if depth >= DEEPEST_CALL or not beside:
+        model.passed[f"call '{name}'"] += 1
+    else:
+        _run(called, called.read_text(encoding="utf-8", errors="replace"), model, depth + 1)
 
 
 def _commands(text: str) -> Iterator[tuple[int, list[str]]]:
@@ -113,7 +144,7 @@ def _commands(text: str) -> Iterator[tuple[int, list[str]]]:
         goes_on = re.search(r"(&|\.\.\.)$", line)
         whole += " " + (line[: goes_on.start()] if goes_on else line)
         if not goes_on:
-            words = re.findall(r"'[^']*'|\"[^\"]*\"|\[[^\]]*\]?|[^\s(),\[]+", whole)
+            words = re.findall(r"'[^']*'|\"[^\"]*\"|\[[^\]]*\]?|[^\s(),=\[]+", whole)
             if words:
                 yield start, words
             whole = ""
@@ -140,13 +171,19 @@ def _follow(line: int, words: list[str], model: _Model) -> None:
     elif two in ("model gravity", "block gravity") or small[0] == "gravity":
         _turn(words, model)
     elif small[0] == "fix" or two == "block fix":
-        _fix(small, words, model)
+        chosen = _in_range(words[1 if small[0] == "fix" else 2 :], model)
+        for block in chosen:
+            block.fixed = True
+        model.passed["fix"] += not chosen
+    elif two == "block property" and small[2:3] == ["density"] and len(words) > 3:
+        for block in _in_range(words[4:], model) if len(words) > 4 else model.blocks:
+            block.density = _number(words[3])
     elif model.blocks and (small[0] in CHANGES or two in CHANGES):
         raise ValueError(
             f"'{model.path}': line {line} changes the blocks ('{' '.join(words)[:60]}'), which only 3DEC does; write "
             "the blocks as they are then, by poly prism or block create"
         )
-    elif small[0] in ("call", "program", "join") or two == "block join":
+    elif small[0] == "join" or two == "block join":
         model.passed[two if small[0] == "block" else small[0]] += 1
 
 
@@ -165,16 +202,18 @@ def _made(line: int, words: list[str], path: Path) -> _Block:
             lists.append((word.lower(), []))
     for word, numbers in lists:
         if word in ABOUT and len(numbers) == 1:
-            about[word] = f"{numbers[0]:g}"
-    shapes = [(word, numbers) for word, numbers in lists if word in ("brick", "prism", "a", "b", "face-1", "face-2")]
+            about[REGION.get(word, word)] = f"{numbers[0]:g}"
+    shapes = [(word, numbers) for word, numbers in lists if word in SHAPES]
     shape = shapes[0][0] if shapes else (lists[0][0] if lists else "")
     if shape == "brick":
         points, faces = _brick(shapes[0][1], line, path)
     elif shape == "prism" and len(shapes) == 3:
         points, faces = _prism(shapes[1][1], shapes[2][1], line, path)
+    elif shape == "face":
+        points, faces = _polyhedron([numbers for _, numbers in shapes], line, path)
     else:
         raise ValueError(
-            f"'{path}': line {line} makes a block by '{shape}', which is not read; write it as brick, or prism a ... b"
+            f"'{path}': line {line} makes a block by '{shape}', which is not read; write it as brick, prism or faces"
         )
     if not np.isfinite(points).all():
         raise ValueError(f"'{path}': line {line} has a corner that is not finite; repair it")
@@ -201,6 +240,17 @@ def _prism(first: list[float], second: list[float], line: int, path: Path) -> tu
     return np.reshape(first + second, (-1, 3)), [list(range(n)), list(range(n, 2 * n)), *sides]
 
 
+def _polyhedron(faces: list[list[float]], line: int, path: Path) -> tuple[np.ndarray, list[list[int]]]:
+    wrong = next((k for k, numbers in enumerate(faces) if len(numbers) % 3 or len(numbers) < 9), None)
+    if wrong is not None or len(faces) < 4:
+        what = f"there are {len(faces)}" if wrong is None else f"face {wrong + 1} has {len(faces[wrong])} numbers"
+        raise ValueError(f"'{path}': line {line} takes four faces or more of three corners (x, y, z) or more; {what}")
+    counts = [len(numbers) // 3 for numbers in faces]
+    ends = np.cumsum(counts)
+    rings = [list(range(end - n, end)) for n, end in zip(counts, ends.tolist(), strict=True)]
+    return np.reshape([number for numbers in faces for number in numbers], (-1, 3)), rings
+
+
 def _turn(words: list[str], model: _Model) -> None:
     """Take the direction of gravity."""
     numbers = [number for word in words if (number := _number(word)) is not None]
@@ -210,34 +260,26 @@ def _turn(words: list[str], model: _Model) -> None:
         model.passed["gravity that is not vertical"] += 1
 
 
-def _fix(small: list[str], words: list[str], model: _Model) -> None:
-    """Fix the blocks of a region or group, or those whose middle lies within limits."""
-    names = {name.lower(): region for region, name in model.names.items()}
-    rest = [k for k, word in enumerate(small) if word not in ("block", "fix", "range", "and")]
-    chosen = list(model.blocks)
-    k = rest[0] if rest else len(words)
-    known = bool(rest)
+def _in_range(words: list[str], model: _Model) -> list[_Block]:
+    """Choose the blocks of a region or group, or those whose middle lies within limits; none of an unknown range."""
+    small = [word.lower() for word in words if word.lower() not in ("range", "and")]
+    words = [_plain(word) for word in words if word.lower() not in ("range", "and")]
+    regions = {name.lower(): region for region, name in model.names.items()}
+    chosen, k = model.blocks if words else [], 0
     while k < len(words):
         key = small[k].removeprefix("pos-")
-        numbers = [_number(word) for word in words[k + 1 : k + 3]]
-        if key in ("region", "group") and k + 1 < len(words):
-            chosen = [block for block in chosen if block.words.get(key) == _plain(words[k + 1])]
-            k += 2
-        elif key in ("x", "y", "z") and len(numbers) == 2 and None not in numbers:
-            low, high = (float(number) for number in numbers if number is not None)
+        after = words[k + 1 : k + 3]
+        if key in ("region", "group") and after:
+            chosen, k = [block for block in chosen if block.words.get(key) == after[0]], k + 2
+        elif key in ("x", "y", "z") and len(after) == 2 and None not in (limits := [_number(word) for word in after]):
+            low, high = (number for number in limits if number is not None)
             axis = "xyz".index(key)
-            chosen = [block for block in chosen if low <= block.middle[axis] <= high]
-            k += 3
-        elif _plain(key) in names:
-            chosen = [block for block in chosen if block.words.get("region") == names[_plain(key)]]
-            k += 1
+            chosen, k = [block for block in chosen if low <= block.middle[axis] <= high], k + 3
+        elif _plain(key) in regions:
+            chosen, k = [block for block in chosen if block.words.get("region") == regions[_plain(key)]], k + 1
         else:
-            known = False
-            break
-    for block in chosen if known else ():
-        block.fixed = True
-    if not known:
-        model.passed["fix"] += 1
+            return []
+    return chosen
 
 
 def _bodies(model: _Model) -> Bodies:
@@ -250,11 +292,11 @@ def _bodies(model: _Model) -> Bodies:
         for body in closed_bodies(name, block.points, fans(block.faces), size, model.path):
             bodies.append(body)
             rows.append(_row(body.name, block, model.names))
-    notes = [f"{len(model.blocks)} blocks of 3DEC; its materials, joints and loads are not read"]
+    notes = [f"{len(model.blocks)} blocks of 3DEC; its joints, loads and steps are not read"]
     fixed = sum(block.fixed for block in model.blocks)
     notes += [f"fixed, as the file says: {fixed} of them"] if fixed else []
-    if model.passed:
-        listed = ", ".join(f"{n} {command}" for command, n in model.passed.items())
+    if model.passed.total():
+        listed = ", ".join(f"{n} {command}" for command, n in model.passed.items() if n)
         notes.append(Note(LEFT_OUT, f"commands that were passed over: {listed}"))
     return Bodies(tuple(bodies), tuple(rows), notes=tuple(notes), up=model.up, up_says=model.up_says)
 
@@ -265,6 +307,7 @@ def _row(name: str, block: _Block, names: dict[str, str]) -> dict[str, Any]:
     material = block.words.get("mat") or block.words.get("material")
     row: dict[str, Any] = {"name": name, "group": group}
     row |= {"material": f"mat {material}"} if material else {}
+    row |= {"density": block.density} if block.density is not None else {}
     return row | ({"role": mechanics.FIXED} if block.fixed else {})
 
 

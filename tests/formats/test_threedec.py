@@ -60,6 +60,47 @@ def test_an_arch_comes_back_with_its_areas(tmp_path, capsys):
     assert "blocks written" in capsys.readouterr().out
 
 
+def faces_of_a_box(x0, x1, z0, z1):
+    corners = [f"{x!r},{y},{z!r}" for z in (z0, z1) for y in (0, 0.5) for x in (x0, x1)]
+    rings = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    return " ".join("face " + " ".join(corners[k] for k in ring) for ring in rings)
+
+
+def test_a_main_file_of_compas_calls_its_geometry_fixes_its_supports_and_gives_densities(tmp_path):
+    written(
+        tmp_path / "supports.dat", f'block create group "Supports" poly {faces_of_a_box(-0.2, 1.2, -0.1, 0)}  r=0\n'
+    )
+    blocks = [
+        f'block create group "Blocks" poly {faces_of_a_box(0.5 * k, 0.5 * k + 0.5, 0.0, 0.3)}  r={k}' for k in (0, 1)
+    ]
+    written(tmp_path / "blocks.dat", "\n".join(blocks))
+    text = """
+    model new
+    program call 'supports.dat' 'blocks.dat'
+    program call '../elsewhere.dat'
+    block property density 2400 range group 'Supports'
+    block property density 1800 range group 'Blocks'
+    block fix range group 'Supports'
+    fish define blocks_output
+        loop foreach ib block.list
+        endloop
+    end
+    model gravity 0 0 -9.806
+    """
+    layout = blockvis.read_layout(written(tmp_path / "main.dat", text))
+    assert layout.groups == ("Supports", "Blocks", "Blocks")
+    assert layout.roles == ("fixed", "", "")
+    assert layout.density.tolist() == [2400, 1800, 1800]
+    np.testing.assert_allclose(layout.sizes**2 * layout.thickness, [0.07, 0.075, 0.075])
+    assert "commands that were passed over: 1 call '../elsewhere.dat'" in layout.notes
+
+
+def test_files_that_call_themselves_end(tmp_path):
+    path = written(tmp_path / "main.3ddat", "call main.3ddat\n")
+    with pytest.raises(ValueError, match="and the files that it calls make no block"):
+        blockvis.read_layout(path)
+
+
 def test_gravity_says_which_way_is_up_and_groups_and_places_what_is_fixed(tmp_path):
     text = """
     block create brick 0 1 0 1 0 1 group "low"
@@ -89,6 +130,7 @@ def test_gravity_says_which_way_is_up_and_groups_and_places_what_is_fixed(tmp_pa
             "def wall\nloop n (1,3)\ncommand\npoly brick 0 1 0 1 0 1\nendcommand\nendloop\nend",
             "line 4 makes blocks by FISH",
         ),
+        ("poly face 0,0,0 1,0,0 0,1,0 face 0,0,0 1,0,0", "line 1 takes four faces or more of three corners"),
         ("block create tunnel radius 1", "line 1 makes a block by 'tunnel', which is not read"),
         ("poly brick 0 1 0 1 0 nan", "line 1 has a corner that is not finite"),
         ("hist xdis 1 2 3", "makes no block by 3DEC's commands"),
