@@ -14,16 +14,23 @@ __all__ = ["FORMATS", "Format"]
 
 @dataclass(frozen=True)
 class Format:
-    """One family of files: its module in this room, and whether it reads and writes them, also blocks in space.
+    """One family of files.
 
-    ``looked_for`` says whether a file of a folder is taken for a stone by this suffix alone.
+    Attributes
+    ----------
+    module : str
+        In this room.
+    reads, writes, writes_space : bool
+        Whether it reads and writes them, also blocks in space.
+    alone : bool
+        Whether a file holds all blocks: in a folder of one file per stone it is something else, such as a picture.
     """
 
     module: str
     reads: bool = True
     writes: bool = False
     writes_space: bool = False
-    looked_for: bool = True
+    alone: bool = False
 
 
 _CAD = Format("gmsh_cad")
@@ -54,7 +61,7 @@ FORMATS = {
     ".glb": _SOLID,
     ".3ddat": Format("threedec"),
     ".3dec": Format("threedec"),
-    ".txt": Format("threedec", looked_for=False),
+    ".txt": Format("threedec", alone=True),
     ".geo": _CAD,
     ".geo_unrolled": _CAD,
     ".step": _CAD,
