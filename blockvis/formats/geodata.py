@@ -11,7 +11,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
-from blockvis.layout.left_out import LeftOut
+from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
 from blockvis.layout.outlines import FLAT, ring_area
 from blockvis.layout.units import UNITS
@@ -160,40 +160,51 @@ def _read_geopackage(path: Path, reading: Reading) -> Layout:
     try:
         # Read only, as it is: a journal beside it is not played back.
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)) as base:
-            features, systems = _features_of_tables(base, path, reading)
+            layers = _layers(base, path)
     except sqlite3.Error as error:
         raise ValueError(f"'{path}' is no readable GeoPackage ({error}); export it again") from None
+    named = [layer.name for layer in layers]
+    chosen = [name for name in named if matches([name], reading.only)] or named
+    wanted = [one for one in layers if one.name in chosen and not matches([one.name], reading.ignore)]
+    systems = {layer.system: layer for layer in reversed(wanted)}
     if len(systems) > 1:
-        listed = ", ".join(f"'{layer}' in {name or 'none'}" for name, (layer, _) in systems.items())
+        listed = ", ".join(f"'{one.name}' in {one.system or 'none'}" for one in reversed(systems.values()))
         raise ValueError(
-            f"'{path}' has layers in several coordinate systems: {listed}; choose by only = [...], or export one"
+            f"'{path}' has layers in several coordinate systems: {listed}; leave one out (ignore), or export one"
         )
-    unit, degrees = _unit_of_system(next((text for _, text in systems.values()), ""))
-    return layout_of_features(features, path, reading, unit=unit, degrees=degrees)
+    unit, degrees = _unit_of_system(next((layer.description for layer in systems.values()), ""))
+    # What is left out as asked is counted with the rest, but not what lies in another system.
+    features = [feature for layer in layers if layer.system in systems for feature in layer.features]
+    found = layout_of_features(features, path, reading, unit=unit, degrees=degrees)
+    other = [LeftOut("asked", np.zeros((0, 2)), "", one.name) for one in layers if one.system not in systems]
+    return replace(found, left_out=(*found.left_out, *other))
 
 
-def _features_of_tables(
-    base: sqlite3.Connection, path: Path, reading: Reading
-) -> tuple[list[Feature], dict[str, tuple[str, str]]]:
-    """Read the tables of a GeoPackage; coordinate systems by name: the first layer in each, and what describes it."""
+@dataclass(frozen=True)
+class _Layer:
+    """A table of a GeoPackage: its features, and the name and description of its coordinate system, "" for none."""
+
+    name: str
+    features: list[Feature]
+    system: str
+    description: str
+
+
+def _layers(base: sqlite3.Connection, path: Path) -> list[_Layer]:
+    """Read the tables of a GeoPackage."""
     base.execute("PRAGMA trusted_schema = OFF")
     base.row_factory = sqlite3.Row
-    found: list[Feature] = []
-    systems: dict[str, tuple[str, str]] = {}
-    tables = base.execute("SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns").fetchall()
-    named = [str(table["table_name"]) for table in tables]
-    chosen = [name for name in named if reading.only and Reading(only=reading.only).wants([name])]
-    for table, layer in zip(tables, named, strict=True):
-        if Reading(ignore=reading.ignore).wants([layer]) and (not chosen or layer in chosen):
-            column = str(table["column_name"])
-            quoted = layer.replace('"', '""')
-            rows = base.execute(f'SELECT * FROM "{quoted}"').fetchall()
-            found += [_row_feature(dict(row), column, layer, path) for row in rows if row[column] is not None]
-            query = "SELECT srs_name, definition FROM gpkg_spatial_ref_sys WHERE srs_id = ?"
-            system = base.execute(query, (table["srs_id"],)).fetchone()
-            name, text = (str(system[0]), str(system[1])) if system else (str(table["srs_id"]), "")
-            systems.setdefault("" if name.lower().startswith("undefined") else name, (layer, text))
-    return found, systems
+    found = []
+    for table in base.execute("SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns").fetchall():
+        name, column = str(table["table_name"]), str(table["column_name"])
+        quoted = name.replace('"', '""')
+        rows = base.execute(f'SELECT * FROM "{quoted}"').fetchall()
+        features = [_row_feature(dict(row), column, name, path) for row in rows if row[column] is not None]
+        query = "SELECT srs_name, definition FROM gpkg_spatial_ref_sys WHERE srs_id = ?"
+        system, text = base.execute(query, (table["srs_id"],)).fetchone() or (table["srs_id"], "")
+        system = "" if str(system).lower().startswith("undefined") else str(system)
+        found.append(_Layer(name, features, system, str(text)))
+    return found
 
 
 def _row_feature(row: dict[str, Any], column: str, layer: str, path: Path) -> Feature:

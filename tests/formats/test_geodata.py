@@ -175,9 +175,12 @@ def test_layers_of_a_geopackage_are_groups(tmp_path):
 def test_layers_in_several_systems_are_refused_unless_one_is_chosen(tmp_path):
     stone = shapely.Polygon(SQUARES[0])
     path = geopackage(tmp_path / "two.gpkg", {"wall": (-1, [(stone, "a")]), "site": (4326, [(stone, "b")])})
-    assert "layers in several coordinate systems: 'wall' in none, 'site' in WGS 84; choose by only" in refusal(path)
-    assert blockvis.read_layout(path, only="wall").groups == ("wall",)
-    assert blockvis.read_layout(path, ignore="site").groups == ("wall",)
+    assert "layers in several coordinate systems: 'wall' in none, 'site' in WGS 84; leave one out" in refusal(path)
+    for asked in ({"only": "wall"}, {"ignore": "s*"}):
+        layout = blockvis.read_layout(path, **asked)
+        assert layout.groups == ("wall",)
+        assert "left out: 1 outline, as asked for on layer 'site'" in layout.notes
+        assert not [note for note in layout.notes if "matches no" in note]
 
 
 def test_damaged_geopackages_are_refused(tmp_path):
