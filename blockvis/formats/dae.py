@@ -49,7 +49,8 @@ def drawn_in(path: Path) -> Drawn:
     document = collada.Collada(str(path), ignore=[collada.common.DaeError])
     announced = len(re.findall(rb"<(?:\w+:)?geometry\s", text))
     if len(document.geometries) < announced:
-        raise ValueError(f"{announced - len(document.geometries)} of {announced} geometries are damaged")
+        damaged = f"{announced - len(document.geometries)} of {announced} geometries are damaged"
+        raise ValueError(f"{damaged}: {document.errors[-1]}" if document.errors else damaged)
     about = document.assetInfo
     order, up = UP.get(str(about.upaxis), UP["Y_UP"])
     metres = float(about.unitmeter or 1.0)

@@ -22,7 +22,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
 from blockvis.layout.outlines import FLAT, ring_area
-from blockvis.layout.units import UNITS
+from blockvis.layout.units import DOUBTED, UNITS
 from blockvis.layout.views import VIEWS, axis_across, upright_note
 from blockvis.system.extras import require
 from solver import mechanics
@@ -33,9 +33,6 @@ from .reading import Reading
 #: Attributes that name a block and its group, the first that a file has; in small letters.
 NAMES = ("name", "label", "title", "stone", "block", "brick", "id", "fid", "objectid")
 GROUPS = ("group", "layer", "kind", "class", "type", "category")
-
-#: Blocks of less than this across, at coordinates that longitude and latitude have, are in degrees: 1 mm or 100 m.
-DEGREES = 1e-3
 
 #: Types of GeoJSON objects that hold outlines.
 GEOJSON = (
@@ -379,8 +376,9 @@ def _check_degrees(rings: list[np.ndarray], path: Path, reading: Reading, system
         return
     median = float(np.median([math.sqrt(abs(ring_area(ring))) for ring in rings]))
     x, y = np.concatenate(rings).T
+    # In metres no stone is as small, and in degrees none as large: 2 km.
     possible = np.abs(x).max() <= 360.0 and np.abs(y).max() <= 90.0
-    if possible and 0.0 < median < DEGREES:
+    if possible and 0.0 < median < DOUBTED[0]:
         zone = int((x.mean() + 180.0) % 360.0 // 6.0) + 1
         code = (32600 if y.mean() >= 0.0 else 32700) + zone
         unless = "" if system else "; if they are no degrees, give their unit"

@@ -77,7 +77,8 @@ def _read_dae(path: Path, reading: Reading) -> Layout | Bodies:
         raise
     except Exception as error:  # noqa: BLE001
         # pycollada passes on the errors of its parsers.
-        reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
+        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__} "
+        reason = " ".join(f"{kind}{error}".split())[:200]
         raise ValueError(f"'{path}' cannot be read as .dae ({reason}); export it again") from None
     size = _checked_size(drawn.parts, path)
     if _are_flat(drawn.parts, size):
