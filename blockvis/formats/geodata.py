@@ -216,8 +216,11 @@ def _row_feature(row: dict[str, Any], column: str, layer: str, path: Path) -> Fe
         raise ValueError(f"{called} is of an extended kind, which is not read; export it again")
     try:
         return Feature(shapely.from_wkb(blob[8 + start :]), row, layer)
+    except NotImplementedError:
+        remedy = f"ogr2ogr -nlt CONVERT_TO_LINEAR {path.stem}_straight.gpkg {path.name}"
+        raise ValueError(f"{called} has arcs or is in space, which is not read; straighten it: {remedy}") from None
     except (shapely.errors.ShapelyError, ValueError, TypeError) as error:
-        raise ValueError(f"{called} cannot be read ({error}); export it again") from None
+        raise ValueError(f"{called} cannot be read ({' '.join(str(error).split())}); export it again") from None
 
 
 def _unit_of_system(text: str) -> tuple[str, str]:
@@ -277,7 +280,7 @@ def layout_of_features(
     _check_degrees([*rings, *(holed[0][:, order] for holed, _ in found.holed)], path, reading, degrees, notes)
     if listed:
         notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
-    kinds, left_out = [rows[k] for k in found.of], []
+    kinds, left_out = _parts(rows, found.of), []
     for holed, k in found.holed:
         outer, *holes = (ring[:, order] for ring in holed)
         x, y = holes[0].mean(axis=0)
@@ -409,6 +412,15 @@ def _rows(features: Sequence[Feature]) -> list[dict[str, Any]]:
         called = value if isinstance(value, str) and value else f"{name} {value}" if value != "" else f"block {k}"
         rows.append(_row(str(called), str(own.get(group, feature.layer)), own))
     return rows
+
+
+def _parts(rows: Sequence[dict[str, Any]], of: Sequence[int]) -> list[dict[str, Any]]:
+    """Rows of outlines; several of one feature are numbered."""
+    several, seen, found = Counter(of), Counter[int](), []
+    for k in of:
+        seen[k] += 1
+        found.append({**rows[k], "name": f"{rows[k]['name']} {seen[k]}"} if several[k] > 1 else rows[k])
+    return found
 
 
 def _first(keys: Iterable[str], rows: Sequence[Mapping[str, Any]], *, distinct: bool) -> str:

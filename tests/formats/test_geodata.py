@@ -167,7 +167,7 @@ def test_layers_of_a_geopackage_are_groups(tmp_path):
     layers = {"fixed": (2, [(shapes[0], "a"), (shapes[1], "b")]), 'odd"name': (2, [(both, None)])}
     layout = blockvis.read_layout(geopackage(tmp_path / "wall #1.gpkg", layers))
     assert layout.groups == ("fixed", "fixed", 'odd"name', 'odd"name')
-    assert layout.names == ("a", "b", "block 2", "block 2")
+    assert layout.names == ("a", "b", "block 2 1", "block 2 2")
     assert layout.unit == "ft"
     np.testing.assert_allclose(layout.sizes**2, 0.08 * 0.3048**2)
 
@@ -188,7 +188,9 @@ def test_damaged_geopackages_are_refused(tmp_path):
     path.write_bytes(b"SQLite format 3\0" + bytes(100))
     assert "is no readable GeoPackage" in refusal(path)
     geopackage(path := tmp_path / "cut.gpkg", {"wall": (-1, [(shapely.Polygon(SQUARES[0]), "a")])})
-    damaged = {b"GP\0\1": "no header", b"GP\0\x21" + bytes(9): "extended", b"GP\0\1" + bytes(9): "cannot be read"}
+    arc = struct.pack("<BII6d", 1, 8, 3, 0.0, 0.0, 1.0, 1.0, 2.0, 0.0)
+    damaged = {b"GP\0\1" + bytes(4) + arc: "straighten it: ogr2ogr -nlt CONVERT_TO_LINEAR cut_straight.gpkg cut.gpkg"}
+    damaged |= {b"GP\0\1": "no header", b"GP\0\x21" + bytes(9): "extended", b"GP\0\1" + bytes(9): "cannot be read"}
     for blob, words in damaged.items():
         with closing(sqlite3.connect(path)) as base:
             base.execute("UPDATE wall SET geom = ?", (blob,))
