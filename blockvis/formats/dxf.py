@@ -22,6 +22,8 @@ from blockvis.layout.outlines import FLAT, arc_points
 from blockvis.layout.units import metres_per
 from blockvis.layout.views import VIEWS, axis_across, upright_note
 
+from .bodies import Bodies
+from .dxf_bodies import DrawnMesh, drawn_mesh, is_mesh, layout_of_meshes
 from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
@@ -61,6 +63,7 @@ class _Found:
     misses: list[float] = field(default_factory=list)
     left_out: list[LeftOut] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    meshes: list[DrawnMesh] = field(default_factory=list)
 
     def add(self, ring: np.ndarray, entity: Any, handle: str) -> None:
         self.rings.append(ring)
@@ -70,7 +73,7 @@ class _Found:
         self.looks.append(_looks(entity))
 
 
-def read(path: Path, reading: Reading) -> Layout:
+def read(path: Path, reading: Reading) -> Layout | Bodies:
     """Read a .dxf drawing; its unit is that of the header variable $INSUNITS."""
     log = logging.getLogger("ezdxf")
     level = log.level
@@ -82,7 +85,7 @@ def read(path: Path, reading: Reading) -> Layout:
         log.setLevel(level)
 
 
-def _read(path: Path, reading: Reading) -> Layout:
+def _read(path: Path, reading: Reading) -> Layout | Bodies:
     import ezdxf
     from ezdxf import recover
 
@@ -114,10 +117,15 @@ def _read(path: Path, reading: Reading) -> Layout:
             found.skipped[f"{entity.dxftype()} on {NEVER_DRAWN}"] += 1
         elif entity.dxftype() in ("HATCH", "MPOLYGON"):
             _add_hatch(entity, handle, found, tolerance)
+        elif is_mesh(entity):
+            found.meshes.append(drawn_mesh(entity, handle))
         elif entity.dxftype() in _CURVES:
             _add_curve(entity, handle, found, tolerance)
         else:
             found.skipped[entity.dxftype()] += 1
+    meshes = _chosen_meshes(found, reading)
+    if meshes:
+        return layout_of_meshes(meshes, path, reading, stated, _faults(audit) + _skipped(found))
     found.notes += _turned(found, reading.view, path)
     faces = _with_loose(found, reading)
     if not found.rings and all(item.kind == "open" for item in found.left_out):
@@ -133,11 +141,7 @@ def _read(path: Path, reading: Reading) -> Layout:
 def _layout(found: _Found, faces: Faces, stated: str) -> Layout:
     """Make a layout of what was found; ``stated`` is the unit that the file states."""
     notes = found.notes + faces.notes + joined_note(found.misses, _size(found))
-    if found.skipped:
-        listed = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
-        notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
-    if found.hidden:
-        notes.append(Note(LEFT_OUT, f"skipped on layers that are off or frozen: {_listed(found.hidden)}"))
+    notes += _skipped(found)
     layout = Layout(
         blocks=tuple(ring[:, :2] for ring in found.rings),
         names=tuple(found.names),
@@ -151,6 +155,29 @@ def _layout(found: _Found, faces: Faces, stated: str) -> Layout:
         for layer, name, row in zip(found.layers, found.names, found.rows, strict=True)
     ]
     return with_rows(layout, rows)
+
+
+def _chosen_meshes(found: _Found, reading: Reading) -> list[DrawnMesh]:
+    """Take the bodies that are asked for, where no outline is; count the others, or the outlines, as skipped."""
+    meshes = [mesh for mesh in found.meshes if reading.wants([mesh.layer, mesh.name])]
+    outlines = [layer for layer, name in zip(found.layers, found.names, strict=True) if reading.wants([layer, name])]
+    if meshes and not outlines:
+        flat = len(found.rings) + len(found.loose)
+        found.skipped.update({"outlines and lines beside bodies in space": flat} if flat else {})
+        return meshes
+    found.skipped.update(Counter(mesh.curved or "body in space" for mesh in found.meshes))
+    return []
+
+
+def _skipped(found: _Found) -> list[str]:
+    """Count what was skipped in notes."""
+    notes = []
+    if found.skipped:
+        listed = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
+        notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
+    if found.hidden:
+        notes.append(Note(LEFT_OUT, f"skipped on layers that are off or frozen: {_listed(found.hidden)}"))
+    return list(notes)
 
 
 def _faults(audit: Any) -> list[str]:
@@ -256,11 +283,7 @@ def _add_curve(entity: Any, handle: str, found: _Found, tolerance: float | None)
         found.add(ring, entity, handle)
         return
     exact = _circular(entity, tolerance)
-    try:
-        points = _points(make_path(entity), tolerance) if exact is None else exact
-    except TypeError:  # a polyface or mesh POLYLINE
-        found.skipped[kind] += 1
-        return
+    points = _points(make_path(entity), tolerance) if exact is None else exact
     if len(points) < 2:
         found.skipped[f"{kind} without length"] += 1
         return

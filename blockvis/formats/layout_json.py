@@ -22,7 +22,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.solids import Solid
 from blockvis.layout.surfaces import cleaned
 
-from . import compas_json
+from . import compas_json, geodata
 from .annotations import program_of
 from .annotations import read_content as read_annotations
 from .bodies import Bodies
@@ -33,6 +33,7 @@ FORMAT = "blockvis layout"
 #: What reads the parsed JSON of other programs; each returns None for what it does not know.
 KINDS: tuple[Callable[[Any, Path, Reading], Layout | Bodies | None], ...] = (
     read_annotations,
+    geodata.read_content,
     compas_json.read_content,
 )
 
@@ -55,7 +56,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     if not isinstance(content, dict) or not isinstance(content.get("blocks"), list):
         raise ValueError(
             f"'{path}' is JSON but no layout; it needs a list \"blocks\" of {{name, outline}}, annotations of COCO, "
-            "LabelMe or VIA, or meshes of COMPAS"
+            "LabelMe or VIA, features of GeoJSON, or meshes of COMPAS"
         )
     if reading.view not in (None, "xy"):
         raise ValueError(f"'{path}' is drawn in the plane xy; it has no view {reading.view}")
@@ -116,6 +117,9 @@ def _read_solids(content: dict[str, Any], path: Path) -> Layout:
 
 def write(layout: Layout, path: Path) -> None:
     """Write a .json layout; of blocks in space to a name that ends in .compas.json meshes of COMPAS."""
+    if path.suffix.lower() == ".geojson":
+        geodata.write(layout, path)
+        return
     if COMPAS in path.name.lower():
         if layout.dimension == 2:
             raise ValueError(f"'{path}': COMPAS knows blocks in space only; give dimension 3, or write to .json")

@@ -27,6 +27,7 @@ from blockvis.system.atomic_files import whole_file, write_whole
 
 from .bodies import Bodies, in_dimension
 from .cells import of_files
+from .elsewhere import cannot_read
 from .files import MissingFile as MissingFile
 from .files import files_of
 from .image_scale import ImageKeys
@@ -374,6 +375,8 @@ def _format(path: Path, verb: str) -> Format:
     suffix = path.suffix.lower()
     known = FORMATS.get(suffix)
     if known is None or not (known.reads if verb == "read" else known.writes):
-        able = sorted(key for key, value in FORMATS.items() if (value.reads if verb == "read" else value.writes))
-        raise ValueError(f"'{path}': cannot {verb} '{suffix or 'a file without suffix'}'; use one of {' '.join(able)}")
+        if verb == "read":
+            raise ValueError(f"'{path}': {cannot_read(suffix)}")
+        able = " ".join(sorted(key for key, value in FORMATS.items() if value.writes))
+        raise ValueError(f"'{path}': cannot write '{suffix or 'a file without suffix'}'; use one of {able}")
     return known

@@ -1,4 +1,4 @@
-"""Bodies in space or flat meshes, .stl .obj .ply .off .glb, through trimesh."""
+"""Bodies in space or flat meshes, .stl .obj .ply .off .glb, through trimesh, and .dae."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from blockvis.layout.block_table import rows_of, with_rows
 from blockvis.layout.layout import Layout
 from blockvis.layout.outlines import FLAT
 from blockvis.layout.solids import Solid, area_vectors, prism, triangles_of
+from blockvis.system.extras import MissingExtra
 
+from . import dae
 from .bodies import Bodies
 from .cells import layout_of_cells, merged
 from .closed_surfaces import enclosed
@@ -27,10 +29,12 @@ LARGEST_HEADER = 64 * 2**20
 
 
 def read(path: Path, reading: Reading) -> Layout | Bodies:
-    """Read bodies or a flat mesh; .glb is in metres, the other formats state no unit."""
+    """Read bodies or a flat mesh; .glb is in metres, .dae states its unit, the other formats state none."""
     import trimesh
 
     suffix = path.suffix.lower()
+    if suffix == ".dae":
+        return _read_dae(path, reading)
     try:
         options = {"split_objects": True, "group_material": False} if suffix == ".obj" else {}
         scene = trimesh.load_scene(str(path), process=False, **options)
@@ -48,23 +52,10 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
         # trimesh passes on the errors of whatever parser it uses.
         reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
         raise ValueError(f"'{path}' cannot be read as {suffix} ({reason}); export it again") from None
-    if not parts:
-        raise ValueError(f"'{path}' has no surface cells; export the blocks as closed bodies or a flat mesh")
-    every = np.concatenate([points for _, points, _ in parts])
-    if not np.isfinite(every).all():
-        bad = every[~np.isfinite(every).all(axis=1)][0]
-        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
-    for name, points, faces in parts:
-        outside = faces[(faces < 0) | (faces >= len(points))]
-        if len(outside):
-            raise ValueError(
-                f"'{path}': a face of '{name}' uses point {int(outside[0])}, but there are {len(points)}; "
-                "export it again"
-            )
-    size = float(np.ptp(every, axis=0).max())
+    size = _checked_size(parts, path)
     unit = "m" if suffix == ".glb" else ""
     rows = _own_rows(path)
-    if float(np.ptp(every, axis=0).min()) <= FLAT * size:
+    if _are_flat(parts, size):
         return replace(_flat(parts, path, rows, reading.view), unit=unit)
     closed = enclosed(parts, size, path, reading)
     bodies = closed.bodies
@@ -78,6 +69,49 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     known = rows if len(rows) == len(bodies) else [{"name": body.name} for body in bodies]
     up, says = _up(path) if suffix == ".glb" else ("z", "")
     return Bodies(tuple(bodies), tuple(known), unit, tuple(closed.notes), up=up, up_says=says)
+
+
+def _read_dae(path: Path, reading: Reading) -> Layout | Bodies:
+    try:
+        drawn = dae.drawn_in(path)
+    except MissingExtra:
+        raise
+    except Exception as error:  # noqa: BLE001
+        # pycollada passes on the errors of its parsers.
+        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__} "
+        reason = " ".join(f"{kind}{error}".split())[:200]
+        raise ValueError(f"'{path}' cannot be read as .dae ({reason}); export it again") from None
+    size = _checked_size(drawn.parts, path)
+    if _are_flat(drawn.parts, size):
+        return replace(_flat(drawn.parts, path, [], reading.view), unit=drawn.unit)
+    closed = enclosed(drawn.parts, size, path, reading)
+    rows = [{"name": body.name} for body in closed.bodies]
+    return Bodies(
+        tuple(closed.bodies), tuple(rows), drawn.unit, tuple(closed.notes), up=drawn.up, up_says=drawn.up_says
+    )
+
+
+def _checked_size(parts: list[tuple[str, np.ndarray, np.ndarray]], path: Path) -> float:
+    """Return the size of all parts, whose points must be finite and there."""
+    if not parts:
+        raise ValueError(f"'{path}' has no surface cells; export the blocks as closed bodies or a flat mesh")
+    every = np.concatenate([points for _, points, _ in parts])
+    if not np.isfinite(every).all():
+        bad = every[~np.isfinite(every).all(axis=1)][0]
+        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+    for name, points, faces in parts:
+        outside = faces[(faces < 0) | (faces >= len(points))]
+        if len(outside):
+            raise ValueError(
+                f"'{path}': a face of '{name}' uses point {int(outside[0])}, but there are {len(points)}; "
+                "export it again"
+            )
+    return float(np.ptp(every, axis=0).max())
+
+
+def _are_flat(parts: list[tuple[str, np.ndarray, np.ndarray]], size: float) -> bool:
+    every = np.concatenate([points for _, points, _ in parts])
+    return float(np.ptp(every, axis=0).min()) <= FLAT * size
 
 
 def _description(path: Path) -> dict[str, Any]:

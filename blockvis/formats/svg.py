@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -101,11 +102,11 @@ def read(path: Path, reading: Reading) -> Layout:
     tolerance = None
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
-    found = _Found()
+    found = _Found(notes=_pattern_fills(root))
     _walk(root, _Where(np.eye(3), (), tolerance, path), found)
     faces = _with_loose(found, reading)
     if not found.rings and all(item.kind == "open" for item in found.left_out):
-        rest = nothing_closed(faces)
+        rest = "; ".join(words for words in (nothing_closed(faces), *_pattern_fills(root)) if words)
         raise ValueError(
             f"'{path}' has no closed shape{f': {rest}' if rest else ''}; draw each block as a closed path or polygon"
         )
@@ -171,6 +172,27 @@ def _unit(root: ElementTree.Element) -> str:
         return "px"
     scale = float(match[1]) * UNITS[match[2]] / max(float(box[2]), 1e-300)
     return next((unit for unit, metres in UNITS.items() if math.isclose(scale, metres, rel_tol=1e-3)), "")
+
+
+def _pattern_fills(root: ElementTree.Element) -> list[str]:
+    """Say which patterns fill shapes: what they draw is not read."""
+    patterns = {element.get("id", "") for element in root.iter() if _tag(element) == "pattern"} - {""}
+    fills = Counter[str]()
+    for element in root.iter():
+        said = " ".join([element.get("fill", ""), element.get("style", ""), _style_sheet(element)])
+        fills.update(name for name in re.findall(r"url\(\s*['\"]?#([^'\")\s]+)", said) if name in patterns)
+    return [
+        Note(
+            LEFT_OUT,
+            f"not read: the lines of the pattern '{name}', which fills {n} shape{'s' * (n > 1)}; turn it into shapes "
+            "(Inkscape: Object, Pattern, Pattern to Objects)",
+        )
+        for name, n in fills.items()
+    ]
+
+
+def _style_sheet(element: ElementTree.Element) -> str:
+    return element.text or "" if _tag(element) == "style" else ""
 
 
 def _tag(element: ElementTree.Element) -> str:

@@ -115,10 +115,8 @@ def in_words(left_out: Sequence[LeftOut]) -> list[Note]:
         misses = [item.miss for item in members if item.miss]
         apart = f"{min(misses):.3g} to {max(misses):.3g}" if len(misses) > 1 else "".join(f"{m:.3g}" for m in misses)
         ends = f", {'their' if len(members) > 1 else 'its'} ends {apart} apart" if misses else ""
-        text = (
-            f"left out: {len(members)} {words}{where}, {'the first ' if len(members) > 1 else ''}{called}"
-            f"at ({x:.6g}, {y:.6g}){ends}"
-        )
+        at = f", {'the first ' if len(members) > 1 else ''}{called}at ({x:.6g}, {y:.6g})" if len(first.points) else ""
+        text = f"left out: {len(members)} {words}{where}{at}{ends}"
         lines.append(Note(LEFT_OUT, text))
     return lines
 

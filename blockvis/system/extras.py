@@ -8,7 +8,12 @@ from importlib.util import find_spec
 EXTRAS: dict[str, tuple[str, ...]] = {
     "studies": ("dask", "distributed", "pandas", "pyarrow", "SALib", "tomli_w"),
     "cad": ("gmsh",),
+    "geo": ("shapefile",),
+    "dae": ("collada",),
 }
+
+#: Packages that are not called as they are imported.
+PACKAGES = {"shapefile": "pyshp", "collada": "pycollada"}
 
 
 class MissingExtra(ImportError):
@@ -45,7 +50,7 @@ def require(extra: str, needed_by: str) -> None:
     MissingExtra
         If a package is not installed.
     """
-    missing = missing_packages(extra)
+    missing = [PACKAGES.get(name, name) for name in missing_packages(extra)]
     if missing:
         raise MissingExtra(
             f"{needed_by} need {', '.join(missing)}, which this environment lacks; "

@@ -95,3 +95,23 @@ def test_entities_are_refused_before_parsing(tmp_path):
 def test_one_curve_has_a_bounded_number_of_chords(tmp_path):
     path = saved(tmp_path, '<circle cx="0" cy="0" r="1"/>', 'viewBox="0 0 1 1"')
     assert len(read(path, chord_tolerance=1e-12).vertices) <= 512
+
+
+def test_lines_of_patterns_that_fill_shapes_are_missed_in_a_note(tmp_path):
+    path = tmp_path / "filled.svg"
+    path.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="4m" viewBox="0 0 4 1"><style>.b{fill:url(#bond)}</style>'
+        '<defs><pattern id="bond" width="1" height="1"><rect width="0.5" height="0.5"/></pattern>'
+        '<pattern id="other"/><linearGradient id="shade"/></defs>'
+        '<rect width="1" height="1" fill="url(#bond)"/>'
+        "<rect x='1' width='1' height='1' style='fill: url( \"#bond\" )'/>"
+        '<rect x="2" width="1" height="1" class="b"/><rect x="3" width="1" height="1" fill="url(#shade)"/></svg>',
+        encoding="utf-8",
+    )
+    layout = read_layout(path)
+    assert layout.n_blocks == 4
+    told = [note for note in layout.notes if "pattern" in note]
+    assert told == [
+        "not read: the lines of the pattern 'bond', which fills 3 shapes; turn it into shapes (Inkscape: Object, "
+        "Pattern, Pattern to Objects)"
+    ]

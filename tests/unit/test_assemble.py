@@ -131,9 +131,27 @@ def test_missing_and_empty_files(tmp_path):
         read(tmp_path / "arc.msh")
     with pytest.raises(ValueError, match=r"is empty \(0 bytes\)"):
         read(tmp_path / "arch.msh")
-    (tmp_path / "arch.xyz").write_text("x", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"cannot read '.xyz'; use one of .*\.dxf"):
-        read(tmp_path / "arch.xyz")
+
+
+@pytest.mark.parametrize(
+    ("suffix", "words"),
+    [
+        (".xyz", r"'.xyz' is not read; give drawings .dxf .svg, .*; docs/formats.md has all"),
+        ("", r"a file without suffix is not read; give drawings"),
+        (".DWG", r"'.dwg' is not read: save it as .dxf .*ODA File Converter"),
+        (".3dm", r"in Rhino: Export Selected, .*\.obj"),
+        (".ifc", r"Bonsai"),
+        (".pdf", r"Inkscape"),
+        (".skp", r"in SketchUp: .*\.dae"),
+        (".rvt", r"in Revit: .*DXF"),
+    ],
+)
+def test_what_is_not_read_says_how_to_get_there(tmp_path, suffix, words):
+    (tmp_path / f"arch{suffix}").write_text("x", encoding="utf-8")
+    with pytest.raises(ValueError, match=words) as caught:
+        read(tmp_path / f"arch{suffix}")
+    assert len(str(caught.value)) < 420
+    assert "\n" not in str(caught.value)
 
 
 def test_halves_of_characters_are_replaced_and_noted(tmp_path):

@@ -166,7 +166,10 @@ def test_there_is_one_way_to_write_a_file():
     }
     allowed = {
         # Their writers get the name that whole_file gives them.
-        *(f"blockvis/formats/{name}.py" for name in ("compas_json", "gmsh_mesh", "layout_json", "solids", "svg")),
+        *(
+            f"blockvis/formats/{name}.py"
+            for name in ("compas_json", "geodata", "gmsh_mesh", "layout_json", "solids", "svg")
+        ),
         # The case of one run of a study, which is made anew each time.
         "blockvis/studies/campaign.py",
         "blockvis/system/atomic_files.py",

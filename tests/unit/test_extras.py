@@ -11,7 +11,7 @@ import pytest
 
 import blockvis
 from blockvis.cli import main
-from blockvis.system.extras import EXTRAS, MissingExtra, require
+from blockvis.system.extras import EXTRAS, PACKAGES, MissingExtra, require
 
 ROOT = Path(__file__).parents[2]
 
@@ -97,7 +97,7 @@ def test_extras_are_those_of_the_project_file():
     core = {re.match(r"[\w-]+", line)[0] for line in project["dependencies"]}
     for extra, modules in EXTRAS.items():
         packages = {re.match(r"[\w-]+", line)[0] for line in project["optional-dependencies"][extra]}
-        assert packages == {name.replace("_", "-") for name in modules}
+        assert packages == {PACKAGES.get(name, name).replace("_", "-") for name in modules}
         assert not packages & core
     assert "pymunk" in core, "a film whose fall lands needs no extra"
     assert "blockvis[studies]" in project["optional-dependencies"]["test"], "the README's test command tests studies"

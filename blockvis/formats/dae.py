@@ -1,0 +1,95 @@
+"""COLLADA files, .dae, as SketchUp and Blender write them, through pycollada (extra ``dae``)."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blockvis.layout.units import UNITS
+from blockvis.system.extras import require
+
+#: Nodes nested deeper than this are refused: nodes may place each other.
+DEEPEST = 100
+
+#: Coordinates in the order in which the last points up, by the file's word for it.
+UP = {"X_UP": ([1, 2, 0], "z"), "Y_UP": ([0, 1, 2], "y"), "Z_UP": ([0, 1, 2], "z")}
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Meshes of a file: name, (n, 3) points in place and (m, 3) faces of each; unit, and the axis that points up."""
+
+    parts: list[tuple[str, np.ndarray, np.ndarray]]
+    unit: str
+    up: str
+    up_says: str
+
+
+def drawn_in(path: Path) -> Drawn:
+    """Read the meshes of a file, each placed by the nodes above it and named after the innermost that has a name.
+
+    Raises
+    ------
+    ValueError
+        For geometry that cannot be read, and entities of XML.
+    """
+    require("dae", f"COLLADA files ('{path}'; .obj and .glb are read without)")
+    import collada
+
+    text = path.read_bytes()
+    if re.search(rb"<!\s*(DOCTYPE|ENTITY)", text, re.IGNORECASE):
+        raise ValueError("it defines XML entities")
+    # Faults of materials and cameras are no matter here; of geometry they are.
+    document = collada.Collada(str(path), ignore=[collada.common.DaeError])
+    announced = len(re.findall(rb"<(?:\w+:)?geometry\s", text))
+    if len(document.geometries) < announced:
+        damaged = f"{announced - len(document.geometries)} of {announced} geometries are damaged"
+        raise ValueError(f"{damaged}: {document.errors[-1]}" if document.errors else damaged)
+    about = document.assetInfo
+    order, up = UP.get(str(about.upaxis), UP["Y_UP"])
+    metres = float(about.unitmeter or 1.0)
+    unit = next((name for name, size in UNITS.items() if math.isclose(metres, size, rel_tol=1e-3)), "")
+    factor = 1.0 if unit else metres
+    parts = []
+    for name, matrix, geometry in _placed(document.scene.nodes if document.scene else [], np.eye(4), "", 0):
+        points, faces = _mesh(geometry)
+        points = points @ matrix[:3, :3].T + matrix[:3, 3]
+        if len(faces):
+            parts.append((name or str(geometry.name or geometry.id), points[:, order] * factor, faces))
+    return Drawn(parts, unit or "m", up, "y is up, as the file says" if up == "y" else "")
+
+
+def _placed(nodes: Any, matrix: np.ndarray, name: str, depth: int) -> Iterator[tuple[str, np.ndarray, Any]]:
+    """Yield the geometries below nodes, with the matrices that place them."""
+    from collada.scene import GeometryNode, Node, NodeNode
+
+    if depth > DEEPEST:
+        raise ValueError(f"it nests nodes more than {DEEPEST} deep")
+    for node in nodes:
+        if isinstance(node, GeometryNode):
+            yield name, matrix, node.geometry
+        elif isinstance(node, NodeNode):
+            yield from _placed([node.node], matrix, name, depth + 1)
+        elif isinstance(node, Node):
+            own = node.xmlnode.get("name") or node.xmlnode.get("id") or name
+            yield from _placed(node.children, matrix @ np.asarray(node.matrix, dtype=float), own, depth + 1)
+
+
+def _mesh(geometry: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Points and triangles of a geometry: its primitives are one surface in several materials."""
+    points, faces, start = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
+    for primitive in geometry.primitives:
+        triangles = primitive.triangleset() if hasattr(primitive, "triangleset") else primitive
+        if np.ndim(triangles.vertex_index) != 2 or np.shape(triangles.vertex_index)[1] != 3:
+            continue
+        own = np.asarray(triangles.vertex, dtype=float).reshape(-1, 3)
+        faces.append(np.asarray(triangles.vertex_index, dtype=np.int64) + start)
+        points.append(own)
+        start += len(own)
+    return np.concatenate(points), np.concatenate(faces)

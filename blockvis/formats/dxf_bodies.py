@@ -1,0 +1,146 @@
+"""Bodies of .dxf drawings: polyface meshes, as CAD and BIM programs export them, meshes, and flat-faced solids."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blockvis.layout.layout import Layout
+from blockvis.layout.outlines import FLAT
+
+from .bodies import Bodies, Body, fans
+from .cells import layout_of_cells
+from .closed_surfaces import closed_bodies
+from .reading import Reading
+
+#: Solids whose geometry is that of the ACIS kernel, of which ezdxf knows the flat faces.
+SOLIDS = ("3DSOLID", "BODY")
+
+
+@dataclass(frozen=True)
+class DrawnMesh:
+    """A mesh of a drawing: (n, 3) points, the points around each face, and ``kind`` where faces of it are missing."""
+
+    name: str
+    layer: str
+    points: np.ndarray
+    faces: list[list[int]]
+    curved: str = ""
+
+
+def is_mesh(entity: Any) -> bool:
+    """Whether an entity is a mesh or a solid in space."""
+    kind = entity.dxftype()
+    return (
+        kind in SOLIDS
+        or kind == "MESH"
+        or (kind == "POLYLINE" and (entity.is_poly_face_mesh or entity.is_polygon_mesh))
+    )
+
+
+def drawn_mesh(entity: Any, handle: str) -> DrawnMesh:
+    """Take the mesh of an entity, as placed by the blocks that insert it."""
+    from ezdxf.render import MeshBuilder
+
+    kind, layer = entity.dxftype(), str(entity.dxf.layer)
+    curved = ""
+    if kind in SOLIDS:
+        meshes, curved = _flat_faces(entity)
+    else:
+        meshes = [MeshBuilder.from_mesh(entity) if kind == "MESH" else MeshBuilder.from_polyface(entity)]
+    points, faces = [np.zeros((0, 3))], list[list[int]]()
+    for mesh in meshes:
+        start = sum(map(len, points))
+        points.append(np.array([tuple(vertex) for vertex in mesh.vertices]).reshape(-1, 3))
+        faces += [[start + int(k) for k in face] for face in mesh.faces if len(face) > 2]
+    return DrawnMesh(f"block {handle}", layer, np.concatenate(points), faces, curved)
+
+
+def _flat_faces(entity: Any) -> tuple[list[Any], str]:
+    """Meshes of the flat faces of a solid, and its kind if it has others."""
+    from ezdxf.acis import api
+
+    try:
+        bodies = list(api.load_dxf(entity))
+        meshes = [mesh for body in bodies for mesh in api.mesh_from_body(body)]
+        drawn = sum(1 for body in bodies for lump in body.lumps() for shell in lump.shells() for _ in shell.faces())
+        matrix = entity.temporary_transformation().get_matrix()
+    except (api.AcisException, ValueError, TypeError, LookupError, AttributeError, ArithmeticError):
+        return [], entity.dxftype()
+    if matrix is not None:
+        for mesh in meshes:
+            mesh.transform(matrix)
+    whole = 0 < drawn == sum(len(mesh.faces) for mesh in meshes)
+    return meshes, "" if whole else entity.dxftype()
+
+
+def layout_of_meshes(
+    meshes: Sequence[DrawnMesh], path: Path, reading: Reading, unit: str, notes: Sequence[str]
+) -> Layout | Bodies:
+    """Make bodies of the meshes of a drawing, or outlines where all of them are flat.
+
+    Parameters
+    ----------
+    meshes : sequence of DrawnMesh
+    path : Path
+        Named in messages.
+    reading : Reading
+    unit : str
+        That the drawing states, "" for none.
+    notes : sequence of str
+
+    Raises
+    ------
+    ValueError
+        For solids with curved faces, and meshes that are not closed.
+    """
+    curved = [mesh for mesh in meshes if mesh.curved]
+    if curved:
+        first = curved[0]
+        raise ValueError(
+            f"'{path}': {first.curved} '{first.name}' on layer '{first.layer}' has faces of the ACIS kernel that are "
+            f"not read ({len(curved)} of {len(meshes)} bodies): export the bodies as .stl (AutoCAD: STLOUT) or .step, "
+            "or leave it out (ignore)"
+        )
+    every = np.concatenate([mesh.points for mesh in meshes])
+    if not np.isfinite(every).all():
+        bad = every[~np.isfinite(every).all(axis=1)][0]
+        raise ValueError(f"'{path}' has a point at {bad.tolist()}; coordinates must be finite numbers: repair the file")
+    size = float(np.ptp(every, axis=0).max())
+    if float(np.ptp(every, axis=0).min()) <= FLAT * size:
+        return _flat(meshes, path, reading, unit, notes)
+    bodies: list[Body] = []
+    rows: list[dict[str, Any]] = []
+    for mesh in meshes:
+        for body in closed_bodies(mesh.name, mesh.points, fans(mesh.faces), size, path):
+            bodies.append(body)
+            rows.append({"name": body.name, "group": mesh.layer, **_material(mesh)})
+    return Bodies(tuple(bodies), tuple(rows), unit, notes=tuple(notes))
+
+
+def _material(mesh: DrawnMesh) -> dict[str, str]:
+    return {"material": mesh.layer} if mesh.layer != "0" else {}
+
+
+def _flat(
+    meshes: Sequence[DrawnMesh], path: Path, reading: Reading, unit: str, notes: Sequence[str]
+) -> Layout | Bodies:
+    # Polyface meshes may repeat the corners of each face.
+    points, number = np.unique(np.concatenate([mesh.points for mesh in meshes]), axis=0, return_inverse=True)
+    number = number.ravel()
+    starts = np.cumsum([0] + [len(mesh.points) for mesh in meshes])
+    counts = [len(mesh.faces) for mesh in meshes]
+    rings = [number[np.add(face, start)] for mesh, start in zip(meshes, starts, strict=False) for face in mesh.faces]
+    data = {"block_id": np.repeat(np.arange(len(meshes)), counts)}
+    for key, values in (
+        ("name", [mesh.name for mesh in meshes]),
+        ("group", [mesh.layer for mesh in meshes]),
+        ("material", [_material(mesh).get("material", "") for mesh in meshes]),
+    ):
+        data[key] = np.repeat(values, counts)
+    found = layout_of_cells(points, rings, data, path, reading.view)
+    return replace(found, unit=unit, notes=(*found.notes, *notes))

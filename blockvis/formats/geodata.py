@@ -1,0 +1,449 @@
+"""Outlines of geographic information systems: GeoJSON, GeoPackages and shapefiles; y points up, attributes are kept."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import re
+import sqlite3
+import warnings
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blockvis.layout.block_table import rows_of, with_rows
+from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import LeftOut, matches
+from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
+from blockvis.layout.outlines import FLAT, ring_area
+from blockvis.layout.units import DOUBTED, UNITS
+from blockvis.layout.views import VIEWS, axis_across, upright_note
+from blockvis.system.extras import require
+from solver import mechanics
+
+from .loose_lines import Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
+from .reading import Reading
+
+#: Attributes that name a block and its group, the first that a file has; in small letters.
+NAMES = ("name", "label", "title", "stone", "block", "brick", "id", "fid", "objectid")
+GROUPS = ("group", "layer", "kind", "class", "type", "category")
+
+#: Types of GeoJSON objects that hold outlines.
+GEOJSON = (
+    "FeatureCollection",
+    "Feature",
+    "GeometryCollection",
+    "Polygon",
+    "MultiPolygon",
+    "LineString",
+    "MultiLineString",
+)
+
+#: Bytes of the envelope in the header of a geometry of a GeoPackage, by its kind.
+ENVELOPES = {0: 0, 1: 32, 2: 48, 3: 48, 4: 64}
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A geometry of shapely with its attributes, and the layer on which it lies."""
+
+    geometry: Any
+    attributes: Mapping[str, Any]
+    layer: str = ""
+
+
+@dataclass
+class _Found:
+    """Outlines and open lines found so far, (n, 3) points each, and the number of the feature of each."""
+
+    rings: list[np.ndarray] = field(default_factory=list)
+    of: list[int] = field(default_factory=list)
+    lines: list[tuple[np.ndarray, int]] = field(default_factory=list)
+    holed: list[tuple[list[np.ndarray], int]] = field(default_factory=list)
+    misses: list[float] = field(default_factory=list)
+    skipped: Counter[str] = field(default_factory=Counter)
+
+
+def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
+    """Read parsed GeoJSON, which states no unit; None if it is another kind of JSON."""
+    if not isinstance(content, dict) or content.get("type") not in GEOJSON:
+        return None
+    features = [_feature(one, k, path) for k, one in enumerate(_geojson_features(content, path))]
+    crs = content.get("crs")
+    name = str(crs.get("properties", {}).get("name", "")) if isinstance(crs, dict) else ""
+    says = name if re.search(r"CRS84|4326$", name) else ""
+    return layout_of_features([one for one in features if one is not None], path, reading, degrees=says)
+
+
+def _geojson_features(content: Mapping[str, Any], path: Path) -> list[Any]:
+    if content["type"] != "FeatureCollection":
+        return [content]
+    features = content.get("features")
+    if not isinstance(features, list):
+        raise ValueError(f"'{path}' is GeoJSON without a list \"features\"; export it again")
+    return features
+
+
+def _feature(found: Any, number: int, path: Path) -> Feature | None:
+    """Make a feature of a member of GeoJSON; None of one without geometry."""
+    from shapely.errors import ShapelyError
+    from shapely.geometry import shape
+
+    whole = isinstance(found, dict) and found.get("type") == "Feature"
+    geometry = found.get("geometry") if whole else found
+    if geometry is None:
+        return None
+    properties = found.get("properties") if whole else None
+    attributes = dict(properties) if isinstance(properties, dict) else {}
+    if whole and isinstance(found.get("id"), str | int):
+        attributes.setdefault("id", found["id"])
+    try:
+        with np.errstate(invalid="ignore"):
+            return Feature(shape(geometry), attributes)
+    except (ShapelyError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        reason = " ".join(f"{type(error).__name__} {error}".split())[:120]
+        raise ValueError(
+            f"'{path}': feature {number} has a geometry that cannot be read ({reason}); repair it"
+        ) from None
+
+
+def read(path: Path, reading: Reading) -> Layout:
+    """Read a GeoPackage, .gpkg, or a shapefile, .shp, with what lies beside it."""
+    return _read_shapefile(path, reading) if path.suffix.lower() == ".shp" else _read_geopackage(path, reading)
+
+
+def _read_shapefile(path: Path, reading: Reading) -> Layout:
+    require("geo", f"shapefiles ('{path}'; GeoJSON and GeoPackage are read without)")
+    import shapefile
+    from shapely.geometry import shape
+
+    beside = {entry.suffix.lower(): entry for entry in path.parent.glob(f"{_escaped(path.stem)}.*")}
+    table, projection = beside.get(".dbf"), beside.get(".prj")
+    features, skipped = [], Counter[str]()
+    # What pyshp would print of rings that turn the wrong way is no fault of a drawing.
+    logging.getLogger("shapefile").setLevel(logging.CRITICAL + 1)
+    try:
+        with path.open("rb") as shapes, (table or path).open("rb") as rows, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            files = {"shp": shapes, **({"dbf": rows} if table else {})}
+            reader = shapefile.Reader(**files, encodingErrors="replace")
+            records = [record.as_dict() for record in reader.iterRecords()] if table else []
+            for k, drawn in enumerate(reader.iterShapes()):
+                if drawn.shapeTypeName in ("NULL", "MULTIPATCH"):
+                    skipped[drawn.shapeTypeName] += 1
+                    continue
+                row = records[k] if k < len(records) else {}
+                features.append(Feature(shape(drawn.__geo_interface__), row))
+    except Exception as error:  # noqa: BLE001
+        # pyshp passes on whatever its parsing runs into.
+        reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
+        raise ValueError(f"'{path}' cannot be read as a shapefile ({reason}); export it again") from None
+    text = projection.read_text(encoding="utf-8", errors="replace") if projection else ""
+    unit, degrees = _unit_of_system(text)
+    return layout_of_features(features, path, reading, unit=unit, degrees=degrees, skipped=skipped)
+
+
+def _escaped(name: str) -> str:
+    return re.sub(r"([\[\]*?])", r"[\1]", name)
+
+
+def _read_geopackage(path: Path, reading: Reading) -> Layout:
+    try:
+        # Read only, as it is: a journal beside it is not played back.
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)) as base:
+            layers = _layers(base, path)
+    except sqlite3.Error as error:
+        raise ValueError(f"'{path}' is no readable GeoPackage ({error}); export it again") from None
+    named = [layer.name for layer in layers]
+    chosen = [name for name in named if matches([name], reading.only)] or named
+    wanted = [one for one in layers if one.name in chosen and not matches([one.name], reading.ignore)]
+    systems = {layer.system: layer for layer in reversed(wanted)}
+    if len(systems) > 1:
+        listed = ", ".join(f"'{one.name}' in {one.system or 'none'}" for one in reversed(systems.values()))
+        raise ValueError(
+            f"'{path}' has layers in several coordinate systems: {listed}; leave one out (ignore), or export one"
+        )
+    unit, degrees = _unit_of_system(next((layer.description for layer in systems.values()), ""))
+    # What is left out as asked is counted with the rest, but not what lies in another system.
+    features = [feature for layer in layers if layer.system in systems for feature in layer.features]
+    found = layout_of_features(features, path, reading, unit=unit, degrees=degrees)
+    other = [LeftOut("asked", np.zeros((0, 2)), "", one.name) for one in layers if one.system not in systems]
+    return replace(found, left_out=(*found.left_out, *other))
+
+
+@dataclass(frozen=True)
+class _Layer:
+    """A table of a GeoPackage: its features, and the name and description of its coordinate system, "" for none."""
+
+    name: str
+    features: list[Feature]
+    system: str
+    description: str
+
+
+def _layers(base: sqlite3.Connection, path: Path) -> list[_Layer]:
+    """Read the tables of a GeoPackage."""
+    base.execute("PRAGMA trusted_schema = OFF")
+    base.row_factory = sqlite3.Row
+    found = []
+    for table in base.execute("SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns").fetchall():
+        name, column = str(table["table_name"]), str(table["column_name"])
+        quoted = name.replace('"', '""')
+        rows = base.execute(f'SELECT * FROM "{quoted}"').fetchall()
+        features = [_row_feature(dict(row), column, name, path) for row in rows if row[column] is not None]
+        query = "SELECT srs_name, definition FROM gpkg_spatial_ref_sys WHERE srs_id = ?"
+        system, text = base.execute(query, (table["srs_id"],)).fetchone() or (table["srs_id"], "")
+        system = "" if str(system).lower().startswith("undefined") else str(system)
+        found.append(_Layer(name, features, system, str(text)))
+    return found
+
+
+def _row_feature(row: dict[str, Any], column: str, layer: str, path: Path) -> Feature:
+    import shapely
+
+    blob = row.pop(column)
+    called = f"'{path}': geometry {row.get('fid', '?')} of layer '{layer}'"
+    if not isinstance(blob, bytes) or blob[:2] != b"GP" or len(blob) < 8:
+        raise ValueError(f"{called} has no header of a GeoPackage; export it again")
+    start = ENVELOPES.get((blob[3] >> 1) & 7)
+    if start is None or blob[3] & 32:
+        raise ValueError(f"{called} is of an extended kind, which is not read; export it again")
+    try:
+        return Feature(shapely.from_wkb(blob[8 + start :]), row, layer)
+    except NotImplementedError:
+        remedy = f"ogr2ogr -nlt CONVERT_TO_LINEAR {path.stem}_straight.gpkg {path.name}"
+        raise ValueError(f"{called} has arcs or is in space, which is not read; straighten it: {remedy}") from None
+    except (shapely.errors.ShapelyError, ValueError, TypeError) as error:
+        raise ValueError(f"{called} cannot be read ({' '.join(str(error).split())}); export it again") from None
+
+
+def _unit_of_system(text: str) -> tuple[str, str]:
+    """Find the unit of length of a coordinate system in words, "" for none, and its name if it is in degrees."""
+    head = re.search(r'\b(PROJCS|PROJCRS|GEOGCS|GEOGCRS|GEODCRS|LOCAL_CS|ENGCRS)\s*\[\s*"([^"]*)"', text)
+    if head is None:
+        return "", ""
+    if head[1].startswith("GEO"):
+        return "", head[2]
+    found = re.findall(r'\b(?:LENGTH)?UNIT\s*\[\s*"[^"]*"\s*,\s*([-+.\deE]+)', text)
+    try:
+        metres = float(found[-1]) if found else 0.0
+    except ValueError:
+        return "", ""
+    return next((unit for unit, size in UNITS.items() if math.isclose(metres, size, rel_tol=1e-5)), ""), ""
+
+
+def layout_of_features(
+    features: Sequence[Feature],
+    path: Path,
+    reading: Reading,
+    *,
+    unit: str = "",
+    degrees: str = "",
+    skipped: Mapping[str, int] | None = None,
+) -> Layout:
+    """Make a layout of polygons, and of the faces between lines.
+
+    Parameters
+    ----------
+    features : sequence of Feature
+    path : Path
+        Named in messages.
+    reading : Reading
+    unit : str
+        Of the coordinates, "" where the file does not say it.
+    degrees : str
+        Name of the coordinate system if it is one of longitude and latitude.
+    skipped : mapping, optional
+        Numbers of what is no outline, by its kind.
+
+    Raises
+    ------
+    ValueError
+        For coordinates in degrees, and where nothing is an outline.
+    """
+    found = _Found(skipped=Counter(skipped or {}))
+    for k, feature in enumerate(features):
+        _add(feature.geometry, k, found)
+    every = [*found.rings, *(points for points, _ in found.lines), *(rings[0] for rings, _ in found.holed)]
+    listed = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
+    if not every:
+        raise ValueError(f"'{path}' has no polygon (found: {listed or 'nothing'}); draw each block as one polygon")
+    order, notes = _order(np.concatenate(every), reading.view, path)
+    rows = _rows(features)
+    rings = [ring[:, order] for ring in found.rings]
+    _check_degrees([*rings, *(holed[0][:, order] for holed, _ in found.holed)], path, reading, degrees, notes)
+    if listed:
+        notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
+    kinds, left_out = _parts(rows, found.of), []
+    for holed, k in found.holed:
+        outer, *holes = (ring[:, order] for ring in holed)
+        x, y = holes[0].mean(axis=0)
+        name, layer = rows[k]["name"], rows[k].get("group", "")
+        message = f"'{name}' has a hole around ({x:.6g}, {y:.6g}); cut the block in two, or fill the hole with a block"
+        left_out.append(LeftOut("hole", outer, message, layer, name, holes=tuple(holes)))
+    lines = []
+    for points, k in found.lines:
+        name, layer = rows[k]["name"], rows[k].get("group", "")
+        line = Line(points[:, order], layer, name, must_close=len(points) > 2)
+        if reading.wants([layer, name]):
+            lines.append(line)
+        else:
+            left_out.append(LeftOut("asked line", line.points, "", layer, name, closed=False))
+    faces = faces_of_lines(lines, rings)
+    for i, pieces in sorted(faces.pieces.items(), reverse=True):
+        rings[i : i + 1] = pieces
+        kinds[i : i + 1] = [{**kinds[i], "name": f"{kinds[i]['name']} {n + 1}"} for n in range(len(pieces))]
+    rings += faces.rings
+    kinds += [_row(f"face {n}", layer, {}) for n, layer in enumerate(faces.layers)]
+    left_out += faces.left_out
+    if not rings and all(item.kind == "open" for item in left_out):
+        raise ValueError(f"'{path}' has no polygon: {nothing_closed(faces)}; draw each block as one polygon")
+    notes += [faces_note(faces, lines)] if faces.rings else []
+    notes += faces.notes + joined_note(found.misses, float(np.ptp(np.concatenate(every), axis=0).max()))
+    layout = Layout(
+        blocks=tuple(rings),
+        names=tuple(row["name"] for row in kinds),
+        unit=unit,
+        notes=tuple(notes),
+        left_out=tuple(left_out),
+    )
+    return with_rows(layout, kinds)
+
+
+def _add(geometry: Any, number: int, found: _Found) -> None:
+    """Add the outlines and lines of a geometry."""
+    import shapely
+
+    kind = geometry.geom_type
+    if geometry.is_empty:
+        found.skipped["empty geometries"] += 1
+    elif kind == "Polygon":
+        rings = [_points(ring)[:-1] for ring in (geometry.exterior, *geometry.interiors)]
+        if len(rings) > 1:
+            found.holed.append((rings, number))
+        else:
+            found.rings.append(rings[0])
+            found.of.append(number)
+    elif kind in ("LineString", "LinearRing"):
+        points = _points(geometry)
+        joined = joined_ends(points)
+        if joined is None:
+            found.lines.append((points, number))
+        else:
+            found.rings.append(joined[0])
+            found.of.append(number)
+            found.misses.append(joined[1])
+    elif kind in ("MultiPolygon", "MultiLineString", "GeometryCollection"):
+        for part in shapely.get_parts(geometry):
+            _add(part, number, found)
+    else:
+        found.skipped[kind] += 1
+
+
+def _points(line: Any) -> np.ndarray:
+    """(n, 3) array: the points of a line; where it has no elevations they are 0."""
+    import shapely
+
+    points = shapely.get_coordinates(line, include_z=True)
+    points[:, 2] = np.nan_to_num(points[:, 2])
+    return np.asarray(points)
+
+
+def _order(points: np.ndarray, view: str | None, path: Path) -> tuple[list[int], list[str]]:
+    """Choose the two coordinates in which the outlines lie, and say what that changes."""
+    if not np.isfinite(points).all():
+        bad = points[~np.isfinite(points).all(axis=1)][0].tolist()
+        raise ValueError(f"'{path}' has a point at {bad}; coordinates must be finite numbers: repair the file")
+    spread = np.ptp(points, axis=0)
+    flat = [name for name in VIEWS if spread[axis_across(name)] <= FLAT * spread.max()]
+    if view is not None and flat and view not in flat:
+        raise ValueError(
+            f"'{path}' lies in {flat[0]}: seen as {view} it has no area; give view = \"{flat[0]}\", or none"
+        )
+    chosen = view or (flat[0] if flat else "xy")
+    if chosen != "xy":
+        return list(VIEWS[chosen]), [upright_note(chosen)]
+    seen = [] if flat else [Note(CHANGED, "elevations were ignored: the drawing was read as seen from above")]
+    return [0, 1], list(seen)
+
+
+def _check_degrees(rings: list[np.ndarray], path: Path, reading: Reading, system: str, notes: list[str]) -> None:
+    """Refuse longitudes and latitudes, with the command that turns them into metres."""
+    if not rings or (reading.unit is not None and not system):
+        return
+    median = float(np.median([math.sqrt(abs(ring_area(ring))) for ring in rings]))
+    x, y = np.concatenate(rings).T
+    # In metres no stone is as small, and in degrees none as large: 2 km.
+    possible = np.abs(x).max() <= 360.0 and np.abs(y).max() <= 90.0
+    if possible and 0.0 < median < DOUBTED[0]:
+        zone = int((x.mean() + 180.0) % 360.0 // 6.0) + 1
+        code = (32600 if y.mean() >= 0.0 else 32700) + zone
+        unless = "" if system else "; if they are no degrees, give their unit"
+        raise ValueError(
+            f"'{path}' is in degrees{f' ({system})' if system else ''}: its median block is {median:.2g} across, near "
+            f"({x[0]:.6f}, {y[0]:.6f}); reproject it to metres: ogr2ogr -t_srs EPSG:{code} {path.stem}_m.gpkg "
+            f"{path.name}{unless}"
+        )
+    if system:
+        notes.append(
+            Note(
+                CHANGED,
+                f"the file says degrees ({system}), in which its median block would be {median * 111.0:.3g} km across; "
+                f"its coordinates were read as lengths",
+            )
+        )
+
+
+def _rows(features: Sequence[Feature]) -> list[dict[str, Any]]:
+    """Write a row of the block table for each feature, of its attributes."""
+    small = [{str(key).lower(): value for key, value in one.attributes.items()} for one in features]
+    said = [{key: value for key, value in one.items() if value not in (None, "")} for one in small]
+    name = _first(NAMES, said, distinct=len(said) > 1)
+    group = _first(GROUPS, said, distinct=False)
+    rows = []
+    for k, (own, feature) in enumerate(zip(said, features, strict=True)):
+        value = own.get(name, "")
+        called = value if isinstance(value, str) and value else f"{name} {value}" if value != "" else f"block {k}"
+        rows.append(_row(str(called), str(own.get(group, feature.layer)), own))
+    return rows
+
+
+def _parts(rows: Sequence[dict[str, Any]], of: Sequence[int]) -> list[dict[str, Any]]:
+    """Rows of outlines; several of one feature are numbered."""
+    several, seen, found = Counter(of), Counter[int](), []
+    for k in of:
+        seen[k] += 1
+        found.append({**rows[k], "name": f"{rows[k]['name']} {seen[k]}"} if several[k] > 1 else rows[k])
+    return found
+
+
+def _first(keys: Iterable[str], rows: Sequence[Mapping[str, Any]], *, distinct: bool) -> str:
+    """Choose the first key that a row has, or that has several values; "" for none."""
+    values: Iterator[tuple[str, set[str]]] = ((key, {str(row[key]) for row in rows if key in row}) for key in keys)
+    return next((key for key, one in values if len(one) > int(distinct)), "")
+
+
+def _row(name: str, group: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
+    row: dict[str, Any] = {"name": name, "group": group}
+    material = str(attributes.get("material", "" if group.strip().lower() in mechanics.ROLES else group))
+    role = str(attributes.get("role", "")).strip().lower()
+    row |= {"material": material} if material else {}
+    row |= {"role": role} if role in mechanics.ROLES else {}
+    return row | {key: attributes[key] for key in ("thickness", "density") if key in attributes}
+
+
+def write(layout: Layout, path: Path) -> None:
+    """Write GeoJSON: a polygon per block, lengths in m, no coordinate system."""
+    features = [
+        {"type": "Feature", "properties": row, "geometry": {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}}
+        for row, ring in zip(rows_of(layout), (ring.tolist() for ring in layout.outlines), strict=True)
+    ]
+    lines = ",\n  ".join(json.dumps(feature, ensure_ascii=False) for feature in features)
+    head = '"type": "FeatureCollection", "crs": null'
+    path.write_text(f'{{{head},\n "features": [\n  {lines}\n]}}\n', encoding="utf-8")

@@ -1,0 +1,322 @@
+"""Blocks of 3DEC's command files, .3ddat .3dec .dat .txt: ``poly brick``, ``poly prism``, ``block create ... face`` ...
+
+Of the other commands those are followed that call a file beside this one, that fix blocks or give their density, and
+that say which way gravity acts. What cuts or deletes blocks, or makes them by FISH, is refused: only 3DEC runs it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blockvis.layout.layout import Layout
+from blockvis.layout.notes import LEFT_OUT, Note
+from solver import mechanics
+
+from . import meshio_files
+from .bodies import Bodies, Body, fans
+from .closed_surfaces import closed_bodies
+from .reading import Reading
+
+#: What tells a command file from a mesh of the same suffix.
+MAKES = re.compile(r"^\s*(poly(hedron)?\s+\S|block\s+create\s)", re.IGNORECASE | re.MULTILINE)
+CALLS = re.compile(r"^\s*(program\s+)?call\s+\S", re.IGNORECASE | re.MULTILINE)
+
+#: Files that call each other deeper than this call themselves.
+DEEPEST_CALL = 8
+
+#: Commands that change blocks made before them, the first words of each.
+CHANGES = (
+    "jset",
+    "joint-set",
+    "cut",
+    "delete",
+    "del",
+    "tunnel",
+    "excavate",
+    "remove",
+    "densify",
+    "block cut",
+    "block delete",
+    "block densify",
+    "block excavate",
+    "block generate",
+)
+
+#: Words that say something of a block by the number after them.
+ABOUT = ("region", "reg", "r", "mat", "material", "con", "cons", "constitutive", "join", "joint", "id")
+
+REGION = {"reg": "region", "r": "region"}
+
+#: Words of the shapes of blocks, before the numbers of their corners.
+SHAPES = ("brick", "prism", "a", "b", "face-1", "face-2", "face")
+
+#: Faces of a brick by its corners, x fastest.
+BRICK = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+
+
+@dataclass
+class _Block:
+    """A block: where it was made, (n, 3) corners, faces, and what is said of it."""
+
+    line: int
+    points: np.ndarray
+    faces: list[list[int]]
+    words: dict[str, str] = field(default_factory=dict)
+    fixed: bool = False
+    density: float | None = None
+
+    @property
+    def middle(self) -> np.ndarray:
+        """(3,) array: of the box around it."""
+        return np.asarray((self.points.min(axis=0) + self.points.max(axis=0)) / 2.0)
+
+
+@dataclass
+class _Model:
+    """What a command file has made so far."""
+
+    path: Path
+    blocks: list[_Block] = field(default_factory=list)
+    names: dict[str, str] = field(default_factory=dict)
+    up: str = "z"
+    up_says: str = ""
+    passed: Counter[str] = field(default_factory=Counter)
+
+
+def read(path: Path, reading: Reading) -> Layout | Bodies:
+    """Read the blocks of a command file; a .dat file that makes none is a mesh of Tecplot."""
+    text = path.read_text(encoding="utf-8", errors="replace")
+    if not MAKES.search(text) and not CALLS.search(text):
+        if path.suffix.lower() == ".dat":
+            return meshio_files.read(path, reading)
+        raise ValueError(
+            f"'{path}' makes no block by 3DEC's commands (poly brick, poly prism, block create ...); give a drawing"
+        )
+    model = _Model(path)
+    _run(path, text, model, 0)
+    if not model.blocks:
+        raise ValueError(f"'{path}' and the files that it calls make no block; give the file of the geometry")
+    return _bodies(model)
+
+
+def _run(path: Path, text: str, model: _Model, depth: int) -> None:
+    """Carry out the commands of a file, and of those beside it that it calls."""
+    inside_fish = False
+    for line, words in _commands(text):
+        small = [word.lower() for word in words]
+        model.path = path
+        if small[0] in ("def", "define") or (small[0] == "fish" and small[1:2] in (["def"], ["define"])):
+            inside_fish = True
+        elif inside_fish and small[0] == "end":
+            inside_fish = False
+        elif inside_fish and MAKES.match(" ".join(words)):
+            raise ValueError(_by_fish(path, line, words))
+        elif not inside_fish and (small[0] == "call" or small[:2] == ["program", "call"]):
+            for word in words[1 if small[0] == "call" else 2 :]:
+                _call(_plain(word), path, model, depth)
+        elif not inside_fish:
+            _follow(line, words, model)
+
+
+def _call(name: str, path: Path, model: _Model, depth: int) -> None:
+    """Carry out a file beside another; others are counted as passed over."""
+    called = path.parent / name
+    beside = called.resolve().is_relative_to(path.parent.resolve()) and called.is_file()
+    if depth >= DEEPEST_CALL or not beside:
+        model.passed[f"call '{name}'"] += 1
+    else:
+        _run(called, called.read_text(encoding="utf-8", errors="replace"), model, depth + 1)
+
+
+def _commands(text: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the number of the first line of each command, and its words: quoted ones as they are."""
+    start, whole = 0, ""
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = raw.split(";")[0].rstrip()
+        start = start if whole else number
+        goes_on = re.search(r"(&|\.\.\.)$", line)
+        whole += " " + (line[: goes_on.start()] if goes_on else line)
+        if not goes_on:
+            words = re.findall(r"'[^']*'|\"[^\"]*\"|\[[^\]]*\]?|[^\s(),=\[]+", whole)
+            if words:
+                yield start, words
+            whole = ""
+
+
+def _by_fish(path: Path, line: int, words: Sequence[str]) -> str:
+    called = " ".join(words)[:60]
+    return (
+        f"'{path}': line {line} makes blocks by FISH ('{called}'), which only 3DEC runs; write them with numbers, or "
+        "export them from 3DEC"
+    )
+
+
+def _follow(line: int, words: list[str], model: _Model) -> None:
+    """Carry out one command, or count it as passed over."""
+    small = [word.lower() for word in words]
+    two = " ".join(small[:2])
+    if small[0] in ("poly", "polyhedron"):
+        model.blocks.append(_made(line, words[1:], model.path))
+    elif two == "block create":
+        model.blocks.append(_made(line, words[2:], model.path))
+    elif small[0] == "range" and small[1:2] == ["name"] and len(words) == 5 and small[3] == "region":
+        model.names[words[4]] = _plain(words[2])
+    elif two in ("model gravity", "block gravity") or small[0] == "gravity":
+        _turn(words, model)
+    elif small[0] == "fix" or two == "block fix":
+        chosen = _in_range(words[1 if small[0] == "fix" else 2 :], model)
+        for block in chosen:
+            block.fixed = True
+        model.passed["fix"] += not chosen
+    elif two == "block property" and small[2:3] == ["density"] and len(words) > 3:
+        for block in _in_range(words[4:], model) if len(words) > 4 else model.blocks:
+            block.density = _number(words[3])
+    elif model.blocks and (small[0] in CHANGES or two in CHANGES):
+        raise ValueError(
+            f"'{model.path}': line {line} changes the blocks ('{' '.join(words)[:60]}'), which only 3DEC does; write "
+            "the blocks as they are then, by poly prism or block create"
+        )
+    elif small[0] == "join" or two == "block join":
+        model.passed[two if small[0] == "block" else small[0]] += 1
+
+
+def _made(line: int, words: list[str], path: Path) -> _Block:
+    """Make the block that a command describes."""
+    shape, lists, about = "", list[tuple[str, list[float]]](), dict[str, str]()
+    for word in words:
+        number = _number(word)
+        if number is not None and lists:
+            lists[-1][1].append(number)
+        elif word[0] in "@[":
+            raise ValueError(_by_fish(path, line, words))
+        elif lists and lists[-1][0] == "group" and not lists[-1][1] and "group" not in about:
+            about["group"] = _plain(word)
+        else:
+            lists.append((word.lower(), []))
+    for word, numbers in lists:
+        if word in ABOUT and len(numbers) == 1:
+            about[REGION.get(word, word)] = f"{numbers[0]:g}"
+    shapes = [(word, numbers) for word, numbers in lists if word in SHAPES]
+    shape = shapes[0][0] if shapes else (lists[0][0] if lists else "")
+    if shape == "brick":
+        points, faces = _brick(shapes[0][1], line, path)
+    elif shape == "prism" and len(shapes) == 3:
+        points, faces = _prism(shapes[1][1], shapes[2][1], line, path)
+    elif shape == "face":
+        points, faces = _polyhedron([numbers for _, numbers in shapes], line, path)
+    else:
+        raise ValueError(
+            f"'{path}': line {line} makes a block by '{shape}', which is not read; write it as brick, prism or faces"
+        )
+    if not np.isfinite(points).all():
+        raise ValueError(f"'{path}': line {line} has a corner that is not finite; repair it")
+    return _Block(line, points, faces, about)
+
+
+def _brick(numbers: list[float], line: int, path: Path) -> tuple[np.ndarray, list[list[int]]]:
+    if len(numbers) not in (2, 4, 6):
+        raise ValueError(f"'{path}': line {line}: brick takes x0 x1 y0 y1 z0 z1; {len(numbers)} numbers stand there")
+    # The last pair holds for the directions that are not given.
+    pairs = [*numbers, *numbers[-2:] * 2][:6]
+    x, y, z = pairs[:2], pairs[2:4], pairs[4:]
+    return np.array([[a, b, c] for c in z for b in y for a in x]), [list(face) for face in BRICK]
+
+
+def _prism(first: list[float], second: list[float], line: int, path: Path) -> tuple[np.ndarray, list[list[int]]]:
+    n = len(first) // 3
+    if len(first) != len(second) or len(first) % 3 or n < 3:
+        raise ValueError(
+            f"'{path}': line {line}: both faces of a prism take as many corners (x, y, z), three or more; there are "
+            f"{len(first)} and {len(second)} numbers"
+        )
+    sides = [[k, (k + 1) % n, (k + 1) % n + n, k + n] for k in range(n)]
+    return np.reshape(first + second, (-1, 3)), [list(range(n)), list(range(n, 2 * n)), *sides]
+
+
+def _polyhedron(faces: list[list[float]], line: int, path: Path) -> tuple[np.ndarray, list[list[int]]]:
+    wrong = next((k for k, numbers in enumerate(faces) if len(numbers) % 3 or len(numbers) < 9), None)
+    if wrong is not None or len(faces) < 4:
+        what = f"there are {len(faces)}" if wrong is None else f"face {wrong + 1} has {len(faces[wrong])} numbers"
+        raise ValueError(f"'{path}': line {line} takes four faces or more of three corners (x, y, z) or more; {what}")
+    counts = [len(numbers) // 3 for numbers in faces]
+    ends = np.cumsum(counts)
+    rings = [list(range(end - n, end)) for n, end in zip(counts, ends.tolist(), strict=True)]
+    return np.reshape([number for numbers in faces for number in numbers], (-1, 3)), rings
+
+
+def _turn(words: list[str], model: _Model) -> None:
+    """Take the direction of gravity."""
+    numbers = [number for word in words if (number := _number(word)) is not None]
+    if len(numbers) == 3 and numbers[1] < 0.0 and numbers[0] == numbers[2] == 0.0:
+        model.up, model.up_says = "y", "gravity acts along -y in the file"
+    elif len(numbers) == 3 and any(numbers[:2]):
+        model.passed["gravity that is not vertical"] += 1
+
+
+def _in_range(words: list[str], model: _Model) -> list[_Block]:
+    """Choose the blocks of a region or group, or those whose middle lies within limits; none of an unknown range."""
+    small = [word.lower() for word in words if word.lower() not in ("range", "and")]
+    words = [_plain(word) for word in words if word.lower() not in ("range", "and")]
+    regions = {name.lower(): region for region, name in model.names.items()}
+    chosen, k = model.blocks if words else [], 0
+    while k < len(words):
+        key = small[k].removeprefix("pos-")
+        after = words[k + 1 : k + 3]
+        if key in ("region", "group") and after:
+            chosen, k = [block for block in chosen if block.words.get(key) == after[0]], k + 2
+        elif key in ("x", "y", "z") and len(after) == 2 and None not in (limits := [_number(word) for word in after]):
+            low, high = (number for number in limits if number is not None)
+            axis = "xyz".index(key)
+            chosen, k = [block for block in chosen if low <= block.middle[axis] <= high], k + 3
+        elif _plain(key) in regions:
+            chosen, k = [block for block in chosen if block.words.get("region") == regions[_plain(key)]], k + 1
+        else:
+            return []
+    return chosen
+
+
+def _bodies(model: _Model) -> Bodies:
+    every = np.concatenate([block.points for block in model.blocks])
+    size = float(np.ptp(every, axis=0).max())
+    bodies: list[Body] = []
+    rows: list[dict[str, Any]] = []
+    for k, block in enumerate(model.blocks):
+        name = f"block {k + 1}"
+        for body in closed_bodies(name, block.points, fans(block.faces), size, model.path):
+            bodies.append(body)
+            rows.append(_row(body.name, block, model.names))
+    notes = [f"{len(model.blocks)} blocks of 3DEC; its joints, loads and steps are not read"]
+    fixed = sum(block.fixed for block in model.blocks)
+    notes += [f"fixed, as the file says: {fixed} of them"] if fixed else []
+    if model.passed.total():
+        listed = ", ".join(f"{n} {command}" for command, n in model.passed.items() if n)
+        notes.append(Note(LEFT_OUT, f"commands that were passed over: {listed}"))
+    return Bodies(tuple(bodies), tuple(rows), notes=tuple(notes), up=model.up, up_says=model.up_says)
+
+
+def _row(name: str, block: _Block, names: dict[str, str]) -> dict[str, Any]:
+    region = block.words.get("region", "")
+    group = block.words.get("group") or names.get(region) or (f"region {region}" if region else "")
+    material = block.words.get("mat") or block.words.get("material")
+    row: dict[str, Any] = {"name": name, "group": group}
+    row |= {"material": f"mat {material}"} if material else {}
+    row |= {"density": block.density} if block.density is not None else {}
+    return row | ({"role": mechanics.FIXED} if block.fixed else {})
+
+
+def _number(word: str) -> float | None:
+    try:
+        return float(word)
+    except ValueError:
+        return None
+
+
+def _plain(word: str) -> str:
+    return word.strip("'\"")

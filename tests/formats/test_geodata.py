@@ -1,0 +1,241 @@
+"""GeoJSON, GeoPackages and shapefiles: blocks, names, groups and units; what is in degrees is refused."""
+
+import json
+import sqlite3
+import struct
+from contextlib import closing
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import blockvis
+from blockvis.layout.layout import Layout
+
+SQUARES = [[[x, y], [x + 0.4, y], [x + 0.4, y + 0.2], [x, y + 0.2], [x, y]] for y in (0, 0.2) for x in (0, 0.4)]
+UTM = 'PROJCS["WGS 84 / UTM 32N",GEOGCS["WGS 84",UNIT["degree",0.01745]],UNIT["{}",{}],AUTHORITY["EPSG","32632"]]'
+DEGREES = 'GEOGCS["WGS 84",DATUM["WGS_1984"],UNIT["degree",0.0174532925199433]]'
+
+
+def geojson(path, features, **more):
+    whole = [one if "geometry" in one else {"geometry": one} for one in features]
+    text = json.dumps({"type": "FeatureCollection", "features": [{"type": "Feature", **one} for one in whole], **more})
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def polygon(*rings, **properties):
+    return {"geometry": {"type": "Polygon", "coordinates": list(rings)}, "properties": properties}
+
+
+def geopackage(path, layers):
+    """Write layers by name: (geometry, stone) each; ``system`` is the first word of a layer's number."""
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("CREATE TABLE gpkg_geometry_columns (table_name, column_name, srs_id)")
+        base.execute("CREATE TABLE gpkg_spatial_ref_sys (srs_id, srs_name, definition)")
+        base.execute("INSERT INTO gpkg_spatial_ref_sys VALUES (-1, 'Undefined Cartesian', 'undefined')")
+        base.execute("INSERT INTO gpkg_spatial_ref_sys VALUES (2, 'in feet', ?)", (UTM.format("foot", 0.3048),))
+        base.execute("INSERT INTO gpkg_spatial_ref_sys VALUES (4326, 'WGS 84', ?)", (DEGREES,))
+        for name, (system, rows) in layers.items():
+            quoted = name.replace('"', '""')
+            base.execute(f'CREATE TABLE "{quoted}" (fid INTEGER PRIMARY KEY, geom BLOB, stone TEXT)')
+            base.execute("INSERT INTO gpkg_geometry_columns VALUES (?, 'geom', ?)", (name, system))
+            for k, (geometry, stone) in enumerate(rows):
+                envelope = struct.pack("<4d", *np.array(geometry.bounds)[[0, 2, 1, 3]]) if k % 2 else b""
+                blob = b"GP\0" + struct.pack("<Bi", 3 if k % 2 else 1, system) + envelope + shapely.to_wkb(geometry)
+                base.execute(f'INSERT INTO "{quoted}" (geom, stone) VALUES (?, ?)', (blob, stone))
+        base.commit()
+    return path
+
+
+def refusal(path, **options):
+    with pytest.raises(ValueError) as caught:
+        blockvis.read_layout(path, **options)
+    assert "\n" not in str(caught.value)
+    assert str(path) in str(caught.value)
+    return str(caught.value)
+
+
+def test_properties_give_names_groups_and_roles(tmp_path):
+    features = [
+        polygon(SQUARES[0], kind="ground", Name="foot", role="fixed"),
+        polygon(SQUARES[1], kind="brick", Name="B1", density=1800),
+        polygon(SQUARES[2], kind="brick", Name=None),
+        {"geometry": None},
+        {"geometry": {"type": "Point", "coordinates": [0, 0]}},
+    ]
+    layout = blockvis.read_layout(geojson(tmp_path / "wall.geojson", features))
+    assert layout.names == ("foot", "B1", "block 2")
+    assert layout.groups == layout.materials == ("ground", "brick", "brick")
+    assert layout.roles == ("fixed", "", "")
+    assert layout.density[1] == 1800
+    np.testing.assert_allclose(layout.sizes**2, 0.08)
+    assert layout.points[:, 1].min() == 0.0, "y points up"
+    assert "skipped: 1 Point" in layout.notes
+
+
+def test_numbers_that_tell_features_apart_name_them(tmp_path):
+    path = geojson(tmp_path / "wall.json", [polygon(ring, id=0, fid=k + 5) for k, ring in enumerate(SQUARES)])
+    assert blockvis.read_layout(path).names == ("fid 5", "fid 6", "fid 7", "fid 8")
+
+
+@settings(max_examples=20)
+@given(n=st.integers(1, 5), shift=st.tuples(st.floats(0, 6e5), st.floats(0, 6e6)), scale=st.floats(0.1, 5))
+def test_a_layout_comes_back_from_geojson(tmp_path_factory, n, shift, scale):
+    path = tmp_path_factory.mktemp("wall") / "wall.geojson"
+    rings = tuple(np.array(SQUARES[0][:-1]) * scale + shift + [0.4 * k * scale, 0] for k in range(n))
+    names = tuple(f"stone ä{k}" for k in range(n))
+    layout = Layout(blocks=rings, names=names, roles=("fixed",) * n, groups=("lowest",) * n)
+    blockvis.write_layout(layout, path)
+    back = blockvis.read_layout(path)
+    assert (back.names, back.roles, back.groups) == (names, layout.roles, layout.groups)
+    np.testing.assert_array_equal(back.points, layout.points)
+
+
+def test_several_polygons_holes_and_lines_of_features(tmp_path):
+    far = np.add(SQUARES[0], [3, 0]).tolist()
+    hole = (np.array(SQUARES[0]) * 0.5 + [5.1, 0.05]).tolist()
+    outer = np.add(SQUARES[0], [5, 0]).tolist()
+    cross = [[[3, 0.1], [3.4, 0.1]]]
+    features = [
+        {"type": "MultiPolygon", "coordinates": [[SQUARES[0]], [far]]},
+        {"type": "Polygon", "coordinates": [outer, hole]},
+        {"type": "MultiLineString", "coordinates": cross},
+        {"type": "LineString", "coordinates": SQUARES[1]},
+    ]
+    layout = blockvis.read_layout(geojson(tmp_path / "wall.geojson", features))
+    assert sorted(np.round(layout.sizes**2, 6)) == [0.04, 0.04, 0.08, 0.08], "the line cuts a block in two"
+    assert [(item.kind, len(item.holes)) for item in layout.left_out] == [("hole", 1)]
+
+
+def test_lines_alone_enclose_blocks(tmp_path):
+    grid = [[[x, 0], [x, 0.4]] for x in (0, 0.4, 0.8)] + [[[0, y], [0.8, y]] for y in (0, 0.2, 0.4)]
+    path = geojson(tmp_path / "net.geojson", [{"type": "LineString", "coordinates": line} for line in grid])
+    np.testing.assert_allclose(blockvis.read_layout(path).sizes ** 2, [0.08] * 4)
+
+
+def test_a_facade_that_stands_upright_is_turned(tmp_path):
+    upright = [[[100 + x, 7, z] for x, z in ring] for ring in SQUARES]
+    layout = blockvis.read_layout(geojson(tmp_path / "facade.geojson", [polygon(ring) for ring in upright]))
+    assert np.ptp(layout.points, axis=0) == pytest.approx([0.8, 0.4])
+    assert any("upright" in note for note in layout.notes)
+
+
+def test_degrees_are_refused_with_the_command_that_makes_them_metres(tmp_path):
+    rings = [(np.array(ring) * 1e-5 + [12.49, 41.89]).tolist() for ring in SQUARES]
+    path = geojson(tmp_path / "rome.geojson", [polygon(ring) for ring in rings])
+    said = refusal(path)
+    assert "is in degrees: its median block is 2.8e-06 across" in said
+    assert "ogr2ogr -t_srs EPSG:32633 rome_m.gpkg rome.geojson; if they are no degrees, give their unit" in said
+    assert blockvis.read_layout(path, unit="km").n_blocks == 4
+    stated = {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}}
+    geojson(path, [polygon((-np.array(ring)).tolist()) for ring in rings], **stated)
+    assert "CRS84" in (said := refusal(path, unit="m"))
+    assert "EPSG:32728" in said, "south of the equator"
+
+
+def test_metres_that_a_program_calls_degrees_are_read_with_a_note(tmp_path):
+    stated = {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}}
+    layout = blockvis.read_layout(geojson(tmp_path / "w.geojson", [polygon(ring) for ring in SQUARES], **stated))
+    assert layout.n_blocks == 4
+    assert any(note.startswith("the file says degrees (urn") for note in layout.notes)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"type": "FeatureCollection"}, 'without a list "features"'),
+        ({"type": "FeatureCollection", "features": []}, "has no polygon (found: nothing)"),
+        ({"type": "FeatureCollection", "features": [3]}, "feature 0 has a geometry that cannot be read"),
+        ({"type": "Polygon", "coordinates": [[[0, 0], [1, 0]]]}, "feature 0 has a geometry that cannot be read"),
+        ({"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, float("nan")]]]}, "must be finite"),
+        ({"type": "LineString", "coordinates": [[0, 0], [1, 0]]}, "has no polygon: "),
+        ({"type": "Topology"}, "features of GeoJSON, or"),
+    ],
+)
+def test_geojson_that_draws_no_block_is_refused(tmp_path, content, words):
+    path = tmp_path / "bad.geojson"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    assert words in refusal(path)
+
+
+def test_layers_of_a_geopackage_are_groups(tmp_path):
+    shapes = [shapely.Polygon(ring) for ring in SQUARES]
+    both = shapely.MultiPolygon(shapes[2:])
+    layers = {"fixed": (2, [(shapes[0], "a"), (shapes[1], "b")]), 'odd"name': (2, [(both, None)])}
+    layout = blockvis.read_layout(geopackage(tmp_path / "wall #1.gpkg", layers))
+    assert layout.groups == ("fixed", "fixed", 'odd"name', 'odd"name')
+    assert layout.names == ("a", "b", "block 2 1", "block 2 2")
+    assert layout.unit == "ft"
+    np.testing.assert_allclose(layout.sizes**2, 0.08 * 0.3048**2)
+
+
+def test_layers_in_several_systems_are_refused_unless_one_is_chosen(tmp_path):
+    stone = shapely.Polygon(SQUARES[0])
+    path = geopackage(tmp_path / "two.gpkg", {"wall": (-1, [(stone, "a")]), "site": (4326, [(stone, "b")])})
+    assert "layers in several coordinate systems: 'wall' in none, 'site' in WGS 84; leave one out" in refusal(path)
+    for asked in ({"only": "wall"}, {"ignore": "s*"}):
+        layout = blockvis.read_layout(path, **asked)
+        assert layout.groups == ("wall",)
+        assert "left out: 1 outline, as asked for on layer 'site'" in layout.notes
+        assert not [note for note in layout.notes if "matches no" in note]
+
+
+def test_damaged_geopackages_are_refused(tmp_path):
+    path = tmp_path / "bad.gpkg"
+    path.write_bytes(b"SQLite format 3\0" + bytes(100))
+    assert "is no readable GeoPackage" in refusal(path)
+    geopackage(path := tmp_path / "cut.gpkg", {"wall": (-1, [(shapely.Polygon(SQUARES[0]), "a")])})
+    arc = struct.pack("<BII6d", 1, 8, 3, 0.0, 0.0, 1.0, 1.0, 2.0, 0.0)
+    damaged = {b"GP\0\1" + bytes(4) + arc: "straighten it: ogr2ogr -nlt CONVERT_TO_LINEAR cut_straight.gpkg cut.gpkg"}
+    damaged |= {b"GP\0\1": "no header", b"GP\0\x21" + bytes(9): "extended", b"GP\0\1" + bytes(9): "cannot be read"}
+    for blob, words in damaged.items():
+        with closing(sqlite3.connect(path)) as base:
+            base.execute("UPDATE wall SET geom = ?", (blob,))
+            base.commit()
+        assert words in refusal(path)
+
+
+def write_shapefile(path, rings, projection=None, kind=5, **attributes):
+    shapefile = pytest.importorskip("shapefile")
+    with shapefile.Writer(str(path), shapeType=kind) as writer:
+        for key in attributes:
+            writer.field(key, "C")
+        writer.field("number", "N")
+        for k, ring in enumerate(rings):
+            writer.poly([ring[::-1]])
+            writer.record(*(values[k] for values in attributes.values()), k)
+    if projection:
+        path.with_suffix(".prj").write_text(projection, encoding="utf-8")
+    return path
+
+
+def test_a_shapefile_is_read_with_its_table_and_unit(tmp_path):
+    path = tmp_path / "wall[1].shp"
+    write_shapefile(
+        path, SQUARES, UTM.format("Foot_US", 0.304800609601219), label=["a", "b", "c", "d"], layer=["x"] * 4
+    )
+    layout = blockvis.read_layout(path)
+    assert (layout.names, layout.groups, layout.unit) == (("a", "b", "c", "d"), ("x",) * 4, "ft")
+    np.testing.assert_allclose(layout.sizes**2, 0.08 * 0.3048**2)
+    path.with_suffix(".dbf").unlink()
+    path.with_suffix(".shx").unlink()
+    assert blockvis.read_layout(path).names == ("block 0", "block 1", "block 2", "block 3")
+
+
+def test_shapefiles_in_degrees_and_damaged_ones_are_refused(tmp_path):
+    rings = [(np.array(ring) * 1e-5 + 41.5).tolist() for ring in SQUARES]
+    path = write_shapefile(tmp_path / "far.shp", rings, DEGREES)
+    assert "is in degrees (WGS 84)" in (said := refusal(path))
+    assert "ogr2ogr -t_srs EPSG:32637 far_m.gpkg far.shp" in said
+    path.write_bytes(path.read_bytes()[:150])
+    assert "cannot be read as a shapefile" in refusal(path)
+
+
+def test_a_shapefile_without_its_package_names_the_command(tmp_path, monkeypatch):
+    monkeypatch.setattr("blockvis.system.extras.is_installed", lambda name: False)
+    (tmp_path / "wall.shp").write_bytes(bytes(100))
+    with pytest.raises(ImportError, match=r"need pyshp, which .*pip install 'blockvis\[geo\]'$"):
+        blockvis.read_layout(tmp_path / "wall.shp")
