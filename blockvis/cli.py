@@ -74,7 +74,7 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Output] | 
     parser = _parser()
     options, left = parser.parse_known_args(arguments)
     options.outputs = outputs
-    if options.verb is _layout and not any(word.startswith("-") for word in left):
+    if options.verb in (_layout, _bond) and not any(word.startswith("-") for word in left):
         # Parameters on either side of an option.
         options.parameters += left
     elif left:
@@ -206,7 +206,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
-    for add in (_add_explain, _add_sweep, _add_new, _add_schema):
+    for add in (_add_bond, _add_explain, _add_sweep, _add_new, _add_schema):
         add(verbs)
     completion = verbs.add_parser(
         "completion",
@@ -270,6 +270,24 @@ def _add_choice(verb: argparse.ArgumentParser) -> None:
         )
 
 
+def _add_bond(verbs: Any) -> None:
+    bond = verbs.add_parser(
+        "bond",
+        help="fill outlines with openings with the stones of a bond, and write them as a file",
+        epilog="keys as of [[bond]] in a case: blockvis bond facade.dxf -o bricks.dxf walls='A-WALL*' bond=flemish",
+    )
+    bond.add_argument("drawing", metavar="DRAWING")
+    bond.add_argument(
+        "parameters", nargs="*", metavar="key=value", help="walls, openings, bond, brick, joint, heads ..., as in TOML"
+    )
+    bond.add_argument("-o", "--output", required=True, metavar="OUT")
+    bond.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    bond.add_argument("--view", choices=tuple(VIEWS), help="coordinates to take, of a drawing in space")
+    _add_choice(bond)
+    bond.add_argument("--force", action="store_true", help="replace OUT if it is there already")
+    bond.set_defaults(verb=_bond)
+
+
 def _add_explain(verbs: Any) -> None:
     explain = verbs.add_parser(
         "explain",
@@ -325,7 +343,19 @@ def _completion(options: argparse.Namespace) -> int:
     parser = _parser()
     # Choices here, not in the parser: a name that does not exist gets a better message than argparse has.
     choices: dict[str, Any] = {"name": _layout_names()}
-    files = {"case", "output", "resume", "file", "source", "target", "results", "study", "picture", "observed"}
+    files = {
+        "case",
+        "drawing",
+        "output",
+        "resume",
+        "file",
+        "source",
+        "target",
+        "results",
+        "study",
+        "picture",
+        "observed",
+    }
     for action in parser._actions:
         for verb in (action.choices or {}).values() if isinstance(action.choices, dict) else ():
             for argument in verb._actions:
@@ -611,6 +641,26 @@ def _convert(options: argparse.Namespace) -> int:
         write_layout(layout, target)
     else:
         save_layout(assemble(layout, joint_thickness=joint if joint == "auto" else _number(joint)), target)
+    print(f"{layout.n_blocks} blocks written to {target}")
+    return 0
+
+
+def _bond(options: argparse.Namespace) -> int:
+    from .cases.bonds import bonded, read_bond
+    from .cases.toml_table import Table
+    from .formats.read import read_outlines, write_layout
+
+    target = _new_file(options.output, options.force)
+    given = dict(_parameter(word) for word in options.parameters)
+    # Layers may be called 0 or 1.5.
+    words = {key: str(of) for key, of in given.items() if key in ("walls", "openings") and isinstance(of, int | float)}
+    table = Table(given | words, "bond", Path(options.drawing))
+    choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
+    outlines = read_outlines(options.drawing, unit=options.unit, **choice)
+    layout = bonded(outlines, [read_bond(table)], str(options.drawing), mortar=True)
+    for note in layout.notes:
+        print(f"blockvis: note: {note}", file=sys.stderr)
+    write_layout(layout, target)
     print(f"{layout.n_blocks} blocks written to {target}")
     return 0
 

@@ -17,7 +17,7 @@ from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of, standing
 from blockvis.layout.outlines import without_collinear
-from blockvis.layout.selection import noted, sorted_out
+from blockvis.layout.selection import as_asked, noted, sorted_out
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
 from blockvis.system.atomic_files import whole_file, write_whole
@@ -79,10 +79,55 @@ def read_layout(
     ValueError
         With the reason and the remedy, for a file that is missing, damaged or no layout.
     """
-    path = Path(path)
+    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
+    layout = _outlines(Path(path), unit, chord_tolerance, view, ignore, only, dimension)
+    if layout.dimension == 3:
+        return noted(layout)
+    layout = sorted_out(layout, ignore, only)
+    for name, ring in zip(layout.names, layout.outlines, strict=True):
+        if len(ring) > MOST_CORNERS:
+            raise ValueError(
+                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
+            )
+    return standing(layout, thickness) if dimension == 3 else layout
+
+
+def read_outlines(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    view: str | None = None,
+    ignore: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
+) -> Layout:
+    """Read all closed outlines of a drawing, those around others and those with holes too.
+
+    Parameters
+    ----------
+    path, unit, view, ignore, only
+        As of :func:`read_layout`.
+
+    Returns
+    -------
+    Layout
+        Outlines with holes are in ``left_out``; none is taken for a frame, a background or debris.
+    """
+    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
+    return as_asked(_outlines(Path(path), unit, None, view, ignore, only, "auto"), ignore, only)
+
+
+def _outlines(
+    path: Path,
+    unit: str | None,
+    chord_tolerance: float | None,
+    view: str | None,
+    ignore: tuple[str, ...],
+    only: tuple[str, ...],
+    dimension: int | str,
+) -> Layout:
+    """Read what a file draws, in metres and checked, before what is no block is left out."""
     if unit is not None:
         metres_per(unit)
-    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
     reading = Reading(unit=unit, chord_tolerance=chord_tolerance, view=checked_view(view), ignore=ignore, only=only)
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
@@ -90,7 +135,7 @@ def read_layout(
     layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
     layout = replace(layout, source=str(path))
     if layout.dimension == 3:
-        return noted(_in_metres(layout, unit))
+        return _in_metres(layout, unit)
     if layout.n_blocks == 0 and not layout.left_out:
         raise ValueError(f"'{path}' draws no block; draw each block as one closed outline or meshed surface")
     for i, ring in enumerate(layout.outlines):
@@ -100,14 +145,7 @@ def read_layout(
                 f"'{path}': block '{layout.names[i]}' has a corner at {bad.tolist()}; "
                 "coordinates must be finite numbers: repair the file"
             )
-    layout = _in_metres(layout, unit)
-    layout = sorted_out(layout, ignore, only)
-    for name, ring in zip(layout.names, layout.outlines, strict=True):
-        if len(ring) > MOST_CORNERS:
-            raise ValueError(
-                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
-            )
-    return standing(layout, thickness) if dimension == 3 else layout
+    return _in_metres(layout, unit)
 
 
 def _in_dimension(

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-BONDS = ("running", "stack", "english", "flemish", "header")
+#: Bonds of rectangular walls.
+BONDS = ("running", "stack", "english")
+
+#: Bonds of brick that fill an outline.
+BRICKWORK = (*BONDS, "flemish", "header")
 
 #: A brick cut shorter than this fraction of its length is joined to its neighbour: a mason lays no piece shorter than a
 #: closer, a quarter of a brick.

@@ -30,7 +30,7 @@ class Bond:
 
     Attributes
     ----------
-    kind : {"running", "stack", "english", "flemish", "header"}
+    kind : {"running", "stack", "english"}
     brick_length, brick_height : float [m]
     """
 

@@ -13,7 +13,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import without_collinear
 
-from .bonds import BONDS
+from .bonds import BRICKWORK
 from .bricks import LOWEST_BRICK, NARROWEST
 from .dimensions import MOST_BLOCKS, above_zero, at_least_zero, choice, whole
 from .heads import HEADS, Units, head_of, top_of
@@ -180,7 +180,12 @@ def _polygon(shape: Any, what: str) -> shapely.Polygon:
 
 
 def filled(
-    wall: shapely.Polygon, openings: Sequence[shapely.Polygon], pattern: Pattern, taken: shapely.Geometry | None = None
+    wall: shapely.Polygon,
+    openings: Sequence[shapely.Polygon],
+    pattern: Pattern,
+    taken: shapely.Geometry | None = None,
+    *,
+    mortar: bool = True,
 ) -> Layout:
     """Fill a wall with stones; see :func:`bond`.
 
@@ -191,6 +196,8 @@ def filled(
     pattern : Pattern
     taken : shapely geometry, optional [m]
         Where other blocks stand in the wall.
+    mortar : bool
+        Whether the joints of the pattern are left open.
 
     Returns
     -------
@@ -240,7 +247,7 @@ def filled(
         raise ValueError(
             f"the stones fill {kept:.9g} of {area:.9g} m² of the wall; its outline may touch itself: redraw it"
         )
-    if pattern.joint:
+    if pattern.joint and mortar:
         stones = _with_mortar(stones, pattern.joint)
     notes = []
     if hanging:
@@ -371,7 +378,7 @@ def _laid(
     for i in order.tolist():
         position = position + 1 if courses[i] == course else 1
         course = int(courses[i])
-        named.append((f"{'stone' if pattern.bond not in BONDS else 'brick'} {course + 1}-{position}", joined[i]))
+        named.append((f"{'stone' if pattern.bond not in BRICKWORK else 'brick'} {course + 1}-{position}", joined[i]))
     return named
 
 

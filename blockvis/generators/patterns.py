@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from .bonds import BONDS, head_joints
+from .bonds import BRICKWORK, head_joints
 
 #: Patterns that fill an outline.
-PATTERNS = (*BONDS, "ashlar", "rubble")
+PATTERNS = (*BRICKWORK, "ashlar", "rubble")
 
 #: Shortest and longest stone of ashlar, as fractions of the mean, and least distance of its head joints from those of
 #: the course below, as a fraction of the shortest stone.

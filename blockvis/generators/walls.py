@@ -47,7 +47,7 @@ def wall(
         Instead of bricks and courses; at a width that is no whole number of bricks the last ones are cut, a height must
         be a whole number of courses.
     brick_length, brick_height : float [m]
-    bond : {"running", "stack", "english", "flemish", "header"}
+    bond : {"running", "stack", "english"}
     openings : sequence of mappings
         Each with ``x``, ``y`` (lower left corner), ``width`` and ``height`` [m] and a ``head``: "lintel", "flat
         arch", "segmental arch", "round arch" or "none"; see :class:`~blockvis.generators.openings.Opening` for the
