@@ -16,6 +16,7 @@ from .left_out import LeftOut, in_words, matches
 from .linked import linked
 from .notes import LEFT_OUT, UNIT, Note
 from .outlines import ring_area, ring_width
+from .unfilled import unfilled
 from .units import doubt
 
 #: An outline with less area than this times its perimeter squared is a line: the solver takes no block of less.
@@ -74,13 +75,14 @@ def sorted_out(layout: Layout, ignore: Sequence[str] = (), only: Sequence[str] =
         first = next((item for item in layout.left_out if item.message), None)
         asked = "all that it draws is left out as asked (ignore, only)"
         counted = f"; {len(layout.left_out) - 1} more are left out" if first and len(layout.left_out) > 1 else ""
-        raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}")
+        wall = next((f"; {note}" for note in unfilled(layout)), "")
+        raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}{wall}")
     return noted(layout)
 
 
 def noted(layout: Layout) -> Layout:
     """Note what is left out, and the doubt that the sizes of the blocks cast on the unit."""
-    notes = [*layout.notes, *in_words(layout.left_out)]
+    notes = [*layout.notes, *unfilled(layout), *in_words(layout.left_out)]
     doubted = doubt(layout.unit, float(np.median(layout.sizes)))
     return replace(layout, notes=(*notes, Note(UNIT, doubted)) if doubted else tuple(notes))
 
