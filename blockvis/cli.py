@@ -31,6 +31,7 @@ from .system.processes import is_broken_pipe
 if TYPE_CHECKING:
     from .cases.contents import Case
     from .dynamics.fall import Fall
+    from .layout.inspect import Inspection
     from .runs.outputs import Output
     from .runs.run import Run
     from .runs.step_check import StepChecking
@@ -426,8 +427,9 @@ def _new(options: argparse.Namespace) -> int:
     stem = drawing.parent.name if glob.has_magic(drawing.name) else drawing.resolve().stem
     target = _new_file(options.output or f"{stem}.toml", options.force)
     choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
-    found = inspect(drawing, unit=options.unit, dimension=_dimension(options), **choice)
-    text = case_text(found, relative_to(target.parent, drawing), **choice)
+    filled = _filled_walls(options, choice)
+    found, walls = filled or (inspect(drawing, unit=options.unit, dimension=_dimension(options), **choice), ())
+    text = case_text(found, relative_to(target.parent, drawing), **choice, walls=walls)
     write_whole(target, text)
     print(f"{target} written for {len(found.kept)} blocks; run it: blockvis run {target}")
     try:
@@ -435,6 +437,22 @@ def _new(options: argparse.Namespace) -> int:
     except ValueError as error:
         print(f"blockvis: note: as it is, blockvis run refuses it: {error}", file=sys.stderr)
     return 0
+
+
+def _filled_walls(options: argparse.Namespace, choice: dict[str, Any]) -> tuple[Inspection, tuple[str, ...]] | None:
+    """Fill the walls that a drawing has as outlines with openings, with bricks; None where it has none."""
+    from .cases.bonds import Bonding, bonded
+    from .formats.read import read_outlines
+    from .generators.fill import Pattern
+    from .layout.inspect import inspected
+    from .layout.regions import Choice
+    from .layout.unfilled import walls_to_fill
+
+    outlines = read_outlines(options.drawing, unit=options.unit, **choice)
+    walls = tuple(walls_to_fill(outlines))
+    if not walls:
+        return None
+    return inspected(bonded(outlines, [Bonding(Choice(walls), Pattern())], options.drawing, mortar=False)), walls
 
 
 def _schema(options: argparse.Namespace) -> int:

@@ -33,8 +33,19 @@ def unfilled(layout: Layout) -> list[Note]:
     layout : Layout
         With what was left out of the drawing.
     """
+    return [Note(LEFT_OUT, words) for words in walls_to_fill(layout).values()]
+
+
+def walls_to_fill(layout: Layout) -> dict[str, str]:
+    """Find layers, or else names, of walls that a drawing holds as outlines with openings, and say how to fill them.
+
+    Parameters
+    ----------
+    layout : Layout
+        With what was left out of the drawing.
+    """
     if layout.dimension == 3 or layout.n_blocks > MOST:
-        return []
+        return {}
     import shapely
 
     blocks = [shapely.Polygon(ring) for ring in layout.outlines]
@@ -45,7 +56,8 @@ def unfilled(layout: Layout) -> list[Note]:
     ]  # fmt: skip
     labels = [layout.groups[i] or layout.names[i] for i in range(layout.n_blocks)]
     around += [(shape, label, ()) for shape, label in zip(blocks, labels, strict=True)]
-    notes, told, walls = [], np.zeros(layout.n_blocks, bool), []
+    found: dict[str, str] = {}
+    told, walls = np.zeros(layout.n_blocks, bool), list[Any]()
     for wall, label, holes in sorted(around, key=lambda one: float(one[0].area)):
         # Around a wall there may be a hatch of it, or the frame of the sheet.
         if not wall.is_valid or wall.area == 0.0 or any(_share(one, wall) > 0.99 for one in walls):
@@ -56,8 +68,8 @@ def unfilled(layout: Layout) -> list[Note]:
         told[inside] = True
         walls.append(wall)
         openings = shapely.union_all([*(blocks[i] for i in inside), *holes])
-        notes.append(Note(LEFT_OUT, _words(layout.source, label, wall, openings) + COUNTED * bool(inside)))
-    return notes
+        found.setdefault(label, _words(layout.source, label, wall, openings) + COUNTED * bool(inside))
+    return found
 
 
 def _may_be_wall(item: LeftOut) -> bool:
