@@ -23,6 +23,9 @@ from .slivers import in_simple_pieces, without_slivers
 #: What is cut of a brick is joined to its neighbour if it is smaller than this fraction of a brick.
 CLOSER = 0.3
 
+#: What is smaller than this fraction of a brick and has no brick beside it is joined to a head.
+CRUMB = 0.1
+
 #: Corners lie on a grid of this fraction of the size of the wall.
 GRID = 1e-12
 
@@ -216,7 +219,7 @@ def filled(
     length, height = pattern.module
     grid = GRID * max(*wall.bounds[2:], length)
     solid = shapely.Polygon(wall.exterior)
-    holes += [shapely.Polygon(ring) for ring in wall.interiors] + _notches(solid, grid)
+    holes = _apart([*holes, *map(shapely.Polygon, wall.interiors), *_notches(solid, grid)])
     rest = wall if taken is None else shapely.difference(wall, _shifted(taken, -corner), grid_size=grid)
     if holes:
         rest = shapely.difference(rest, shapely.union_all(holes, grid_size=grid), grid_size=grid)
@@ -240,8 +243,7 @@ def filled(
     stones += [(f"quoin {k}", shape) for k, shape in enumerate(quoins, start=1)]
     if quoins:
         rest = shapely.difference(rest, shapely.union_all(quoins, grid_size=grid), grid_size=grid)
-    laid = _laid(rest, wall.bounds, pattern, grid)
-    stones = [*laid, *stones]
+    stones = _with_crumbs(_laid(rest, wall.bounds, pattern, grid), stones, pattern, grid)
     kept = sum(shape.area for _, shape in stones)
     if abs(kept - area) > KEPT * area:
         raise ValueError(
@@ -296,6 +298,15 @@ def _notches(solid: shapely.Polygon, grid: float) -> list[shapely.Polygon]:
         if part.geom_type == "Polygon" and b < low + near and a > left + near and c < right - near and d < high - near:
             found.append(shapely.Polygon(part.exterior))
     return found
+
+
+def _apart(holes: Sequence[shapely.Polygon]) -> list[shapely.Polygon]:
+    """Make one opening of those that overlap or touch, in the order in which they are given."""
+    if not holes:
+        return []
+    parts = [shapely.Polygon(part.exterior) for part in shapely.get_parts(shapely.union_all(holes))]
+    parts = [part for part in shapely.get_parts(shapely.union_all(parts)) if part.area > 0.0]
+    return sorted(parts, key=lambda part: next(k for k, hole in enumerate(holes) if part.intersects(hole)))
 
 
 def _has_wall_over(hole: shapely.Polygon, rest: shapely.Geometry, strip: float) -> bool:
@@ -359,15 +370,9 @@ def _laid(
         pieces = bedded(pieces, rest)
 
     def too_small(shape: shapely.Polygon, piece: int) -> bool:
-        if is_whole[piece]:
-            return False
-        if shape.area < CLOSER * length * height:
-            return True
-        low, high = shape.bounds[1::2]
-        return high - low < LOWEST_BRICK * height or bool(shape.buffer(-NARROWEST / 2.0 * height).is_empty)
+        return not is_whole[piece] and _is_sliver(shape, length, height)
 
     joined = [shape for shape, _ in without_slivers(pieces, too_small, height, grid)]
-    joined = [shape for shape in joined if shape.area > DUST * length * height]
     middles = shapely.get_coordinates(shapely.centroid(joined))
     if random:
         order = np.lexsort((middles[:, 0], np.round(middles[:, 1] / height)))
@@ -382,6 +387,27 @@ def _laid(
     return named
 
 
+def _is_sliver(shape: shapely.Polygon, length: float, height: float) -> bool:
+    if shape.area < CLOSER * length * height:
+        return True
+    low, high = shape.bounds[1::2]
+    return high - low < LOWEST_BRICK * height or bool(shape.buffer(-NARROWEST / 2.0 * height).is_empty)
+
+
+def _with_crumbs(
+    laid: list[tuple[str, shapely.Polygon]], others: list[tuple[str, shapely.Polygon]], pattern: Pattern, grid: float
+) -> list[tuple[str, shapely.Polygon]]:
+    """Join what is left between heads and openings, a crumb of a brick, to a head or quoin; drop dust."""
+    length, height = pattern.module
+    every = [*laid, *others]
+
+    def is_crumb(shape: shapely.Polygon, piece: int) -> bool:
+        return piece < len(laid) and shape.area < CRUMB * length * height
+
+    joined = without_slivers([shape for _, shape in every], is_crumb, height, grid)
+    return [(every[piece][0], shape) for shape, piece in joined if shape.area > DUST * length * height]
+
+
 def _with_mortar(stones: list[tuple[str, shapely.Polygon]], joint: float) -> list[tuple[str, shapely.Polygon]]:
     """Draw stones back from each other by half a joint; where no stone lies beside them they stay."""
     shapes = [shape for _, shape in stones]
@@ -393,7 +419,8 @@ def _with_mortar(stones: list[tuple[str, shapely.Polygon]], joint: float) -> lis
         free = shapely.difference(reach, beside)
         drawn = shapely.intersection(free.buffer(-joint / 2.0, join_style="mitre"), shape)
         parts = [part for part in shapely.get_parts(drawn) if part.geom_type == "Polygon"]
-        if parts:
-            largest = max(parts, key=lambda part: part.area)
-            reduced.append((name, shapely.Polygon(largest.exterior)))
+        largest = max(parts, key=lambda part: part.area, default=shapely.Polygon())
+        # What mortar would hide stays as it is, a stone that touches.
+        left = shapely.Polygon(largest.exterior) if largest.area > 0.2 * shape.area else shape
+        reduced.append((name, left))
     return reduced
