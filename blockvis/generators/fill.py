@@ -182,6 +182,8 @@ def _polygon(shape: Any, what: str) -> shapely.Polygon:
     return polygon
 
 
+# On a grid GEOS divides by zero inside, for parallel edges, and numpy would tell.
+@np.errstate(divide="ignore", invalid="ignore")
 def filled(
     wall: shapely.Polygon,
     openings: Sequence[shapely.Polygon],
@@ -388,7 +390,7 @@ def _laid(
 
 
 def _is_sliver(shape: shapely.Polygon, length: float, height: float) -> bool:
-    if shape.area < CLOSER * length * height:
+    if shape.area < CLOSER * (1.0 - 1e-6) * length * height:
         return True
     low, high = shape.bounds[1::2]
     return high - low < LOWEST_BRICK * height or bool(shape.buffer(-NARROWEST / 2.0 * height).is_empty)
