@@ -28,6 +28,9 @@ LINTEL, SKEW, RELIEF = 0.12, 20.0, 1.0 / 6.0
 #: Depth of a ring of stones that are longer, as a fraction of its span.
 RING = 0.25
 
+#: Fewest voussoirs of a ring.
+LEAST = 5
+
 #: Where there is no room a head is made smaller, down to these fractions of its depth and bearing.
 DEPTHS, BEARINGS = (1.0, 0.75, 0.5), (1.0, 0.75, 0.5, 0.25, 0.1)
 
@@ -220,7 +223,7 @@ def _relief(top: Top, bearing: float, depth: float, units: Units) -> list[shapel
 def _ring(top: Top, depth: float, units: Units) -> list[shapely.Polygon]:
     """Voussoirs around a curved top, their joints across it, their soffits as drawn."""
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(top.chain, axis=0).T))])
-    n = odd(lengths[-1] / units.height)
+    n = max(LEAST, odd(lengths[-1] / units.height))
     places = np.linspace(0.0, lengths[-1], n + 1)
     nearest = lengths[np.abs(lengths - places[:, None]).argmin(axis=1)]
     # A joint beside a corner of the outline goes through it: no edge is much shorter than a voussoir.

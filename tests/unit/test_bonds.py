@@ -69,8 +69,11 @@ def first_status(layout, friction=0.6):
     return next(found).status
 
 
-@pytest.mark.parametrize("bond", BONDS)
 @pytest.mark.path
+@pytest.mark.parametrize(
+    "bond",
+    [pytest.param(bond, marks=[pytest.mark.thorough] * (bond in ("stack", "english", "header"))) for bond in BONDS],
+)
 def test_each_bond_fills_the_wall_and_stands_over_a_door_and_two_windows(bond):
     layout = generators.bond(WALL, OPENINGS, bond=bond, brick=(0.5, 0.25), stone=0.5)
     checked(layout, WALL.area - shapely.union_all(OPENINGS).area)
@@ -80,7 +83,8 @@ def test_each_bond_fills_the_wall_and_stands_over_a_door_and_two_windows(bond):
     assert first_status(layout) is solver.Status.EQUILIBRIUM
 
 
-@pytest.mark.parametrize("heads", ["lintel", "flat arch", "arch"])
+@pytest.mark.path
+@pytest.mark.parametrize("heads", [pytest.param("lintel", marks=pytest.mark.thorough), "flat arch", "arch"])
 def test_other_heads_stand_too(heads):
     layout = generators.bond(WALL, OPENINGS, brick=(0.5, 0.25), heads=heads)
     checked(layout, WALL.area - shapely.union_all(OPENINGS).area)
