@@ -31,6 +31,7 @@ from .system.processes import is_broken_pipe
 if TYPE_CHECKING:
     from .cases.contents import Case
     from .dynamics.fall import Fall
+    from .layout.inspect import Inspection
     from .runs.outputs import Output
     from .runs.run import Run
     from .runs.step_check import StepChecking
@@ -74,7 +75,7 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Output] | 
     parser = _parser()
     options, left = parser.parse_known_args(arguments)
     options.outputs = outputs
-    if options.verb is _layout and not any(word.startswith("-") for word in left):
+    if options.verb in (_layout, _bond) and not any(word.startswith("-") for word in left):
         # Parameters on either side of an option.
         options.parameters += left
     elif left:
@@ -206,7 +207,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
-    for add in (_add_explain, _add_sweep, _add_new, _add_schema):
+    for add in (_add_bond, _add_explain, _add_sweep, _add_new, _add_schema):
         add(verbs)
     completion = verbs.add_parser(
         "completion",
@@ -287,6 +288,24 @@ def _add_image(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--smallest", type=float, metavar="M", help="less of an image than this across is a speck")
 
 
+def _add_bond(verbs: Any) -> None:
+    bond = verbs.add_parser(
+        "bond",
+        help="fill outlines with openings with the stones of a bond, and write them as a file",
+        epilog="keys as of [[bond]] in a case: blockvis bond facade.dxf -o bricks.dxf walls='A-WALL*' bond=flemish",
+    )
+    bond.add_argument("drawing", metavar="DRAWING")
+    bond.add_argument(
+        "parameters", nargs="*", metavar="key=value", help="walls, openings, bond, brick, joint, heads ..., as in TOML"
+    )
+    bond.add_argument("-o", "--output", required=True, metavar="OUT")
+    bond.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
+    bond.add_argument("--view", choices=tuple(VIEWS), help="coordinates to take, of a drawing in space")
+    _add_choice(bond)
+    bond.add_argument("--force", action="store_true", help="replace OUT if it is there already")
+    bond.set_defaults(verb=_bond)
+
+
 def _add_explain(verbs: Any) -> None:
     explain = verbs.add_parser(
         "explain",
@@ -342,7 +361,19 @@ def _completion(options: argparse.Namespace) -> int:
     parser = _parser()
     # Choices here, not in the parser: a name that does not exist gets a better message than argparse has.
     choices: dict[str, Any] = {"name": _layout_names()}
-    files = {"case", "output", "resume", "file", "source", "target", "results", "study", "picture", "observed"}
+    files = {
+        "case",
+        "drawing",
+        "output",
+        "resume",
+        "file",
+        "source",
+        "target",
+        "results",
+        "study",
+        "picture",
+        "observed",
+    }
     for action in parser._actions:
         for verb in (action.choices or {}).values() if isinstance(action.choices, dict) else ():
             for argument in verb._actions:
@@ -413,8 +444,9 @@ def _new(options: argparse.Namespace) -> int:
     stem = drawing.parent.name if glob.has_magic(drawing.name) else drawing.resolve().stem
     target = _new_file(options.output or f"{stem}.toml", options.force)
     choice = _choice(options)
-    found = inspect(drawing, unit=options.unit, dimension=_dimension(options), **choice)
-    text = case_text(found, relative_to(target.parent, drawing), **choice)
+    filled = _filled_walls(options, choice)
+    found, walls = filled or (inspect(drawing, unit=options.unit, dimension=_dimension(options), **choice), ())
+    text = case_text(found, relative_to(target.parent, drawing), **choice, walls=walls)
     write_whole(target, text)
     print(f"{target} written for {len(found.kept)} blocks; run it: blockvis run {target}")
     try:
@@ -422,6 +454,22 @@ def _new(options: argparse.Namespace) -> int:
     except ValueError as error:
         print(f"blockvis: note: as it is, blockvis run refuses it: {error}", file=sys.stderr)
     return 0
+
+
+def _filled_walls(options: argparse.Namespace, choice: dict[str, Any]) -> tuple[Inspection, tuple[str, ...]] | None:
+    """Fill the walls that a drawing has as outlines with openings, with bricks; None where it has none."""
+    from .cases.bonds import Bonding, bonded
+    from .formats.read import read_outlines
+    from .generators.fill import Pattern
+    from .layout.inspect import inspected
+    from .layout.regions import Choice
+    from .layout.unfilled import walls_to_fill
+
+    outlines = read_outlines(options.drawing, unit=options.unit, **choice)
+    walls = tuple(walls_to_fill(outlines))
+    if not walls:
+        return None
+    return inspected(bonded(outlines, [Bonding(Choice(walls), Pattern())], options.drawing, mortar=False)), walls
 
 
 def _schema(options: argparse.Namespace) -> int:
@@ -628,6 +676,26 @@ def _convert(options: argparse.Namespace) -> int:
         write_layout(layout, target)
     else:
         save_layout(assemble(layout, joint_thickness=joint if joint == "auto" else _number(joint)), target)
+    print(f"{layout.n_blocks} blocks written to {target}")
+    return 0
+
+
+def _bond(options: argparse.Namespace) -> int:
+    from .cases.bonds import bonded, read_bond
+    from .cases.toml_table import Table
+    from .formats.read import read_outlines, write_layout
+
+    target = _new_file(options.output, options.force)
+    given = dict(_parameter(word) for word in options.parameters)
+    # Layers may be called 0 or 1.5.
+    words = {key: str(of) for key, of in given.items() if key in ("walls", "openings") and isinstance(of, int | float)}
+    table = Table(given | words, "bond", Path(options.drawing))
+    choice = _choice(options)
+    outlines = read_outlines(options.drawing, unit=options.unit, **choice)
+    layout = bonded(outlines, [read_bond(table)], str(options.drawing), mortar=True)
+    for note in layout.notes:
+        print(f"blockvis: note: {note}", file=sys.stderr)
+    write_layout(layout, target)
     print(f"{layout.n_blocks} blocks written to {target}")
     return 0
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import solver
+from blockvis.cases.bonds import BOND
 from blockvis.cases.build import DENSITY, THICKNESS
 from blockvis.cases.distributions import KINDS as DISTRIBUTIONS
 from blockvis.cases.explain_settings import EXPLAIN
@@ -486,6 +487,7 @@ OUTPUT = Section(
 SECTIONS = (
     GEOMETRY,
     PARAMETERS,
+    BOND,
     ROLES,
     SUPPORTS,
     MATERIAL,

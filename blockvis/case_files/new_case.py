@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from blockvis.case_files import case_keys
+from blockvis.cases.bonds import BOND
 from blockvis.cases.build import DENSITY
 from blockvis.cases.key import Key, Section
 from blockvis.layout.inspect import Inspection
@@ -27,6 +28,9 @@ FRICTION = 0.6
 
 #: Parts of the names and layers of blocks that are supports, where the drawing says nothing of roles.
 SUPPORT_WORDS = ("springer", "support", "ground", "foundation", "footing", "abutment", "bearing")
+
+#: What a new case says of walls without stones.
+WALLS = "The drawing has no stones but outlines with openings: give the size of yours."
 
 #: Keys of a drawing in the plane, which one in space does not have.
 _IN_THE_PLANE = ("window", "thickness", "closing", "outline_tolerance")
@@ -65,6 +69,7 @@ def case_text(
     ignore: Sequence[str] = (),
     only: Sequence[str] = (),
     window: Sequence[float] = (),
+    walls: Sequence[str] = (),
     **image: Any,
 ) -> str:
     """Write the text of a case file for a drawing.
@@ -77,6 +82,8 @@ def case_text(
         The drawing, relative to the case file.
     view, ignore, only, window, **image
         With which the drawing was read.
+    walls : sequence of str
+        Layers or names of outlines that are filled with a bond.
 
     Returns
     -------
@@ -96,7 +103,7 @@ def case_text(
         "only": list(only) or None,
         "window": list(window or ()) or None,
         "dimension": 3 if in_space else None,
-        "joint_thickness": "auto" if found.joint_thickness > 0.0 else None,
+        "joint_thickness": "auto" if found.joint_thickness > 0.0 and not walls else None,
         **image,
     }
     hidden = (*(_IN_THE_PLANE if in_space else ()), *(() if any(image.values()) else case_keys.OF_IMAGES))
@@ -107,6 +114,7 @@ def case_text(
         *(_comment(f"Note: {note}") for note in found.layout.notes),
         "",
         _table(case_keys.GEOMETRY, geometry, leaving=("layout", "parameters", *hidden)),
+        *([_table(BOND, {"walls": list(walls), "bond": "running", "brick": [0.25, 0.075]}, WALLS)] if walls else ()),
         _roles(found, ground),
         *(
             _table(case_keys.SUPPORTS, support, leaving=("material",) if in_space else ("material", "levels"))

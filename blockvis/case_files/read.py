@@ -10,6 +10,7 @@ from typing import Any
 
 import solver
 from blockvis import generators
+from blockvis.cases.bonds import Bonding, read_bond
 from blockvis.cases.contents import Case
 from blockvis.cases.explain_settings import read_explain
 from blockvis.cases.imperfections import Imperfection, read_imperfection
@@ -139,6 +140,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         source=source,
         text=text,
         **geometry | {"file": None if geometry["file"] is None else source.parent / geometry["file"]},
+        bonds=_bonds(top, geometry["file"]),
         roles=dict(roles),
         supports=tuple(_support(table) for table in top.tables("supports")),
         **_law(keys.MATERIAL.read(top.table("material"))),
@@ -178,6 +180,13 @@ def _geometry(table: Table) -> dict[str, Any]:
             raise table.error(key, "belongs to a file, not to a layout")
     image = {key: values.pop(key) for key in keys.OF_IMAGES} | {"outline_tolerance": values["outline_tolerance"]}
     return values | {"parameters": dict(values["parameters"]), "image": image}
+
+
+def _bonds(top: Table, file: str | None) -> tuple[Bonding, ...]:
+    tables = top.tables("bond")
+    if tables and file is None:
+        raise tables[0].error("walls", 'are outlines of a drawing, and a layout has none; give [geometry] file = "..."')
+    return tuple(map(read_bond, tables))
 
 
 def _checked(case: Case, settings: Mapping[str, Any]) -> Case:

@@ -11,13 +11,14 @@ import numpy as np
 
 import solver
 from blockvis import generators
-from blockvis.formats.read import overlap_remedy, read_layout
+from blockvis.formats.read import overlap_remedy, read_layout, read_outlines
 from blockvis.layout import layout
 from blockvis.layout.assemble import assemble
 from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.units import doubt
 from blockvis.text import nearest
 
+from .bonds import bonded
 from .contents import Case
 from .coordinates import check_coordinates
 from .imperfections import imperfect, joint_scatter
@@ -181,6 +182,18 @@ def across_blocks(assembly: solver.Assembly) -> np.ndarray:
 
 def _case_layout(case: Case) -> layout.Layout:
     thickness = case.thickness or THICKNESS
+    if case.file is not None and case.bonds:
+        outlines = read_outlines(
+            case.file,
+            unit=case.unit,
+            view=case.view,
+            ignore=case.ignore,
+            only=case.only,
+            window=case.window,
+            **case.image,
+        )
+        walls = bonded(outlines, case.bonds, str(case.source), case.roles, mortar=False)
+        return layout.standing(walls, thickness) if case.dimension == 3 else walls
     if case.file is not None:
         return read_layout(
             case.file,

@@ -11,6 +11,7 @@ from typing import Any
 import solver
 from blockvis.formats.image_scale import ImageKeys
 
+from .bonds import Bonding
 from .explain_settings import ExplainSettings
 from .imperfections import Imperfection
 from .loads import LoadCase
@@ -27,6 +28,8 @@ class Case:
         The case file; paths in it are relative to its folder.
     text : str
         The case file as it was read.
+    bonds : tuple of Bonding
+        Walls of the drawing that are filled with stones.
     analysis : str
         Name of the kind of analysis.
     settings : optional
@@ -56,6 +59,7 @@ class Case:
     window: tuple[float, ...] | None = None
     image: ImageKeys = field(default_factory=ImageKeys)
     thickness: float | None = None
+    bonds: tuple[Bonding, ...] = ()
     joint_thickness: float | str = 0.0
     closing: str = "auto"
     outline_tolerance: float | None = None

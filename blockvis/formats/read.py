@@ -19,10 +19,10 @@ from blockvis.layout.layout import Layout, layout_of, standing
 from blockvis.layout.outlines import without_collinear
 from blockvis.layout.remedies import deep_overlaps, proposed_ignore
 from blockvis.layout.repair import DeepOverlap
-from blockvis.layout.selection import noted, sorted_out
+from blockvis.layout.selection import as_asked, noted, sorted_out
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
-from blockvis.layout.window import checked_window
+from blockvis.layout.window import checked_window, within_window
 from blockvis.system.atomic_files import whole_file, write_whole
 
 from .bodies import Bodies, in_dimension
@@ -97,11 +97,62 @@ def read_layout(
     ValueError
         With the reason and the remedy, for a file that is missing, damaged or no layout.
     """
-    path = Path(path)
+    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
+    corners = checked_window(window)
+    layout = _outlines(Path(path), unit, chord_tolerance, view, ignore, only, dimension, image)
+    if layout.dimension == 3:
+        if corners:
+            raise ValueError(f"'{path}' was read in space, and window is of the plane; choose blocks by ignore or only")
+        return noted(layout)
+    layout = sorted_out(layout, ignore, only, corners)
+    for name, ring in zip(layout.names, layout.outlines, strict=True):
+        if len(ring) > MOST_CORNERS:
+            raise ValueError(
+                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
+            )
+    return standing(layout, thickness) if dimension == 3 else layout
+
+
+def read_outlines(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    view: str | None = None,
+    ignore: str | Sequence[str] = (),
+    only: str | Sequence[str] = (),
+    window: Sequence[float] | None = None,
+    **image: Unpack[ImageKeys],
+) -> Layout:
+    """Read all closed outlines of a drawing, those around others and those with holes too.
+
+    Parameters
+    ----------
+    path, unit, view, ignore, only, window, **image
+        As of :func:`read_layout`.
+
+    Returns
+    -------
+    Layout
+        Outlines with holes are in ``left_out``; none is taken for a frame, a background or debris.
+    """
+    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
+    layout = _outlines(Path(path), unit, None, view, ignore, only, "auto", image)
+    return within_window(as_asked(layout, ignore, only), checked_window(window))
+
+
+def _outlines(
+    path: Path,
+    unit: str | None,
+    chord_tolerance: float | None,
+    view: str | None,
+    ignore: tuple[str, ...],
+    only: tuple[str, ...],
+    dimension: int | str,
+    image: ImageKeys,
+) -> Layout:
+    """Read what a file draws, in metres and checked, before what is no block is left out."""
     if unit is not None:
         metres_per(unit)
-    corners = checked_window(window)
-    ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
     reading = Reading(unit, chord_tolerance, checked_view(view), ignore, only, {**image})
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
@@ -109,9 +160,7 @@ def read_layout(
     layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
     layout = replace(layout, source=str(path))
     if layout.dimension == 3:
-        if corners:
-            raise ValueError(f"'{path}' was read in space, and window is of the plane; choose blocks by ignore or only")
-        return noted(_in_metres(layout, unit))
+        return _in_metres(layout, unit)
     if layout.n_blocks == 0 and not layout.left_out:
         raise ValueError(f"'{path}' draws no block; draw each block as one closed outline or meshed surface")
     for i, ring in enumerate(layout.outlines):
@@ -121,14 +170,7 @@ def read_layout(
                 f"'{path}': block '{layout.names[i]}' has a corner at {bad.tolist()}; "
                 "coordinates must be finite numbers: repair the file"
             )
-    layout = _in_metres(layout, unit)
-    layout = sorted_out(layout, ignore, only, corners)
-    for name, ring in zip(layout.names, layout.outlines, strict=True):
-        if len(ring) > MOST_CORNERS:
-            raise ValueError(
-                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
-            )
-    return standing(layout, thickness) if dimension == 3 else layout
+    return _in_metres(layout, unit)
 
 
 def _in_dimension(

@@ -4,6 +4,7 @@ from .arches import arch, basket_handle_arch, pointed_arch, segmental_arch
 from .catalogue import LAYOUTS, build, dimension_of, help_text, parameters_of
 from .corners import l_corner, t_corner, two_leaf_wall
 from .domes import dome
+from .fill import bond
 from .frames import arch_on_piers, buttressed_arch, column, portal
 from .groins import church_bay, cross_vault, pavilion_vault
 from .vaults import barrel_vault, extruded_arch
@@ -15,6 +16,7 @@ __all__ = [
     "arch_on_piers",
     "barrel_vault",
     "basket_handle_arch",
+    "bond",
     "build",
     "buttressed_arch",
     "church_bay",

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+#: Bonds of rectangular walls.
 BONDS = ("running", "stack", "english")
+
+#: Bonds of brick that fill an outline.
+BRICKWORK = (*BONDS, "flemish", "header")
 
 #: A brick cut shorter than this fraction of its length is joined to its neighbour: a mason lays no piece shorter than a
 #: closer, a quarter of a brick.
@@ -16,10 +20,12 @@ def head_joints(bond: str, course: int, width: float, brick_length: float) -> np
 
     Parameters
     ----------
-    bond : {"running", "stack", "english"}
+    bond : {"running", "stack", "english", "flemish", "header"}
     course : int
         From 0 at the bottom. Even courses are whole bricks (stretchers); odd ones are shifted by half a brick in
-        running bond, and in English bond are headers with a queen closer next to each end.
+        running bond, and in English bond are headers with a queen closer next to each end. In Flemish bond each course
+        is a stretcher and a header in turn, each header over the middle of a stretcher, with a queen closer at the left
+        of odd courses; in header bond all are headers, and odd courses begin with three quarters of a brick.
     width, brick_length : float [m]
 
     Returns
@@ -35,7 +41,15 @@ def head_joints(bond: str, course: int, width: float, brick_length: float) -> np
     [0.0, 0.5, 0.75, 1.25, 1.5, 2.0]
     """
     n = int(np.ceil(2.0 * width / brick_length)) + 2
-    if course % 2 == 0 or bond == "stack":
+    if bond == "flemish":
+        ends = np.array([1.0, 1.5]) if course % 2 == 0 else np.array([0.75, 1.75])
+        inside = (ends + 1.5 * np.arange(n)[:, None]).ravel() * brick_length
+        # The first header of odd courses has a queen closer at its right.
+        inside = np.append(0.5 * brick_length, inside) if course % 2 else inside
+    elif bond == "header":
+        inside = (0.5 + 0.25 * (course % 2) + 0.5 * np.arange(n)) * brick_length
+        inside = inside if course % 2 == 0 else inside[inside < width - 0.5 * brick_length]
+    elif course % 2 == 0 or bond == "stack":
         inside = np.arange(1, n) * brick_length
     elif bond == "running":
         inside = (np.arange(n) + 0.5) * brick_length

@@ -12,6 +12,7 @@ import shapely
 from blockvis.layout.outlines import without_collinear
 
 from .bonds import SHORTEST_BRICK, head_joints
+from .slivers import without_slivers
 
 #: All corners lie on a grid of this fraction of the brick height, so that cuts leave no slivers of rounding errors.
 GRID = 1e-10
@@ -21,12 +22,6 @@ LOWEST_BRICK = 0.3
 
 #: So is a piece into which no circle of this fraction of the brick height in diameter fits: the end of a wedge.
 NARROWEST = 0.25
-
-#: Pieces are joined along at least this fraction of the brick height, not where they touch at a corner,
-LEAST_SHARED = 0.01
-
-#: or along this fraction of the sliver's own perimeter: one so small that all its edges are shorter is joined, too.
-LEAST_OF_PERIMETER = 0.05
 
 
 @dataclass(frozen=True)
@@ -115,30 +110,15 @@ def cut_bricks(bond: Bond, bricks: Sequence[Brick], rings: Sequence[np.ndarray])
             parts = shapely.get_parts(rest)
             pieces += [Brick(brick.course, part) for part in parts if part.area > 0.0]
         kept = pieces
-    return _without_slivers(bond, kept)
+    whole = without_slivers(
+        [brick.shape for brick in kept], lambda shape, _: _is_sliver(bond, shape), bond.brick_height, bond.grid
+    )
+    return [Brick(kept[piece].course, shape) for shape, piece in whole]
 
 
 def brick_outline(brick: Brick) -> np.ndarray:
     """(n, 2) array [m]: corners of a brick, without collinear points."""
     return without_collinear(shapely.get_coordinates(brick.shape)[:-1], 1e-9)
-
-
-def _without_slivers(bond: Bond, bricks: list[Brick]) -> list[Brick]:
-    bricks = list(bricks)
-    unjoinable: set[int] = set()
-    while True:
-        slivers = [i for i, brick in enumerate(bricks) if i not in unjoinable and _is_sliver(bond, brick.shape)]
-        if not slivers:
-            return bricks
-        i = min(slivers, key=lambda k: bricks[k].shape.area)
-        neighbour = _best_neighbour(bond, bricks, i)
-        if neighbour is None:
-            unjoinable.add(i)
-            continue
-        larger = max(i, neighbour, key=lambda k: bricks[k].shape.area)
-        bricks[neighbour] = Brick(bricks[larger].course, _joined(bond, bricks[i].shape, bricks[neighbour].shape))
-        del bricks[i]
-        unjoinable = {k - (k > i) for k in unjoinable}
 
 
 def _is_sliver(bond: Bond, shape: shapely.Polygon) -> bool:
@@ -150,24 +130,3 @@ def _is_sliver(bond: Bond, shape: shapely.Polygon) -> bool:
     if len(shape.exterior.coords) == 5 and shape.area > 0.999 * (right - left) * (high - low):
         return False
     return bool(shape.buffer(-NARROWEST / 2.0 * bond.brick_height).is_empty)
-
-
-def _best_neighbour(bond: Bond, bricks: list[Brick], sliver: int) -> int | None:
-    """Find the neighbour with which a sliver makes the block that fills most of its convex hull."""
-    shape = bricks[sliver].shape
-    least = min(LEAST_SHARED * bond.brick_height, LEAST_OF_PERIMETER * shape.length)
-    best, fullest = None, 0.0
-    for i in np.flatnonzero(shapely.intersects([brick.shape for brick in bricks], shape)).tolist():
-        if i == sliver or shape.boundary.intersection(bricks[i].shape.boundary).length < least:
-            continue
-        whole = _joined(bond, shape, bricks[i].shape)
-        if whole.geom_type != "Polygon" or len(whole.interiors):
-            continue
-        filled = whole.area / whole.convex_hull.area
-        if filled > fullest * (1.0 + 1e-9):
-            best, fullest = i, filled
-    return best
-
-
-def _joined(bond: Bond, first: shapely.Polygon, second: shapely.Polygon) -> shapely.Polygon:
-    return shapely.union(first, second, grid_size=bond.grid)

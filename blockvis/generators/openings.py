@@ -114,13 +114,13 @@ def checked_opening(
         skew=skew,
         voussoirs=whole(
             f"{where}: voussoirs",
-            values.get("voussoirs", _odd((math.pi / 2.0 if head == "round arch" else 1.0) * width / brick_height)),
+            values.get("voussoirs", odd((math.pi / 2.0 if head == "round arch" else 1.0) * width / brick_height)),
             2,
         ),
     )
 
 
-def _odd(number: float) -> int:
+def odd(number: float) -> int:
     """Round to an odd number of at least three, so that an arch has a keystone."""
     return max(3, 2 * round((number - 1.0) / 2.0) + 1)
 

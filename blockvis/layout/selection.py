@@ -18,6 +18,7 @@ from .left_out import LeftOut, in_words, matches
 from .linked import linked
 from .notes import LEFT_OUT, UNIT, Note
 from .outlines import ring_area, ring_width
+from .unfilled import unfilled
 from .units import doubt
 from .window import within_window
 
@@ -93,13 +94,14 @@ def sorted_out(
         if ground is not None and any(item.kind in UNREAD for item in layout.left_out):
             why = f"{first.message if first else asked}{counted}"
             raise ValueError(f"{where}: nothing but a background is left, '{ground.name}': {why}")
-        raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}")
+        wall = next((f"; {note}" for note in unfilled(layout)), "")
+        raise ValueError(f"{where} draws no block: {first.message if first else asked}{counted}{wall}")
     return noted(layout)
 
 
 def noted(layout: Layout) -> Layout:
     """Note what is left out, and the doubt that the sizes of the blocks cast on the unit."""
-    notes = [*layout.notes, *in_words(layout.left_out)]
+    notes = [*layout.notes, *unfilled(layout), *in_words(layout.left_out)]
     doubted = doubt(layout.unit, float(np.median(layout.sizes)))
     return replace(layout, notes=(*notes, Note(UNIT, doubted)) if doubted else tuple(notes))
 

@@ -30,6 +30,7 @@ EVERY_TABLE: dict[str, Any] = {
     "loads": [{"kind": "live", "force": [1.0, 0.0]}],
     "analysis": {"kind": "pushover"},
     "control": {"block": "brick 1-1"},
+    "bond": [{"walls": ["A-WALL*"]}],
     "explain": {},
     "output": {},
 }

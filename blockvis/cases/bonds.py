@@ -1,0 +1,156 @@
+"""Walls of a drawing that a case fills with the stones of a bond."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+import shapely
+
+from blockvis.generators.fill import Pattern, filled
+from blockvis.generators.heads import HEADS
+from blockvis.generators.patterns import PATTERNS
+from blockvis.layout.layout import Layout
+from blockvis.layout.notes import CHANGED, Note
+from blockvis.layout.regions import Choice, Region, regions_of
+from blockvis.layout.selection import sorted_out
+
+from .key import NOT_NEGATIVE, PAIR, POSITIVE, TEXTS, Key, Section, one_of, whole
+from .toml_table import Table
+
+_DEFAULT = Pattern()
+
+BOND = Section(
+    "bond",
+    "A wall that the drawing has as an outline with openings, filled with stones; several tables fill several walls",
+    (
+        Key("walls", TEXTS, "Layers, groups, materials and names, or patterns of them, of the closed outlines, hatches "
+            "and faces to fill", ["A-WALL*"], required=True, remedy='name layers of the drawing: walls = ["A-WALL*"]'),
+        Key("openings", TEXTS, "Those of the openings, which may reach the rim of the wall; what else lies in the wall "
+            "stays a block then", ["A-WIN*", "A-DOOR*"], otherwise="holes, and all outlines in the walls", default=()),
+        Key("bond", one_of(PATTERNS), "Pattern; the lengths of the stones of ashlar are random, and the outlines of "
+            "rubble", "flemish", default=_DEFAULT.bond),
+        Key("brick", PAIR, "Length and height of a brick with its joint; of ashlar the mean length", [0.25, 0.075], "m",
+            _DEFAULT.brick),
+        Key("joint", NOT_NEGATIVE, "Thickness of the mortar that blockvis bond leaves open between stones; a run "
+            "closes joints to their middle, so that stones touch", 0.01, "m", _DEFAULT.joint),
+        Key("heads", one_of(HEADS), 'Heads over openings: "auto" is a ring of voussoirs around a curved top and a '
+            'lintel over a straight one; "arch" is a relieving arch over a straight one', "flat arch",
+            default=_DEFAULT.heads),
+        Key("bearing", POSITIVE, "Bearing of lintels on either side, less where there is no room", 0.125, "m",
+            otherwise="half a brick"),
+        Key("quoins", PAIR, "Length and height of larger stones at the upright ends of the wall, every second one half "
+            "as long", [0.5, 0.225], "m", otherwise="none"),
+        Key("stone", POSITIVE, "Mean length of the stones of rubble", 0.3, "m", otherwise="the length of a brick"),
+        Key("flatness", POSITIVE, "Length over height of the stones of rubble", 1.6, default=_DEFAULT.flatness),
+        Key("seed", whole(0, 2**31 - 1), "Of the random lengths and outlines of ashlar and rubble", 1,
+            default=_DEFAULT.seed),
+        Key("thickness", POSITIVE, "Thickness out of plane of the wall", 0.25, "m", otherwise="that of [geometry]"),
+    ),
+    several=True,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Bonding:
+    """A table [[bond]].
+
+    Attributes
+    ----------
+    choice : Choice
+        What of the drawing is filled.
+    pattern : Pattern
+    thickness : float or None [m]
+    """
+
+    choice: Choice
+    pattern: Pattern
+    thickness: float | None = None
+
+
+def read_bond(table: Table) -> Bonding:
+    """Read a table [[bond]]."""
+    values = BOND.read(table)
+    laid = {field.name: values[field.name] for field in fields(Pattern)}
+    try:
+        pattern = Pattern(**laid)
+    except ValueError as error:
+        raise ValueError(f"{table.source}: [{table.where}] {error}") from None
+    if not values["walls"]:
+        raise table.error("walls", 'is empty; name layers of the drawing: walls = ["A-WALL*"]')
+    return Bonding(Choice(tuple(values["walls"]), tuple(values["openings"])), pattern, values["thickness"])
+
+
+def bonded(
+    layout: Layout, bondings: Sequence[Bonding], where: str, roles: Mapping[str, str] | None = None, *, mortar: bool
+) -> Layout:
+    """Fill walls of a drawing with the stones of their bonds.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of all outlines of the drawing, as :func:`blockvis.formats.read.read_outlines` gives it.
+    bondings : sequence of Bonding
+    where : str
+        The case file or command, for messages.
+    roles : mapping of str to str, optional
+        Supports are not filled.
+    mortar : bool
+        Whether joints are left open; a run closes them to their middle.
+
+    Returns
+    -------
+    Layout
+        The stones, each on the layer of its wall, after what else is drawn.
+
+    Raises
+    ------
+    ValueError
+        For an outline that is missing or open, an opening outside of its wall, a brick longer than its wall.
+    """
+    if layout.dimension == 3:
+        raise ValueError(f"{where}: bond: '{layout.source}' draws blocks in space; a bond fills outlines in the plane")
+    groups, rest = regions_of(layout, [one.choice for one in bondings], roles)
+    several = sum(map(len, groups)) > 1
+    notes, number = list(rest.notes), 0
+    for bonding, regions in zip(bondings, groups, strict=True):
+        for region in regions:
+            number += 1
+            openings = [shapely.Polygon(one.exterior) for one in shapely.get_parts(shapely.union_all(region.openings))]
+            stones = _filled(region, openings, bonding.pattern, f"{where}: bond", mortar)
+            names = [f"wall {number} {name}" if several else name for name in stones.names]
+            notes += [*stones.notes, _told(region, len(openings), stones, bonding.pattern)]
+            more: dict[str, Any] = {"thickness": [bonding.thickness or np.nan] * stones.n_blocks}
+            layers = [region.layer] * stones.n_blocks
+            rest = rest.with_more(stones.blocks, names=names, groups=layers, materials=stones.materials, **more)
+    return sorted_out(_without_nan(rest, notes))
+
+
+def _filled(region: Region, openings: Sequence[shapely.Polygon], pattern: Pattern, where: str, mortar: bool) -> Layout:
+    taken = shapely.union_all(region.taken) if region.taken else None
+    try:
+        return filled(region.wall, openings, pattern, taken, mortar=mortar)
+    except ValueError as error:
+        raise ValueError(f"{where}: the wall '{region.name}' on layer '{region.layer}': {error}") from None
+
+
+def _told(region: Region, openings: int, stones: Layout, pattern: Pattern) -> Note:
+    """Say what was filled."""
+    wall = sum(float(shapely.Polygon(ring).area) for ring in stones.outlines)
+    return Note(
+        CHANGED,
+        f"bond: an outline of {region.wall.area:.4g} m² on layer '{region.layer}'{_openings(openings)} was "
+        f"filled with {stones.n_blocks} stones of {wall:.4g} m², {pattern.bond}",
+    )
+
+
+def _openings(number: int) -> str:
+    return f" with {number} opening{'s' if number > 1 else ''}" if number else ""
+
+
+def _without_nan(layout: Layout, notes: Sequence[str]) -> Layout:
+    """Leave density and thickness to the case where no block has them."""
+    density, thickness = (None if of is None or np.isnan(of).all() else of for of in (layout.density, layout.thickness))
+    return replace(layout, notes=tuple(notes), density=density, thickness=thickness)

@@ -1,0 +1,428 @@
+"""Walls drawn as outlines with openings, filled with the stones of a bond."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from blockvis.layout.layout import Layout
+from blockvis.layout.notes import CHANGED, Note
+from blockvis.layout.outlines import without_collinear
+
+from .bonds import BRICKWORK
+from .bricks import LOWEST_BRICK, NARROWEST
+from .dimensions import MOST_BLOCKS, above_zero, at_least_zero, choice, whole
+from .heads import HEADS, Units, head_of, top_of
+from .patterns import PATTERNS, bedded, coursed, rubble
+from .slivers import in_simple_pieces, without_slivers
+
+#: What is cut of a brick is joined to its neighbour if it is smaller than this fraction of a brick.
+CLOSER = 0.3
+
+#: What is smaller than this fraction of a brick and has no brick beside it is joined to a head.
+CRUMB = 0.1
+
+#: Corners lie on a grid of this fraction of the size of the wall.
+GRID = 1e-12
+
+#: An opening has wall over it where a strip of this fraction of a course over its top is wall at all.
+OVER = 0.1
+
+#: The stones fill the wall to this fraction of its area.
+KEPT = 1e-9
+
+#: What is left over when shapes are cut that share an edge is dropped below this fraction of a brick.
+DUST = 1e-9
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """How a wall is laid.
+
+    Attributes
+    ----------
+    bond : str
+        One of :data:`PATTERNS`.
+    brick : (float, float) [m]
+        Length and height, joint included.
+    joint : float [m]
+        Thickness of the mortar left open around each stone; 0 for stones that touch.
+    heads : {"auto", "lintel", "flat arch", "arch", "none"}
+    bearing : float, optional [m]
+        Of lintels; half a brick by default.
+    quoins : (float, float), optional [m]
+        Length and height of larger stones at the upright ends, every second one half as long.
+    stone : float, optional [m]
+        Mean length of the stones of rubble; the length of a brick by default.
+    flatness : float
+        Length over height of the stones of rubble.
+    seed : int
+        Of random lengths and outlines.
+    """
+
+    bond: str = "running"
+    brick: tuple[float, float] = (0.25, 0.075)
+    joint: float = 0.0
+    heads: str = "auto"
+    bearing: float | None = None
+    quoins: tuple[float, float] | None = None
+    stone: float | None = None
+    flatness: float = 1.6
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        choice("bond", self.bond, PATTERNS)
+        choice("heads", self.heads, HEADS)
+        for name in ("brick", "quoins"):
+            pair = getattr(self, name)
+            if pair is None:
+                continue
+            if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
+                raise ValueError(f"{name} is {pair!r}; give its length and height [length, height] in m")
+            sizes = tuple(above_zero(f"{name}: {word}", v) for word, v in zip(("length", "height"), pair, strict=True))
+            object.__setattr__(self, name, sizes)
+        above_zero("flatness", self.flatness, "")
+        whole("seed", self.seed, 0, 2**31)
+        for name in ("bearing", "stone"):
+            if getattr(self, name) is not None:
+                above_zero(name, getattr(self, name))
+        if at_least_zero("joint", self.joint) > 0.5 * min(self.module):
+            raise ValueError(
+                f"joint is {self.joint:g} m, more than half of a course of {min(self.module):g} m; give the thickness "
+                "of the mortar alone"
+            )
+
+    @property
+    def module(self) -> tuple[float, float]:
+        """Length and height of a stone with its joint [m]."""
+        if self.bond == "rubble":
+            stone = self.stone or self.brick[0]
+            return stone, stone / self.flatness
+        return self.brick
+
+
+def bond(
+    outline: Any,
+    openings: Sequence[Any] = (),
+    *,
+    bond: str = "running",
+    brick: tuple[float, float] = (0.25, 0.075),
+    joint: float = 0.0,
+    heads: str = "auto",
+    bearing: float | None = None,
+    quoins: tuple[float, float] | None = None,
+    stone: float | None = None,
+    flatness: float = 1.6,
+    seed: int = 0,
+) -> Layout:
+    """Fill the outline of a wall with the stones of a bond, with heads over its openings.
+
+    Parameters
+    ----------
+    outline : shapely.Polygon, or (n, 2) array [m]
+        The wall; holes are openings. A notch in its lower edge is a door.
+    openings : sequence of shapely.Polygon, or (n, 2) arrays [m]
+        They may reach the rim of the wall, as doors do.
+    bond : {"running", "stack", "english", "flemish", "header", "ashlar", "rubble"}
+        In ashlar the lengths of the stones of a course are random, in rubble all of their outline.
+    brick : (float, float) [m]
+        Length and height of a brick, joint included; of ashlar in the mean.
+    joint : float [m]
+        Thickness of the mortar left open between stones; 0 for stones that touch and fill the wall.
+    heads : {"auto", "lintel", "flat arch", "arch", "none"}
+        Over openings with wall over them. "auto" is a ring of voussoirs around a curved top and a lintel over a
+        straight one; "arch" puts a relieving arch over a straight one.
+    bearing : float, optional [m]
+        Of lintels on either side; half a brick by default, less where there is no room.
+    quoins : (float, float), optional [m]
+        Length and height of larger stones at the upright ends of the wall, every second one half as long.
+    stone, flatness : float
+        Mean length [m] of the stones of rubble, and their length over their height; a brick long by default.
+    seed : int
+        Of random lengths and outlines.
+
+    Returns
+    -------
+    Layout
+        "brick 1-1" (course from the bottom, position from the left), "stone 1" of rubble, "voussoir 2-1", "lintel 2",
+        "quoin 1"; openings are numbered as they are given, holes and notches after them. Without a ground.
+
+    Raises
+    ------
+    ValueError
+        For a brick longer or higher than the wall, an opening outside of it, and impossible values.
+
+    Examples
+    --------
+    >>> wall = bond([[0, 0], [3, 0], [3, 1.5], [0, 1.5]], [[[1, 0], [2, 0], [2, 1], [1, 1]]], brick=(0.5, 0.25))
+    >>> wall.n_blocks, wall.names[-1]
+    (32, 'lintel 1')
+    """
+    pattern = Pattern(
+        bond=bond, brick=brick, joint=joint, heads=heads, bearing=bearing, quoins=quoins, stone=stone,
+        flatness=flatness, seed=seed,
+    )  # fmt: skip
+    return filled(_polygon(outline, "the outline"), [_polygon(one, f"opening {k}") for k, one in
+                  enumerate(openings, start=1)], pattern)  # fmt: skip
+
+
+def _polygon(shape: Any, what: str) -> shapely.Polygon:
+    try:
+        polygon = shape if isinstance(shape, shapely.Polygon) else shapely.Polygon(np.asarray(shape, dtype=float))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{what} is no polygon ({error}); give its corners [[x, y], ...] in m") from None
+    if not polygon.is_valid or polygon.area == 0.0:
+        reason = shapely.is_valid_reason(polygon) if polygon.area else "it has no area"
+        raise ValueError(f"{what} is no simple polygon: {reason}; redraw it")
+    return polygon
+
+
+# On a grid GEOS divides by zero inside, for parallel edges, and numpy would tell.
+@np.errstate(divide="ignore", invalid="ignore")
+def filled(
+    wall: shapely.Polygon,
+    openings: Sequence[shapely.Polygon],
+    pattern: Pattern,
+    taken: shapely.Geometry | None = None,
+    *,
+    mortar: bool = True,
+) -> Layout:
+    """Fill a wall with stones; see :func:`bond`.
+
+    Parameters
+    ----------
+    wall : shapely.Polygon [m]
+    openings : sequence of shapely.Polygon [m]
+    pattern : Pattern
+    taken : shapely geometry, optional [m]
+        Where other blocks stand in the wall.
+    mortar : bool
+        Whether the joints of the pattern are left open.
+
+    Returns
+    -------
+    Layout
+    """
+    # Far from the origin, as in maps, corners have no digits left for a grid.
+    corner = np.array(wall.bounds[:2])
+    wall, *holes = [_shifted(shape, -corner) for shape in (wall, *openings)]
+    _check_size(wall, pattern)
+    for number, hole in enumerate(holes, start=1):
+        if hole.intersection(wall).area <= DUST * hole.area:
+            x, y = np.array(hole.centroid.coords[0]) + corner
+            raise ValueError(
+                f"opening {number} around ({x:.6g}, {y:.6g}) lies outside its wall; move it, or leave it out"
+            )
+    length, height = pattern.module
+    grid = GRID * max(*wall.bounds[2:], length)
+    solid = shapely.Polygon(wall.exterior)
+    holes = _apart([*holes, *map(shapely.Polygon, wall.interiors), *_notches(solid, grid)])
+    rest = wall if taken is None else shapely.difference(wall, _shifted(taken, -corner), grid_size=grid)
+    if holes:
+        rest = shapely.difference(rest, shapely.union_all(holes, grid_size=grid), grid_size=grid)
+    area = rest.area
+    bearing = length / 2.0 if pattern.bearing is None else pattern.bearing
+    units = Units(length=length, height=height, bearing=bearing, base=0.0, grid=grid)
+    stones: list[tuple[str, shapely.Polygon]] = []
+    hanging: list[np.ndarray] = []
+    for number, hole in enumerate(holes, start=1):
+        if pattern.heads == "none" or not _has_wall_over(hole, rest, OVER * height):
+            continue
+        head = head_of(hole, pattern.heads, rest, _nearest(hole, holes), units)
+        if head is None:
+            hanging.append(np.array(hole.centroid.coords[0]) + corner)
+            continue
+        word, parts = head
+        several = len(parts) > 1
+        stones += [(f"{word} {number}-{i}" if several else f"{word} {number}", part) for i, part in enumerate(parts, 1)]
+        rest = shapely.difference(rest, shapely.union_all(parts, grid_size=grid), grid_size=grid)
+    quoins = _quoins(solid, rest, pattern, grid)
+    stones += [(f"quoin {k}", shape) for k, shape in enumerate(quoins, start=1)]
+    if quoins:
+        rest = shapely.difference(rest, shapely.union_all(quoins, grid_size=grid), grid_size=grid)
+    stones = _with_crumbs(_laid(rest, wall.bounds, pattern, grid), stones, pattern, grid)
+    kept = sum(shape.area for _, shape in stones)
+    if abs(kept - area) > KEPT * area:
+        raise ValueError(
+            f"the stones fill {kept:.9g} of {area:.9g} m² of the wall; its outline may touch itself: redraw it"
+        )
+    if pattern.joint and mortar:
+        stones = _with_mortar(stones, pattern.joint)
+    notes = []
+    if hanging:
+        x, y = hanging[0]
+        notes.append(Note(CHANGED, f"bond: {len(hanging)} openings have no room for a head, the first around "
+                     f"({x:.6g}, {y:.6g}): what lies over them may hang; give a smaller bearing or brick"))  # fmt: skip
+    return Layout(
+        blocks=tuple(without_collinear(np.array(shape.exterior.coords)[:-1], 1e-9) + corner for _, shape in stones),
+        names=tuple(name for name, _ in stones),
+        materials=tuple("brick" if name.startswith("brick") else "stone" for name, _ in stones),
+        notes=tuple(notes),
+    )
+
+
+def _shifted(shape: Any, by: np.ndarray) -> Any:
+    return shapely.transform(shape, lambda xy: xy + by)
+
+
+def _check_size(wall: shapely.Polygon, pattern: Pattern) -> None:
+    """Refuse bricks larger than the wall, and more of them than can be analysed."""
+    _, _, width, high = wall.bounds
+    length, height = pattern.module
+    word = "stone" if pattern.bond == "rubble" else "brick"
+    for size, room, long, wide in ((length, width, "long", "wide"), (height, high, "high", "high")):
+        if size > room * (1.0 + 1e-9):
+            raise ValueError(
+                f"{word} is {size:g} m {long}, the wall {room:.4g} m {wide}; give a smaller {word}, or the unit of the "
+                "drawing"
+            )
+    number = wall.area / (length * height)
+    if number > MOST_BLOCKS:
+        raise ValueError(
+            f"{word} of {length:g} × {height:.3g} m makes {number:.3g} blocks of a wall of {wall.area:.4g} m²; at most "
+            f"{MOST_BLOCKS} can be laid: give a larger {word}, or the unit of the drawing"
+        )
+
+
+def _notches(solid: shapely.Polygon, grid: float) -> list[shapely.Polygon]:
+    """Doors drawn as notches of the outline: what its box has beside it that reaches the box at the bottom only."""
+    left, low, right, high = solid.bounds
+    beside = shapely.difference(shapely.box(left, low, right, high), solid, grid_size=grid)
+    near = 1e-6 * (right - left)
+    found = []
+    for part in shapely.get_parts(beside):
+        a, b, c, d = part.bounds
+        if part.geom_type == "Polygon" and b < low + near and a > left + near and c < right - near and d < high - near:
+            found.append(shapely.Polygon(part.exterior))
+    return found
+
+
+def _apart(holes: Sequence[shapely.Polygon]) -> list[shapely.Polygon]:
+    """Make one opening of those that overlap or touch, in the order in which they are given."""
+    if not holes:
+        return []
+    parts = [shapely.Polygon(part.exterior) for part in shapely.get_parts(shapely.union_all(holes))]
+    parts = [part for part in shapely.get_parts(shapely.union_all(parts)) if part.area > 0.0]
+    return sorted(parts, key=lambda part: next(k for k, hole in enumerate(holes) if part.intersects(hole)))
+
+
+def _has_wall_over(hole: shapely.Polygon, rest: shapely.Geometry, strip: float) -> bool:
+    top = top_of(hole)
+    middle, third = (top.left + top.right) / 2.0, top.span / 3.0
+    over = shapely.box(middle - third / 2.0, top.crown, middle + third / 2.0, top.crown + strip)
+    return bool(shapely.intersection(over, rest).area > 0.5 * over.area)
+
+
+def _nearest(hole: shapely.Polygon, holes: Sequence[shapely.Polygon]) -> float:
+    """Distance from an opening to the next one that its head could meet [m]."""
+    left, low, right, high = hole.bounds
+    tall = shapely.box(left, (low + high) / 2.0, right, high + (high - low) / 2.0)
+    return min((tall.distance(other) for other in holes if other is not hole), default=np.inf)
+
+
+def _quoins(solid: shapely.Polygon, rest: shapely.Geometry, pattern: Pattern, grid: float) -> list[shapely.Polygon]:
+    """Larger stones along the upright edges of a wall, long and short in turn."""
+    if pattern.quoins is None:
+        return []
+    length, height = pattern.quoins
+    if 2.0 * length > solid.bounds[2]:
+        raise ValueError(
+            f"quoins are {length:g} m long, the wall {solid.bounds[2]:.4g} m wide; give at most half of that"
+        )
+    ring = np.array(shapely.orient_polygons(solid).exterior.coords)
+    found: list[shapely.Polygon] = []
+    for (x, y), (u, v) in zip(ring[:-1].tolist(), ring[1:].tolist(), strict=True):
+        # Counter-clockwise, the wall lies on the left of an edge that rises and on the right of one that falls.
+        if abs(x - u) > 1e-6 * abs(y - v) or abs(y - v) < 2.0 * height:
+            continue
+        low, n = min(y, v), max(1, round(abs(y - v) / height - 0.2))
+        levels = [*(low + height * np.arange(n)), max(y, v)]
+        inwards = -1.0 if v > y else 1.0
+        for k in range(n):
+            reach = x + inwards * (length if k % 2 == 0 else length / 2.0)
+            box = shapely.box(min(x, reach), levels[k], max(x, reach), levels[k + 1])
+            clipped = shapely.intersection(box, rest, grid_size=grid)
+            if clipped.area > 0.95 * box.area and clipped.geom_type == "Polygon" and not len(clipped.interiors):
+                found.append(clipped)
+    return found
+
+
+def _laid(
+    rest: shapely.Geometry, box: tuple[float, ...], pattern: Pattern, grid: float
+) -> list[tuple[str, shapely.Polygon]]:
+    """Lay the pattern where there is wall, and join what is cut too small."""
+    length, height = pattern.module
+    random = pattern.bond == "rubble"
+    if random:
+        units = rubble(box[2], box[3], length, pattern.flatness, pattern.seed)
+    else:
+        units = coursed(pattern.bond, box[2], box[3], pattern.brick, pattern.seed)
+    cut = shapely.intersection(np.array(units), rest, grid_size=grid)
+    pieces, is_whole = [], []
+    for unit, shape in zip(units, cut, strict=True):
+        parts = in_simple_pieces(shape, grid)
+        pieces += parts
+        is_whole += [part.area > (1.0 - 1e-6) * unit.area for part in parts]
+    if random:
+        pieces = bedded(pieces, rest)
+
+    def too_small(shape: shapely.Polygon, piece: int) -> bool:
+        return not is_whole[piece] and _is_sliver(shape, length, height)
+
+    joined = [shape for shape, _ in without_slivers(pieces, too_small, height, grid)]
+    middles = shapely.get_coordinates(shapely.centroid(joined))
+    if random:
+        order = np.lexsort((middles[:, 0], np.round(middles[:, 1] / height)))
+        return [(f"stone {k}", joined[i]) for k, i in enumerate(order.tolist(), start=1)]
+    courses = np.floor(np.array([shape.bounds[1] for shape in joined]) / height + 1e-6).astype(int)
+    order = np.lexsort((middles[:, 0], courses))
+    named, position, course = [], 0, -1
+    for i in order.tolist():
+        position = position + 1 if courses[i] == course else 1
+        course = int(courses[i])
+        named.append((f"{'stone' if pattern.bond not in BRICKWORK else 'brick'} {course + 1}-{position}", joined[i]))
+    return named
+
+
+def _is_sliver(shape: shapely.Polygon, length: float, height: float) -> bool:
+    if shape.area < CLOSER * (1.0 - 1e-6) * length * height:
+        return True
+    low, high = shape.bounds[1::2]
+    return high - low < LOWEST_BRICK * height or bool(shape.buffer(-NARROWEST / 2.0 * height).is_empty)
+
+
+def _with_crumbs(
+    laid: list[tuple[str, shapely.Polygon]], others: list[tuple[str, shapely.Polygon]], pattern: Pattern, grid: float
+) -> list[tuple[str, shapely.Polygon]]:
+    """Join what is left between heads and openings, a crumb of a brick, to a head or quoin; drop dust."""
+    length, height = pattern.module
+    every = [*laid, *others]
+
+    def is_crumb(shape: shapely.Polygon, piece: int) -> bool:
+        return piece < len(laid) and shape.area < CRUMB * length * height
+
+    joined = without_slivers([shape for _, shape in every], is_crumb, height, grid)
+    return [(every[piece][0], shape) for shape, piece in joined if shape.area > DUST * length * height]
+
+
+def _with_mortar(stones: list[tuple[str, shapely.Polygon]], joint: float) -> list[tuple[str, shapely.Polygon]]:
+    """Draw stones back from each other by half a joint; where no stone lies beside them they stay."""
+    shapes = [shape for _, shape in stones]
+    tree = shapely.STRtree(shapes)
+    reduced = []
+    for i, (name, shape) in enumerate(stones):
+        beside = shapely.union_all([shapes[j] for j in tree.query(shape, "intersects").tolist() if j != i])
+        reach = shape.buffer(joint, join_style="mitre")
+        free = shapely.difference(reach, beside)
+        drawn = shapely.intersection(free.buffer(-joint / 2.0, join_style="mitre"), shape)
+        parts = [part for part in shapely.get_parts(drawn) if part.geom_type == "Polygon"]
+        largest = max(parts, key=lambda part: part.area, default=shapely.Polygon())
+        # What mortar would hide stays as it is, a stone that touches.
+        left = shapely.Polygon(largest.exterior) if largest.area > 0.2 * shape.area else shape
+        reduced.append((name, left))
+    return reduced

@@ -1,0 +1,262 @@
+"""Heads over openings of any outline: rings of voussoirs, flat arches, lintels, relieving arches."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from .arches import segmental_joints, voussoir_outlines
+from .openings import Opening, head_joints_of, odd
+
+#: Heads that an opening may be given.
+HEADS = ("auto", "lintel", "flat arch", "arch", "none")
+
+#: A top whose level part is longer than this fraction of the span is straight, whatever its corners are.
+STRAIGHT = 0.5
+
+#: Corners of an outline on an arc lie within this fraction of its radius.
+ROUND = 4e-3
+
+#: Depth of a lintel of at least a course, as a fraction of its span; joints of a flat arch lean by so much [degrees];
+#: rise of a relieving arch as a fraction of its span.
+LINTEL, SKEW, RELIEF = 0.12, 20.0, 1.0 / 6.0
+
+#: Depth of a ring of stones that are longer, as a fraction of its span.
+RING = 0.25
+
+#: Fewest voussoirs of a ring.
+LEAST = 5
+
+#: Where there is no room a head is made smaller, down to these fractions of its depth and bearing.
+DEPTHS, BEARINGS = (1.0, 0.75, 0.5), (1.0, 0.75, 0.5, 0.25, 0.1)
+
+#: What of a head may lie outside of the wall, as a fraction of its area: rounding errors.
+OUTSIDE = 1e-7
+
+
+@dataclass(frozen=True)
+class Units:
+    """Sizes of the stones of heads.
+
+    Attributes
+    ----------
+    length : float [m]
+        Of a stone; a ring is at most as deep.
+    height : float [m]
+        Of a course, and width of a voussoir along the intrados.
+    bearing : float [m]
+        Of a lintel on either side.
+    base : float [m]
+        Level from which courses count.
+    grid : float [m]
+        Spacing of the grid on which corners lie.
+    """
+
+    length: float
+    height: float
+    bearing: float
+    base: float
+    grid: float
+
+    def depth_of_ring(self, span: float) -> float:
+        """Depth of a ring of voussoirs, or of wedges [m]: a stone, and less of long stones over a short span."""
+        return min(self.length, max(self.height, RING * span))
+
+    def level_above(self, y: float, least: float) -> float:
+        """Find the first joint of a course that lies so far above a level, or a little less."""
+        return self.base + self.height * math.ceil((y + least - self.base) / self.height - 0.4)
+
+
+@dataclass(frozen=True)
+class Top:
+    """Upper edge of an opening, from the left springing to the right one.
+
+    Attributes
+    ----------
+    chain : (n, 2) array [m]
+    """
+
+    chain: np.ndarray
+
+    @property
+    def left(self) -> float:
+        """Left end of the span [m]."""
+        return float(self.chain[0, 0])
+
+    @property
+    def right(self) -> float:
+        """Right end of the span [m]."""
+        return float(self.chain[-1, 0])
+
+    @property
+    def span(self) -> float:
+        """Distance between the jambs [m]."""
+        return self.right - self.left
+
+    @property
+    def springing(self) -> float:
+        """Level of the lower end of the jambs [m]."""
+        return float(self.chain[[0, -1], 1].min())
+
+    @property
+    def crown(self) -> float:
+        """Highest level [m]."""
+        return float(self.chain[:, 1].max())
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether most of it is level."""
+        edges = np.diff(self.chain, axis=0)
+        level = np.abs(edges[:, 1]) <= 1e-3 * self.span
+        return len(self.chain) == 2 or bool(np.abs(edges[level, 0]).max(initial=0.0) > STRAIGHT * self.span)
+
+
+def top_of(opening: shapely.Polygon) -> Top:
+    """Find the upper edge of an opening: its outline between the highest points of its jambs.
+
+    Examples
+    --------
+    >>> top_of(shapely.box(0, 0, 1, 2)).chain.tolist()
+    [[0.0, 2.0], [1.0, 2.0]]
+    """
+    ring = np.array(shapely.orient_polygons(opening).exterior.coords)[:-1]
+    near = 1e-3 * float(np.ptp(ring[:, 0]))
+    ends = []
+    for side in (ring[:, 0] >= ring[:, 0].max() - near, ring[:, 0] <= ring[:, 0].min() + near):
+        at = np.flatnonzero(side)
+        ends.append(int(at[np.argmax(ring[at, 1])]))
+    first, last = ends
+    ring = np.roll(ring, -first, axis=0)
+    return Top(ring[: (last - first) % len(ring) + 1][::-1])
+
+
+def head_of(
+    opening: shapely.Polygon, kind: str, room: shapely.Geometry, near: float, units: Units
+) -> tuple[str, list[shapely.Polygon]] | None:
+    """Build the head of an opening.
+
+    Parameters
+    ----------
+    opening : shapely.Polygon [m]
+    kind : {"auto", "lintel", "flat arch", "arch"}
+        A curved top gets a ring of voussoirs, a lintel is cut to it; a straight top a lintel ("auto", "lintel"), wedges
+        or a relieving arch ("arch") over a stone.
+    room : shapely geometry [m]
+        Where there is wall and no other head.
+    near : float [m]
+        Distance to the next opening beside it.
+    units : Units
+
+    Returns
+    -------
+    (str, list of shapely.Polygon [m]) or None
+        "voussoir" or "lintel", and the stones from left to right; None where no head fits.
+    """
+    top = top_of(opening)
+    shapely.prepare(room)
+    for word, stones in _tried(top, kind, near, units):
+        parts = [shapely.difference(stone, opening, grid_size=units.grid) for stone in stones]
+        if not all(part.geom_type == "Polygon" and not len(part.interiors) and part.area > 0.0 for part in parts):
+            continue
+        whole = shapely.union_all(parts)
+        total = sum(part.area for part in parts)
+        if whole.area > (1.0 - OUTSIDE) * total and shapely.difference(whole, room).area <= OUTSIDE * total:
+            return word, parts
+    return None
+
+
+def _tried(top: Top, kind: str, near: float, units: Units) -> Iterator[tuple[str, list[shapely.Polygon]]]:
+    """Yield heads in the order in which they are tried: the one that is asked for, smaller ones, a lintel."""
+    if not top.is_straight and kind != "lintel":
+        for depth in DEPTHS:
+            yield "voussoir", _ring(top, depth * units.depth_of_ring(top.span), units)
+    if top.is_straight and kind == "flat arch":
+        for depth in DEPTHS:
+            yield "voussoir", _wedges(top, depth, units)
+    if top.is_straight and kind == "arch":
+        for bearing in BEARINGS[:3]:
+            for depth in DEPTHS:
+                reach, deep = min(bearing * units.bearing, near / 2.0), depth * units.depth_of_ring(top.span)
+                yield "voussoir", _relief(top, reach, deep, units)
+    for depth in DEPTHS:
+        for bearing in BEARINGS:
+            reach = min(bearing * units.bearing, near / 2.0)
+            yield "lintel", [_lintel(top, (reach, reach), depth, units)]
+    for left in BEARINGS:
+        for right in BEARINGS:
+            reaches = (min(left * units.bearing, near / 2.0), min(right * units.bearing, near / 2.0))
+            yield "lintel", [_lintel(top, reaches, DEPTHS[-1], units)]
+
+
+def _lintel(top: Top, bearings: tuple[float, float], share: float, units: Units) -> shapely.Polygon:
+    least = max(units.height, LINTEL * top.span)
+    level = units.level_above(top.crown, least) if share == 1.0 else top.crown + share * least
+    return shapely.box(top.left - bearings[0], top.springing, top.right + bearings[1], level)
+
+
+def _wedges(top: Top, share: float, units: Units) -> list[shapely.Polygon]:
+    """Wedges of a flat arch, as those of rectangular walls."""
+    deep = units.depth_of_ring(top.span)
+    level = units.level_above(top.crown, deep) if share == 1.0 else top.crown + share * deep
+    opening = Opening(
+        x=top.left, y=top.springing, width=top.span, height=0.0, head="flat arch", depth=level - top.springing,
+        bearing=units.bearing, rise=0.0, skew=SKEW, voussoirs=odd(top.span / units.height),
+    )  # fmt: skip
+    joints = head_joints_of(opening)
+    assert joints is not None
+    return [shapely.Polygon(outline) for outline in voussoir_outlines(joints)]
+
+
+def _relief(top: Top, bearing: float, depth: float, units: Units) -> list[shapely.Polygon]:
+    """Make a relieving arch of the stone under it and its ring."""
+    span = top.span + 2.0 * bearing
+    joints, _ = segmental_joints(span, RELIEF * span, depth, odd(1.05 * span / units.height))
+    joints = joints + np.array([(top.left + top.right) / 2.0, top.crown])
+    ring = [shapely.Polygon(outline) for outline in voussoir_outlines(joints)]
+    return [*ring, shapely.Polygon(joints[:, 0])]
+
+
+def _ring(top: Top, depth: float, units: Units) -> list[shapely.Polygon]:
+    """Voussoirs around a curved top, their joints across it, their soffits as drawn."""
+    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(top.chain, axis=0).T))])
+    n = max(LEAST, odd(lengths[-1] / units.height))
+    places = np.linspace(0.0, lengths[-1], n + 1)
+    nearest = lengths[np.abs(lengths - places[:, None]).argmin(axis=1)]
+    # A joint beside a corner of the outline goes through it: no edge is much shorter than a voussoir.
+    places = np.where(np.abs(nearest - places) < 0.15 * lengths[-1] / n, nearest, places)
+    inner = _along(top.chain, lengths, places)
+    outer = inner + depth * _normals(top.chain, lengths, places, inner)
+    stones = []
+    for k in range(n):
+        between = top.chain[(lengths > places[k] + 1e-12) & (lengths < places[k + 1] - 1e-12)]
+        stones.append(shapely.Polygon([inner[k], *between, inner[k + 1], outer[k + 1], outer[k]]))
+    return stones if all(stone.is_valid for stone in stones) else []
+
+
+def _along(chain: np.ndarray, lengths: np.ndarray, places: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(places, lengths, chain[:, k]) for k in (0, 1)], axis=1)
+
+
+def _normals(chain: np.ndarray, lengths: np.ndarray, places: np.ndarray, inner: np.ndarray) -> np.ndarray:
+    """(n, 2) array: directions outwards across a curve; radial where its corners lie on a circle."""
+    centre, radius = _circle(chain)
+    away = inner - centre
+    distance = np.hypot(*away.T)
+    if (np.abs(np.hypot(*(chain - centre).T) - radius) <= ROUND * radius).all():
+        return away / distance[:, None]
+    step = 0.5 * float(np.diff(places).mean())
+    along = _along(chain, lengths, places + step) - _along(chain, lengths, places - step)
+    return np.stack([-along[:, 1], along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+
+
+def _circle(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Fit a circle to points, in the sense of least squares of their powers."""
+    middle = points.mean(axis=0)
+    x = points - middle
+    matrix = np.column_stack([2.0 * x, np.ones(len(x))])
+    u, v, c = np.linalg.lstsq(matrix, (x**2).sum(axis=1), rcond=None)[0]
+    return middle + np.array([u, v]), math.sqrt(max(c + u * u + v * v, 0.0))

@@ -1,0 +1,191 @@
+"""Patterns of masonry over a rectangle: bonds of brick, coursed ashlar with random lengths, rubble."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from .bonds import BRICKWORK, head_joints
+
+#: Patterns that fill an outline.
+PATTERNS = (*BRICKWORK, "ashlar", "rubble")
+
+#: Shortest and longest stone of ashlar, as fractions of the mean, and least distance of its head joints from those of
+#: the course below, as a fraction of the shortest stone.
+ASHLAR, LAP = (0.6, 1.4), 0.4
+
+#: Rubble: how far centres are from the middle of their place, as a fraction of it; rounds in which each centre moves
+#: to the middle of its stone (Lloyd's method); edges shorter than this fraction of a stone's height are closed.
+JITTER, ROUNDS, SHORT_EDGE = 0.3, 3, 0.2
+
+#: Steepest joint that reaches an upright rim: a mason does not lay a stone there that may slide out.
+STEEPEST = 0.2
+
+
+def coursed(kind: str, width: float, height: float, brick: tuple[float, float], seed: int) -> list[shapely.Polygon]:
+    """Lay the bricks of a bond over a rectangle from (0, 0), course by course; the last course may reach beyond it.
+
+    Parameters
+    ----------
+    kind : str
+        One of :data:`PATTERNS` but "rubble".
+    width, height : float [m]
+    brick : (float, float) [m]
+        Length and height.
+    seed : int
+        Of the lengths of ashlar.
+    """
+    length, high = brick
+    boxes: list[shapely.Polygon] = []
+    random = np.random.default_rng(seed)
+    below = np.zeros(0)
+    for course in range(int(np.ceil(height / high - 1e-9))):
+        if kind == "ashlar":
+            joints = _random_joints(random, width, length, below)
+        else:
+            joints = head_joints(kind, course, width, length)
+        boxes += [shapely.box(a, course * high, b, (course + 1) * high) for a, b in pairwise(joints)]
+        below = joints[1:-1]
+    return boxes
+
+
+def _random_joints(random: np.random.Generator, width: float, length: float, below: np.ndarray) -> np.ndarray:
+    """Head joints of a course of stones of random length, off those of the course below."""
+    shortest, longest = (share * length for share in ASHLAR)
+    joints = [0.0]
+    while width - joints[-1] > longest:
+        tried = joints[-1] + random.uniform(shortest, longest, 24)
+        # What is left is a stone, too.
+        tried = tried[(width - tried >= shortest)] if (width - tried >= shortest).any() else tried
+        off = np.abs(tried[:, None] - below).min(axis=1, initial=np.inf)
+        clear = np.flatnonzero(off >= LAP * shortest)
+        joints.append(float(tried[clear[0] if len(clear) else off.argmax()]))
+    return np.array([*joints, width])
+
+
+def rubble(width: float, height: float, stone: float, flatness: float, seed: int) -> list[shapely.Polygon]:
+    """Lay stones of random outline over a rectangle from (0, 0), which they fill.
+
+    Parameters
+    ----------
+    width, height : float [m]
+    stone : float [m]
+        Length of a stone in the mean.
+    flatness : float
+        Length over height of a stone in the mean.
+    seed : int
+
+    Notes
+    -----
+    Cells of a Voronoi diagram whose centres stand in rows, each row half a stone off the one below, shifted at random
+    and moved to the middles of their cells; short edges between cells are closed.
+    """
+    random = np.random.default_rng(seed)
+    rows = max(1, round(height * flatness / stone))
+    sites = []
+    for row in range(rows):
+        n = max(1, round(width / stone))
+        x = (np.arange(n + row % 2) + (0.0 if row % 2 else 0.5)) / n * width
+        x = np.clip(x, 0.25 * width / n, width - 0.25 * width / n)
+        y = np.full(len(x), (row + 0.5) / rows * height)
+        sites.append(np.column_stack([x, y]) + random.uniform(-JITTER, JITTER, (len(x), 2)) * [stone, stone / flatness])
+    points = np.concatenate(sites)
+    # In a drawing stretched by the flatness stones are as high as they are long.
+    stretched = np.array([1.0, flatness])
+    frame = shapely.box(0.0, 0.0, width, height * flatness)
+    for _ in range(ROUNDS):
+        cells = shapely.intersection(_cells(points * stretched, frame), frame)
+        points = shapely.get_coordinates(shapely.centroid(cells)) / stretched
+    cells = _closed(list(shapely.intersection(_cells(points * stretched, frame), frame)), SHORT_EDGE * stone)
+    return [shapely.transform(cell, lambda xy: xy / stretched) for cell in cells]
+
+
+def _cells(points: np.ndarray, frame: shapely.Polygon) -> np.ndarray:
+    cells = shapely.voronoi_polygons(shapely.MultiPoint(points), extend_to=frame.buffer(frame.length), ordered=True)
+    return np.array(shapely.get_parts(cells))
+
+
+def _closed(cells: list[shapely.Polygon], shortest: float) -> list[shapely.Polygon]:
+    """Close short edges between cells: both ends move to their middle, in all cells that have them."""
+    kept = list(cells)
+    places: dict[tuple[float, float], tuple[float, float]] = {}
+    frame = shapely.union_all(cells).bounds
+
+    def rim(x: float, y: float) -> bool:
+        return min(abs(x - frame[0]), abs(x - frame[2]), abs(y - frame[1]), abs(y - frame[3])) < 1e-9
+
+    def key(x: float, y: float) -> tuple[float, float]:
+        return round(x, 7), round(y, 7)
+
+    for cell in cells:
+        ring = np.array(cell.exterior.coords)
+        for a, b in pairwise(ring.tolist()):
+            ends = key(*a), key(*b)
+            if np.hypot(a[0] - b[0], a[1] - b[1]) < shortest and not any(end in places for end in ends):
+                if rim(*a) or rim(*b):
+                    continue
+                middle = ((a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0)
+                places[ends[0]] = places[ends[1]] = middle
+    for k, cell in enumerate(cells):
+        moved = [places.get(key(x, y), (x, y)) for x, y in cell.exterior.coords]
+        corners = [p for i, p in enumerate(moved[:-1]) if p != moved[i - 1 if i else -2]]
+        kept[k] = shapely.Polygon(corners) if len(corners) > 2 else shapely.Polygon()
+    right = all(cell.is_valid and cell.area > 0.0 for cell in kept)
+    whole = sum(cell.area for cell in cells)
+    fits = right and abs(shapely.union_all(kept).area - whole) + abs(sum(c.area for c in kept) - whole) < 1e-9 * whole
+    return kept if fits else cells
+
+
+def bedded(stones: list[shapely.Polygon], wall: shapely.Geometry) -> list[shapely.Polygon]:
+    """Turn joints that reach an upright rim of the wall towards the level, so that no stone slides out there.
+
+    Parameters
+    ----------
+    stones : list of shapely.Polygon [m]
+        Side by side in the wall, without holes.
+    wall : shapely geometry [m]
+    """
+    kept = [np.array(stone.exterior.coords)[:-1] for stone in stones]
+    at: dict[tuple[float, float], list[int]] = {}
+    for i, ring in enumerate(kept):
+        for x, y in ring.tolist():
+            at.setdefault((round(x, 9), round(y, 9)), []).append(i)
+    corners = np.array(list(at))
+    rim = shapely.dwithin(shapely.points(corners), _upright(wall), 1e-8)
+    own = np.round(shapely.get_coordinates(wall), 9)
+    taken = set(map(tuple, own.tolist()))
+    for key in (key for key, on in zip(at, rim.tolist(), strict=True) if on and key not in taken):
+        if len(at[key]) != 2:
+            continue
+        moved = [found for found in (_levelled(kept[i], key) for i in at[key]) if found is not None]
+        if len(moved) < 2 or abs(moved[0][0] - moved[1][0]) > 1e-8:
+            continue
+        before = sum(shapely.Polygon(kept[i]).area for i in at[key])
+        after = [shapely.Polygon(ring) for _, ring in moved]
+        if all(shape.is_valid for shape in after) and abs(sum(s.area for s in after) - before) < 1e-12 * before:
+            for i, (_, ring) in zip(at[key], moved, strict=True):
+                kept[i] = ring
+    return [shapely.Polygon(ring) for ring in kept]
+
+
+def _levelled(ring: np.ndarray, corner: tuple[float, float]) -> tuple[float, np.ndarray] | None:
+    """Move a corner at an upright rim so that its joint is not too steep; gives its new level and the outline."""
+    k = int(np.abs(ring - corner).max(axis=1).argmin())
+    inner = next((p for p in (ring[k - 1], ring[(k + 1) % len(ring)]) if abs(p[0] - corner[0]) > 1e-8), None)
+    if inner is None:
+        return None
+    most = STEEPEST * abs(inner[0] - corner[0])
+    moved = ring.copy()
+    moved[k, 1] = inner[1] + np.clip(ring[k, 1] - inner[1], -most, most)
+    return float(moved[k, 1]), moved
+
+
+def _upright(wall: shapely.Geometry) -> shapely.MultiLineString:
+    """Upright edges of the rim of a wall."""
+    edges = []
+    for part in shapely.get_parts(wall.boundary):
+        ends = shapely.get_coordinates(part)
+        edges += [(a, b) for a, b in pairwise(ends.tolist()) if abs(a[0] - b[0]) < 1e-3 * abs(a[1] - b[1])]
+    return shapely.MultiLineString(edges)

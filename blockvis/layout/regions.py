@@ -1,0 +1,288 @@
+"""Walls drawn as outlines with openings: which outlines they are, and where in them there is wall."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from blockvis.text import by_similarity
+from solver import mechanics
+
+from .layout import Layout
+from .left_out import LeftOut, matches
+from .notes import CHANGED, Note
+from .roles import roles_of
+from .selection import ANNOTATIONS, labels_of
+
+#: An outline lies in a wall if this fraction of its area does, outside if less than the second does.
+INSIDE, OUTSIDE = 0.5, 1e-6
+
+#: Outlines are the same if what only one of them covers is below this fraction of its area.
+SAME = 1e-4
+
+#: What of an opening lies outside of its wall is told from this fraction of its area on.
+TOLD = 0.01
+
+#: Kinds of what a reader leaves out that may be outlines of walls.
+_OUTLINES = ("hole", "background", "across")
+
+
+@dataclass(frozen=True)
+class Region:
+    """A wall drawn as an outline.
+
+    Attributes
+    ----------
+    wall : shapely.Polygon [m]
+        Without holes.
+    openings : list of shapely.Polygon [m]
+    taken : list of shapely.Polygon [m]
+        Other blocks, and walls of another bond, in it.
+    layer, name : str
+    """
+
+    wall: Any
+    layer: str
+    name: str
+    openings: list[Any] = field(default_factory=list)
+    taken: list[Any] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What of a drawing is filled with one bond.
+
+    Attributes
+    ----------
+    walls : tuple of str
+        Layers, groups, materials and names of outlines, or patterns of them.
+    openings : tuple of str
+        Likewise; empty for all outlines in the walls.
+    """
+
+    walls: tuple[str, ...]
+    openings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """A closed outline of a drawing: a block, or what was left out."""
+
+    shape: Any
+    holes: tuple[Any, ...]
+    labels: tuple[str, ...]
+    block: int = -1
+    item: int = -1
+
+
+def regions_of(
+    layout: Layout, choices: Sequence[Choice], roles: Mapping[str, str] | None = None
+) -> tuple[list[list[Region]], Layout]:
+    """Find the walls that are to be filled.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of all outlines of a drawing.
+    choices : sequence of Choice
+    roles : mapping of str to str, optional
+        Supports are neither walls nor openings.
+
+    Returns
+    -------
+    list of list of Region
+        For each choice.
+    Layout
+        What else is drawn.
+
+    Raises
+    ------
+    ValueError
+        Where no closed outline is on a layer, and for an opening outside of the walls; names the drawing, layer and
+        place.
+    """
+    source = f"'{layout.source}'"
+    drawn = _drawn(layout)
+    role = roles_of(layout, roles or {}, all_match=False)
+    free = [k for k, one in enumerate(drawn) if one.block < 0 or role[one.block] == mechanics.FREE]
+    walls: dict[int, int] = {}
+    for number, choice in enumerate(choices):
+        mine = [k for k in free if k not in walls and matches(drawn[k].labels, choice.walls)]
+        if not mine:
+            raise ValueError(f"{source}: {_no_outline(layout, drawn, choice)}")
+        walls |= dict.fromkeys(mine, number)
+    regions: list[list[Region]] = [[] for _ in choices]
+    used = set(walls)
+    for number in range(len(choices)):
+        mine = [k for k, n in walls.items() if n == number]
+        regions[number] = _nested([drawn[k] for k in mine])
+    every = [(region, number) for number, group in enumerate(regions) for region in group]
+    for region, number in every:
+        region.taken.extend(
+            other.wall for other, n in every
+            if n != number and other.wall.area < region.wall.area and _share(other.wall, region.wall) > OUTSIDE
+        )  # fmt: skip
+    notes: list[str] = list(layout.notes)
+    others = [k for k in free if k not in walls]
+    for k in others:
+        asked = [number for number, choice in enumerate(choices) if matches(drawn[k].labels, choice.openings)]
+        holding = [
+            (region, number) for region, number in every
+            if (number in asked or not choices[number].openings)
+            and _share(drawn[k].shape, region.wall) > (OUTSIDE if asked else INSIDE)
+            and (asked or (drawn[k].shape.area < region.wall.area and not _is_beside(drawn[k])))
+        ]  # fmt: skip
+        if asked and not holding:
+            x, y = drawn[k].shape.centroid.coords[0]
+            raise ValueError(
+                f"{source}: the opening '{drawn[k].labels[-1]}' on layer '{drawn[k].labels[0]}' around ({x:.6g}, "
+                f"{y:.6g}) lies outside of the walls; move it into one, or leave it out (ignore)"
+            )
+        for region, _ in holding:
+            region.openings.append(drawn[k].shape)
+        if holding:
+            used.add(k)
+    notes += _reaching_out(drawn, every)
+    notes += _left_in(drawn, [k for k in others if k not in used and drawn[k].block >= 0], every)
+    blocks = {drawn[k].block for k in used}
+    items = {drawn[k].item for k in used}
+    rest = layout.chosen([i for i in range(layout.n_blocks) if i not in blocks])
+    left_out = tuple(one for i, one in enumerate(layout.left_out) if i not in items)
+    return regions, replace(rest, left_out=left_out, notes=tuple(notes))
+
+
+def _drawn(layout: Layout) -> list[_Drawn]:
+    import shapely
+
+    found = []
+    for i, ring in enumerate(layout.outlines):
+        shape = _polygon(ring)
+        if shape is not None:
+            found.append(_Drawn(shape, (), labels_of(layout, i), block=i))
+    for i, one in enumerate(layout.left_out):
+        shape = _polygon(one.points) if one.closed and one.kind in _OUTLINES else None
+        if shape is not None:
+            holes = tuple(hole for hole in map(_polygon, one.holes) if hole is not None)
+            found.append(_Drawn(shape, holes, (one.layer, one.name), item=i))
+    shapely.prepare([one.shape for one in found])
+    return found
+
+
+def _polygon(ring: np.ndarray) -> Any:
+    """Make a polygon of an outline, of one that touches itself its largest part; None where it has no area."""
+    import shapely
+
+    if len(ring) < 3:
+        return None
+    shape: Any = shapely.Polygon(ring)
+    if not shape.is_valid:
+        shape = max(shapely.get_parts(shapely.make_valid(shape)), key=lambda part: part.area)
+    shape = shapely.Polygon(shape.exterior) if shape.geom_type == "Polygon" else shape
+    return shape if shape.geom_type == "Polygon" and shape.area > 0.0 else None
+
+
+def _share(inner: Any, outer: Any) -> float:
+    """Fraction of the area of one shape that lies in another."""
+    return float(inner.intersection(outer).area / inner.area) if inner.intersects(outer) else 0.0
+
+
+def _is_beside(one: _Drawn) -> bool:
+    """Whether by its layer an outline explains the drawing."""
+    return ANNOTATIONS.fullmatch(one.labels[0].strip()) is not None
+
+
+def _nested(drawn: Sequence[_Drawn]) -> list[Region]:
+    """Walls among the outlines of one choice: those in an even number of others; those in an odd one are openings."""
+    unlike: list[_Drawn] = []
+    for one in sorted(drawn, key=lambda one: -one.shape.area):
+        twin = next((k for k, other in enumerate(unlike) if _is_same(one.shape, other.shape)), None)
+        if twin is None:
+            unlike.append(one)
+        elif one.holes:
+            # An outline and the hatch in it.
+            unlike[twin] = replace(unlike[twin], holes=(*unlike[twin].holes, *one.holes))
+    regions: list[Region] = []
+    around: list[list[int]] = []
+    for k, one in enumerate(unlike):
+        around.append([j for j in range(k) if _share(one.shape, unlike[j].shape) > 1.0 - SAME])
+        if len(around[k]) % 2:
+            parent = next(region for region in reversed(regions) if _share(one.shape, region.wall) > 1.0 - SAME)
+            parent.openings.append(one.shape)
+        else:
+            regions.append(Region(one.shape, one.labels[0], one.labels[-1], openings=list(one.holes)))
+    return regions
+
+
+def _is_same(one: Any, other: Any) -> bool:
+    return bool(one.symmetric_difference(other).area < SAME * other.area) if one.intersects(other) else False
+
+
+def _no_outline(layout: Layout, drawn: Sequence[_Drawn], choice: Choice) -> str:
+    """Say why there is no outline to fill."""
+    asked = ", ".join(f"'{word}'" for word in choice.walls)
+    lines = [
+        one
+        for one in layout.left_out
+        if not one.closed and one.kind == "open" and matches((one.layer, one.name), choice.walls)
+    ]
+    if lines:
+        gap, (x, y) = _smallest_gap(lines)
+        return (
+            f"bond: the outline on layer '{lines[0].layer}' is open by {gap:.3g} m at ({x:.6g}, {y:.6g}); close it: "
+            "join the ends of its lines"
+        )
+    layers = Counter(one.labels[0] or one.labels[-1] for one in drawn)
+    near = by_similarity(choice.walls[0], list(layers)[:2000])[:12] if choice.walls else list(layers)[:12]
+    listed = ", ".join(f"'{layer}' ({layers[layer]})" for layer in near) or "no closed outline"
+    return f"bond: walls = {asked} matches no closed outline; the drawing has {listed}"
+
+
+def _smallest_gap(lines: Sequence[LeftOut]) -> tuple[float, np.ndarray]:
+    """Smallest distance between ends of lines that do not meet [m], and where that is."""
+    ends = np.array([one.points[k] for one in lines for k in (0, -1)])
+    apart = np.hypot(*(ends[:, None] - ends).transpose(2, 0, 1))
+    size = float(np.ptp(np.concatenate([one.points for one in lines]), axis=0).max())
+    apart[apart <= 1e-6 * size] = np.inf
+    i, j = np.unravel_index(int(np.argmin(apart)), apart.shape)
+    return float(apart[i, j]), ends[i]
+
+
+def _reaching_out(drawn: Sequence[_Drawn], every: Sequence[tuple[Region, int]]) -> list[str]:
+    """Note openings that reach beyond their wall."""
+    found = []
+    for region, _ in every:
+        for opening in region.openings:
+            out = 1.0 - _share(opening, region.wall)
+            if out > TOLD:
+                x, y = opening.centroid.coords[0]
+                found.append(
+                    f"bond: {out:.0%} of the opening around ({x:.6g}, {y:.6g}) lies outside of its wall on layer "
+                    f"'{region.layer}'; what lies in it is taken out"
+                )
+    return [Note(CHANGED, text) for text in found]
+
+
+def _left_in(drawn: Sequence[_Drawn], others: Sequence[int], every: Sequence[tuple[Region, int]]) -> list[str]:
+    """Lay the bond around other blocks in a wall, and note them by their layer."""
+    layers: Counter[str] = Counter()
+    for k in others:
+        for region, _ in every:
+            if (
+                drawn[k].shape.area < region.wall.area
+                and _share(drawn[k].shape, region.wall) > INSIDE
+                and not _is_beside(drawn[k])
+            ):
+                region.taken.append(drawn[k].shape)
+                layers[drawn[k].labels[0]] += 1
+    return [
+        Note(
+            CHANGED,
+            f"bond: {n} outline{'s' if n > 1 else ''} on layer '{layer}' in the walls, not among the openings, "
+            "stayed as blocks; the bond is laid around them",
+        )
+        for layer, n in layers.items()
+    ]

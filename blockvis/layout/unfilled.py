@@ -1,0 +1,112 @@
+"""Walls drawn as outlines with openings and without stones: how a drawing shows that it holds such, in words."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .left_out import LeftOut
+from .notes import LEFT_OUT, Note
+
+if TYPE_CHECKING:
+    from .layout import Layout
+
+#: Outlines within another are openings if they cover at most this fraction of it, and lie farther apart than this
+#: fraction of their size: stones on a background lie closer.
+COVERED, APART = 0.6, 0.1
+
+#: What a run makes of such a drawing.
+COUNTED = "; as it is, what lies in it counts as blocks, and the wall as none"
+
+#: More outlines than this in one wall are no openings.
+MOST = 200
+
+
+def unfilled(layout: Layout) -> list[Note]:
+    """Say of each wall that a drawing holds as an outline with openings how it is filled.
+
+    Parameters
+    ----------
+    layout : Layout
+        With what was left out of the drawing.
+    """
+    return [Note(LEFT_OUT, words) for words in walls_to_fill(layout).values()]
+
+
+def walls_to_fill(layout: Layout) -> dict[str, str]:
+    """Find layers, or else names, of walls that a drawing holds as outlines with openings, and say how to fill them.
+
+    Parameters
+    ----------
+    layout : Layout
+        With what was left out of the drawing.
+    """
+    if layout.dimension == 3 or layout.n_blocks > MOST:
+        return {}
+    import shapely
+
+    blocks = [shapely.Polygon(ring) for ring in layout.outlines]
+    blocks = [shape if shape.is_valid else shapely.Polygon() for shape in blocks]
+    around: list[tuple[Any, str, tuple[Any, ...]]] = [
+        (shapely.Polygon(item.points), item.layer or item.name, tuple(map(shapely.Polygon, item.holes)))
+        for item in layout.left_out if _may_be_wall(item)
+    ]  # fmt: skip
+    labels = [layout.groups[i] or layout.names[i] for i in range(layout.n_blocks)]
+    around += [(shape, label, ()) for shape, label in zip(blocks, labels, strict=True)]
+    found: dict[str, str] = {}
+    told, walls = np.zeros(layout.n_blocks, bool), list[Any]()
+    for wall, label, holes in sorted(around, key=lambda one: float(one[0].area)):
+        # Around a wall there may be a hatch of it, or the frame of the sheet.
+        if not wall.is_valid or wall.area == 0.0 or any(_share(one, wall) > 0.99 for one in walls):
+            continue
+        inside = [i for i in np.flatnonzero(~told).tolist() if _lies_in(blocks[i], wall)]
+        if not _are_openings(wall, [blocks[i] for i in inside], holes):
+            continue
+        told[inside] = True
+        walls.append(wall)
+        openings = shapely.union_all([*(blocks[i] for i in inside), *holes])
+        found.setdefault(label, _words(layout.source, label, wall, openings) + COUNTED * bool(inside))
+    return found
+
+
+def _may_be_wall(item: LeftOut) -> bool:
+    return item.closed and item.kind in ("background", "hole") and len(item.points) > 2
+
+
+def _lies_in(shape: Any, wall: Any) -> bool:
+    return bool(0.0 < shape.area < 0.9 * wall.area and _share(shape, wall) > 0.99)
+
+
+def _share(inner: Any, outer: Any) -> float:
+    """Fraction of the area of one shape that lies in another."""
+    return float(inner.intersection(outer).area / inner.area) if inner.intersects(outer) else 0.0
+
+
+def _are_openings(wall: Any, shapes: list[Any], holes: Iterable[Any]) -> bool:
+    """Whether outlines in a wall lie apart, as openings do and stones do not."""
+    import shapely
+
+    every = [*shapes, *holes]
+    if not every or not all(hole.is_valid for hole in every):
+        return False
+    # A hole of a hatch may be drawn as an outline, too.
+    unlike = list(shapely.get_parts(shapely.union_all(every)))
+    if sum(shape.area for shape in unlike) > COVERED * wall.area or len(unlike) < len(shapes):
+        return False
+    size = float(np.median(np.sqrt(shapely.area(unlike))))
+    return all(one.distance(other) > APART * size for k, one in enumerate(unlike) for other in unlike[:k])
+
+
+def _words(source: str, label: str, wall: Any, openings: Any) -> str:
+    import shapely
+
+    number = len(shapely.get_parts(openings))
+    rest = wall.difference(openings).area
+    command = shlex.join(["blockvis", "bond", source or "DRAWING", "-o", "bricks.dxf", f"walls={label}"])
+    return (
+        f"an outline of {wall.area:.4g} m² on layer '{label}' with {number} opening{'s' if number > 1 else ''}, "
+        f'{rest:.4g} m² of wall: fill it with a bond: {command}, or in a case [[bond]] walls = ["{label}"]'
+    )
