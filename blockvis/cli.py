@@ -587,10 +587,16 @@ def _write_report(response: solver.Response, folder: Path) -> Fall | None:
 
 def _info(options: argparse.Namespace) -> int:
     from .formats.read import inspect
-    from .pictures.inspection import draw_inspection
+    from .layout.refusal import Refused
+    from .pictures.inspection import draw_inspection, draw_refusal
 
     choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
-    found = inspect(options.file, unit=options.unit, dimension=_dimension(options), **choice)
+    try:
+        found = inspect(options.file, unit=options.unit, dimension=_dimension(options), **choice)
+    except Refused as refused:
+        if options.picture and (drawn := draw_refusal(refused, options.picture)) is not None:
+            print(f"drawn in {drawn}")
+        raise
     print(found)
     if options.picture:
         print(f"drawn in {draw_inspection(found, options.picture)}")

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from blockvis.layout.linked import linked
+from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.surfaces import same_points, turned_faces
 
-from .bodies import Body, fans
+from .bodies import Bodies, Body, as_drawn, fans
 
 #: Points closer than this fraction of the size of the drawing are one: single precision is accurate to 6e-8.
 SAME_POINT = 2e-6
@@ -20,7 +21,7 @@ SAME_POINT = 2e-6
 SAME_ANGLE = 1e-4
 
 
-class OpenSurface(ValueError):
+class OpenSurface(Refused):
     """A surface that encloses nothing."""
 
 
@@ -91,6 +92,35 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
     edge = inverse.ravel().reshape(-1, 3)
     piece = components(list(edge), len(unique))
     return _pieces(name, points, _seen_from_outside(points, faces, edge, piece), piece)
+
+
+def bodies_of_parts(
+    parts: Sequence[tuple[str, np.ndarray, np.ndarray]], size: float, path: Path | str
+) -> tuple[list[Body], np.ndarray]:
+    """Split meshes of triangles into the closed bodies that each holds.
+
+    Parameters
+    ----------
+    parts : sequence of (name, (n, 3) points, (m, 3) faces)
+    size : float
+        Of the drawing, in the unit of the points.
+    path : Path or str
+        Named in messages.
+
+    Returns
+    -------
+    bodies : list of Body
+    parts : (n_bodies,) int array
+        The mesh of each.
+
+    Raises
+    ------
+    Refused
+        For what :func:`closed_bodies` refuses, with all meshes.
+    """
+    with carrying(lambda: as_drawn(Bodies(tuple(Body(*part) for part in parts), ()))):
+        found = [closed_bodies(*part, size, path) for part in parts]
+    return [body for own in found for body in own], np.repeat(np.arange(len(parts)), [len(own) for own in found])
 
 
 def _pieces(name: str, points: np.ndarray, faces: np.ndarray, piece: np.ndarray) -> list[Body]:
@@ -177,13 +207,8 @@ def bodies_of_surfaces(
     bodies : list of Body
     owners : (n_bodies,) int array
     """
-    size = float(np.ptp(points, axis=0).max())
-    bodies: list[Body] = []
-    owners: list[int] = []
-    for whose, name in enumerate(names):
-        found = closed_bodies(
-            name, points, fans([rings[k].tolist() for k in np.flatnonzero(owner == whose).tolist()]), size, path
-        )
-        bodies += found
-        owners += [whose] * len(found)
-    return bodies, np.array(owners)
+    parts = [
+        (name, points, fans([rings[k].tolist() for k in np.flatnonzero(owner == whose).tolist()]))
+        for whose, name in enumerate(names)
+    ]
+    return bodies_of_parts(parts, float(np.ptp(points, axis=0).max()), path)

@@ -23,7 +23,7 @@ from solver import mechanics
 
 from .bodies import Bodies, fans
 from .cells import layout_of_cells
-from .closed_surfaces import closed_bodies
+from .closed_surfaces import bodies_of_parts
 
 #: Objects nested deeper than this are not looked into.
 DEEPEST = 40
@@ -94,12 +94,13 @@ def read_content(content: Any, path: Path, view: str | None) -> Layout | Bodies 
     if len(planes) < len(meshes):
         # A single face among bodies is a ground without depth.
         meshes = [mesh for mesh in meshes if len(mesh.faces) > 1]
-    bodies, rows, notes = [], [], [] if len(planes) == 0 else [_left_out(planes)]
-    for mesh in meshes:
-        row = {key: value for key, value in mesh.row.items() if key != "key"}
-        for body in closed_bodies(str(row["name"]), mesh.points, fans(mesh.faces), size, path):
-            bodies.append(body)
-            rows.append({**row, "name": body.name})
+    notes = [] if len(planes) == 0 else [_left_out(planes)]
+    parts = [(str(mesh.row["name"]), mesh.points, fans(mesh.faces)) for mesh in meshes]
+    bodies, whose = bodies_of_parts(parts, size, path)
+    rows = [
+        {**{key: value for key, value in meshes[k].row.items() if key != "key"}, "name": body.name}
+        for body, k in zip(bodies, whose.tolist(), strict=True)
+    ]
     return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} blocks of COMPAS", *notes))
 
 

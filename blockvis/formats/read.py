@@ -17,12 +17,13 @@ from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of, standing
 from blockvis.layout.outlines import without_collinear
+from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.selection import noted, sorted_out
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
 from blockvis.system.atomic_files import whole_file, write_whole
 
-from .bodies import Bodies, in_dimension
+from .bodies import Bodies, as_drawn, in_dimension
 from .cells import of_files
 from .files import MissingFile as MissingFile
 from .files import files_of
@@ -83,11 +84,31 @@ def read_layout(
     if unit is not None:
         metres_per(unit)
     ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
+    try:
+        layout = _read(path, unit, chord_tolerance, view, ignore, only, dimension)
+    except Refused as error:
+        if error.layout is not None and not error.layout.source:
+            error.layout = _in_metres(replace(error.layout, source=str(path)), unit)
+        raise
+    return standing(layout, thickness) if dimension == 3 and layout.dimension == 2 else layout
+
+
+def _read(
+    path: Path,
+    unit: str | None,
+    chord_tolerance: float | None,
+    view: str | None,
+    ignore: tuple[str, ...],
+    only: tuple[str, ...],
+    dimension: int | str,
+) -> Layout:
+    """Read what a file draws, in metres, without what is no block."""
     reading = Reading(unit=unit, chord_tolerance=chord_tolerance, view=checked_view(view), ignore=ignore, only=only)
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
     content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)
-    layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
+    with carrying(lambda: as_drawn(content)):
+        layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
     layout = replace(layout, source=str(path))
     if layout.dimension == 3:
         return noted(_in_metres(layout, unit))
@@ -100,14 +121,17 @@ def read_layout(
                 f"'{path}': block '{layout.names[i]}' has a corner at {bad.tolist()}; "
                 "coordinates must be finite numbers: repair the file"
             )
-    layout = _in_metres(layout, unit)
-    layout = sorted_out(layout, ignore, only)
-    for name, ring in zip(layout.names, layout.outlines, strict=True):
+    drawn = _in_metres(layout, unit)
+    with carrying(lambda: drawn):
+        layout = sorted_out(drawn, ignore, only)
+    for k, (name, ring) in enumerate(zip(layout.names, layout.outlines, strict=True)):
         if len(ring) > MOST_CORNERS:
-            raise ValueError(
-                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
+            raise Refused(
+                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer",
+                layout,
+                [k],
             )
-    return standing(layout, thickness) if dimension == 3 else layout
+    return layout
 
 
 def _in_dimension(

@@ -16,7 +16,7 @@ from blockvis.layout.solids import Solid, area_vectors, prism, triangles_of
 
 from .bodies import Bodies
 from .cells import layout_of_cells, merged
-from .closed_surfaces import closed_bodies
+from .closed_surfaces import bodies_of_parts
 from .reading import Reading
 
 #: Programs that write coordinates to .glb as they are, with z up, in small letters.
@@ -66,7 +66,7 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     rows = _own_rows(path)
     if float(np.ptp(every, axis=0).min()) <= FLAT * size:
         return replace(_flat(parts, path, rows, reading.view), unit=unit)
-    bodies = [body for part in parts for body in closed_bodies(*part, size, path)]
+    bodies = bodies_of_parts(parts, size, path)[0]
     if suffix == ".obj":
         # The reader returns the objects in an order of its own: rows are matched to them by name.
         by_name = {row.get("name"): row for row in rows}

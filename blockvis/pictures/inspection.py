@@ -1,173 +1,506 @@
-"""A picture of what a layout holds: names, roles, overlaps, joints by their thickness, what was left out."""
+"""A picture of what a drawing holds, in the plane and in space: roles, overlaps, joints, and why it is refused."""
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blockvis.layout.inspect import Inspection
+import solver
+from blockvis.layout.faults import faults_of
+from blockvis.layout.joints.facing_edges import Facing
+from blockvis.text import length_text, rounded_length
+from solver import mechanics
+
+from . import palette
+
+if TYPE_CHECKING:
+    from blockvis.layout.inspect import Inspection
+    from blockvis.layout.layout import Layout
+    from blockvis.layout.refusal import Refused
 
 #: Names are written where they fit into their block at this size [points]; smaller ones cannot be read.
-SMALLEST_TEXT, LARGEST_TEXT = 4.0, 9.0
+SMALLEST_TEXT, LARGEST_TEXT = 6.0, 9.0
 
-#: Width and smallest and largest height of the drawing on paper [in].
-WIDTH, HEIGHTS = 10.0, (3.0, 14.0)
+#: Width and smallest and largest height of the drawing on paper [in], and dots per inch.
+WIDTH, HEIGHTS, DPI = 10.0, (1.6, 14.0), 150
+
+#: Characters of a line above the drawing, and most lines there.
+LINE, MOST_LINES = 118, 6
+
+#: Pixels of the width of blocks in space: more than on paper, which smooths their edges.
+PIXELS = 2000
+
+#: Blocks at fault that are named beside them, and overlaps that are ringed: as many as are listed.
+MOST_NAMED = 8
 
 #: Colours of gaps, from narrow to wide: all stand out from the blocks and from white.
 GAPS = ("#2166ac", "#1b9e77", "#e6a100", "#d95f02", "#a50026")
 
-#: Colour of what was left out.
-LEFT_OUT = "#b05ac8"
+
+@dataclass(frozen=True)
+class Kind:
+    """Blocks that are drawn alike.
+
+    Attributes
+    ----------
+    label : str
+    colour : (int, int, int)
+    blocks : tuple of int
+    hatch : str
+        Pattern of matplotlib, in the plane.
+    """
+
+    label: str
+    colour: tuple[int, int, int]
+    blocks: tuple[int, ...]
+    hatch: str = ""
 
 
-def draw_inspection(inspection: Inspection, path: str | Path) -> Path:
-    """Draw what was found: outlines with their names and roles, joints by their thickness, what was left out.
+@dataclass(frozen=True)
+class Contents:
+    """What a picture of a drawing shows.
+
+    Attributes
+    ----------
+    layout : Layout
+        All that is drawn.
+    title : str
+    findings : tuple of str
+        Lines below it.
+    kinds : tuple of Kind
+    marked : tuple of int
+        Blocks that are named beside them.
+    rings : (n, d) array [m]
+        Places to look at, and what they are.
+    rings_are : str
+    ends : (n, 2) array [m]
+        Ends of open lines.
+    edges : (n, 2, 3) array [m]
+        Edges of open surfaces.
+    joints : Facing
+        In the plane.
+    """
+
+    layout: Layout
+    title: str
+    findings: tuple[str, ...]
+    kinds: tuple[Kind, ...]
+    marked: tuple[int, ...] = ()
+    rings: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    rings_are: str = ""
+    ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    edges: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
+    joints: Facing = field(default_factory=Facing.none)
+
+    @property
+    def drawn(self) -> list[int]:
+        """Numbers of the blocks that are drawn."""
+        return [k for kind in self.kinds for k in kind.blocks]
+
+
+def draw_inspection(
+    inspection: Inspection, path: str | Path, *, ground: Layout | None = None, falling: Sequence[int] = ()
+) -> Path:
+    """Draw what was found: blocks with their names and roles, joints by their thickness, what was left out.
 
     Parameters
     ----------
     inspection : Inspection
     path : str or Path
-        .png, .svg or .pdf; of blocks in space .png or .pdf.
+        .png, .svg or .pdf.
+    ground : Layout, optional
+        Supports beside the blocks of the drawing, with their roles, in the plane or in space as these are.
+    falling : sequence of int
+        Blocks of the layout that do not stand.
 
     Returns
     -------
     pathlib.Path
     """
-    if inspection.layout.dimension == 3:
-        from .solid_inspection import draw_solid_inspection
+    return _drawn(_contents(inspection, ground, set(falling)), path)
 
-        return draw_solid_inspection(inspection, path)
+
+def draw_refusal(refused: Refused, path: str | Path) -> Path | None:
+    """Draw why a drawing was refused: its lines as they are, their open ends, crossings and blocks at fault.
+
+    Parameters
+    ----------
+    refused : blockvis.layout.refusal.Refused
+    path : str or Path
+        As of :func:`draw_inspection`.
+
+    Returns
+    -------
+    pathlib.Path
+        None where nothing was read that could be drawn.
+    """
+    layout = refused.layout
+    if layout is None or not (layout.n_blocks or any(len(item.points) for item in layout.left_out)):
+        return None
+    faults = faults_of(layout, refused.blocks)
+    wrong = faults.blocks
+    others = tuple(k for k in range(layout.n_blocks) if k not in wrong)
+    kinds = (Kind("read", palette.DRAWN, others), Kind("refused", palette.REFUSED, wrong))
+    contents = Contents(
+        layout=layout,
+        title=f"{_name(layout)}: refused",
+        findings=(str(refused),),
+        kinds=tuple(kind for kind in kinds if kind.blocks),
+        marked=wrong[:MOST_NAMED],
+        rings=faults.crossings,
+        rings_are=f"crosses itself: {len(faults.crossings)}",
+        ends=faults.ends,
+        edges=faults.edges,
+    )
+    return _drawn(contents, path)
+
+
+def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) -> Contents:
+    """Sort the blocks of an inspection, and what is laid under them, into kinds; say what was found."""
+    layout, kept = inspection.layout, inspection.kept.tolist()
+    deep = [pair for pair in inspection.overlapping if pair[2] > inspection.overlap_tolerance]
+    sorted_out: dict[int, str] = dict.fromkeys((k for pair in inspection.twins for k in pair), "twice")
+    sorted_out |= dict.fromkeys(falling, "falls") | dict.fromkeys((k for pair in deep for k in pair[:2]), "overlap")
+    sorted_out |= dict.fromkeys(inspection.at_fault, "refused")
+    own = {k: sorted_out.get(k) or inspection.roles[k] for k in kept}
+    kinds = [
+        Kind(label, colour, tuple(k for k in kept if own[k] == key), hatch)
+        for key, label, colour, hatch in (
+            (mechanics.FREE, "free", palette.DRAWN, ""),
+            (mechanics.FIXED, "fixed", palette.SUPPORT, "////"),
+            (mechanics.MOVING, "moving", palette.MOVING, "\\\\\\\\"),
+            ("twice", "drawn twice", palette.TWICE, ""),
+            ("falls", "does not stand", palette.FALLS, ""),
+            ("overlap", "overlapping, refused", palette.REFUSED, ""),
+            ("refused", "refused", palette.REFUSED, ""),
+        )
+    ]
+    if ground is not None:
+        first, layout = layout.n_blocks, layout.with_more(ground.blocks, names=ground.names, roles=ground.roles)
+        for role, colour, hatch in (
+            (mechanics.FIXED, palette.SUPPORT, "////"),
+            (mechanics.MOVING, palette.MOVING, "\\\\\\\\"),
+        ):
+            laid = tuple(first + k for k, given in enumerate(ground.roles) if given == role)
+            kinds.append(Kind(f"ground laid below, {role}", colour, laid, hatch))
+    middles = [_overlap(layout, i, j) for i, j, _ in deep[:MOST_NAMED]]
+    in_space = " in space" if layout.dimension == 3 else ""
+    return Contents(
+        layout=layout,
+        title=f"{_name(layout)}: {len(kept)} blocks{in_space}, read in {layout.unit}",
+        findings=_findings(inspection, deep),
+        kinds=tuple(kind for kind in kinds if kind.blocks),
+        marked=inspection.at_fault[:MOST_NAMED],
+        rings=np.array(middles).reshape(-1, layout.dimension),
+        rings_are=f"deepest overlaps: {len(middles)}",
+        joints=inspection.joints,
+    )
+
+
+def _findings(inspection: Inspection, deep: Sequence[tuple[int, int, float]]) -> tuple[str, ...]:
+    """Say in lines what is not seen at a glance."""
+    size = " × ".join(f"{length:.4g}" for length in inspection.high - inspection.low)
+    said = [f"{size} m"]
+    thickness = f"joint_thickness {inspection.joint_thickness * 1e3:g} mm"
+    if len(inspection.joints):
+        said.append(f"{thickness} found")
+    if inspection.open_joints:
+        said.append(f"open joints: {len(inspection.open_joints)}, {thickness} closes them")
+    if inspection.layout.dimension == 3:
+        said.append(inspection.facing.note or "faces in contact lie in one plane")
+    if deep:
+        i, j, depth = deep[0]
+        names = inspection.layout.names
+        said.append(f"pairs that overlap: {len(deep)}, '{names[i]}' and '{names[j]}' by {depth:.3g} m")
+    return ("   ·   ".join(said), *([inspection.refused] if inspection.refused else []))
+
+
+def _name(layout: Layout) -> str:
+    return Path(layout.source).name or "layout"
+
+
+def _overlap(layout: Layout, i: int, j: int) -> np.ndarray:
+    """(d,) array [m]: the middle of what the boxes around two blocks have in common."""
+    one, other = layout.corners(i), layout.corners(j)
+    low = np.maximum(one.min(axis=0), other.min(axis=0))
+    return np.asarray((low + np.minimum(one.max(axis=0), other.max(axis=0))) / 2.0)
+
+
+@dataclass(frozen=True)
+class _Canvas:
+    """Axes with the blocks drawn, and how places get there.
+
+    Attributes
+    ----------
+    axes : matplotlib.axes.Axes
+    axis : (2, d) array
+        Unit vectors to the right and up.
+    names : dict of int to array
+        By block: (2, 2), the middle of where its name may stand, and how wide and high that is [m].
+    inches : float
+        Of a metre on paper.
+    """
+
+    axes: Any
+    axis: np.ndarray
+    names: dict[int, np.ndarray]
+    inches: float
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """(..., 2) array [m]: places on paper of points (..., d) [m]."""
+        return np.asarray(points @ self.axis.T)
+
+
+def _drawn(contents: Contents, path: str | Path) -> Path:
+    """Draw what a drawing holds on a sheet with title, findings and legend."""
     from matplotlib.figure import Figure
 
-    layout = inspection.layout
-    found = f", joint_thickness {inspection.joint_thickness * 1e3:g} mm found" if len(inspection.joints) else ""
-    low, high = _box(inspection)
+    from blockvis.system.atomic_files import whole_file
+
+    lines = [line for text in contents.findings for line in textwrap.wrap(text, LINE)]
+    if len(lines) > MOST_LINES:
+        lines = [*lines[: MOST_LINES - 1], f"{lines[MOST_LINES - 1]} ..."]
+    figure = Figure(layout="constrained")
+    canvas = (_in_space if contents.layout.dimension == 3 else _in_the_plane)(figure, contents)
+    keys = [*_keys(contents), *_add_marks(canvas, contents)]
+    missing = _add_names(canvas, contents)
+    if missing:
+        lines.append(f"names not written: {missing}, hidden or wider than their blocks")
+    if contents.layout.dimension == 2:
+        keys += _add_left_out(canvas, contents)
+        _add_gaps(figure, canvas.axes, contents.joints)
+    figure.set_figheight(figure.get_figheight() + 0.5 + 0.19 * (len(lines) + (len(keys) + 3) // 4))
+    figure.suptitle("\n".join([contents.title, *lines]), x=0.01, ha="left", fontsize=9.5)
+    figure.legend(handles=keys, loc="outside lower center", ncols=4, frameon=False)
+    with whole_file(path) as partial:
+        figure.savefig(partial, dpi=DPI)
+    return Path(path)
+
+
+def _in_the_plane(figure: Any, contents: Contents) -> _Canvas:
+    """Draw the blocks as outlines, over axes with their coordinates."""
+    from matplotlib.collections import PolyCollection
+
+    layout = contents.layout
+    low, high = _box(contents)
     width, height = np.maximum(high - low, 1e-9)
-    drawn = float(np.clip(WIDTH * height / width, *HEIGHTS))
-    figure = Figure(figsize=(WIDTH, drawn + 1.6), layout="constrained")
+    # Scale and words beside the axes take the rest.
+    across = (0.85 if len(contents.joints) else 0.93) * WIDTH
+    drawn = float(np.clip(across * height / width, *HEIGHTS))
+    figure.set_size_inches(WIDTH, drawn + 0.7)
     axes = figure.add_subplot()
-    inches = min(0.85 * WIDTH / width, drawn / height)
-    _add_blocks(axes, inspection)
-    _add_left_out(axes, inspection)
-    _add_names(axes, inspection, inches)
-    _add_gaps(figure, axes, inspection)
+    for kind in contents.kinds:
+        rings = [layout.outlines[k] for k in kind.blocks]
+        colour = palette.hexadecimal(kind.colour)
+        axes.add_collection(
+            PolyCollection(rings, facecolor=colour, edgecolor=_EDGE, hatch=kind.hatch or None, linewidth=0.4)
+        )
     axes.set_xlim(low[0] - 0.02 * width, high[0] + 0.02 * width)
     axes.set_ylim(low[1] - 0.02 * height, high[1] + 0.02 * height)
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
-    axes.set_title(
-        f"{Path(layout.source).name or 'layout'}: {len(inspection.kept)} blocks, read in {layout.unit}{found}"
+    names = {}
+    for k in contents.drawn:
+        ring = layout.outlines[k]
+        names[k] = np.array([(ring.min(axis=0) + ring.max(axis=0)) / 2.0, np.ptp(ring, axis=0)])
+    return _Canvas(axes, np.eye(2), names, min(across / width, drawn / height))
+
+
+def _in_space(figure: Any, contents: Contents) -> _Canvas:
+    """Draw the blocks as a scene sees them, with a bar to scale."""
+    from .frame import Frame
+    from .solid_scene import SolidScene, seen_faces
+    from .solid_view import ABOVE, AROUND, View
+
+    layout, view = contents.layout, View(AROUND[0], ABOVE)
+    colour_of = {k: kind.colour for kind in contents.kinds for k in kind.blocks}
+    drawn = sorted(k for k in colour_of if np.isfinite(layout.corners(k)).all())
+    assembly = unchecked(layout.chosen(drawn))
+    fill = np.array([colour_of[k] for k in drawn], dtype=np.uint8)
+    flat = view.projected(assembly.vertices)
+    margin = 0.04 * float(np.ptp(flat, axis=0).max())
+    frame = Frame(flat.min(axis=0) - margin, flat.max(axis=0) + margin)
+    proportion = float(np.clip(frame.size[1] / frame.size[0], HEIGHTS[0] / WIDTH, HEIGHTS[1] / WIDTH))
+    scene = SolidScene(assembly, view, frame, (PIXELS, round(PIXELS * proportion)), fill)
+    picture = scene.image()
+    places, room = seen_faces(scene)
+    (left, bottom), (right, top) = scene.frame.low, scene.frame.high
+    scene.close()
+    figure.set_size_inches(WIDTH, WIDTH * proportion + 0.2)
+    axes = figure.add_subplot()
+    axes.imshow(picture, extent=(left, right, bottom, top), interpolation="antialiased")
+    axes.set_axis_off()
+    length = rounded_length(0.2 * (right - left))
+    x, y = left + 0.02 * (right - left), bottom + 0.02 * (top - bottom)
+    axes.plot([x, x + length], [y, y], color=palette.hexadecimal(palette.INK), linewidth=2.5, solid_capstyle="butt")
+    axes.text(x + length / 2.0, y, f"{length_text(length)}\n", ha="center", va="bottom", fontsize=8, linespacing=0.4)
+    names = {k: np.array([places[n] @ view.axes[:2].T, room[n]]) for n, k in enumerate(drawn) if room[n].all()}
+    return _Canvas(axes, view.axes[:2], names, WIDTH / (right - left))
+
+
+def unchecked(layout: Layout) -> solver.Assembly:
+    """Make an assembly of blocks in space to be drawn: what is no block by its shape is none the less drawn."""
+    return solver.Assembly(
+        shapes=mechanics.Polyhedra.of_surfaces([(points, list(faces)) for points, faces in layout.solids]),
+        names=layout.names,
+        roles=np.array([role or mechanics.FREE for role in layout.roles]),
+        density=np.ones(layout.n_blocks),
+        materials=layout.materials,
     )
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
-    figure.savefig(path, dpi=150)
-    return Path(path)
 
 
-def _box(inspection: Inspection) -> tuple[np.ndarray, np.ndarray]:
+_EDGE = "#4a4032"
+
+
+def _box(contents: Contents) -> tuple[np.ndarray, np.ndarray]:
     """Corners of the box around the blocks, and around what was left out unless that is far away."""
-    low, high = inspection.low, inspection.high
-    size = high - low
-    for item in inspection.layout.left_out:
-        if len(item.points):
-            # A stray point far off would shrink the blocks to a dot.
-            low = np.minimum(low, np.maximum(item.points.min(axis=0), inspection.low - 0.5 * size))
-            high = np.maximum(high, np.minimum(item.points.max(axis=0), inspection.high + 0.5 * size))
+    layout = contents.layout
+    beside = [item.points for item in layout.left_out if len(item.points)]
+    corners = [layout.outlines[k] for k in contents.drawn] or beside
+    every = np.concatenate(corners)
+    every = every[np.isfinite(every).all(axis=1)]
+    first_low, first_high = every.min(axis=0), every.max(axis=0)
+    size, low, high = first_high - first_low, first_low, first_high
+    for points in beside:
+        # A stray point far off would shrink the blocks to a dot.
+        low = np.minimum(low, np.maximum(points.min(axis=0), first_low - 0.5 * size))
+        high = np.maximum(high, np.minimum(points.max(axis=0), first_high + 0.5 * size))
     return low, high
 
 
-def _add_blocks(axes: Any, inspection: Inspection) -> None:
-    from matplotlib.collections import PolyCollection
+def _keys(contents: Contents) -> list[Any]:
+    """Return the entries of the legend for the blocks."""
+    from matplotlib.patches import Patch
 
-    layout = inspection.layout
-    later = sorted({copy for _, copy in inspection.twins})
-    deep = {i for a, b, depth in inspection.overlapping if depth > inspection.overlap_tolerance for i in (a, b)}
-    of_role = {
-        role: [int(i) for i in inspection.kept if i not in deep and inspection.roles[i] == role]
-        for role in ("free", "fixed", "moving")
-    }
-    classes = (
-        ("free", "#efe6d4", "", of_role["free"]),
-        ("fixed", "#9a9a9a", "////", of_role["fixed"]),
-        ("moving", "#f3c08b", "\\\\\\\\", of_role["moving"]),
-        ("drawn twice", "#5b8fd6", "", later),
-        ("overlapping, refused", "#d6605b", "", sorted(deep)),
-    )
-    for label, colour, hatch, members in classes:
-        if members:
-            rings = [layout.outlines[i] for i in members]
-            axes.add_collection(
-                PolyCollection(
-                    rings,
-                    facecolor=colour,
-                    edgecolor="#4a4032",
-                    hatch=hatch,
-                    linewidth=0.4,
-                    label=f"{label}: {len(members)}",
-                )
-            )
+    hatched = contents.layout.dimension == 2
+    return [
+        Patch(
+            facecolor=palette.hexadecimal(kind.colour),
+            edgecolor=_EDGE,
+            linewidth=0.4,
+            hatch=(hatched and kind.hatch) or None,
+            label=f"{kind.label}: {len(kind.blocks)}",
+        )
+        for kind in contents.kinds
+    ]
 
 
-def _add_left_out(axes: Any, inspection: Inspection) -> None:
+def _add_marks(canvas: _Canvas, contents: Contents) -> list[Any]:
+    """Ring places, mark open ends and edges, name blocks at fault beside them; returns entries of the legend."""
     from matplotlib.collections import LineCollection
 
-    items = [item for item in inspection.layout.left_out if len(item.points) > 1]
-    if items:
-        lines = [np.vstack([item.points, item.points[:1]]) if item.closed else item.points for item in items]
-        axes.add_collection(
-            LineCollection(
-                lines, colors=LEFT_OUT, linewidth=1.0, linestyle=(0, (5, 3)), label=f"left out: {len(items)}", zorder=3
-            )
+    axes, warning, keys = canvas.axes, palette.hexadecimal(palette.WARNING), []
+    if len(contents.edges):
+        lines = LineCollection(
+            list(canvas.at(contents.edges)), colors=warning, linewidth=2.2, zorder=5, label="open edges"
         )
+        lines.set_label(f"edges that are not of two faces: {len(contents.edges)}")
+        axes.add_collection(lines)
+        keys.append(lines)
+    if len(contents.ends):
+        style = {"facecolors": warning, "edgecolors": "white", "linewidths": 0.6, "zorder": 5}
+        dots = axes.scatter(*contents.ends.T, s=16.0, label=f"open ends: {len(contents.ends)}", **style)
+        keys.append(dots)
+    if len(contents.rings):
+        style = {"facecolors": "none", "edgecolors": warning, "linewidths": 1.8, "zorder": 6}
+        keys.append(axes.scatter(*canvas.at(contents.rings).T, s=170.0, label=contents.rings_are, **style))
+    for k in contents.marked:
+        place = canvas.at(_middle(contents.layout.corners(k)))
+        if np.isfinite(place).all():
+            axes.annotate(
+                contents.layout.names[k],
+                place,
+                (14.0, 14.0),
+                textcoords="offset points",
+                fontsize=8,
+                zorder=7,
+                arrowprops={"arrowstyle": "-", "color": warning, "linewidth": 1.2},
+                bbox={"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": warning},
+            )
+    return keys
 
 
-def _add_names(axes: Any, inspection: Inspection, inches: float) -> None:
-    """Write the name of each block into it where it can be read; ``inches`` are those of a metre on paper."""
+def _middle(corners: np.ndarray) -> np.ndarray:
+    return np.asarray((corners.min(axis=0) + corners.max(axis=0)) / 2.0)
+
+
+def _add_left_out(canvas: _Canvas, contents: Contents) -> list[Any]:
+    """Draw outlines and lines that were left out; of a refused drawing all its lines."""
+    from matplotlib.collections import LineCollection
+
+    items = [item for item in contents.layout.left_out if len(item.points) > 1]
+    if not items:
+        return []
+    rings = [np.vstack([item.points, item.points[:1]]) if item.closed else item.points for item in items]
+    alone = not contents.kinds
+    lines = LineCollection(
+        rings,
+        colors=palette.hexadecimal(palette.INK if alone else palette.LEFT_OUT),
+        linewidth=1.0,
+        linestyle="solid" if alone else (0, (5, 3)),
+        label=f"{'lines as drawn' if alone else 'left out'}: {len(items)}",
+        zorder=3,
+    )
+    canvas.axes.add_collection(lines)
+    return [lines]
+
+
+def _add_names(canvas: _Canvas, contents: Contents) -> int:
+    """Write the name of each block into it where it can be read; returns how many could not be."""
     from matplotlib.patheffects import withStroke
 
     rim = [withStroke(linewidth=2.0, foreground="#ffffffb0")]
-    for i in inspection.kept:
-        ring, name = inspection.layout.outlines[i], inspection.layout.names[i]
-        width, height = np.ptp(ring, axis=0) * inches * 72.0
+    marked, missing = set(contents.marked), 0
+    for k in contents.drawn:
+        name = contents.layout.names[k]
+        if k in marked or k not in canvas.names:
+            missing += k not in marked
+            continue
+        (x, y), room = canvas.names[k]
+        width, height = room * canvas.inches * 72.0
         # A letter is some 0.55 of its size wide; upright where the block is tall.
         across, up = (width, height) if width >= height else (height, width)
         size = min(0.85 * across / (0.55 * max(len(name), 1)), 0.6 * up, LARGEST_TEXT)
-        if size >= SMALLEST_TEXT:
-            x, y = (ring.min(axis=0) + ring.max(axis=0)) / 2.0
-            turn = 0.0 if width >= height else 90.0
-            axes.text(
-                x,
-                y,
-                name,
-                fontsize=size,
-                rotation=turn,
-                ha="center",
-                va="center",
-                color="#2b2b2b",
-                zorder=4,
-                path_effects=rim,
-            )
+        if size < SMALLEST_TEXT:
+            missing += 1
+            continue
+        canvas.axes.text(
+            x,
+            y,
+            name,
+            fontsize=size,
+            rotation=0.0 if width >= height else 90.0,
+            ha="center",
+            va="center",
+            color="#2b2b2b",
+            zorder=4,
+            path_effects=rim,
+        )
+    return missing
 
 
-def _add_gaps(figure: Any, axes: Any, inspection: Inspection) -> None:
+def _add_gaps(figure: Any, axes: Any, joints: Facing) -> None:
     """Draw the joints by their widest gap [mm], in classes with round limits."""
     from matplotlib.collections import LineCollection
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
-    if not len(inspection.joints):
+    if not len(joints):
         return
-    gaps = inspection.joints.gaps.max(axis=1) * 1e3
+    gaps = joints.gaps.max(axis=1) * 1e3
     limits = _round_limits(float(gaps.min()), float(gaps.max()))
     if len(limits) == 2:
         colours = [GAPS[1]]
     else:
         colours = [GAPS[round(k * (len(GAPS) - 1) / (len(limits) - 2))] for k in range(len(limits) - 1)]
     scale = ListedColormap(colours)
-    lines = LineCollection(
-        list(inspection.joints.midline), cmap=scale, norm=BoundaryNorm(limits, scale.N), linewidth=1.8, zorder=2
-    )
+    norm = BoundaryNorm(limits, scale.N)
+    lines = LineCollection(list(joints.midline), cmap=scale, norm=norm, linewidth=1.8, zorder=2)
     lines.set_array(np.clip(gaps, limits[0], limits[-1] * (1.0 - 1e-9)))
     axes.add_collection(lines)
     alone = len(limits) == 2
