@@ -586,7 +586,9 @@ def _write_report(response: solver.Response, folder: Path) -> Fall | None:
 
 
 def _info(options: argparse.Namespace) -> int:
+    from .case_files.new_case import ground_of
     from .formats.read import inspect
+    from .layout.assemble import supports_of
     from .layout.refusal import Refused
     from .pictures.inspection import draw_inspection, draw_refusal
 
@@ -599,7 +601,8 @@ def _info(options: argparse.Namespace) -> int:
         raise
     print(found)
     if options.picture:
-        print(f"drawn in {draw_inspection(found, options.picture)}")
+        ground = supports_of(ground_of(found).supports, found.layout.dimension)
+        print(f"drawn in {draw_inspection(found, options.picture, ground=ground)}")
     return 0
 
 

@@ -73,6 +73,8 @@ class Contents:
     findings : tuple of str
         Lines below it.
     kinds : tuple of Kind
+    named : tuple of int
+        Blocks whose names are written into them where there is room.
     marked : tuple of int
         Blocks that are named beside them.
     rings : (n, d) array [m]
@@ -90,6 +92,7 @@ class Contents:
     title: str
     findings: tuple[str, ...]
     kinds: tuple[Kind, ...]
+    named: tuple[int, ...] = ()
     marked: tuple[int, ...] = ()
     rings: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     rings_are: str = ""
@@ -151,6 +154,7 @@ def draw_refusal(refused: Refused, path: str | Path) -> Path | None:
         title=f"{_name(layout)}: refused",
         findings=(str(refused),),
         kinds=tuple(kind for kind in kinds if kind.blocks),
+        named=tuple(range(layout.n_blocks)),
         marked=wrong[:MOST_NAMED],
         rings=faults.crossings,
         rings_are=f"crosses itself: {len(faults.crossings)}",
@@ -187,7 +191,7 @@ def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) 
             (mechanics.MOVING, palette.MOVING, "\\\\\\\\"),
         ):
             laid = tuple(first + k for k, given in enumerate(ground.roles) if given == role)
-            kinds.append(Kind(f"ground laid below, {role}", colour, laid, hatch))
+            kinds.append(Kind(f"ground of blockvis new, {role}", colour, laid, hatch))
     middles = [_overlap(layout, i, j) for i, j, _ in deep[:MOST_NAMED]]
     in_space = " in space" if layout.dimension == 3 else ""
     return Contents(
@@ -195,6 +199,7 @@ def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) 
         title=f"{_name(layout)}: {len(kept)} blocks{in_space}, read in {layout.unit}",
         findings=_findings(inspection, deep),
         kinds=tuple(kind for kind in kinds if kind.blocks),
+        named=tuple(kept),
         marked=inspection.at_fault[:MOST_NAMED],
         rings=np.array(middles).reshape(-1, layout.dimension),
         rings_are=f"deepest overlaps: {len(middles)}",
@@ -262,7 +267,7 @@ def _drawn(contents: Contents, path: str | Path) -> Path:
 
     from blockvis.system.atomic_files import whole_file
 
-    lines = [line for text in contents.findings for line in textwrap.wrap(text, LINE)]
+    lines = [line.strip(" ·") for text in contents.findings for line in textwrap.wrap(text, LINE)]
     if len(lines) > MOST_LINES:
         lines = [*lines[: MOST_LINES - 1], f"{lines[MOST_LINES - 1]} ..."]
     figure = Figure(layout="constrained")
@@ -276,7 +281,7 @@ def _drawn(contents: Contents, path: str | Path) -> Path:
         _add_gaps(figure, canvas.axes, contents.joints)
     figure.set_figheight(figure.get_figheight() + 0.5 + 0.19 * (len(lines) + (len(keys) + 3) // 4))
     figure.suptitle("\n".join([contents.title, *lines]), x=0.01, ha="left", fontsize=9.5)
-    figure.legend(handles=keys, loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(handles=keys, loc="outside lower center", ncols=4, frameon=False, fontsize=8.5)
     with whole_file(path) as partial:
         figure.savefig(partial, dpi=DPI)
     return Path(path)
@@ -321,7 +326,7 @@ def _in_space(figure: Any, contents: Contents) -> _Canvas:
     layout, view = contents.layout, View(AROUND[0], ABOVE)
     colour_of = {k: kind.colour for kind in contents.kinds for k in kind.blocks}
     drawn = sorted(k for k in colour_of if np.isfinite(layout.corners(k)).all())
-    assembly = unchecked(layout.chosen(drawn))
+    assembly = _unchecked(layout.chosen(drawn))
     fill = np.array([colour_of[k] for k in drawn], dtype=np.uint8)
     flat = view.projected(assembly.vertices)
     margin = 0.04 * float(np.ptp(flat, axis=0).max())
@@ -344,7 +349,7 @@ def _in_space(figure: Any, contents: Contents) -> _Canvas:
     return _Canvas(axes, view.axes[:2], names, WIDTH / (right - left))
 
 
-def unchecked(layout: Layout) -> solver.Assembly:
+def _unchecked(layout: Layout) -> solver.Assembly:
     """Make an assembly of blocks in space to be drawn: what is no block by its shape is none the less drawn."""
     return solver.Assembly(
         shapes=mechanics.Polyhedra.of_surfaces([(points, list(faces)) for points, faces in layout.solids]),
@@ -431,24 +436,28 @@ def _middle(corners: np.ndarray) -> np.ndarray:
 
 
 def _add_left_out(canvas: _Canvas, contents: Contents) -> list[Any]:
-    """Draw outlines and lines that were left out; of a refused drawing all its lines."""
+    """Draw outlines and lines that were left out, and those that cannot be; of a drawing without blocks all lines."""
     from matplotlib.collections import LineCollection
 
-    items = [item for item in contents.layout.left_out if len(item.points) > 1]
-    if not items:
-        return []
-    rings = [np.vstack([item.points, item.points[:1]]) if item.closed else item.points for item in items]
-    alone = not contents.kinds
-    lines = LineCollection(
-        rings,
-        colors=palette.hexadecimal(palette.INK if alone else palette.LEFT_OUT),
-        linewidth=1.0,
-        linestyle="solid" if alone else (0, (5, 3)),
-        label=f"{'lines as drawn' if alone else 'left out'}: {len(items)}",
-        zorder=3,
-    )
-    canvas.axes.add_collection(lines)
-    return [lines]
+    alone, dashes = not contents.kinds, (0, (5, 3))
+    keys = []
+    for serious, label, colour, style in (
+        (False, "lines as drawn" if alone else "left out", palette.INK if alone else palette.LEFT_OUT, dashes),
+        (True, "no block", palette.WARNING, "solid"),
+    ):
+        items = [item for item in contents.layout.left_out if item.serious == serious and len(item.points) > 1]
+        if items:
+            lines = LineCollection(
+                [np.vstack([item.points, item.points[:1]]) if item.closed else item.points for item in items],
+                colors=palette.hexadecimal(colour),
+                linewidth=1.0 + 0.8 * serious,
+                linestyle="solid" if alone else style,
+                label=f"{label}: {len(items)}",
+                zorder=3,
+            )
+            canvas.axes.add_collection(lines)
+            keys.append(lines)
+    return keys
 
 
 def _add_names(canvas: _Canvas, contents: Contents) -> int:
@@ -457,7 +466,7 @@ def _add_names(canvas: _Canvas, contents: Contents) -> int:
 
     rim = [withStroke(linewidth=2.0, foreground="#ffffffb0")]
     marked, missing = set(contents.marked), 0
-    for k in contents.drawn:
+    for k in contents.named:
         name = contents.layout.names[k]
         if k in marked or k not in canvas.names:
             missing += k not in marked
