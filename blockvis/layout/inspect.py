@@ -15,7 +15,6 @@ from solver import mechanics
 
 from .facing import Facing as FacedJoints
 from .facing import faced, facing_tolerance
-from .faults import no_blocks
 from .joints.close import Proposal, proposed
 from .joints.facing_edges import Facing
 from .layout import Layout
@@ -75,8 +74,6 @@ class Inspection:
         In space, pairs of blocks of which faces cover each other across a gap, and the gap [m], widest first.
     refused : str
         Why a run would refuse the blocks, or "".
-    at_fault : tuple of int
-        In space, the blocks that are refused, each by itself.
     """
 
     layout: Layout
@@ -95,7 +92,6 @@ class Inspection:
     facing: FacedJoints = field(default_factory=lambda: FacedJoints(()))
     open_joints: tuple[tuple[int, int, float], ...] = ()
     refused: str = ""
-    at_fault: tuple[int, ...] = ()
 
     @property
     def unit_clash(self) -> str:
@@ -177,7 +173,6 @@ def inspected(layout: Layout) -> Inspection:
     free = np.array([roles[i] == mechanics.FREE for i in kept])
     with carrying(lambda: drawn):
         found = _in_space(drawn, free) if layout.dimension == 3 else _in_the_plane(drawn)
-    found["at_fault"] = tuple(int(kept[i]) for i in found.get("at_fault", ()))
     for key in ("overlapping", "open_joints"):
         found[key] = tuple((int(kept[i]), int(kept[j]), by) for i, j, by in found.get(key, ()))
     return Inspection(
@@ -239,14 +234,14 @@ def _in_space(layout: Layout, free: np.ndarray) -> dict[str, Any]:
     facing = faced(layout.solids, layout.names)
     overlapping: list[tuple[int, int, float]] = []
     gaps: list[tuple[int, int, float]] = []
-    refused, at_fault = "", []
+    refused = ""
     tolerance = facing_tolerance(layout.solids)
     try:
         assembly = solver.Assembly.from_solids(facing.solids, names=layout.names)
         overlapping = overlaps(assembly, tolerance)
         gaps = _open_joints(assembly, float(np.median([width_of(*solid) for solid in layout.solids])))
     except ValueError as error:
-        refused, at_fault = str(error), no_blocks(facing.solids)
+        refused = str(error)
     thickness = _closing_thickness(gaps)
     joint_rows = [("joints", facing.note or "faces in contact lie in one plane")]
     if gaps:
@@ -261,7 +256,6 @@ def _in_space(layout: Layout, free: np.ndarray) -> dict[str, Any]:
         "facing": facing,
         "open_joints": gaps,
         "refused": refused,
-        "at_fault": at_fault,
         "rows": _solid_rows(layout, free),
         "joint_rows": tuple(joint_rows),
     }

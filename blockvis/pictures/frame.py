@@ -294,6 +294,14 @@ def write_labels(
             return
 
 
+def room_in(ring: np.ndarray) -> np.ndarray:
+    """(2,) array: width and height of a box in the shape of that around an outline (n, 2), as large as the outline."""
+    width, height = np.ptp(ring, axis=0)
+    x, y = (ring - ring[0]).T
+    area = 0.5 * abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum()))
+    return np.array([width, height]) * np.sqrt(area / (width * height) if width * height else 0.0)
+
+
 def _swatch(draw: ImageDraw.ImageDraw, key: Key, x: float, y: float, wide: float, text: float) -> None:
     if key.kind == "area":
         draw.rectangle((x, y - 0.38 * text, x + wide, y + 0.38 * text), fill=key.colour)

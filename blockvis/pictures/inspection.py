@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import solver
-from blockvis.layout.faults import faults_of
+from blockvis.layout.faults import faults_of, no_blocks
 from blockvis.layout.joints.facing_edges import Facing
 from blockvis.text import length_text, rounded_length
 from solver import mechanics
 
 from . import palette
+from .frame import room_in
 
 if TYPE_CHECKING:
     from blockvis.layout.inspect import Inspection
@@ -170,7 +171,8 @@ def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) 
     deep = [pair for pair in inspection.overlapping if pair[2] > inspection.overlap_tolerance]
     sorted_out: dict[int, str] = dict.fromkeys((k for pair in inspection.twins for k in pair), "twice")
     sorted_out |= dict.fromkeys(falling, "falls") | dict.fromkeys((k for pair in deep for k in pair[:2]), "overlap")
-    sorted_out |= dict.fromkeys(inspection.at_fault, "refused")
+    wrong = tuple(kept[k] for k in no_blocks(inspection.facing.solids)) if inspection.refused else ()
+    sorted_out |= dict.fromkeys(wrong, "refused")
     own = {k: sorted_out.get(k) or inspection.roles[k] for k in kept}
     kinds = [
         Kind(label, colour, tuple(k for k in kept if own[k] == key), hatch)
@@ -200,7 +202,7 @@ def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) 
         findings=_findings(inspection, deep),
         kinds=tuple(kind for kind in kinds if kind.blocks),
         named=tuple(kept),
-        marked=inspection.at_fault[:MOST_NAMED],
+        marked=wrong[:MOST_NAMED],
         rings=np.array(middles).reshape(-1, layout.dimension),
         rings_are=f"deepest overlaps: {len(middles)}",
         joints=inspection.joints,
@@ -313,7 +315,7 @@ def _in_the_plane(figure: Any, contents: Contents) -> _Canvas:
     names = {}
     for k in contents.drawn:
         ring = layout.outlines[k]
-        names[k] = np.array([(ring.min(axis=0) + ring.max(axis=0)) / 2.0, np.ptp(ring, axis=0)])
+        names[k] = np.array([_middle(ring), room_in(ring)])
     return _Canvas(axes, np.eye(2), names, min(across / width, drawn / height))
 
 

@@ -18,7 +18,7 @@ import solver
 from solver import mechanics
 
 from . import palette
-from .frame import Frame, framed
+from .frame import Frame, framed, room_in
 from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes
 from .solid_view import ABOVE, AROUND, View, showing_faces
 from .surface import sharp_edges, triangles_of
@@ -343,7 +343,7 @@ def seen_faces(scene: SolidScene) -> tuple[np.ndarray, np.ndarray]:
     room = np.zeros((len(shapes), 2))
     for block, face in enumerate(best.tolist()):
         ring = flat[shapes.corners[shapes.face_offsets[face] : shapes.face_offsets[face + 1]]]
-        room[block] = np.ptp(ring, axis=0)
+        room[block] = room_in(ring)
     room[(showing <= 0.0) | ~scene.sees(places)] = 0.0
     return places, room
 
