@@ -596,8 +596,13 @@ def _info(options: argparse.Namespace) -> int:
     try:
         found = inspect(options.file, unit=options.unit, dimension=_dimension(options), **choice)
     except Refused as refused:
-        if options.picture and (drawn := draw_refusal(refused, options.picture)) is not None:
-            print(f"drawn in {drawn}")
+        if options.picture:
+            # Why there is no picture does not replace why there are no blocks.
+            try:
+                drawn = draw_refusal(refused, options.picture)
+                print("nothing was read that could be drawn" if drawn is None else f"drawn in {drawn}")
+            except (ValueError, OSError) as error:
+                print(f"blockvis: no picture: {error}", file=sys.stderr)
         raise
     print(found)
     if options.picture:

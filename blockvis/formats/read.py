@@ -88,7 +88,9 @@ def read_layout(
         layout = _read(path, unit, chord_tolerance, view, ignore, only, dimension)
     except Refused as error:
         if error.layout is not None and not error.layout.source:
-            error.layout = _in_metres(replace(error.layout, source=str(path)), unit)
+            # Readers name places in the unit of the file, and so does the picture beside what they say.
+            error.unit = unit or error.layout.unit or "unit of the file"
+            error.layout = replace(error.layout, source=str(path))
         raise
     return standing(layout, thickness) if dimension == 3 and layout.dimension == 2 else layout
 
@@ -159,7 +161,8 @@ def _apart(content: Layout | Bodies, path: Path) -> Layout | Bodies:
 
 def _in_metres(layout: Layout, unit: str | None) -> Layout:
     """Choose the unit of a layout, and check its coordinates."""
-    chosen, note = chosen_unit(unit, layout.unit, layout.sizes)
+    stated = unit or layout.unit or "m"
+    chosen, note = chosen_unit(unit, layout.unit, layout.sizes) if layout.n_blocks else (stated, "")
     factor = metres_per(chosen)
     layout = replace(
         layout,

@@ -52,13 +52,13 @@ def faults_of(layout: Layout, known: Sequence[int] = ()) -> Faults:
     if layout.dimension == 3:
         open_edges = [_open_edges(*solid) for solid in layout.solids]
         blocks = {k for k, edges in enumerate(open_edges) if len(edges)} | set(known)
-        blocks |= set(() if blocks else no_blocks(layout.solids))
         return Faults(tuple(sorted(blocks)), edges=np.concatenate([np.zeros((0, 2, 3)), *open_edges]))
-    blocks = set(known) | set(no_blocks(layout.outlines))
-    crossings = [_crossings(layout.outlines[k]) for k in sorted(blocks)]
+    # Debris has no area, and is no reason to refuse anything: what crosses itself is.
+    crossings = {k: _crossings(layout.outlines[k]) for k in no_blocks(layout.outlines)}
+    blocks = {k for k, places in crossings.items() if len(places)} | set(known)
     return Faults(
         tuple(sorted(blocks)),
-        crossings=np.concatenate([np.zeros((0, 2)), *crossings]),
+        crossings=np.concatenate([np.zeros((0, 2)), *crossings.values()]),
         ends=np.zeros((0, 2)) if blocks else _open_ends(layout),
     )
 

@@ -17,14 +17,19 @@ class Refused(ValueError):
         One line: what is wrong, where, and what to do.
     layout : Layout, optional
         What was read, as far as that went: outlines may cross themselves, surfaces may be open, and there may be lines
-        only. Its unit is that of the file until the layout has a source.
+        only.
     blocks : sequence of int
         Blocks of the layout that are at fault, where that is known.
+
+    Attributes
+    ----------
+    unit : str
+        Of the coordinates: m, or that of the file where it was refused as it was read.
     """
 
     def __init__(self, message: str, layout: Layout | None = None, blocks: Sequence[int] = ()) -> None:
         super().__init__(message)
-        self.layout, self.blocks = layout, tuple(blocks)
+        self.layout, self.blocks, self.unit = layout, tuple(blocks), "m"
 
 
 @contextmanager

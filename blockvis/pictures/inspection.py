@@ -87,6 +87,8 @@ class Contents:
         Edges of open surfaces.
     joints : Facing
         In the plane.
+    unit : str
+        Of the coordinates.
     """
 
     layout: Layout
@@ -100,6 +102,7 @@ class Contents:
     ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     edges: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
     joints: Facing = field(default_factory=Facing.none)
+    unit: str = "m"
 
     @property
     def drawn(self) -> list[int]:
@@ -161,6 +164,7 @@ def draw_refusal(refused: Refused, path: str | Path) -> Path | None:
         rings_are=f"crosses itself: {len(faults.crossings)}",
         ends=faults.ends,
         edges=faults.edges,
+        unit=refused.unit,
     )
     return _drawn(contents, path)
 
@@ -310,8 +314,8 @@ def _in_the_plane(figure: Any, contents: Contents) -> _Canvas:
     axes.set_xlim(low[0] - 0.02 * width, high[0] + 0.02 * width)
     axes.set_ylim(low[1] - 0.02 * height, high[1] + 0.02 * height)
     axes.set_aspect("equal")
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y [m]")
+    axes.set_xlabel(f"x [{contents.unit}]")
+    axes.set_ylabel(f"y [{contents.unit}]")
     names = {}
     for k in contents.drawn:
         ring = layout.outlines[k]
@@ -344,9 +348,10 @@ def _in_space(figure: Any, contents: Contents) -> _Canvas:
     axes.imshow(picture, extent=(left, right, bottom, top), interpolation="antialiased")
     axes.set_axis_off()
     length = rounded_length(0.2 * (right - left))
+    scale = length_text(length) if contents.unit == "m" else f"{length:g} [{contents.unit}]"
     x, y = left + 0.02 * (right - left), bottom + 0.02 * (top - bottom)
     axes.plot([x, x + length], [y, y], color=palette.hexadecimal(palette.INK), linewidth=2.5, solid_capstyle="butt")
-    axes.text(x + length / 2.0, y, f"{length_text(length)}\n", ha="center", va="bottom", fontsize=8, linespacing=0.4)
+    axes.text(x + length / 2.0, y, f"{scale}\n", ha="center", va="bottom", fontsize=8, linespacing=0.4)
     names = {k: np.array([places[n] @ view.axes[:2].T, room[n]]) for n, k in enumerate(drawn) if room[n].all()}
     return _Canvas(axes, view.axes[:2], names, WIDTH / (right - left))
 
@@ -450,7 +455,11 @@ def _add_left_out(canvas: _Canvas, contents: Contents) -> list[Any]:
         items = [item for item in contents.layout.left_out if item.serious == serious and len(item.points) > 1]
         if items:
             lines = LineCollection(
-                [np.vstack([item.points, item.points[:1]]) if item.closed else item.points for item in items],
+                [
+                    np.vstack([points, points[:1]]) if item.closed else points
+                    for item in items
+                    for points in (item.points, *item.holes)
+                ],
                 colors=palette.hexadecimal(colour),
                 linewidth=1.0 + 0.8 * serious,
                 linestyle="solid" if alone else style,

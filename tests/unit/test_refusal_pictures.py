@@ -80,11 +80,12 @@ def test_an_outline_that_crosses_itself_is_ringed_and_named(tmp_path):
     assert {"read: 2", "refused: 1", "crosses itself: 1"} <= set(_comments(words_of(tmp_path / "a.svg")))
 
 
-def test_lengths_of_a_refused_drawing_are_in_metres(tmp_path):
+def test_coordinates_of_what_a_reader_refuses_are_those_of_the_file(tmp_path):
     path = drawing(tmp_path / "a.dxf", ([[0, 0], [1000, 0], [1000, 500]], False))
-    with pytest.raises(Refused) as refused:
+    with pytest.raises(Refused, match=r"ends at \(1000, 500\)") as refused:
         read_layout(path, unit="mm")
-    assert faults_of(refused.value.layout).ends.tolist() == [[0, 0], [1, 0.5]]
+    assert faults_of(refused.value.layout).ends.tolist() == [[0, 0], [1000, 500]]
+    assert "x [mm]" in _comments(words_of(draw_refusal(refused.value, tmp_path / "a.svg")))
 
 
 def test_a_file_without_geometry_is_refused_without_a_picture(tmp_path, capsys):
