@@ -586,10 +586,13 @@ def _write_report(response: solver.Response, folder: Path) -> Fall | None:
 
 
 def _info(options: argparse.Namespace) -> int:
+    from dataclasses import replace
+
     from .case_files.new_case import ground_of
     from .formats.read import inspect
     from .layout.assemble import supports_of
     from .layout.refusal import Refused
+    from .layout.roles import roles_of
     from .pictures.inspection import draw_inspection, draw_refusal
 
     choice = {"view": options.view, "ignore": options.ignore, "only": options.only}
@@ -606,8 +609,11 @@ def _info(options: argparse.Namespace) -> int:
         raise
     print(found)
     if options.picture:
-        ground = supports_of(ground_of(found).supports, found.layout.dimension)
-        print(f"drawn in {draw_inspection(found, options.picture, ground=ground)}")
+        # As blockvis new would have it: supports by their names, and a ground below.
+        ground = ground_of(found)
+        found = replace(found, roles=tuple(roles_of(found.layout, ground.roles)))
+        laid = supports_of(ground.supports, found.layout.dimension)
+        print(f"drawn in {draw_inspection(found, options.picture, ground=laid)}")
     return 0
 
 

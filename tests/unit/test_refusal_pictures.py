@@ -127,3 +127,15 @@ def test_names_are_written_where_they_can_be_read(tmp_path):
     save_layout(solver.Assembly.from_outlines(outlines), tmp_path / "a.json")
     said = _comments(words_of(draw_inspection(inspect(tmp_path / "a.json"), tmp_path / "a.svg")))
     assert any("names not written: 300" in text for text in said)
+
+
+def test_info_draws_supports_as_a_new_case_has_them(tmp_path):
+    named = solver.Assembly.from_outlines(
+        [box(0), box(2), box(0, 0.5, width=3)], names=["springer 1", "springer 2", "lintel"]
+    )
+    save_layout(named, tmp_path / "named.json")
+    save_layout(solver.Assembly.from_outlines([box(0), box(1)]), tmp_path / "wall.json")
+    for name in ("named", "wall"):
+        assert main(["info", str(tmp_path / f"{name}.json"), "--picture", str(tmp_path / f"{name}.svg")]) == 0
+    assert {"free: 1", "fixed: 1", "moving: 1"} <= set(_comments(words_of(tmp_path / "named.svg")))
+    assert "ground of blockvis new, moving: 1" in _comments(words_of(tmp_path / "wall.svg"))
