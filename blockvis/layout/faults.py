@@ -58,7 +58,7 @@ def faults_of(layout: Layout, known: Sequence[int] = ()) -> Faults:
     blocks = {k for k, places in crossings.items() if len(places)} | set(known)
     return Faults(
         tuple(sorted(blocks)),
-        crossings=np.concatenate([np.zeros((0, 2)), *crossings.values()]),
+        crossings=np.concatenate([*crossings.values(), crossings_left_out(layout)]),
         ends=np.zeros((0, 2)) if blocks else _open_ends(layout),
     )
 
@@ -75,6 +75,14 @@ def no_blocks(shapes: Sequence[Outline | Solid]) -> list[int]:
         except ValueError:
             refused.append(k)
     return refused
+
+
+def crossings_left_out(layout: Layout) -> np.ndarray:
+    """(n, 2) array [m]: where outlines cross themselves that were left out unasked."""
+    # A line that is drawn there and back is no crossing.
+    other = ("asked", "no area", "sliver")
+    rings = [item.points for item in layout.left_out if item.closed and item.kind not in other]
+    return np.concatenate([np.zeros((0, 2)), *map(_crossings, rings)])
 
 
 def _crossings(ring: np.ndarray) -> np.ndarray:

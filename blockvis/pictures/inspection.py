@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blockvis.layout.faults import faults_of, no_blocks
+from blockvis.layout.faults import crossings_left_out, faults_of, no_blocks
 from solver import mechanics
 
 from . import palette
@@ -112,6 +112,8 @@ def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) 
             laid = tuple(first + k for k, given in enumerate(ground.roles) if given == role)
             kinds.append(Kind(f"ground of blockvis new, {role}", colour, laid, hatch))
     middles = [_overlap(layout, i, j) for i, j, _ in deep[:MOST_NAMED]]
+    crossings = crossings_left_out(layout) if layout.dimension == 2 else np.zeros((0, 3))
+    counted = (("deepest overlaps", len(middles)), ("crosses itself", len(crossings)))
     in_space = " in space" if layout.dimension == 3 else ""
     return Contents(
         layout=layout,
@@ -120,8 +122,8 @@ def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) 
         kinds=tuple(kind for kind in kinds if kind.blocks),
         named=tuple(kept),
         marked=wrong[:MOST_NAMED],
-        rings=np.array(middles).reshape(-1, layout.dimension),
-        rings_are=f"deepest overlaps: {len(middles)}",
+        rings=np.concatenate([np.array(middles).reshape(-1, layout.dimension), crossings]),
+        rings_are=", ".join(f"{what}: {n}" for what, n in counted if n),
         joints=inspection.joints,
     )
 

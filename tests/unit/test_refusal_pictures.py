@@ -8,6 +8,9 @@ from blockvis import inspect, read_layout, save_layout
 from blockvis.cli import main
 from blockvis.layout.assemble import supports_of
 from blockvis.layout.faults import faults_of
+from blockvis.layout.inspect import inspected
+from blockvis.layout.layout import Layout
+from blockvis.layout.left_out import LeftOut
 from blockvis.layout.refusal import Refused
 from blockvis.pictures.inspection import draw_inspection, draw_refusal
 
@@ -69,15 +72,24 @@ def test_ends_that_meet_are_not_open(tmp_path):
     assert sorted(faults_of(refused.value.layout).ends.tolist()) == [[0, 0], [1, 1]]
 
 
+CROSSED = np.array([[0, 0.5], [2, 0.5], [0, 2.5], [1, 2.5]])
+
+
 def test_an_outline_that_crosses_itself_is_ringed_and_named(tmp_path):
-    crossed = [[0, 0.5], [2, 0.5], [0, 2.5], [1, 2.5]]
-    with pytest.raises(Refused, match="crosses itself") as refused:
-        inspect(drawing(tmp_path / "a.dxf", (box(0), True), (box(1), True), (crossed, True)))
+    layout = Layout((np.array(box(0)), np.array(box(1)), CROSSED), ("a", "b", "c"))
+    with pytest.raises(Refused, match=r"'c'\) crosses itself") as refused:
+        inspected(layout)
     faults = faults_of(refused.value.layout)
     assert faults.blocks == (2,)
     assert faults.crossings == pytest.approx(np.array([[2 / 3, 11 / 6]]))
     draw_refusal(refused.value, tmp_path / "a.svg")
     assert {"read: 2", "refused: 1", "crosses itself: 1"} <= set(_comments(words_of(tmp_path / "a.svg")))
+
+
+def test_an_outline_that_is_left_out_for_crossing_itself_is_ringed(tmp_path):
+    layout = Layout((np.array(box(0)), np.array(box(1))), ("a", "b"), left_out=(LeftOut("across", CROSSED, ""),))
+    path = draw_inspection(inspected(layout), tmp_path / "a.svg")
+    assert {"left out: 1", "crosses itself: 1"} <= set(_comments(words_of(path)))
 
 
 def test_coordinates_of_what_a_reader_refuses_are_those_of_the_file(tmp_path):
