@@ -651,14 +651,34 @@ def _write_report(response: solver.Response, folder: Path) -> Fall | None:
 
 
 def _info(options: argparse.Namespace) -> int:
+    from dataclasses import replace
+
+    from .case_files.new_case import ground_of
     from .formats.read import inspect
-    from .pictures.inspection import draw_inspection
+    from .layout.assemble import supports_of
+    from .layout.refusal import Refused
+    from .layout.roles import roles_of
+    from .pictures.inspection import draw_inspection, draw_refusal
 
     choice = _choice(options)
-    found = inspect(options.file, unit=options.unit, dimension=_dimension(options), **choice)
+    try:
+        found = inspect(options.file, unit=options.unit, dimension=_dimension(options), **choice)
+    except Refused as refused:
+        if options.picture:
+            # Why there is no picture does not replace why there are no blocks.
+            try:
+                drawn = draw_refusal(refused, options.picture)
+                print("nothing was read that could be drawn" if drawn is None else f"drawn in {drawn}")
+            except (ValueError, OSError) as error:
+                print(f"blockvis: no picture: {error}", file=sys.stderr)
+        raise
     print(found)
     if options.picture:
-        print(f"drawn in {draw_inspection(found, options.picture)}")
+        # As blockvis new would have it: supports by their names, and a ground below.
+        ground = ground_of(found)
+        found = replace(found, roles=tuple(roles_of(found.layout, ground.roles)))
+        laid = supports_of(ground.supports, found.layout.dimension)
+        print(f"drawn in {draw_inspection(found, options.picture, ground=laid)}")
     return 0
 
 

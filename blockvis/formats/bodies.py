@@ -16,6 +16,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut, matches
 from blockvis.layout.notes import CHANGED, Note
 from blockvis.layout.outlines import outlines_of_cells, rectangle
+from blockvis.layout.refusal import Refused
 from blockvis.layout.selection import MORTAR
 from blockvis.layout.solids import volume
 from blockvis.layout.views import VIEWS, axis_across, view_along
@@ -129,6 +130,30 @@ class _Seen:
         return float(np.ptp(self.low) + np.ptp(self.high - self.low))
 
 
+def as_drawn(found: Layout | Bodies) -> Layout:
+    """Make a layout of bodies of whatever shape, triangle by triangle, for a picture of what is refused."""
+    if isinstance(found, Layout):
+        return found
+    blocks = []
+    for body in _drawable(found):
+        own, number = np.unique(body.faces, return_inverse=True)
+        points = body.points[own]
+        turned = points[:, [0, 2, 1]] * [1.0, -1.0, 1.0] if found.up == "y" else points
+        blocks.append((turned, number.reshape(-1, 3).tolist()))
+    return Layout(blocks=tuple(blocks), names=tuple(body.name for body in _drawable(found)), unit=found.unit)
+
+
+def _drawable(found: Bodies) -> list[Body]:
+    # Half of an .obj file has points of one coordinate.
+    whole = [body for body in found.bodies if len(body.faces) and body.points.shape[1] == 3]
+    return [body for body in whole if np.isfinite(body.points[body.faces]).all()]
+
+
+def _refused(message: str, found: Bodies, wrong: Body) -> Refused:
+    """Refuse bodies for one of them."""
+    return Refused(message, as_drawn(found), [k for k, body in enumerate(_drawable(found)) if body is wrong])
+
+
 def layout_of_bodies(
     found: Bodies,
     path: Path | str,
@@ -212,18 +237,23 @@ def solids_of_bodies(
     asked = _asked(found, path, ignore, only)
     lying = found.up == "y" if view is None else view == "xy"
     solids, warped, changed = [], [], []
+
     for body in asked.bodies:
         plane = with_plane_faces(body.points, body.faces)
         points, faces = plane.solid
         if len(faces) > MOST_FACES:
-            raise ValueError(
+            raise _refused(
                 f"'{path}': body '{body.name}' has {len(faces)} faces, more than {MOST_FACES}; simplify it to the "
-                "plane faces of a stone"
+                "plane faces of a stone",
+                found,
+                body,
             )
         if not volume(points, faces) > NO_VOLUME * asked.size**3:
             x, y, z = points.mean(axis=0)
-            raise ValueError(
-                f"'{path}': body '{body.name}' around ({x:.6g}, {y:.6g}, {z:.6g}) has no volume; remove or redraw it"
+            raise _refused(
+                f"'{path}': body '{body.name}' around ({x:.6g}, {y:.6g}, {z:.6g}) has no volume; remove or redraw it",
+                found,
+                body,
             )
         if plane.warp:
             warped.append((plane.warp, body.name, plane.place))

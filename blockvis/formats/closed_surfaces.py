@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,9 +11,10 @@ import numpy as np
 from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import FLAT
+from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.surfaces import same_points, turned_faces
 
-from .bodies import Body, fans
+from .bodies import Bodies, Body, as_drawn, fans
 from .reading import Reading
 
 #: Points closer than this fraction of the size of the drawing are one: single precision is accurate to 6e-8.
@@ -24,7 +25,7 @@ SAME_POINT = 2e-6
 SAME_ANGLE = 1e-4
 
 
-class OpenSurface(ValueError):
+class OpenSurface(Refused):
     """A surface that encloses nothing."""
 
 
@@ -169,13 +170,13 @@ class Enclosed:
 
 
 def enclosed(
-    parts: Iterable[tuple[str, np.ndarray, np.ndarray]], size: float, path: Path | str, reading: Reading | None = None
+    parts: Sequence[tuple[str, np.ndarray, np.ndarray]], size: float, path: Path | str, reading: Reading | None = None
 ) -> Enclosed:
     """Find the closed bodies of the parts of a file; plane ones, and open ones that nobody wants, are left out.
 
     Parameters
     ----------
-    parts : iterable of (name, (n, 3) points, (m, 3) faces)
+    parts : sequence of (name, (n, 3) points, (m, 3) faces)
     size : float
         Of the drawing, in the unit of the points.
     path : Path or str
@@ -193,22 +194,23 @@ def enclosed(
     owners: list[int] = []
     plane, unwanted = [], []
     first: OpenSurface | None = None
-    for number, (name, points, faces) in enumerate(parts):
-        try:
-            found = closed_bodies(name, points, faces, size, path)
-        except ValueError as error:
-            if reading is not None and not reading.wants([name]):
-                unwanted.append(name)
-            elif isinstance(error, OpenSurface) and _is_plane(points[np.unique(faces)], size):
-                plane.append(name)
-            else:
-                raise
-            first = first or (error if isinstance(error, OpenSurface) else None)
-            continue
-        bodies += found
-        owners += [number] * len(found)
-    if not bodies and first is not None:
-        raise first
+    with carrying(lambda: as_drawn(Bodies(tuple(Body(*part) for part in parts), ()))):
+        for number, (name, points, faces) in enumerate(parts):
+            try:
+                found = closed_bodies(name, points, faces, size, path)
+            except ValueError as error:
+                if reading is not None and not reading.wants([name]):
+                    unwanted.append(name)
+                elif isinstance(error, OpenSurface) and _is_plane(points[np.unique(faces)], size):
+                    plane.append(name)
+                else:
+                    raise
+                first = first or (error if isinstance(error, OpenSurface) else None)
+                continue
+            bodies += found
+            owners += [number] * len(found)
+        if not bodies and first is not None:
+            raise first
     notes = [without_volume(plane)] if plane else []
     if unwanted:
         notes.append(Note(LEFT_OUT, f"left out: {_listed(unwanted)}, no closed body, as asked for"))
@@ -255,8 +257,8 @@ def bodies_of_surfaces(
         Named in messages.
     reading : Reading, optional
     """
-    parts = (
+    parts = [
         (name, points, fans([rings[k].tolist() for k in np.flatnonzero(owner == whose).tolist()]))
         for whose, name in enumerate(names)
-    )
+    ]
     return enclosed(parts, float(np.ptp(points, axis=0).max()), path, reading)

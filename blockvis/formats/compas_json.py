@@ -23,7 +23,7 @@ from solver import mechanics
 
 from .bodies import Bodies, fans
 from .cells import layout_of_cells
-from .closed_surfaces import closed_bodies, without_volume
+from .closed_surfaces import enclosed, without_volume
 from .reading import Reading
 
 #: Objects nested deeper than this are not looked into.
@@ -95,12 +95,14 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | Bodies 
     if len(planes) < len(meshes):
         # A single face among bodies is a ground without depth.
         meshes = [mesh for mesh in meshes if len(mesh.faces) > 1]
-    bodies, rows, notes = [], [], [] if len(planes) == 0 else [_without_volume(planes)]
-    for mesh in meshes:
-        row = {key: value for key, value in mesh.row.items() if key != "key"}
-        for body in closed_bodies(str(row["name"]), mesh.points, fans(mesh.faces), size, path):
-            bodies.append(body)
-            rows.append({**row, "name": body.name})
+    notes = [] if len(planes) == 0 else [_without_volume(planes)]
+    parts = [(str(mesh.row["name"]), mesh.points, fans(mesh.faces)) for mesh in meshes]
+    closed = enclosed(parts, size, path, reading)
+    bodies, notes = closed.bodies, [*notes, *closed.notes]
+    rows = [
+        {**{key: value for key, value in meshes[k].row.items() if key != "key"}, "name": body.name}
+        for body, k in zip(bodies, closed.owners.tolist(), strict=True)
+    ]
     return Bodies(tuple(bodies), tuple(rows), notes=(f"{len(bodies)} blocks of COMPAS", *notes))
 
 

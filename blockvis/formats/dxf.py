@@ -19,6 +19,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import CHANGED, LEFT_OUT, UPRIGHT, Note, kind_of
 from blockvis.layout.outlines import FLAT, arc_points
+from blockvis.layout.refusal import Refused
 from blockvis.layout.units import metres_per
 from blockvis.layout.views import VIEWS, axis_across, upright_note
 
@@ -131,8 +132,10 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     if not found.rings and all(item.kind == "open" for item in found.left_out):
         seen = ", ".join(f"{n} {kind}" for kind, n in found.skipped.items())
         listed = "; ".join(words for words in (nothing_closed(faces), seen) if words) or "nothing"
-        raise ValueError(
-            f"'{path}' has no closed outline in its model space (found: {listed}); draw each block as a closed polyline"
+        raise Refused(
+            f"'{path}' has no closed outline in its model space (found: {listed}); draw each block as a closed "
+            "polyline",
+            Layout((), (), unit=stated, left_out=tuple(found.left_out)),
         )
     found.notes += _faults(audit) + _elevations(found, reading.view)
     return _layout(found, faces, stated)

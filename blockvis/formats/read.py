@@ -17,6 +17,7 @@ from blockvis.layout.assemble import assemble
 from blockvis.layout.inspect import Inspection, inspected
 from blockvis.layout.layout import Layout, layout_of, standing
 from blockvis.layout.outlines import without_collinear
+from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.remedies import deep_overlaps, proposed_ignore
 from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.selection import as_asked, noted, sorted_out
@@ -25,7 +26,7 @@ from blockvis.layout.views import checked_dimension, checked_view
 from blockvis.layout.window import checked_window, within_window
 from blockvis.system.atomic_files import whole_file, write_whole
 
-from .bodies import Bodies, in_dimension
+from .bodies import Bodies, as_drawn, in_dimension
 from .cells import of_files
 from .elsewhere import cannot_read
 from .files import MissingFile as MissingFile
@@ -98,19 +99,46 @@ def read_layout(
         With the reason and the remedy, for a file that is missing, damaged or no layout.
     """
     ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
-    corners = checked_window(window)
-    layout = _outlines(Path(path), unit, chord_tolerance, view, ignore, only, dimension, image)
-    if layout.dimension == 3:
+    try:
+        layout = _blocks(
+            Path(path), unit, chord_tolerance, view, ignore, only, checked_window(window), dimension, image
+        )
+    except Refused as error:
+        if error.layout is not None and not error.layout.source:
+            # Readers name places in the unit of the file, and so does the picture beside what they say.
+            error.unit = unit or error.layout.unit or "unit of the file"
+            error.layout = replace(error.layout, source=str(path))
+        raise
+    return standing(layout, thickness) if dimension == 3 and layout.dimension == 2 else layout
+
+
+def _blocks(
+    path: Path,
+    unit: str | None,
+    chord_tolerance: float | None,
+    view: str | None,
+    ignore: tuple[str, ...],
+    only: tuple[str, ...],
+    corners: tuple[float, ...],
+    dimension: int | str,
+    image: ImageKeys,
+) -> Layout:
+    """Read what a file draws, in metres, without what is no block."""
+    drawn = _outlines(path, unit, chord_tolerance, view, ignore, only, dimension, image)
+    if drawn.dimension == 3:
         if corners:
             raise ValueError(f"'{path}' was read in space, and window is of the plane; choose blocks by ignore or only")
-        return noted(layout)
-    layout = sorted_out(layout, ignore, only, corners)
-    for name, ring in zip(layout.names, layout.outlines, strict=True):
+        return noted(drawn)
+    with carrying(lambda: drawn):
+        layout = sorted_out(drawn, ignore, only, corners)
+    for k, (name, ring) in enumerate(zip(layout.names, layout.outlines, strict=True)):
         if len(ring) > MOST_CORNERS:
-            raise ValueError(
-                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer"
+            raise Refused(
+                f"'{path}': block '{name}' has {len(ring)} corners, more than {MOST_CORNERS}; draw it with fewer",
+                layout,
+                [k],
             )
-    return standing(layout, thickness) if dimension == 3 else layout
+    return layout
 
 
 def read_outlines(
@@ -157,7 +185,8 @@ def _outlines(
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
     content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)
-    layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
+    with carrying(lambda: as_drawn(content)):
+        layout = _in_dimension(content, path, checked_dimension(dimension), view, ignore, only)
     layout = replace(layout, source=str(path))
     if layout.dimension == 3:
         return _in_metres(layout, unit)
@@ -198,7 +227,8 @@ def _apart(content: Layout | Bodies, path: Path) -> Layout | Bodies:
 
 def _in_metres(layout: Layout, unit: str | None) -> Layout:
     """Choose the unit of a layout, and check its coordinates."""
-    chosen, note = chosen_unit(unit, layout.unit, layout.sizes)
+    stated = unit or layout.unit or "m"
+    chosen, note = chosen_unit(unit, layout.unit, layout.sizes) if layout.n_blocks else (stated, "")
     factor = metres_per(chosen)
     layout = replace(
         layout,

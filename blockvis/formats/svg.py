@@ -25,6 +25,7 @@ from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import LARGEST_CHORD
+from blockvis.layout.refusal import Refused
 from blockvis.layout.units import UNITS, metres_per
 from solver import mechanics
 
@@ -107,8 +108,9 @@ def read(path: Path, reading: Reading) -> Layout:
     faces = _with_loose(found, reading)
     if not found.rings and all(item.kind == "open" for item in found.left_out):
         rest = "; ".join(words for words in (nothing_closed(faces), *_pattern_fills(root)) if words)
-        raise ValueError(
-            f"'{path}' has no closed shape{f': {rest}' if rest else ''}; draw each block as a closed path or polygon"
+        raise Refused(
+            f"'{path}' has no closed shape{f': {rest}' if rest else ''}; draw each block as a closed path or polygon",
+            Layout((), (), unit=stated, left_out=tuple(item.mapped((1.0, -1.0)) for item in found.left_out)),
         )
     every = np.concatenate([*found.rings, *(item.points for item in found.left_out)])
     found.notes += faces.notes + joined_note(found.misses, float(np.ptp(every, axis=0).max()))

@@ -144,7 +144,31 @@ def _filled(given: np.ndarray | None, default: float, n: int) -> np.ndarray:
 def _with_supports(layout: Layout, supports: Sequence[Mapping[str, Any]]) -> Layout:
     if not supports:
         return layout
-    in_space = layout.dimension == 3
+    laid = supports_of(supports, layout.dimension)
+    of_blocks = {key: getattr(laid, key) for key in ("names", "roles", "materials", "density", "thickness")}
+    return layout.with_more(laid.blocks, **of_blocks)
+
+
+def supports_of(supports: Sequence[Mapping[str, Any]], dimension: int) -> Layout:
+    """Make a layout of supports that a drawing does not contain.
+
+    Parameters
+    ----------
+    supports : sequence of mappings
+        As of :func:`assemble`.
+    dimension : {2, 3}
+        Of the drawing.
+
+    Returns
+    -------
+    Layout
+
+    Raises
+    ------
+    ValueError
+        Names the support and the key.
+    """
+    in_space = dimension == 3
     known = {"name", "role", "outline", "density", "material", "levels" if in_space else "thickness"}
     names = [str(support.get("name", f"support {k}")) for k, support in enumerate(supports)]
     blocks, roles = [], []
@@ -158,13 +182,13 @@ def _with_supports(layout: Layout, supports: Sequence[Mapping[str, Any]]) -> Lay
         outline = _outline_of(support, name)
         blocks.append(prism(outline, *_levels_of(support, name)) if in_space else outline)
         roles.append(checked_role(str(support.get("role", mechanics.FIXED)), f"support '{name}'"))
-    return layout.with_more(
-        blocks,
-        names=names,
-        roles=roles,
-        materials=[str(support.get("material", "")) for support in supports],
-        density=[float(support.get("density", np.nan)) for support in supports],
-        thickness=[float(support.get("thickness", np.nan)) for support in supports],
+    return Layout(
+        blocks=tuple(blocks),
+        names=tuple(names),
+        roles=tuple(roles),
+        materials=tuple(str(support.get("material", "")) for support in supports),
+        density=np.array([float(support.get("density", np.nan)) for support in supports]),
+        thickness=None if in_space else np.array([float(support.get("thickness", np.nan)) for support in supports]),
     )
 
 

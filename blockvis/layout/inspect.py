@@ -19,6 +19,7 @@ from .joints.close import Proposal, proposed
 from .joints.facing_edges import Facing
 from .layout import Layout
 from .notes import UNIT_CLASH, kind_of
+from .refusal import carrying
 from .repair import DEFAULT_OVERLAP, ROUNDING, duplicates, overlaps
 from .roles import dropped_twins, roles_of
 from .simplify import default_tolerance, simplified
@@ -176,6 +177,11 @@ def inspected(layout: Layout) -> Inspection:
     Returns
     -------
     Inspection
+
+    Raises
+    ------
+    Refused
+        For outlines in the plane that are no blocks.
     """
     twins = duplicates(layout.every_corner)
     dropped = dropped_twins(layout, twins, {})
@@ -183,7 +189,8 @@ def inspected(layout: Layout) -> Inspection:
     drawn = layout.chosen(kept)
     roles = tuple(roles_of(layout, {}))
     free = np.array([roles[i] == mechanics.FREE for i in kept])
-    found = _in_space(drawn, free) if layout.dimension == 3 else _in_the_plane(drawn)
+    with carrying(lambda: drawn):
+        found = _in_space(drawn, free) if layout.dimension == 3 else _in_the_plane(drawn)
     for key in ("overlapping", "open_joints"):
         found[key] = tuple((int(kept[i]), int(kept[j]), by) for i, j, by in found.get(key, ()))
     return Inspection(

@@ -16,9 +16,6 @@ from solver import mechanics
 
 from . import palette
 
-#: Names of fewer pixels are not written.
-SMALLEST_NAME = 8
-
 #: Height of the text as a fraction of the height of the picture, and its least size in pixels.
 TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 36.0, 12
 
@@ -297,26 +294,12 @@ def write_labels(
             return
 
 
-def write_names(picture: Image.Image, names: Sequence[str], places: np.ndarray, room: np.ndarray) -> None:
-    """Write names on a picture where they fit, with a pale rim.
-
-    Parameters
-    ----------
-    picture : PIL.Image.Image
-        Drawn upon.
-    names : sequence of str
-    places : (n, 2) array [pixel]
-        The middle of each name.
-    room : (n,) array [pixel]
-        How wide it may be.
-    """
-    draw = ImageDraw.Draw(picture)
-    largest = round(picture.height / 55.0)
-    for name, (x, y), wide in zip(names, places.tolist(), room.tolist(), strict=True):
-        # A letter is some 0.6 of its size wide.
-        size = min(largest, int(0.85 * wide / (0.6 * max(len(name), 1))))
-        if size >= SMALLEST_NAME:
-            draw.text((x, y), name, palette.INK, _font(size), anchor="mm", stroke_width=2, stroke_fill=(255, 255, 255))
+def room_in(ring: np.ndarray) -> np.ndarray:
+    """(2,) array: width and height of a box in the shape of that around an outline (n, 2), as large as the outline."""
+    width, height = np.ptp(ring, axis=0)
+    x, y = (ring - ring[0]).T
+    area = 0.5 * abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum()))
+    return np.array([width, height]) * np.sqrt(area / (width * height) if width * height else 0.0)
 
 
 def _swatch(draw: ImageDraw.ImageDraw, key: Key, x: float, y: float, wide: float, text: float) -> None:

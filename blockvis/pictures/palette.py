@@ -22,6 +22,12 @@ SETTLEMENT = (0, 121, 107)
 MOVING = (127, 187, 180)
 LIVE = (190, 24, 118)
 WARNING = (190, 30, 30)
+#: Blocks as drawn, before any analysis: all, drawn twice, refused, not standing; and what was left out.
+DRAWN = (239, 230, 212)
+TWICE = (91, 143, 214)
+REFUSED = (214, 96, 91)
+FALLS = (244, 176, 97)
+LEFT_OUT = (176, 90, 200)
 
 #: Fills by material, in the order of their sorted names: sandstone, brick, slate, tuff, moss, ash.
 STONES = np.array(

@@ -18,9 +18,9 @@ import solver
 from solver import mechanics
 
 from . import palette
-from .frame import Frame
+from .frame import Frame, framed, room_in
 from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes
-from .solid_view import View
+from .solid_view import ABOVE, AROUND, View, showing_faces
 from .surface import sharp_edges, triangles_of
 from .swing import Swing
 
@@ -311,6 +311,41 @@ class SolidScene:
         )  # fmt: skip
         drawn_forward(actor, forward)
         self._layers[layer] = actor
+
+
+def blocks_picture(assembly: solver.Assembly, size: tuple[int, int], fill: np.ndarray) -> Image.Image:
+    """Draw blocks in space where the layout has them, ``size`` pixels wide and high, in colours (n_blocks, 3) uint8."""
+    view = View(AROUND[0], ABOVE)
+    frame = framed(assembly, [solver.Pose.initial(assembly)], margin=0.04, supports=1.0, axes=view.axes[:2])
+    scene = SolidScene(assembly, view, frame, size, fill)
+    picture = scene.image()
+    scene.close()
+    return picture
+
+
+def seen_faces(scene: SolidScene) -> tuple[np.ndarray, np.ndarray]:
+    """Find where the name of each block can stand: on the face that shows most of itself in the last picture.
+
+    Parameters
+    ----------
+    scene : SolidScene
+
+    Returns
+    -------
+    places : (n_blocks, 3) array [m]
+        Middle of that face.
+    room : (n_blocks, 2) array [m]
+        Its width and height in the picture; 0 where something hides it.
+    """
+    shapes = scene.assembly.polyhedra
+    places, best, showing = showing_faces(shapes, scene.view.axes[2])
+    flat = scene.view.projected(shapes.vertices)
+    room = np.zeros((len(shapes), 2))
+    for block, face in enumerate(best.tolist()):
+        ring = flat[shapes.corners[shapes.face_offsets[face] : shapes.face_offsets[face + 1]]]
+        room[block] = room_in(ring)
+    room[(showing <= 0.0) | ~scene.sees(places)] = 0.0
+    return places, room
 
 
 def drawn_forward(actor: Any, by: float) -> None:

@@ -70,10 +70,14 @@ def _cut(corners: np.ndarray) -> np.ndarray:
 
 
 def sharp_edges(shapes: mechanics.Polyhedra) -> np.ndarray:
-    """(n, 2) int array: vertices at both ends of each edge between faces that are not in one plane."""
+    """(n, 2) int array: vertices at both ends of each edge but those between two faces in one plane."""
     normals = shapes.faces(shapes.vertices).normals[shapes.face_of_corner]
-    twins = shapes.twins
-    sharp = (normals * normals[twins]).sum(axis=1) < FLAT
-    once = np.arange(len(twins)) < twins
-    corners = np.flatnonzero(sharp & once)
-    return np.stack([shapes.corners[corners], shapes.corners[shapes.next_corner[corners]]], axis=1)
+    ends = np.sort(np.stack([shapes.corners, shapes.corners[shapes.next_corner]], axis=1), axis=1).astype(np.int64)
+    # Surfaces that are refused are drawn, too: their edges may be of one face, or of more than two.
+    _, once, edge, counts = np.unique(
+        ends @ [len(shapes.vertices), 1], return_index=True, return_inverse=True, return_counts=True
+    )
+    total = np.stack([np.bincount(edge.ravel(), normal) for normal in normals.T], axis=1)
+    # Of two unit vectors, half the square of their sum is one more than their product.
+    flat = (counts == 2) & (0.5 * (total**2).sum(axis=1) - 1.0 >= FLAT)
+    return np.asarray(ends[once[~flat]])

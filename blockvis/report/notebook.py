@@ -122,7 +122,7 @@ def assembly_html(assembly: solver.Assembly) -> str:
 
 def _drawn_in_space(assembly: solver.Assembly) -> str:
     """Draw blocks in space as PNG, at twice the pixels that it is shown with."""
-    from blockvis.pictures.solid_inspection import blocks_picture
+    from blockvis.pictures.solid_scene import blocks_picture
 
     buffer = io.BytesIO()
     blocks_picture(assembly, (2 * WIDE, 2 * HIGH), palette.role_colours(assembly)).save(buffer, "PNG")

@@ -8,6 +8,7 @@ import pytest
 
 import solver
 from blockvis import inspect, save_layout
+from blockvis.pictures import palette
 from blockvis.pictures.inspection import draw_inspection
 
 FACADE = Path(__file__).resolve().parents[3] / "shared" / "data" / "facade" / "facade.dxf"
@@ -47,8 +48,8 @@ def test_picture(layout, tmp_path):
     from PIL import Image
 
     colours = {colour for _, colour in Image.open(path).convert("RGB").getcolors(1 << 24)}
-    # Blocks, the duplicate and the overlap are there in their colours.
-    assert {(0xEF, 0xE6, 0xD4), (0x5B, 0x8F, 0xD6), (0xD6, 0x60, 0x5B)} <= colours
+    # A support, the duplicate and the overlap are there in their colours.
+    assert {palette.SUPPORT, palette.TWICE, palette.REFUSED} <= colours
 
 
 @pytest.mark.skipif(not FACADE.exists(), reason="third-party drawing, not part of the project")

@@ -1,0 +1,128 @@
+"""What is wrong with the shapes of a drawing, and where: outlines that cross themselves, open surfaces, open lines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+import solver
+
+from .layout import Layout, Outline
+from .solids import Solid
+from .surfaces import same_points
+
+#: Points nearer to each other than this fraction of the size of what they belong to are one.
+SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Faults:
+    """Places to look at in a drawing that is refused.
+
+    Attributes
+    ----------
+    blocks : tuple of int
+        Blocks that are none by themselves.
+    crossings : (n, 2) array [m]
+        Where outlines cross themselves.
+    ends : (n, 2) array [m]
+        Ends of lines at which no other line begins.
+    edges : (n, 2, 3) array [m]
+        Edges of surfaces that do not belong to two faces.
+    """
+
+    blocks: tuple[int, ...] = ()
+    crossings: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    edges: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
+
+
+def faults_of(layout: Layout, known: Sequence[int] = ()) -> Faults:
+    """Find what is wrong with the shapes of a drawing.
+
+    Parameters
+    ----------
+    layout : Layout
+        As read: its blocks may have any shape.
+    known : sequence of int
+        Blocks that are at fault for a reason that their shape does not show.
+    """
+    if layout.dimension == 3:
+        open_edges = [_open_edges(*solid) for solid in layout.solids]
+        blocks = {k for k, edges in enumerate(open_edges) if len(edges)} | set(known)
+        return Faults(tuple(sorted(blocks)), edges=np.concatenate([np.zeros((0, 2, 3)), *open_edges]))
+    # Debris has no area, and is no reason to refuse anything: what crosses itself is.
+    crossings = {k: _crossings(layout.outlines[k]) for k in no_blocks(layout.outlines)}
+    blocks = {k for k, places in crossings.items() if len(places)} | set(known)
+    return Faults(
+        tuple(sorted(blocks)),
+        crossings=np.concatenate([*crossings.values(), crossings_left_out(layout)]),
+        ends=np.zeros((0, 2)) if blocks else _open_ends(layout),
+    )
+
+
+def no_blocks(shapes: Sequence[Outline | Solid]) -> list[int]:
+    """Numbers of the outlines or solids that the solver refuses each by itself."""
+    refused = []
+    for k, shape in enumerate(shapes):
+        try:
+            if isinstance(shape, tuple):
+                solver.Assembly.from_solids([shape])
+            else:
+                solver.Assembly.from_outlines([shape])
+        except ValueError:
+            refused.append(k)
+    return refused
+
+
+def crossings_left_out(layout: Layout) -> np.ndarray:
+    """(n, 2) array [m]: where outlines cross themselves that were left out unasked."""
+    # A line that is drawn there and back is no crossing.
+    other = ("asked", "no area", "sliver")
+    rings = [item.points for item in layout.left_out if item.closed and item.kind not in other]
+    return np.concatenate([np.zeros((0, 2)), *map(_crossings, rings)])
+
+
+def _crossings(ring: np.ndarray) -> np.ndarray:
+    """(n, 2) array: where an outline meets itself."""
+    import shapely
+
+    if len(ring) < 3 or not np.isfinite(ring).all():
+        return np.zeros((0, 2))
+    lines = shapely.get_parts(shapely.node(shapely.LinearRing(ring)))
+    ends = np.array([line.coords[k] for line in lines for k in (0, -1)])
+    same = same_points(ends, SAME * float(np.ptp(ring, axis=0).max()))
+    # A ring that is cut where it meets nothing has two ends there.
+    places, counts = np.unique(same, return_counts=True)
+    return np.asarray(ends[places[counts > 2]])
+
+
+def _open_ends(layout: Layout) -> np.ndarray:
+    """(n, 2) array [m]: ends of lines that close nothing, where no other line is near."""
+    import shapely
+
+    lines = [item.points for item in layout.left_out if item.kind == "open" and len(item.points) > 1]
+    if not lines:
+        return np.zeros((0, 2))
+    near = SAME * float(np.ptp(np.concatenate(lines), axis=0).max())
+    tree = shapely.STRtree([shapely.LineString(points) for points in lines])
+    ends = np.array([points[k] for points in lines for k in (0, -1)])
+    end, other = tree.query(shapely.points(ends), "dwithin", near)
+    met = np.zeros(len(ends), dtype=bool)
+    met[end[other != end // 2]] = True
+    closed = [bool(np.linalg.norm(points[0] - points[-1]) <= near) for points in lines]
+    return np.asarray(ends[~met & ~np.repeat(closed, 2)])
+
+
+def _open_edges(points: np.ndarray, faces: Sequence[Sequence[int]]) -> np.ndarray:
+    """(n, 2, 3) array: edges of a surface that are those of one face, or of more than two."""
+    if not np.isfinite(points).all():
+        return np.zeros((0, 2, 3))
+    same = same_points(points, SAME * float(np.ptp(points, axis=0).max()))
+    pairs = np.array([(face[k - 1], face[k]) for face in faces for k in range(len(face))])
+    edges = np.sort(same[pairs], axis=1)
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    unique, counts = np.unique(edges, axis=0, return_counts=True)
+    return np.asarray(points[unique[counts != 2]])

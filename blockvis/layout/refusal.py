@@ -1,0 +1,51 @@
+"""A drawing that is refused, with what it draws: a picture can show then why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+from .layout import Layout
+
+
+class Refused(ValueError):
+    """A drawing that no blocks can be made of.
+
+    Parameters
+    ----------
+    message : str
+        One line: what is wrong, where, and what to do.
+    layout : Layout, optional
+        What was read, as far as that went: outlines may cross themselves, surfaces may be open, and there may be lines
+        only.
+    blocks : sequence of int
+        Blocks of the layout that are at fault, where that is known.
+
+    Attributes
+    ----------
+    unit : str
+        Of the coordinates: m, or that of the file where it was refused as it was read.
+    """
+
+    def __init__(self, message: str, layout: Layout | None = None, blocks: Sequence[int] = ()) -> None:
+        super().__init__(message)
+        self.layout, self.blocks, self.unit = layout, tuple(blocks), "m"
+
+
+@contextmanager
+def carrying(drawn: Callable[[], Layout]) -> Iterator[None]:
+    """Give what is refused within the geometry that it is about.
+
+    Parameters
+    ----------
+    drawn : callable
+        Makes the layout; called where something is refused only.
+    """
+    try:
+        yield
+    except Refused as error:
+        if error.layout is None:
+            error.layout = drawn()
+        raise
+    except ValueError as error:
+        raise Refused(str(error), drawn()) from error
