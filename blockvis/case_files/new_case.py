@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from blockvis.case_files import case_keys
 from blockvis.cases.build import DENSITY
 from blockvis.cases.key import Key, Section
+from blockvis.layout.ground import Ground, block_size, ground_of, with_role
 from blockvis.layout.inspect import Inspection
 from blockvis.text import as_key, as_toml, rounded_length
 from solver import mechanics
@@ -25,36 +25,11 @@ INCREMENT, LIMIT = 0.05, 1.0
 #: Friction of dry masonry joints where nothing is known, and a density that most stones and bricks are near.
 FRICTION = 0.6
 
-#: Parts of the names and layers of blocks that are supports, where the drawing says nothing of roles.
-SUPPORT_WORDS = ("springer", "support", "ground", "foundation", "footing", "abutment", "bearing")
-
 #: Keys of a drawing in the plane, which one in space does not have.
 _IN_THE_PLANE = ("thickness", "closing", "outline_tolerance")
 
 #: Characters of a line of comment.
 WIDTH = 100
-
-
-@dataclass(frozen=True)
-class Ground:
-    """What stands and what settles.
-
-    Attributes
-    ----------
-    says : str
-        How it was found.
-    roles : mapping of str to str
-        To write under [roles].
-    supports : tuple of mappings
-        To write as [[supports]].
-    settles : bool
-        Whether there is a moving support.
-    """
-
-    says: str
-    roles: Mapping[str, str] = field(default_factory=dict)
-    supports: tuple[Mapping[str, Any], ...] = ()
-    settles: bool = True
 
 
 def case_text(
@@ -143,102 +118,9 @@ def relative_to(folder: Path, drawing: str | Path) -> str:
     return Path(path).as_posix()
 
 
-def block_size(found: Inspection) -> float:
-    """Find the distance across the median free block [m]."""
-    across = [float(np.linalg.norm(np.ptp(found.layout.corners(i), axis=0))) for i in _with_role(found, mechanics.FREE)]
-    return float(np.median(across)) if across else 1.0
-
-
-def ground_of(found: Inspection) -> Ground:
-    """Say what stands and what settles, of what a drawing says.
-
-    Parameters
-    ----------
-    found : Inspection
-    """
-    fixed, moving = _with_role(found, mechanics.FIXED), _with_role(found, mechanics.MOVING)
-    if moving:
-        return Ground("The drawing says which blocks are supports, and which of them move.")
-    if not fixed and (named := _named_supports(found)):
-        last = max(named, key=lambda label: named[label])
-        roles = {label: mechanics.MOVING if label == last and len(named) > 1 else mechanics.FIXED for label in named}
-        says = "The drawing says nothing of supports; these were taken by their names"
-        return Ground(
-            f"{says}, and the rightmost settles." if len(named) > 1 else f"{says}.", roles, settles=len(named) > 1
-        )
-    if not fixed:
-        return Ground(
-            "The drawing has no supports: here the ground below it stands on the left and settles on the right.",
-            supports=_two_halves(found),
-        )
-    names = found.layout.names
-    right = max(fixed, key=lambda i: float(found.layout.corners(i)[:, 0].mean()))
-    if len(fixed) > 1 and names[right] and names.count(names[right]) == 1:
-        return Ground(
-            f"The drawing says which blocks are supports, but of none that it moves: here '{names[right]}' does.",
-            roles={names[right]: mechanics.MOVING},
-        )
-    return Ground("The drawing has supports that stand, and none that moves.", settles=False)
-
-
-def _named_supports(found: Inspection) -> dict[str, float]:
-    """Where blocks stand in the mean [m] whose layer, or else name, is that of a support; by that layer or name."""
-    layout = found.layout
-    places: dict[str, list[float]] = {}
-    for i in found.kept.tolist():
-        labels = [layout.groups[i], layout.names[i]]
-        label = next((one for one in labels if any(word in one.lower() for word in SUPPORT_WORDS)), None)
-        if label is not None:
-            places.setdefault(label, []).append(float(layout.corners(i)[:, 0].mean()))
-    # A role is no key of all blocks: something must be left that can fall.
-    if sum(map(len, places.values())) == len(found.kept):
-        return {}
-    return {label: sum(x) / len(x) for label, x in places.items()}
-
-
-def _two_halves(found: Inspection) -> tuple[Mapping[str, Any], ...]:
-    """Lay a ground under the lowest blocks, split where they leave a gap nearest to the middle, or in the middle."""
-    corners = [found.layout.corners(i) for i in found.kept]
-    up = found.layout.dimension - 1
-    low = min(float(points[:, up].min()) for points in corners)
-    depth = rounded_length(0.5 * block_size(found))
-    near = 1e-3 * depth
-    # Mortar between two stones is no opening.
-    opening = near + 1.01 * found.joint_thickness
-    feet = sorted(
-        (float(foot.min()), float(foot.max()))
-        for foot in (points[points[:, up] < low + near, 0] for points in corners)
-        if len(foot)
-    )
-    left, right = feet[0][0], max(end for _, end in feet)
-    middle, gaps, reached = 0.5 * (left + right), [], feet[0][1]
-    for start, end in feet[1:]:
-        if start > reached + opening:
-            gaps.append(0.5 * (reached + start))
-        reached = max(reached, end)
-    split = min(gaps, key=lambda x: abs(x - middle), default=middle)
-
-    def half(name: str, role: str, start: float, end: float) -> Mapping[str, Any]:
-        if up == 2:
-            front, back = float(found.low[1]) - depth, float(found.high[1]) + depth
-            plan = [[start, front], [end, front], [end, back], [start, back]]
-            return {"name": name, "role": role, "outline": plan, "levels": [low - depth, low]}
-        corners = [[start, low - depth], [end, low - depth], [end, low], [start, low]]
-        return {"name": name, "role": role, "outline": corners}
-
-    return (
-        half("ground left", mechanics.FIXED, left - depth, split),
-        half("ground right", mechanics.MOVING, split, right + depth),
-    )
-
-
-def _with_role(found: Inspection, role: str) -> list[int]:
-    return [int(i) for i in found.kept if found.roles[i] == role]
-
-
 def _counted(found: Inspection) -> str:
     size = (found.high - found.low).tolist()
-    roles = [f"{len(_with_role(found, role))} {role}" for role in mechanics.ROLES if _with_role(found, role)]
+    roles = [f"{len(with_role(found, role))} {role}" for role in mechanics.ROLES if with_role(found, role)]
     deep = f"{size[1]:.4g} m deep, " if len(size) == 3 else ""
     where = " in space" if deep else ""
     return f"{len(found.kept)} blocks{where}, {', '.join(roles)}; {size[0]:.4g} m wide, {deep}{size[-1]:.4g} m high."
