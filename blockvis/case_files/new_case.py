@@ -15,6 +15,8 @@ from blockvis.cases.build import DENSITY
 from blockvis.cases.key import Key, Section
 from blockvis.layout.ground import Ground, block_size, ground_of, with_role
 from blockvis.layout.inspect import Inspection
+from blockvis.layout.notes import UNIT, UNIT_CLASH, kind_of
+from blockvis.layout.units import better_unit
 from blockvis.text import as_key, as_toml, rounded_length
 from solver import mechanics
 
@@ -24,6 +26,9 @@ INCREMENT, LIMIT = 0.05, 1.0
 
 #: Friction of dry masonry joints where nothing is known, and a density that most stones and bricks are near.
 FRICTION = 0.6
+
+#: Kinds of notes that stand above the unit.
+_OF_UNITS = (UNIT, UNIT_CLASH)
 
 #: Keys of a drawing in the plane, which one in space does not have.
 _IN_THE_PLANE = ("thickness", "closing", "outline_tolerance")
@@ -39,6 +44,7 @@ def case_text(
     view: str | None = None,
     ignore: Sequence[str] = (),
     only: Sequence[str] = (),
+    unit_says: str = "",
 ) -> str:
     """Write the text of a case file for a drawing.
 
@@ -50,6 +56,8 @@ def case_text(
         The drawing, relative to the case file.
     view, ignore, only
         With which the drawing was read.
+    unit_says : str
+        Why it was read in another unit than its own; see :func:`unit_instead`.
 
     Returns
     -------
@@ -74,9 +82,14 @@ def case_text(
     parts = [
         _comment(f"Case of {Path(file).name}, written by blockvis new. Lengths in m, forces in N, angles in rad."),
         _comment(_counted(found)),
-        *(_comment(f"Note: {note}") for note in found.layout.notes),
+        *(_comment(f"Note: {note}") for note in found.layout.notes if kind_of(note) not in _OF_UNITS),
         "",
-        _table(case_keys.GEOMETRY, geometry, leaving=("layout", "parameters", *(_IN_THE_PLANE if in_space else ()))),
+        _table(
+            case_keys.GEOMETRY,
+            geometry,
+            leaving=("layout", "parameters", *(_IN_THE_PLANE if in_space else ())),
+            beside={"unit": unit_says or _note(found, *_OF_UNITS)},
+        ),
         _roles(found, ground),
         *(
             _table(case_keys.SUPPORTS, support, leaving=("material",) if in_space else ("material", "levels"))
@@ -118,6 +131,19 @@ def relative_to(folder: Path, drawing: str | Path) -> str:
     return Path(path).as_posix()
 
 
+def unit_instead(found: Inspection) -> tuple[str, str]:
+    """Find the unit in which a drawing is masonry, where its own is in doubt, and why; both "" where it is not."""
+    unit = better_unit(found.layout.unit, float(np.median(found.layout.sizes)))
+    if not unit:
+        return "", ""
+    doubted = _note(found, UNIT).partition(": say so")[0]
+    return unit, f"{doubted}; the file is read in {unit} here"
+
+
+def _note(found: Inspection, *kinds: str) -> str:
+    return next((str(note) for note in found.layout.notes if kind_of(note) in kinds), "")
+
+
 def _counted(found: Inspection) -> str:
     size = (found.high - found.low).tolist()
     roles = [f"{len(with_role(found, role))} {role}" for role in mechanics.ROLES if with_role(found, role)]
@@ -151,6 +177,7 @@ def _table(
     *,
     leaving: Sequence[str] = (),
     single: bool = False,
+    beside: Mapping[str, str] | None = None,
 ) -> str:
     """Write a table: the keys that have a value, the others as comments.
 
@@ -165,6 +192,8 @@ def _table(
         Keys that are not written at all.
     single : bool
         Whether the table is written as the only one of its kind.
+    beside : mapping, optional
+        Comments on keys beside their meaning.
     """
     lines = [_comment(f"{section.meaning}. {says}".strip()), f"[{section.name}]" if single else section.header]
     for key in section.keys:
@@ -172,6 +201,8 @@ def _table(
             continue
         given = values.get(key.name)
         lines.append(_comment(_about(key, given=given is not None)))
+        if beside and beside.get(key.name):
+            lines.append(_comment(f"Note: {beside[key.name]}"))
         shown = _other(key, values) if given is None else given
         lines.append(f"{'# ' if given is None else ''}{key.name} = {as_toml(shown)}")
     return "\n".join([*lines, ""])

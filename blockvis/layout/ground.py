@@ -206,7 +206,7 @@ def _feet_in_the_plane(found: Inspection) -> list[_Foot]:
     low = np.array([ring.min(axis=0) for ring in outlines])
     high = np.array([ring.max(axis=0) for ring in outlines])
     height = float(np.median(high[:, 1] - low[:, 1]))
-    touching = _touching(shapely.polygons(outlines), 1e-3 * height + _opening(found))
+    touching = _touching(np.array([shapely.Polygon(ring) for ring in outlines]), 1e-3 * height + _opening(found))
     arch = _springers_of_arch(touching, low[:, 1])
     feet: list[_Foot] = []
     springers: set[int] = set()
