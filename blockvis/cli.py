@@ -434,10 +434,9 @@ def _sweep(options: argparse.Namespace) -> int:
 
 
 def _new(options: argparse.Namespace) -> int:
-    from .case_files.new_case import case_text, relative_to
-    from .case_files.read import parse_case
-    from .cases.build import case_assembly
+    from .case_files.new_case import case_text, relative_to, unit_instead
     from .formats.read import inspect
+    from .layout.units import metres_per
     from .system.atomic_files import write_whole
 
     drawing = Path(options.drawing)
@@ -446,14 +445,45 @@ def _new(options: argparse.Namespace) -> int:
     choice = _choice(options)
     filled = _filled_walls(options, choice)
     found, walls = filled or (inspect(drawing, unit=options.unit, dimension=_dimension(options), **choice), ())
-    text = case_text(found, relative_to(target.parent, drawing), **choice, walls=walls)
+    unit, unit_says = ("", "") if options.unit or walls else unit_instead(found)
+    if unit:
+        if choice["window"]:
+            # It is in metres of the drawing as it was read.
+            factor = metres_per(unit) / metres_per(found.layout.unit or "m")
+            choice["window"] = [x * factor for x in choice["window"]]
+        found = inspect(drawing, unit=unit, dimension=_dimension(options), **choice)
+        print(f"blockvis: note: {unit_says}", file=sys.stderr)
+    text = case_text(found, relative_to(target.parent, drawing), unit_says=unit_says, walls=walls, **choice)
     write_whole(target, text)
     print(f"{target} written for {len(found.kept)} blocks; run it: blockvis run {target}")
+    _try_new(text, target)
+    return 0
+
+
+def _try_new(text: str, target: Path) -> None:
+    """Say whether what a new case describes stands, and draw it with its ground."""
+    from dataclasses import replace
+
+    from .case_files.read import parse_case
+    from .cases.build import case_assembly
+    from .layout.inspect import inspected
+    from .layout.layout import layout_of
+    from .pictures.inspection import draw_inspection
+    from .runs.first_equilibrium import first_equilibrium
+
     try:
-        case_assembly(parse_case(text, target))
+        case = parse_case(text, target)
+        assembly = case_assembly(case)
+        found = first_equilibrium(case, assembly)
     except ValueError as error:
         print(f"blockvis: note: as it is, blockvis run refuses it: {error}", file=sys.stderr)
-    return 0
+        return
+    if found.stands:
+        print(found.says)
+    else:
+        print(f"blockvis: note: {found.says}", file=sys.stderr)
+    layout = replace(layout_of(assembly), source=str(target))
+    print(f"drawn with its supports in {draw_inspection(inspected(layout), target.with_suffix('.supports.png'))}")
 
 
 def _filled_walls(options: argparse.Namespace, choice: dict[str, Any]) -> tuple[Inspection, tuple[str, ...]] | None:
@@ -653,9 +683,9 @@ def _write_report(response: solver.Response, folder: Path) -> Fall | None:
 def _info(options: argparse.Namespace) -> int:
     from dataclasses import replace
 
-    from .case_files.new_case import ground_of
     from .formats.read import inspect
     from .layout.assemble import supports_of
+    from .layout.ground import ground_of
     from .layout.refusal import Refused
     from .layout.roles import roles_of
     from .pictures.inspection import draw_inspection, draw_refusal

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,10 @@ from blockvis.case_files import case_keys
 from blockvis.cases.bonds import BOND
 from blockvis.cases.build import DENSITY
 from blockvis.cases.key import Key, Section
+from blockvis.layout.ground import Ground, block_size, ground_of, with_role
 from blockvis.layout.inspect import Inspection
+from blockvis.layout.notes import UNIT, UNIT_CLASH, kind_of
+from blockvis.layout.units import better_unit
 from blockvis.text import as_key, as_toml, rounded_length
 from solver import mechanics
 
@@ -26,8 +28,8 @@ INCREMENT, LIMIT = 0.05, 1.0
 #: Friction of dry masonry joints where nothing is known, and a density that most stones and bricks are near.
 FRICTION = 0.6
 
-#: Parts of the names and layers of blocks that are supports, where the drawing says nothing of roles.
-SUPPORT_WORDS = ("springer", "support", "ground", "foundation", "footing", "abutment", "bearing")
+#: Kinds of notes that stand above the unit.
+_OF_UNITS = (UNIT, UNIT_CLASH)
 
 #: What a new case says of walls without stones.
 WALLS = "The drawing has no stones but outlines with openings: give the size of yours."
@@ -39,28 +41,6 @@ _IN_THE_PLANE = ("window", "thickness", "closing", "outline_tolerance")
 WIDTH = 100
 
 
-@dataclass(frozen=True)
-class Ground:
-    """What stands and what settles.
-
-    Attributes
-    ----------
-    says : str
-        How it was found.
-    roles : mapping of str to str
-        To write under [roles].
-    supports : tuple of mappings
-        To write as [[supports]].
-    settles : bool
-        Whether there is a moving support.
-    """
-
-    says: str
-    roles: Mapping[str, str] = field(default_factory=dict)
-    supports: tuple[Mapping[str, Any], ...] = ()
-    settles: bool = True
-
-
 def case_text(
     found: Inspection,
     file: str,
@@ -70,6 +50,7 @@ def case_text(
     only: Sequence[str] = (),
     window: Sequence[float] = (),
     walls: Sequence[str] = (),
+    unit_says: str = "",
     **image: Any,
 ) -> str:
     """Write the text of a case file for a drawing.
@@ -84,6 +65,8 @@ def case_text(
         With which the drawing was read.
     walls : sequence of str
         Layers or names of outlines that are filled with a bond.
+    unit_says : str
+        Why it was read in another unit than its own; see :func:`unit_instead`.
 
     Returns
     -------
@@ -111,9 +94,14 @@ def case_text(
     parts = [
         _comment(f"Case of {Path(file).name}, written by blockvis new. Lengths in m, forces in N, angles in rad."),
         _comment(_counted(found)),
-        *(_comment(f"Note: {note}") for note in found.layout.notes),
+        *(_comment(f"Note: {note}") for note in found.layout.notes if kind_of(note) not in _OF_UNITS),
         "",
-        _table(case_keys.GEOMETRY, geometry, leaving=("layout", "parameters", *hidden)),
+        _table(
+            case_keys.GEOMETRY,
+            geometry,
+            leaving=("layout", "parameters", *hidden),
+            beside={"unit": unit_says or _note(found, *_OF_UNITS)},
+        ),
         *([_table(BOND, {"walls": list(walls), "bond": "running", "brick": [0.25, 0.075]}, WALLS)] if walls else ()),
         _roles(found, ground),
         *(
@@ -157,102 +145,22 @@ def relative_to(folder: Path, drawing: str | Path) -> str:
     return Path(path).as_posix()
 
 
-def block_size(found: Inspection) -> float:
-    """Find the distance across the median free block [m]."""
-    across = [float(np.linalg.norm(np.ptp(found.layout.corners(i), axis=0))) for i in _with_role(found, mechanics.FREE)]
-    return float(np.median(across)) if across else 1.0
+def unit_instead(found: Inspection) -> tuple[str, str]:
+    """Find the unit in which a drawing is masonry, where its own is in doubt, and why; both "" where it is not."""
+    unit = better_unit(found.layout.unit, float(np.median(found.layout.sizes)))
+    if not unit:
+        return "", ""
+    doubted = _note(found, UNIT).partition(": say so")[0]
+    return unit, f"{doubted}; the file is read in {unit} here"
 
 
-def ground_of(found: Inspection) -> Ground:
-    """Say what stands and what settles, of what a drawing says.
-
-    Parameters
-    ----------
-    found : Inspection
-    """
-    fixed, moving = _with_role(found, mechanics.FIXED), _with_role(found, mechanics.MOVING)
-    if moving:
-        return Ground("The drawing says which blocks are supports, and which of them move.")
-    if not fixed and (named := _named_supports(found)):
-        last = max(named, key=lambda label: named[label])
-        roles = {label: mechanics.MOVING if label == last and len(named) > 1 else mechanics.FIXED for label in named}
-        says = "The drawing says nothing of supports; these were taken by their names"
-        return Ground(
-            f"{says}, and the rightmost settles." if len(named) > 1 else f"{says}.", roles, settles=len(named) > 1
-        )
-    if not fixed:
-        return Ground(
-            "The drawing has no supports: here the ground below it stands on the left and settles on the right.",
-            supports=_two_halves(found),
-        )
-    names = found.layout.names
-    right = max(fixed, key=lambda i: float(found.layout.corners(i)[:, 0].mean()))
-    if len(fixed) > 1 and names[right] and names.count(names[right]) == 1:
-        return Ground(
-            f"The drawing says which blocks are supports, but of none that it moves: here '{names[right]}' does.",
-            roles={names[right]: mechanics.MOVING},
-        )
-    return Ground("The drawing has supports that stand, and none that moves.", settles=False)
-
-
-def _named_supports(found: Inspection) -> dict[str, float]:
-    """Where blocks stand in the mean [m] whose layer, or else name, is that of a support; by that layer or name."""
-    layout = found.layout
-    places: dict[str, list[float]] = {}
-    for i in found.kept.tolist():
-        labels = [layout.groups[i], layout.names[i]]
-        label = next((one for one in labels if any(word in one.lower() for word in SUPPORT_WORDS)), None)
-        if label is not None:
-            places.setdefault(label, []).append(float(layout.corners(i)[:, 0].mean()))
-    # A role is no key of all blocks: something must be left that can fall.
-    if sum(map(len, places.values())) == len(found.kept):
-        return {}
-    return {label: sum(x) / len(x) for label, x in places.items()}
-
-
-def _two_halves(found: Inspection) -> tuple[Mapping[str, Any], ...]:
-    """Lay a ground under the lowest blocks, split where they leave a gap nearest to the middle, or in the middle."""
-    corners = [found.layout.corners(i) for i in found.kept]
-    up = found.layout.dimension - 1
-    low = min(float(points[:, up].min()) for points in corners)
-    depth = rounded_length(0.5 * block_size(found))
-    near = 1e-3 * depth
-    # Mortar between two stones is no opening.
-    opening = near + 1.01 * found.joint_thickness
-    feet = sorted(
-        (float(foot.min()), float(foot.max()))
-        for foot in (points[points[:, up] < low + near, 0] for points in corners)
-        if len(foot)
-    )
-    left, right = feet[0][0], max(end for _, end in feet)
-    middle, gaps, reached = 0.5 * (left + right), [], feet[0][1]
-    for start, end in feet[1:]:
-        if start > reached + opening:
-            gaps.append(0.5 * (reached + start))
-        reached = max(reached, end)
-    split = min(gaps, key=lambda x: abs(x - middle), default=middle)
-
-    def half(name: str, role: str, start: float, end: float) -> Mapping[str, Any]:
-        if up == 2:
-            front, back = float(found.low[1]) - depth, float(found.high[1]) + depth
-            plan = [[start, front], [end, front], [end, back], [start, back]]
-            return {"name": name, "role": role, "outline": plan, "levels": [low - depth, low]}
-        corners = [[start, low - depth], [end, low - depth], [end, low], [start, low]]
-        return {"name": name, "role": role, "outline": corners}
-
-    return (
-        half("ground left", mechanics.FIXED, left - depth, split),
-        half("ground right", mechanics.MOVING, split, right + depth),
-    )
-
-
-def _with_role(found: Inspection, role: str) -> list[int]:
-    return [int(i) for i in found.kept if found.roles[i] == role]
+def _note(found: Inspection, *kinds: str) -> str:
+    return next((str(note) for note in found.layout.notes if kind_of(note) in kinds), "")
 
 
 def _counted(found: Inspection) -> str:
     size = (found.high - found.low).tolist()
-    roles = [f"{len(_with_role(found, role))} {role}" for role in mechanics.ROLES if _with_role(found, role)]
+    roles = [f"{len(with_role(found, role))} {role}" for role in mechanics.ROLES if with_role(found, role)]
     deep = f"{size[1]:.4g} m deep, " if len(size) == 3 else ""
     where = " in space" if deep else ""
     return f"{len(found.kept)} blocks{where}, {', '.join(roles)}; {size[0]:.4g} m wide, {deep}{size[-1]:.4g} m high."
@@ -283,6 +191,7 @@ def _table(
     *,
     leaving: Sequence[str] = (),
     single: bool = False,
+    beside: Mapping[str, str] | None = None,
 ) -> str:
     """Write a table: the keys that have a value, the others as comments.
 
@@ -297,6 +206,8 @@ def _table(
         Keys that are not written at all.
     single : bool
         Whether the table is written as the only one of its kind.
+    beside : mapping, optional
+        Comments on keys beside their meaning.
     """
     lines = [_comment(f"{section.meaning}. {says}".strip()), f"[{section.name}]" if single else section.header]
     for key in section.keys:
@@ -304,6 +215,8 @@ def _table(
             continue
         given = values.get(key.name)
         lines.append(_comment(_about(key, given=given is not None)))
+        if beside and beside.get(key.name):
+            lines.append(_comment(f"Note: {beside[key.name]}"))
         shown = _other(key, values) if given is None else given
         lines.append(f"{'# ' if given is None else ''}{key.name} = {as_toml(shown)}")
     return "\n".join([*lines, ""])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -211,6 +211,9 @@ def _in_the_plane(layout: Layout) -> dict[str, Any]:
     outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
     finer = simplified(outlines, default_tolerance(outlines))[1]
     proposal = proposed(outlines)
+    if proposal.thickness < SMALLEST_JOINT * width:
+        # Rounding of coordinates is no mortar.
+        proposal = replace(proposal, thickness=0.0)
     return {
         "sizes": assembly.areas,
         "overlapping": overlaps(assembly, ROUNDING * width),
@@ -246,6 +249,9 @@ def _mortar_rows(proposal: Proposal, rounding: float) -> tuple[Row, ...]:
     ]
     for k in np.flatnonzero(counts):
         rows.append(("", f"{edges[k]:6.1f} to {edges[k + 1]:6.1f} mm  {counts[k]:6d} stretches  {metres[k]:9.3f} m"))
+    if not proposal.thickness:
+        rows.append(("", f"narrower than {SMALLEST_JOINT:g} of a block: rounding, no joints to close"))
+        return tuple(rows)
     rows.append(("proposed", f'joint_thickness = {proposal.thickness:g}   (m, or "auto")'))
     if proposal.way == "voronoi":
         rows.append(("", 'closing = "voronoi": faces are not straight, mortar goes to the nearest stone'))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .notes import UNIT_CLASH, Note
@@ -35,6 +37,9 @@ DOUBTED = (0.02, 10.0)
 
 #: Median size of the blocks of common masonry [m], from a split brick to an ashlar.
 COMMON = (0.04, 3.0)
+
+#: Units that are tried where another makes no masonry.
+TRIED = ("mm", "cm", "m", "dm", "in", "ft")
 
 
 def metres_per(unit: str) -> float:
@@ -84,13 +89,48 @@ def chosen_unit(given: str | None, stated: str, sizes: np.ndarray) -> tuple[str,
         return "m", "the file does not say its unit; m was assumed"
     low, high = PLAUSIBLE_SIZE
     in_stated, in_metres = median * metres_per(stated), median
-    if not low <= in_stated <= high and low <= in_metres <= high:
-        return "m", Note(
-            UNIT_CLASH,
-            f"unit clash: the file says its unit is {stated}, which makes the median block {in_stated:.3g} m in size; "
-            f"m was assumed, which makes it {in_metres:.3g} m; give unit=... to settle it",
-        )
-    return stated, ""
+    if low <= in_stated <= high:
+        return stated, ""
+    # Most drawings whose unit is wrong are in m; blocks of several m are rather bricks in another.
+    likely = "m" if COMMON[0] <= in_metres <= COMMON[1] else _masonry_unit(median)
+    likely = likely or ("m" if low <= in_metres <= high else "")
+    if not likely:
+        return stated, ""
+    return likely, Note(
+        UNIT_CLASH,
+        f"unit clash: the file says its unit is {stated}, which makes the median block {in_stated:.3g} m in size; "
+        f"{likely} was assumed, which makes it {median * metres_per(likely):.3g} m; give unit=... to settle it",
+    )
+
+
+def _masonry_unit(size: float, tried: Sequence[str] = TRIED) -> str:
+    """Find the unit in which blocks of a size, a number of the file, are masonry; "" if there is none."""
+    return next((unit for unit in tried if COMMON[0] <= size * metres_per(unit) <= COMMON[1]), "")
+
+
+def better_unit(unit: str, size: float) -> str:
+    """Find the unit that makes blocks masonry whose unit is doubted.
+
+    Parameters
+    ----------
+    unit : str
+        In which the drawing was read.
+    size : float [m]
+        Root of the area of the median block, as read.
+
+    Returns
+    -------
+    str
+        "" if there is nothing to doubt, or no such unit.
+
+    Examples
+    --------
+    >>> better_unit("m", 130.0)
+    'mm'
+    """
+    if DOUBTED[0] <= size <= DOUBTED[1] or size <= 0.0:
+        return ""
+    return _masonry_unit(size / metres_per(unit), (*TRIED, "km"))
 
 
 def doubt(unit: str, size: float, *, remedy: str = 'say so under [geometry] unit = "{}", or by --unit {}') -> str:
@@ -117,12 +157,9 @@ def doubt(unit: str, size: float, *, remedy: str = 'say so under [geometry] unit
     """
     if DOUBTED[0] <= size <= DOUBTED[1] or size <= 0.0:
         return ""
-    own = metres_per(unit)
-    for other in ("mm", "cm", "m", "in", "ft", "km"):
-        better = size / own * metres_per(other)
-        if COMMON[0] <= better <= COMMON[1]:
-            return (
-                f"unit {unit} in doubt: it makes the median block {size:.3g} m across; {other} would make it "
-                f"{better:.3g} m: {remedy.format(other, other)}"
-            )
-    return f"unit {unit} in doubt: it makes the median block {size:.3g} m across; no other unit makes it masonry"
+    doubted = f"unit {unit} in doubt: it makes the median block {size:.3g} m across"
+    other = better_unit(unit, size)
+    if not other:
+        return f"{doubted}; no other unit makes it masonry"
+    better = size / metres_per(unit) * metres_per(other)
+    return f"{doubted}; {other} would make it {better:.3g} m: {remedy.format(other, other)}"

@@ -11,8 +11,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import solver
 from blockvis.case_files.read import parse_case, read_case
 from blockvis.cases.build import case_assembly
@@ -27,14 +25,12 @@ from blockvis.results.viewer_files import restore_grids
 from blockvis.system.atomic_files import PARTIAL
 from solver import mechanics
 
+from .first_equilibrium import settled_note
 from .outputs import Clock, Drawing, Output
 from .plan import planned
 from .progress import Progress
 from .reopen import open_results
 from .write import finish
-
-#: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
-AS_DRAWN = 0.002
 
 
 def record_of(case: Case) -> Record:
@@ -253,8 +249,8 @@ def _solved(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Seque
             run.recorded(results.increments)
             # What stands after a settlement that is not reported has moved with it.
             as_drawn = bool(case.settlements) == bool(run.course.settlements)
-            if len(results.increments) == 1 and as_drawn:
-                _note_settled(results.assembly, increment)
+            if len(results.increments) == 1 and as_drawn and (note := settled_note(results.assembly, increment)):
+                warnings.warn(note, stacklevel=2)
             for note in increment.notes:
                 warnings.warn(note, stacklevel=2)
             progress.increment(increment)
@@ -274,18 +270,6 @@ def _solved(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Seque
             missing = _made(outputs, case, response, folder, clock)
         flushed.result()
     return Run(response, folder, summary, missing, stages=dict(clock.seconds))
-
-
-def _note_settled(assembly: solver.Assembly, first: solver.Increment) -> None:
-    """Warn where the blocks as drawn were in no equilibrium and found one a little further."""
-    moved = np.linalg.norm(first.pose.positions - assembly.centroids, axis=1)
-    block = int(np.argmax(moved))
-    if first.status == solver.Status.EQUILIBRIUM and moved[block] > AS_DRAWN * assembly.block_size:
-        warnings.warn(
-            f"before any settlement '{assembly.names[block]}' moved by {moved[block]:.3g} m until it came to rest: as "
-            "drawn the blocks do not stand; look for gaps between them (joint_thickness) or a missing support",
-            stacklevel=2,
-        )
 
 
 def _given_up(folder: Path, error: OSError) -> OSError:

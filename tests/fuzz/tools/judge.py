@@ -12,7 +12,7 @@ from oracle import GRAVITY, Touching, judged, moved_on, support_velocities, touc
 from rubble import Trial, trial
 
 import solver
-from blockvis.runs.run import AS_DRAWN
+from blockvis.runs.first_equilibrium import AS_DRAWN
 from solver import mechanics
 
 #: Distance at which corners touch, in block sizes: above what the solver leaves open, below every real gap.

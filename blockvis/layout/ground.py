@@ -1,0 +1,453 @@
+"""The ground of a drawing without supports: what stands, what settles, and where the line between them is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import shapely
+
+from blockvis.text import rounded_length
+from solver import mechanics
+
+from .inspect import Inspection
+from .layout import Layout
+from .outlines import without_collinear
+from .simplify import default_tolerance, simplified
+
+#: Blocks of the lowest course have their bottom within this fraction of the median height of the lowest.
+COURSE = 0.5
+
+#: Part of a foot that no lower block covers; less is the sliver that the next voussoir, or a joint, leaves.
+EXPOSED = 0.3
+
+#: A foot that slopes more than this (24 degrees) is a springer's; ground lies under edges up to the steepest.
+SLOPE, STEEPEST = 0.45, 1.0
+
+#: A foot narrower than this fraction of its block, in space of its plan, is a point or an edge.
+NARROW = 0.2
+
+#: Slope of what is level; corners within this fraction of its height above the bottom are in a bottom face in space.
+LEVEL = 0.01
+
+#: Corners of the ground closer to a straight line than this fraction of the median block are left out.
+STRAIGHT = 1e-6
+
+#: Parts of the names and layers of blocks that are supports, where the drawing says nothing of roles.
+SUPPORT_WORDS = ("springer", "support", "ground", "foundation", "footing", "abutment", "bearing")
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What stands and what settles.
+
+    Attributes
+    ----------
+    says : str
+        How it was found.
+    roles : mapping of str to str
+        To write under [roles].
+    supports : tuple of mappings
+        To write as [[supports]].
+    settles : bool
+        Whether there is a moving support.
+    """
+
+    says: str
+    roles: Mapping[str, str] = field(default_factory=dict)
+    supports: tuple[Mapping[str, Any], ...] = ()
+    settles: bool = True
+
+
+@dataclass(frozen=True)
+class _Foot:
+    """A block of the lowest course.
+
+    Attributes
+    ----------
+    block : int
+    low, high : (d - 1,) arrays [m]
+        Box of the block in plan.
+    bed : (n, 2) array [m] or None
+        On which it lies, in the plane from left to right, in space in plan; None for one that becomes a support.
+    level : float [m]
+        Of its bottom.
+    """
+
+    block: int
+    low: np.ndarray
+    high: np.ndarray
+    bed: np.ndarray | None
+    level: float
+
+
+@dataclass(frozen=True)
+class _Split:
+    """Where the half that settles begins: along an axis in plan, in a gap or, without one, in the middle."""
+
+    axis: int
+    at: float
+
+    def moves(self, foot: _Foot) -> bool:
+        return 0.5 * float(foot.low[self.axis] + foot.high[self.axis]) > self.at
+
+
+def block_size(found: Inspection) -> float:
+    """Find the distance across the median free block [m]."""
+    across = [float(np.linalg.norm(np.ptp(found.layout.corners(i), axis=0))) for i in with_role(found, mechanics.FREE)]
+    return float(np.median(across)) if across else 1.0
+
+
+def with_role(found: Inspection, role: str) -> list[int]:
+    """List the numbers of the blocks of a role, without duplicates."""
+    return [int(i) for i in found.kept if found.roles[i] == role]
+
+
+def ground_of(found: Inspection) -> Ground:
+    """Say what stands and what settles, of what a drawing says and shows.
+
+    Parameters
+    ----------
+    found : Inspection
+
+    Returns
+    -------
+    Ground
+        Supports as the drawing says, or as names and layers say; otherwise blocks that touch the ground in a point,
+        an edge or a slope, and below the others a ground that their bottoms lie on.
+    """
+    fixed = with_role(found, mechanics.FIXED)
+    if with_role(found, mechanics.MOVING):
+        return Ground("The drawing says which blocks are supports, and which of them move.")
+    if fixed:
+        return _of_fixed(found, fixed)
+    if named := _named_supports(found):
+        last = max(named, key=lambda label: named[label])
+        roles = {label: mechanics.MOVING if label == last and len(named) > 1 else mechanics.FIXED for label in named}
+        says = "The drawing says nothing of supports; these were taken by their names"
+        return Ground(
+            f"{says}, and the rightmost settles." if len(named) > 1 else f"{says}.", roles, settles=len(named) > 1
+        )
+    return _laid(found)
+
+
+def _of_fixed(found: Inspection, fixed: Sequence[int]) -> Ground:
+    """Let the supports of one side settle, where the drawing has supports that stand and their names tell them."""
+    layout = found.layout
+    feet = [_Foot(i, *_plan_box(layout, i), None, 0.0) for i in fixed]
+    split = _split(feet, _opening(found))
+    moving = [foot.block for foot in feet if split.moves(foot)]
+    names = _names_of(layout, found.kept, moving)
+    if not 0 < len(moving) < len(fixed) or not names:
+        return Ground("The drawing has supports that stand, and none that moves.", settles=False)
+    said = f"'{next(iter(names))}' does" if len(names) == 1 else f"the {len(moving)} of one side do"
+    return Ground(
+        f"The drawing says which blocks are supports, but of none that it moves: here {said}.",
+        roles=dict.fromkeys(names, mechanics.MOVING),
+    )
+
+
+def _named_supports(found: Inspection) -> dict[str, float]:
+    """Where blocks stand in the mean [m] whose layer, or else name, is that of a support; by that layer or name."""
+    layout = found.layout
+    places: dict[str, list[float]] = {}
+    for i in found.kept.tolist():
+        labels = [layout.groups[i], layout.names[i]]
+        label = next((one for one in labels if any(word in one.lower() for word in SUPPORT_WORDS)), None)
+        if label is not None:
+            places.setdefault(label, []).append(float(layout.corners(i)[:, 0].mean()))
+    # A role is no key of all blocks: something must be left that can fall.
+    if sum(map(len, places.values())) == len(found.kept):
+        return {}
+    return {label: sum(x) / len(x) for label, x in places.items()}
+
+
+def _laid(found: Inspection) -> Ground:
+    """Lay a ground under the lowest course, and make supports of the blocks that no ground can lie under."""
+    layout, blocks = found.layout, found.kept.tolist()
+    depth = rounded_length(0.5 * block_size(found))
+    feet = _feet_in_space(found) if layout.dimension == 3 else _feet_in_the_plane(found)
+    split = _split(feet, 1e-3 * depth + _opening(found))
+    springers = [foot for foot in feet if foot.bed is None]
+    beds = [foot for foot in feet if foot.bed is not None]
+    roles: dict[str, str] = {}
+    for role, moves in ((mechanics.FIXED, False), (mechanics.MOVING, True)):
+        side = [foot.block for foot in springers if split.moves(foot) is moves]
+        roles |= dict.fromkeys(_names_of(layout, blocks, side), role)
+    supports: list[Mapping[str, Any]] = []
+    if beds and layout.dimension == 3:
+        supports = _pads(beds, split) if springers or not _is_level(beds, depth) else _slab(found, beds, split, depth)
+    elif beds:
+        supports = _bedded(found, feet, split, depth)
+    where = "on the right" if split.axis == 0 else "on the far side"
+    said = f"stands on one side and settles {where}"
+    if supports and roles:
+        says = f"The drawing has no supports: {len(springers)} blocks that end in a slope, an edge or a point become "
+        says += f"supports, and a ground lies below the others; it {said}."
+    elif roles:
+        says = f"The drawing has no supports: the {len(springers)} blocks below, that end in a slope, an edge or a "
+        says += f"point, become supports; what they carry {said}."
+    else:
+        says = "The drawing has no supports: here the ground below it stands on the left and settles on the right."
+        if split.axis:
+            says = f"The drawing has no supports: here the ground below it {said}."
+    settles = mechanics.MOVING in [*roles.values(), *(support["role"] for support in supports)]
+    return Ground(says, roles, tuple(supports), settles)
+
+
+def _feet_in_the_plane(found: Inspection) -> list[_Foot]:
+    """Find the blocks of the lowest course, from left to right, and the part of each that nothing lower covers."""
+    blocks = found.kept.tolist()
+    outlines = [found.layout.corners(i) for i in blocks]
+    # A run drops the same corners: the ground is to touch what is left.
+    outlines = simplified(outlines, default_tolerance(outlines))[0]
+    low = np.array([ring.min(axis=0) for ring in outlines])
+    high = np.array([ring.max(axis=0) for ring in outlines])
+    height = float(np.median(high[:, 1] - low[:, 1]))
+    touching = _touching(np.array([shapely.Polygon(ring) for ring in outlines]), 1e-3 * height + _opening(found))
+    arch = _springers_of_arch(touching, low[:, 1])
+    feet: list[_Foot] = []
+    springers: set[int] = set()
+    for k in arch or np.argsort(low[:, 1], kind="stable").tolist():
+        if low[k, 1] > low[:, 1].min() + COURSE * height and not arch:
+            break
+        edges = _lower_edges(outlines[k])
+        steep = _slope(edges, float(high[k, 0] - low[k, 0])) > (LEVEL if arch else SLOPE)
+        lower = [j for j in touching[k] if low[j, 1] < low[k, 1]]
+        if steep and springers.intersection(lower):
+            # It rests on a springer, or on a voussoir that does.
+            springers.add(k)
+            continue
+        if steep and not lower and _can_be_named(found, blocks[k]):
+            springers.add(k)
+            bed = None
+        else:
+            taken = [(low[j, 0], high[j, 0]) for j in np.flatnonzero(low[:, 1] < low[k, 1])]
+            taken += [(foot.bed[0, 0], foot.bed[-1, 0]) for foot in feet if foot.bed is not None]
+            bed = _widest_free(edges, taken)
+            if bed is None:
+                continue
+        feet.append(_Foot(blocks[k], low[k, :1], high[k, :1], bed, float(low[k, 1])))
+    return feet
+
+
+def _springers_of_arch(touching: Sequence[set[int]], bottoms: np.ndarray) -> list[int]:
+    """Find the ends of a chain of blocks, if that is all there is and it rises from both of them."""
+    ends = [k for k, others in enumerate(touching) if len(others) == 1]
+    if len(ends) != 2 or len(touching) < 4 or max(map(len, touching)) > 2:
+        return []
+    chain = [ends[0], *touching[ends[0]]]
+    while following := touching[chain[-1]].difference(chain[-2:]):
+        chain += following
+    if len(chain) < len(touching):
+        return []
+    rise = np.diff(bottoms[chain])
+    top = int(bottoms[chain].argmax())
+    rises = 0 < top < len(chain) - 1 and (rise[:top] >= 0.0).all() and (rise[top:] <= 0.0).all()
+    return ends if rises and rise[0] > 0.0 > rise[-1] else []
+
+
+def _touching(shapes: np.ndarray, near: float) -> list[set[int]]:
+    """List the blocks that each touches across at most a gap [m]."""
+    tree = shapely.STRtree(shapes)
+    others: list[set[int]] = [set() for _ in shapes]
+    for i, j in tree.query(shapes, predicate="dwithin", distance=near).T.tolist():
+        if i != j:
+            others[i].add(j)
+    return others
+
+
+def _lower_edges(points: np.ndarray) -> np.ndarray:
+    """(n, 2) array [m]: from left to right, the corners between the edges of the lower hull that are not too steep."""
+    hull: list[np.ndarray] = []
+    for point in points[np.lexsort((points[:, 1], points[:, 0]))]:
+        while len(hull) > 1 and _turn(hull[-2], hull[-1], point) <= 0.0:
+            hull.pop()
+        hull.append(point)
+    chain = np.array(hull)
+    run, rise = np.diff(chain, axis=0).T
+    gentle = np.flatnonzero((np.abs(rise) <= STEEPEST * run) & (run > 0.0))
+    return chain[gentle[0] : gentle[-1] + 2] if len(gentle) else chain[[chain[:, 1].argmin()]]
+
+
+def _turn(first: np.ndarray, second: np.ndarray, third: np.ndarray) -> float:
+    (ax, ay), (bx, by) = second - first, third - first
+    return float(ax * by - ay * bx)
+
+
+def _slope(bed: np.ndarray, width: float) -> float:
+    """Slope of a bed from end to end, infinite for a point or an edge."""
+    run, rise = np.abs(bed[-1] - bed[0]).tolist()
+    return rise / run if run > NARROW * width else np.inf
+
+
+def _widest_free(bed: np.ndarray, taken: Iterable[tuple[float, float]]) -> np.ndarray | None:
+    """Cut the widest part of a bed that no interval of x takes; None where less is left than a foot needs."""
+    start, end = float(bed[0, 0]), float(bed[-1, 0])
+    free, reached = [], start
+    for low, high in sorted(taken):
+        free.append((reached, min(float(low), end)))
+        reached = max(reached, float(high))
+    free.append((reached, end))
+    left, right = max(free, key=lambda part: part[1] - part[0])
+    if right - left < EXPOSED * (end - start) or right <= left:
+        return None
+    inner = bed[(bed[:, 0] > left) & (bed[:, 0] < right)]
+    ends = [[x, float(np.interp(x, bed[:, 0], bed[:, 1]))] for x in (left, right)]
+    return np.vstack([ends[:1], inner, ends[1:]])
+
+
+def _bedded(found: Inspection, feet: Sequence[_Foot], split: _Split, depth: float) -> list[Mapping[str, Any]]:
+    """Lay two halves whose top follows the beds, with a step half-way between each and the next."""
+    beds = sorted((foot.bed for foot in feet if foot.bed is not None), key=lambda bed: float(bed[0, 0]))
+    top = [beds[0][0] - [depth, 0.0]]
+    for bed, following in zip(beds, [*beds[1:], None], strict=True):
+        top += list(bed)
+        if following is not None:
+            middle = 0.5 * float(bed[-1, 0] + following[0, 0])
+            top += [np.array([middle, bed[-1, 1]]), np.array([middle, following[0, 1]])]
+    top.append(beds[-1][-1] + [depth, 0.0])
+    floor = min(foot.level for foot in feet) - depth
+    (start, _), (end, _) = top[0], top[-1]
+    line = shapely.simplify(shapely.LineString(top), STRAIGHT * depth)
+    ground = shapely.Polygon([[start, floor], [end, floor], *shapely.get_coordinates(line)[::-1]])
+    # What leans over its neighbour's bed, and a springer between, keep their place.
+    above = [shapely.Polygon(found.layout.corners(i)) for i in found.kept]
+    reach = [shape for shape in above if shape.intersects(ground) and shape.intersection(ground).area > 0.0]
+    if reach:
+        ground = ground.difference(shapely.union_all(reach))
+    halves: list[Mapping[str, Any]] = []
+    for name, role, left, right in (
+        ("ground left", mechanics.FIXED, start, split.at),
+        ("ground right", mechanics.MOVING, split.at, end),
+    ):
+        half = _largest(ground.intersection(shapely.box(left, floor - depth, right, floor + 1e3 * depth)))
+        if half is not None:
+            corners = _from_lowest_left(shapely.get_coordinates(half.exterior)[:-1])
+            halves.append({"name": name, "role": role, "outline": corners.tolist()})
+    return halves
+
+
+def _largest(shape: Any) -> Any:
+    parts = [part for part in shapely.get_parts(shape) if part.geom_type == "Polygon" and part.area > 0.0]
+    return max(parts, key=lambda part: part.area, default=None)
+
+
+def _from_lowest_left(ring: np.ndarray) -> np.ndarray:
+    """Turn a ring counter-clockwise, and begin it at its lowest corner on the left, without collinear corners."""
+    ring = ring if shapely.Polygon(ring).exterior.is_ccw else ring[::-1]
+    ring = without_collinear(ring)
+    return np.roll(ring, -int(np.lexsort((ring[:, 0], ring[:, 1]))[0]), axis=0)
+
+
+def _feet_in_space(found: Inspection) -> list[_Foot]:
+    """Find the blocks of the lowest course in space, and the bottom faces they lie on in plan."""
+    blocks = found.kept.tolist()
+    corners = [found.layout.corners(i) for i in blocks]
+    low = np.array([points.min(axis=0) for points in corners])
+    high = np.array([points.max(axis=0) for points in corners])
+    height = high[:, 2] - low[:, 2]
+    near = COURSE * float(np.median(height))
+    course = np.flatnonzero(low[:, 2] <= low[:, 2].min() + near)
+    plans = [shapely.MultiPoint(points[:, :2]).convex_hull for points in corners]
+    boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    touching = _touching(boxes, 1e-3 * near + _opening(found))
+    feet = []
+    for k in course.tolist():
+        lower = [j for j in touching[k] if low[j, 2] < low[k, 2] - 1e-6 * near]
+        covered = plans[k].intersection(shapely.union_all([plans[j] for j in lower])).area if lower else 0.0
+        if covered > (1.0 - EXPOSED) * plans[k].area:
+            continue
+        points = corners[k]
+        bottom = points[points[:, 2] <= low[k, 2] + LEVEL * height[k]]
+        face = shapely.MultiPoint(bottom[:, :2]).convex_hull
+        if face.area > NARROW * plans[k].area:
+            bed = shapely.get_coordinates(face)[:-1]
+        elif any(low[j, 2] < low[k, 2] - 0.5 * near for j in lower) or not _can_be_named(found, blocks[k]):
+            # It rests on a springer.
+            continue
+        else:
+            bed = None
+        feet.append(_Foot(blocks[k], low[k, :2], high[k, :2], bed, float(low[k, 2])))
+    if 2 * sum(foot.bed is None for foot in feet) > len(feet):
+        # Corner pieces of a vault end flat by chance.
+        feet = [replace(foot, bed=None) if _can_be_named(found, foot.block) else foot for foot in feet]
+    return feet
+
+
+def _is_level(beds: Sequence[_Foot], depth: float) -> bool:
+    levels = [foot.level for foot in beds]
+    return max(levels) - min(levels) < 1e-3 * depth
+
+
+def _slab(found: Inspection, beds: Sequence[_Foot], split: _Split, depth: float) -> list[Mapping[str, Any]]:
+    """Lay two rectangles in plan, from below the first of the lowest blocks to below the last."""
+    level = min(foot.level for foot in beds)
+    low, high = found.low[:2] - depth, found.high[:2] + depth
+    low[split.axis] = min(foot.low[split.axis] for foot in beds) - depth
+    high[split.axis] = max(foot.high[split.axis] for foot in beds) + depth
+    halves: list[Mapping[str, Any]] = []
+    for name, role, side in (("ground left", mechanics.FIXED, high), ("ground right", mechanics.MOVING, low)):
+        near, far = low.copy(), high.copy()
+        (far if side is high else near)[split.axis] = split.at
+        plan = [[near[0], near[1]], [far[0], near[1]], [far[0], far[1]], [near[0], far[1]]]
+        plan = [[float(x), float(y)] for x, y in plan]
+        halves.append({"name": name, "role": role, "outline": plan, "levels": [level - depth, level]})
+    return halves
+
+
+def _pads(beds: Sequence[_Foot], split: _Split) -> list[Mapping[str, Any]]:
+    """Lay a pad under each block of the lowest course: what is level has one height only."""
+    pads: list[Mapping[str, Any]] = []
+    for number, foot in enumerate(beds, 1):
+        assert foot.bed is not None
+        role = mechanics.MOVING if split.moves(foot) else mechanics.FIXED
+        thick = rounded_length(0.5 * float(np.ptp(foot.bed, axis=0).max()))
+        levels = [foot.level - thick, foot.level]
+        pads.append({"name": f"ground {number}", "role": role, "outline": foot.bed.tolist(), "levels": levels})
+    return pads
+
+
+def _split(feet: Sequence[_Foot], opening: float) -> _Split:
+    """Split feet in the gap nearest to their middle, along the axis whose gap is wider, or else the longer one."""
+    found = []
+    for axis in range(len(feet[0].low)):
+        spans = sorted((float(foot.low[axis]), float(foot.high[axis])) for foot in feet)
+        left, right = spans[0][0], max(end for _, end in spans)
+        middle, gaps, reached = 0.5 * (left + right), [], spans[0][1]
+        for start, end in spans[1:]:
+            if start > reached + opening:
+                gaps.append((reached, start))
+            reached = max(reached, end)
+        near = min(gaps, key=lambda gap: abs(0.5 * sum(gap) - middle), default=(middle, middle))
+        # Of two gaps that are as wide but for rounding, or of none, the first axis has it.
+        found.append((near[1] - near[0], right - left, _Split(axis, 0.5 * sum(near))))
+    best = found[0]
+    for other in found[1:]:
+        if other[0] > 1.01 * best[0] or (best[0] == other[0] == 0.0 and other[1] > 1.01 * best[1]):
+            best = other
+    return best[2]
+
+
+def _opening(found: Inspection) -> float:
+    """Widest gap that is mortar between two stones, and no opening [m]."""
+    return 1.01 * found.joint_thickness
+
+
+def _plan_box(layout: Layout, block: int) -> tuple[np.ndarray, np.ndarray]:
+    points = layout.corners(block)[:, : layout.dimension - 1]
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _can_be_named(found: Inspection, block: int) -> bool:
+    name = found.layout.names[block]
+    return bool(name) and [found.layout.names[i] for i in found.kept].count(name) == 1
+
+
+def _names_of(layout: Layout, kept: Iterable[int], chosen: Sequence[int]) -> list[str]:
+    """Names that these blocks have and no other; none where they cannot be told by names."""
+    names = dict.fromkeys(layout.names[i] for i in chosen)
+    others = {layout.names[i] for i in kept if i not in set(chosen)}
+    return [] if "" in names or others.intersection(names) else list(names)

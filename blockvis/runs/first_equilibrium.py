@@ -1,0 +1,111 @@
+"""Whether the structure of a case stands as drawn, before anything is asked of it; if not, what falls and why."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import solver
+from blockvis.cases.contents import Case
+from blockvis.layout.linked import linked
+from solver import mechanics
+
+from .plan import planned
+
+#: Movement before any settlement that closes the gaps of a drawing, in block sizes; more is worth a word.
+AS_DRAWN = 0.002
+
+#: Most blocks whose first equilibrium is found in some seconds, in the plane and in space.
+MOST_BLOCKS = {2: 2500, 3: 400}
+
+#: The cause is looked for where the first equilibrium took no longer than this [s].
+PATIENCE = 10.0
+
+#: Friction with which blocks that can only tip still fall.
+ROUGH = 5.0
+
+
+@dataclass(frozen=True)
+class FirstEquilibrium:
+    """What came of a case as drawn.
+
+    Attributes
+    ----------
+    stands : bool or None
+        None where it was not tried.
+    says : str
+    """
+
+    stands: bool | None
+    says: str
+
+
+def first_equilibrium(case: Case, assembly: solver.Assembly) -> FirstEquilibrium:
+    """Find the first equilibrium of a case, or say which blocks fall and why.
+
+    Parameters
+    ----------
+    case : Case
+    assembly : solver.Assembly
+        That was built of it.
+
+    Raises
+    ------
+    ValueError
+        For input that cannot be analysed.
+    """
+    most = MOST_BLOCKS[assembly.dimension]
+    if assembly.n_blocks > most:
+        return FirstEquilibrium(None, f"not tried whether it stands: {assembly.n_blocks} blocks are more than {most}")
+    started = time.perf_counter()
+    first, ending = _first_of(case, assembly)
+    seconds = time.perf_counter() - started
+    if ending is None and first is not None and first.status != solver.Status.FALLING:
+        note = settled_note(assembly, first)
+        return FirstEquilibrium(True, note or f"it stands: first equilibrium found in {seconds:.1f} s")
+    message = "no first equilibrium was found" if ending is None else ending.message
+    cause = _cause(case, assembly) if seconds < PATIENCE else ""
+    return FirstEquilibrium(False, f"{message.partition(';')[0]}; {cause}" if cause else message)
+
+
+def settled_note(assembly: solver.Assembly, first: solver.Increment) -> str:
+    """Say where the blocks as drawn were in no equilibrium and found one a little further; "" where they were."""
+    moved = np.linalg.norm(first.pose.positions - assembly.centroids, axis=1)
+    block = int(np.argmax(moved))
+    if first.status != solver.Status.EQUILIBRIUM or moved[block] <= AS_DRAWN * assembly.block_size:
+        return ""
+    return (
+        f"before any settlement '{assembly.names[block]}' moved by {moved[block]:.3g} m until it came to rest: as "
+        "drawn the blocks do not stand; look for gaps between them (joint_thickness) or a missing support"
+    )
+
+
+def _first_of(case: Case, assembly: solver.Assembly) -> tuple[solver.Increment | None, mechanics.Ending | None]:
+    """Find the first increment, and the ending of an analysis that has no second because nothing stands."""
+    steps = planned(case, assembly).steps
+    first = next(steps, None)
+    if first is None or first.status == solver.Status.FALLING:
+        for _ in steps:
+            pass
+        return first, steps.ending
+    steps.close()
+    return first, None
+
+
+def _cause(case: Case, assembly: solver.Assembly) -> str:
+    """Say why blocks fall: they touch nothing that stands, they slide, or they tip."""
+    contacts = mechanics.find_contacts(assembly, assembly.vertices, AS_DRAWN * assembly.block_size)
+    part = linked(contacts.block_a, contacts.block_b, assembly.n_blocks)
+    loose = np.flatnonzero(assembly.free & ~np.isin(part, part[~assembly.free]))
+    if len(loose):
+        shown = ", ".join(f"'{assembly.names[i]}'" for i in loose[:6].tolist()) + (" ..." if len(loose) > 6 else "")
+        return (
+            f"{len(loose)} of them touch nothing that stands ({shown}): give them a support, leave them out (ignore), "
+            "or close the gaps (joint_thickness)"
+        )
+    first, ending = _first_of(replace(case, friction_coefficient=ROUGH, interfaces={}), assembly)
+    if ending is None and first is not None and first.status != solver.Status.FALLING:
+        return f"they slide: with more friction than {case.friction_coefficient:g} they would stand"
+    return "they tip or drop whatever the friction is: look for gaps below them, a missing stone or a missing support"
