@@ -38,7 +38,7 @@ BESIDE_PLANE = 1e-13
 #: Faces of a part and of its block that overlap by less than this lie beside each other.
 OVERLAPS = 1e-6
 
-#: What an edge that a cut runs through, which makes a corner, outweighs of the lengths along which it runs, in diagonals.
+#: How much an edge that a cut runs through, and makes a corner of, outweighs of the edges along which it runs.
 THROUGH_EDGE = 1e-3
 
 #: Difference of volumes, as a fraction of them, up to which they are equal: corners of hulls are welded at 1e-7.
@@ -250,7 +250,7 @@ class _Piece:
 
     def separated(self, normal: np.ndarray, origin: np.ndarray) -> list[_Piece]:
         """Cut along a plane, and tell apart the bodies in which that leaves the piece."""
-        # Corners in the plane are so to the last digit and the cuts beside it, or faces there would stay with both sides.
+        # Corners in the plane are so to the last digit; cuts run beside it, or faces there would stay with both sides.
         first = unit(np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())]))
         frame = np.stack([normal, first, np.cross(normal, first)])
         level = (self.points - origin) @ frame.T
