@@ -28,7 +28,7 @@ NOISE = 2.0
 WORSE = 0.5
 
 #: A block whose volume faces in one plane with those of others change by more than this part of it stays as drawn.
-SAME_BLOCK = 0.1
+SAME_BLOCK = 0.5
 
 #: Faces that cover each other by less than this fraction of the smaller one touch at an edge.
 COVERS = 1e-3
