@@ -144,7 +144,11 @@ def _unless_worse(
 ) -> tuple[tuple[Solid, ...], list[int]]:
     """Leave blocks as drawn that overlap more, and by more than ``near``, when they are faced, and tell which."""
     found, kept = tuple(moved), set[int]()
-    after = _depths(found, names, near)
+    try:
+        after = _depths(found, names, near)
+    except ValueError:
+        # Moved so far that a block is none any more.
+        return tuple(drawn), list(range(len(drawn)))
     before = _depths(drawn, names, near) if after else {}
     while True:
         # What has been moved of two blocks that now overlap more goes back, until nothing does.

@@ -357,8 +357,7 @@ def _crossing(piece: _Piece) -> np.ndarray | None:
 def _is_inner(face: np.ndarray, whole: _Piece, flatness: float) -> bool:
     """Whether nothing of the surface of the block lies in a face of a part."""
     arms = face - face[0]
-    area = np.cross(arms[1:-1], arms[2:]).sum(axis=0)
-    normal = area / np.linalg.norm(area)
+    normal = unit(cross(arms[1:-1], arms[2:]).sum(axis=0))
     own = whole.points[whole.triangles[whole.normals @ normal > ONE_WAY]]
     own = own[(np.abs((own - face.mean(axis=0)) @ normal) <= 2.0 * flatness).all(axis=1)]
     # They lie apart where an edge of one of them has the other on its outer side.
