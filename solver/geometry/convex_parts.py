@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,6 +46,9 @@ SAME_VOLUME = 1e-6
 
 #: A part with less than this fraction of the cube over the diagonal of its block is what rounding has left at a cut.
 SMALLEST_PART = 1e-10
+
+#: Blocks whose parts are kept: an assembly is made anew with each change of roles, imperfections or joints.
+MOST_KEPT = 2000
 
 #: A stone with more parts than this was drawn by a scanner.
 MOST_PARTS = 500
@@ -136,7 +139,12 @@ def convex_parts(solids: Solids) -> ConvexParts:
         own, loops = solids.surface(block)
         start = int(solids.offsets[block])
         frame = _spread_corners(own)
-        parts = _parts_of(solids, block, own, loops) if is_bent[block] else [(own, loops, [False] * len(loops))]
+        parts = [(own, loops, [False] * len(loops))]
+        if is_bent[block]:
+            try:
+                parts = _parts_of(own.tobytes(), tuple(map(tuple, loops)))
+            except ValueError as error:
+                raise NoParts(block, str(error)) from None
         for corners, around, inside in parts:
             inner_faces += inside
             surfaces.append((corners, around))
@@ -275,16 +283,24 @@ def _body(points: np.ndarray, triangles: np.ndarray) -> Manifold:
     return Manifold(Mesh64(points, triangles.astype(np.uint64), face_id=np.arange(len(triangles), dtype=np.uint64)))
 
 
+@lru_cache(maxsize=MOST_KEPT)
 def _parts_of(
-    solids: Solids, block: int, vertices: np.ndarray, faces: list[list[int]]
+    points: bytes, faces: tuple[tuple[int, ...], ...]
 ) -> list[tuple[np.ndarray, list[list[int]], list[bool]]]:
-    """Corners and faces of each part of a block, and which of the faces are inside the block."""
+    """Corners and faces of each part of a block, and which of the faces are inside the block; kept of the last blocks.
+
+    Raises
+    ------
+    ValueError
+        Says why there are none.
+    """
     from manifold3d import Manifold
 
+    vertices, loops = np.frombuffer(points).reshape(-1, 3), [list(face) for face in faces]
     origin, size = vertices[0], float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    drawn = Solids.of_surfaces([((vertices - origin) / size, faces)])
+    drawn = Solids.of_surfaces([((vertices - origin) / size, loops)])
     planes, flatness = drawn.faces(drawn.vertices), DRAWN_GAP * float(drawn.widths[0])
-    whole = _whole(drawn.vertices, faces, planes.normals)
+    whole = _whole(drawn.vertices, loops, planes.normals)
     queue, parts, total = [whole], [], 0.0
     while queue:
         piece = queue.pop()
@@ -295,13 +311,13 @@ def _parts_of(
             hull = Manifold.hull_points(_drawn_corners(piece.corners, drawn.vertices))
             total += hull.volume()
             mesh = hull.to_mesh64()
-            corners, loops = merged_faces((mesh.vert_properties, mesh.tri_verts.astype(np.int64).tolist()), flatness)
-            inner = [_is_inner(corners[loop], whole, flatness) for loop in loops]
-            parts.append((corners * size + origin, loops, inner))
+            corners, rings = merged_faces((mesh.vert_properties, mesh.tri_verts.astype(np.int64).tolist()), flatness)
+            inner = [_is_inner(corners[ring], whole, flatness) for ring in rings]
+            parts.append((corners * size + origin, rings, inner))
         if len(queue) + len(parts) > MOST_PARTS:
-            raise NoParts(block, f"has more than {MOST_PARTS} convex parts; simplify its surface")
+            raise ValueError(f"has more than {MOST_PARTS} convex parts; simplify its surface")
     if abs(total - whole.volume) > VOLUME_LEFT * whole.volume:
-        raise NoParts(block, _why(whole, total, size, origin))
+        raise ValueError(_why(whole, total, size, origin))
     return parts
 
 
