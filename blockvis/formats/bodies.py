@@ -61,11 +61,12 @@ ECCENTRIC = 1e-3
 
 @dataclass(frozen=True)
 class Body:
-    """A closed surface of triangles: name, (n, 3) points, (m, 3) faces."""
+    """A closed surface of triangles: name, (n, 3) points, (m, 3) faces, and edges of holes that were closed."""
 
     name: str
     points: np.ndarray
     faces: np.ndarray
+    n_hole_edges: int = 0
 
 
 def body_of_polygons(name: str, points: np.ndarray, faces: Sequence[Sequence[int]]) -> Body:
@@ -207,7 +208,7 @@ def layout_of_bodies(
         blocks=best.outlines,
         names=tuple(body.name for body in bodies),
         unit=found.unit,
-        notes=(*notes, *found.notes),
+        notes=(*notes, *_holes_note(bodies), *found.notes),
     )
     layout = replace(with_rows(layout, rows), thickness=best.high - best.low)
     return replace(layout, left_out=asked.left_out(found, name, ignore))
@@ -280,7 +281,7 @@ def solids_of_bodies(
         blocks=tuple(solids),
         names=tuple(body.name for body in asked.bodies),
         unit=found.unit,
-        notes=(*(Note(CHANGED, text) for text in said), *found.notes),
+        notes=(*(Note(CHANGED, text) for text in said), *_holes_note(asked.bodies), *found.notes),
     )
     return replace(with_rows(layout, asked.rows), left_out=asked.left_out(found, "xz", ignore))
 
@@ -328,6 +329,15 @@ class _Asked:
 
 def _labels(row: Mapping[str, Any]) -> list[str]:
     return [str(row.get(key, "")) for key in ("name", "group", "material")]
+
+
+def _holes_note(bodies: Sequence[Body]) -> tuple[Note, ...]:
+    """Say which bodies had holes that were closed."""
+    holed = [f"'{body.name}' ({body.n_hole_edges} edges)" for body in bodies if body.n_hole_edges]
+    if not holed:
+        return ()
+    more = f" and {len(holed) - 6} more" if len(holed) > 6 else ""
+    return (Note(CHANGED, f"small holes in the surface of {', '.join(holed[:6])}{more} were closed"),)
 
 
 def _asked(found: Bodies, path: Path | str, ignore: Sequence[str], only: Sequence[str]) -> _Asked:

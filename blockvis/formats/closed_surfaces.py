@@ -12,6 +12,7 @@ from blockvis.layout.linked import linked
 from blockvis.layout.notes import LEFT_OUT, Note
 from blockvis.layout.outlines import FLAT
 from blockvis.layout.refusal import Refused, carrying
+from blockvis.layout.solids import area_vectors
 from blockvis.layout.surfaces import same_points, turned_faces
 
 from .bodies import Bodies, Body, as_drawn, fans
@@ -23,6 +24,10 @@ SAME_POINT = 2e-6
 
 #: Faces around an edge whose angles differ by less than this [rad] coincide.
 SAME_ANGLE = 1e-4
+
+
+#: Holes of up to so many edges, that are up to this part of the surface, are what a scanner has missed.
+HOLE_EDGES, HOLE_AREA = 16, 0.02
 
 
 class OpenSurface(Refused):
@@ -79,6 +84,12 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
         piece = _touching_bodies(points, every)
         if piece is not None:
             return _pieces(name, points, every, piece)
+    holes = unique[counts == 1]
+    closed = _with_holes_closed(points, faces, holes) if len(holes) and counts.max() == 2 else None
+    if closed is not None:
+        points, faces = closed
+        edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        unique, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     if (counts == 1).any():
         x, y, z = points[unique[counts == 1][0]].mean(axis=0)
         raise OpenSurface(
@@ -95,12 +106,47 @@ def closed_bodies(name: str, points: np.ndarray, faces: np.ndarray, size: float,
     # Pieces are connected by edges, not by points: blocks that touch at a corner remain two.
     edge = inverse.ravel().reshape(-1, 3)
     piece = components(list(edge), len(unique))
-    return _pieces(name, points, _seen_from_outside(points, faces, edge, piece), piece)
+    return _pieces(name, points, _seen_from_outside(points, faces, edge, piece), piece, holes)
 
 
-def _pieces(name: str, points: np.ndarray, faces: np.ndarray, piece: np.ndarray) -> list[Body]:
+def _with_holes_closed(
+    points: np.ndarray, faces: np.ndarray, open_edges: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Points and faces, with those that close its holes; None where a hole is large, or holes touch."""
+    beside: dict[int, list[int]] = {}
+    for a, b in open_edges.tolist():
+        beside.setdefault(a, []).append(b)
+        beside.setdefault(b, []).append(a)
+    if any(len(others) != 2 for others in beside.values()):
+        return None
+    middles: list[np.ndarray] = []
+    patches, waiting = [], dict.fromkeys(beside)
+    while waiting:
+        ring = [next(iter(waiting))]
+        del waiting[ring[0]]
+        while following := [k for k in beside[ring[-1]] if k in waiting]:
+            ring.append(following[0])
+            del waiting[ring[-1]]
+        if len(ring) > HOLE_EDGES:
+            return None
+        # Around a point in the middle: a diagonal may be an edge of the surface already.
+        patches.append([[ring[k - 1], ring[k], len(points) + len(middles)] for k in range(len(ring))])
+        middles.append(points[ring].mean(axis=0))
+    points, patch = np.vstack([points, middles]), np.concatenate(patches)
+    areas = [float(np.linalg.norm(area_vectors(points, some), axis=1).sum()) for some in (patch, faces)]
+    return (points, np.concatenate([faces, patch])) if areas[0] <= HOLE_AREA * areas[1] else None
+
+
+def _pieces(
+    name: str, points: np.ndarray, faces: np.ndarray, piece: np.ndarray, holes: np.ndarray | None = None
+) -> list[Body]:
     n = int(piece.max()) + 1
-    return [Body(name if n == 1 else f"{name} {k + 1}", points, faces[piece == k]) for k in range(n)]
+    bodies = []
+    for k in range(n):
+        own = faces[piece == k]
+        n_hole_edges = 0 if holes is None else int(np.isin(holes, own).all(axis=1).sum())
+        bodies.append(Body(name if n == 1 else f"{name} {k + 1}", points, own, n_hole_edges))
+    return bodies
 
 
 def _seen_from_outside(points: np.ndarray, faces: np.ndarray, edge: np.ndarray, piece: np.ndarray) -> np.ndarray:

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import solver
+
 from .faces import ROUNDING, flattened
 from .linked import linked
 from .solids import Solid, area_vectors, planes_of, volume, width_of
-from .surfaces import cleaned
+from .surfaces import cleaned, is_closed
 
 #: Gaps and overlaps of joints up to this fraction of the width of a typical block are faced unless the caller says
 #: otherwise: drawings of real vaults overlap by up to 8e-4 of a block, and their corners are as far off.
@@ -21,6 +23,12 @@ OPPOSITE = -np.cos(np.radians(10.0))
 
 #: Joints that go on beside each other are in one plane if they are within this many times the largest gap found.
 NOISE = 2.0
+
+#: Overlaps up to this fraction of what is faced may grow, where facing makes others smaller.
+WORSE = 0.5
+
+#: A block whose volume faces in one plane with those of others change by more than this part of it stays as drawn.
+SAME_BLOCK = 0.5
 
 #: Faces that cover each other by less than this fraction of the smaller one touch at an edge.
 COVERS = 1e-3
@@ -60,10 +68,12 @@ class _Faces:
 def facing_tolerance(
     solids: Sequence[Solid], joint_thickness: float = 0.0, overlap_tolerance: float | None = None
 ) -> float:
-    """Find the gap and overlap [m] up to which joints are faced: by default 0.01 of the width of a typical block."""
-    if overlap_tolerance is None:
-        overlap_tolerance = DEFAULT_FACING * float(np.median([width_of(*solid) for solid in solids]))
-    return max(joint_thickness, overlap_tolerance)
+    """Find the gap and overlap [m] up to which joints are faced: at least 0.01 of the width of a typical block.
+
+    A tolerance below that does not face less: it refuses what is left.
+    """
+    default = DEFAULT_FACING * float(np.median([width_of(*solid) for solid in solids]))
+    return max(joint_thickness, overlap_tolerance or 0.0, default)
 
 
 def faced(
@@ -113,7 +123,9 @@ def faced(
                 planes[k], changed[k] = side * plane, True
     joint = np.zeros(len(planes), dtype=bool)
     joint[np.concatenate([one, other])] = True
-    moved = _moved(solids, faces, planes, changed, joint)
+    moved, kept = _unless_worse(
+        solids, _moved(solids, faces, planes, changed, joint), names, WORSE * facing_tolerance(solids)
+    )
     worst = int(np.abs(apart).argmax())
     n = int(rough.sum())
     a, b = names[faces.block[one[worst]]], names[faces.block[other[worst]]]
@@ -122,7 +134,38 @@ def faced(
         f"{n} joints between faces were not plane: they {what} by up to {abs(apart[worst]):.3g} m ('{a}' and '{b}'); "
         "their faces were moved into one plane each"
     )
+    if kept:
+        note += f"; {len(kept)} blocks stay as drawn, which overlap less so ('{names[kept[0]]}')"
     return Facing(moved, n, float(abs(apart[worst])), note)
+
+
+def _unless_worse(
+    drawn: Sequence[Solid], moved: Sequence[Solid], names: Sequence[str], near: float
+) -> tuple[tuple[Solid, ...], list[int]]:
+    """Leave blocks as drawn that overlap more, and by more than ``near``, when they are faced, and tell which."""
+    found, kept = tuple(moved), set[int]()
+    try:
+        after = _depths(found, names, near)
+    except ValueError:
+        # Moved so far that a block is none any more.
+        return tuple(drawn), list(range(len(drawn)))
+    before = _depths(drawn, names, near) if after else {}
+    while True:
+        # What has been moved of two blocks that now overlap more goes back, until nothing does.
+        worse = {i for pair, depth in after.items() if depth > (1.0 + ROUNDING) * before.get(pair, near) for i in pair}
+        worse = {i for i in worse - kept if moved[i] is not drawn[i]}
+        if not worse:
+            return found, sorted(kept)
+        kept |= worse
+        found = tuple(drawn[i] if i in kept else solid for i, solid in enumerate(moved))
+        after = _depths(found, names, near)
+
+
+def _depths(solids: Sequence[Solid], names: Sequence[str], near: float) -> dict[tuple[int, int], float]:
+    """How deep [m] pairs of blocks overlap, by more than ``near``."""
+    assembly = solver.Assembly.from_solids(solids, names=names)
+    i, j, depth = assembly.shapes.overlaps(assembly.vertices, near)
+    return {(int(a), int(b)): float(d) for a, b, d in zip(i, j, depth, strict=True)}
 
 
 def _faces_of(solids: Sequence[Solid]) -> _Faces:
@@ -300,6 +343,7 @@ def _moved(
         points, rings = solids[i]
         mine = slice(start[i], start[i + 1])
         found = flattened(points, rings, planes[mine], joint[mine])
-        if volume(*found) > 0.0:
-            moved[i] = cleaned(*found)
+        solid, drawn = cleaned(*found), volume(points, rings)
+        if is_closed(solid[1]) and abs(volume(*solid) - drawn) <= SAME_BLOCK * drawn:
+            moved[i] = solid
     return tuple(moved)

@@ -41,8 +41,8 @@ def cleaned(points: np.ndarray, faces: list[list[int]]) -> Solid:
     if len(used) < len(points):
         place = {corner: k for k, corner in enumerate(used)}
         points, rings = points[used], [[place[corner] for corner in ring] for ring in rings]
-    edges = [(ring[k - 1], ring[k]) for ring in rings for k in range(len(ring))]
-    if len(set(edges)) < len(edges) or not {(b, a) for a, b in edges} <= set(edges):
+    if not is_closed(rings):
+        edges = _edges_of(rings)
         face = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
         low, high = np.sort(np.array(edges), axis=1).T
         edge, counts = np.unique(low * np.int64(len(points)) + high, return_inverse=True, return_counts=True)[1:]
@@ -50,6 +50,16 @@ def cleaned(points: np.ndarray, faces: list[list[int]]) -> Solid:
             turned = turned_faces(np.array(edges), edge.ravel(), face)
             rings = [ring[::-1] if turned[k] else ring for k, ring in enumerate(rings)]
     return outward(points, rings)
+
+
+def is_closed(faces: list[list[int]]) -> bool:
+    """Whether faces run through each of their edges once in each sense."""
+    edges = _edges_of(faces)
+    return len(set(edges)) == len(edges) and {(b, a) for a, b in edges} <= set(edges)
+
+
+def _edges_of(faces: list[list[int]]) -> list[tuple[int, int]]:
+    return [(ring[k - 1], ring[k]) for ring in faces for k in range(len(ring))]
 
 
 def _without_repeats(face: list[int]) -> list[int]:

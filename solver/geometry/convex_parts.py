@@ -2,39 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from solver.tolerances import DRAWN_GAP
 
 from .flat_faces import ONE_WAY, merged_faces
-from .outlines import next_vertices
 from .portions import alike
-from .solids import Solids, dot
+from .solids import Faces, Solids, cross, dot, unit
 
 if TYPE_CHECKING:
-    from scipy.spatial import ConvexHull
+    from manifold3d import Manifold
 
 #: An edge is re-entrant where the outward normals of its faces turn against each other by more than this sine.
 REENTRANT = 1e-4
 
 #: Points nearer to a plane than this fraction of the diagonal of their block are on it.
-ON_PLANE = 1e-9
+ON_PLANE = 1e-6
 
 #: Corners of parts farther than this fraction of that diagonal from all corners of their block are made by a cut.
-ON_CORNER = 1e-7
+ON_CORNER = 5e-6
 
 #: Parts whose volumes do not add up to that of their block within this fraction of it are no parts of it.
 VOLUME_LEFT = 0.01
 
 #: Re-entrant edges and third corners through which cuts are tried: more cost time and find no better one.
 EDGES_TRIED, CORNERS_TRIED = 6, 24
+
+#: A plane with corners in it cuts this far beside them, less than manifold3d tells apart and more than its rounding.
+BESIDE_PLANE = 1e-13
+
+#: Faces of a part and of its block that overlap by less than this lie beside each other.
+OVERLAPS = 1e-6
+
+#: How much an edge that a cut runs through, and makes a corner of, outweighs of the edges along which it runs.
+THROUGH_EDGE = 1e-3
+
+#: Difference of volumes, as a fraction of them, up to which they are equal: corners of hulls are welded at 1e-7.
+SAME_VOLUME = 1e-6
+
+#: A part with less than this fraction of the cube over the diagonal of its block is what rounding has left at a cut.
+SMALLEST_PART = 1e-10
+
+#: Blocks whose parts are kept: an assembly is made anew with each change of roles, imperfections or joints.
+MOST_KEPT = 2000
 
 #: A stone with more parts than this was drawn by a scanner.
 MOST_PARTS = 500
@@ -125,7 +139,12 @@ def convex_parts(solids: Solids) -> ConvexParts:
         own, loops = solids.surface(block)
         start = int(solids.offsets[block])
         frame = _spread_corners(own)
-        parts = _parts_of(solids, block, own, loops) if is_bent[block] else [(own, loops, [False] * len(loops))]
+        parts = [(own, loops, [False] * len(loops))]
+        if is_bent[block]:
+            try:
+                parts = _parts_of(own.tobytes(), tuple(map(tuple, loops)))
+            except ValueError as error:
+                raise NoParts(block, str(error)) from None
         for corners, around, inside in parts:
             inner_faces += inside
             surfaces.append((corners, around))
@@ -193,324 +212,244 @@ def _spread_corners(vertices: np.ndarray) -> np.ndarray:
     return np.array([first, second, third, fourth])
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Piece:
-    """What is left of a surface on one side of the cuts so far, without the faces that the cuts have made.
+    """What is left of a block on one side of the cuts so far: the triangles around it, in diagonals of the block.
 
     Attributes
     ----------
-    polygons : list of (k, 3) arrays [m]
-        Convex.
-    normals : list of (3,) arrays
-        Outward.
-    edges : list of (2, 3) arrays [m]
-        What is left of the re-entrant edges.
+    points : (n, 3) array
+    triangles : (m, 3) int array
+    face : (m,) int array
+        The face of the block in which each triangle lies; numbers beyond those of its faces are of cuts.
+    volume : float
     """
 
-    polygons: list[np.ndarray]
-    normals: list[np.ndarray]
-    edges: list[np.ndarray]
+    points: np.ndarray
+    triangles: np.ndarray
+    face: np.ndarray
+    volume: float
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """(m, 3) array: unit normals; zero of triangles without an area, whose direction is rounding."""
+        corners = self.points[self.triangles]
+        arms = np.roll(corners, -1, axis=1) - corners
+        area = cross(arms[:, 0], arms[:, 1])
+        length, longest = np.sqrt(dot(area, area)), np.sqrt(dot(arms, arms)).max(axis=1)
+        return np.where((length > ON_PLANE * longest)[:, None], unit(area), 0.0)
+
+    @cached_property
+    def corners(self) -> np.ndarray:
+        """(k, 3) array: points of triangles with an area."""
+        return self.points[np.unique(self.triangles[self.normals.any(axis=1)])]
 
     @property
-    def points(self) -> np.ndarray:
-        """(n, 3) array [m]: all corners, several times each."""
-        return np.concatenate(self.polygons)
+    def edges(self) -> np.ndarray:
+        """(3 m, 2) int array: first and last point of the edges around all triangles."""
+        return self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+
+    @cached_property
+    def twins(self) -> np.ndarray:
+        """(3 m,) int array: each edge as the triangle beyond it has it."""
+        number = np.array([len(self.points), 1])
+        order = np.argsort(self.edges @ number)
+        return order[np.searchsorted(self.edges @ number, self.edges[:, ::-1] @ number, sorter=order)]
+
+    def separated(self, normal: np.ndarray, origin: np.ndarray) -> list[_Piece]:
+        """Cut along a plane, and tell apart the bodies in which that leaves the piece."""
+        # Corners in the plane are so to the last digit; cuts run beside it, or faces there would stay with both sides.
+        first = unit(np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())]))
+        frame = np.stack([normal, first, np.cross(normal, first)])
+        level = (self.points - origin) @ frame.T
+        level[np.abs(level[:, 0]) <= ON_PLANE, 0] = 0.0
+        body, found, cut = _body(level, self.triangles), [], int(self.face.max()) + 1
+        sides = (body.trim_by_plane((sense, 0.0, 0.0), BESIDE_PLANE) for sense in (1.0, -1.0))
+        for part in (part for side in sides for part in side.decompose()):
+            if part.volume() > SMALLEST_PART:
+                mesh = part.to_mesh64()
+                # The triangles of the body come first, then those of the plane.
+                face, n = np.full(len(mesh.tri_verts), cut), mesh.run_index[1] // 3
+                face[:n] = self.face[mesh.face_id[:n]]
+                points, triangles = mesh.vert_properties @ frame + origin, mesh.tri_verts.astype(np.int64)
+                found.append(_Piece(points, triangles, face, part.volume()))
+        return found
 
 
+def _body(points: np.ndarray, triangles: np.ndarray) -> Manifold:
+    # Loaded where it is used: most blocks are convex.
+    from manifold3d import Manifold, Mesh64
+
+    return Manifold(Mesh64(points, triangles.astype(np.uint64), face_id=np.arange(len(triangles), dtype=np.uint64)))
+
+
+@lru_cache(maxsize=MOST_KEPT)
 def _parts_of(
-    solids: Solids, block: int, vertices: np.ndarray, faces: list[list[int]]
+    points: bytes, faces: tuple[tuple[int, ...], ...]
 ) -> list[tuple[np.ndarray, list[list[int]], list[bool]]]:
-    """Corners and faces of each part of a block, and which of the faces are inside the block."""
-    origin = vertices[0]
-    own = vertices - origin
-    width, volume = float(solids.widths[block]), float(solids.volumes[block])
-    near = ON_PLANE * float(np.linalg.norm(np.ptp(own, axis=0)))
-    flatness = DRAWN_GAP * width
-    queue, hulls = [_piece_of(own, faces)], []
+    """Corners and faces of each part of a block, and which of the faces are inside the block; kept of the last blocks.
+
+    Raises
+    ------
+    ValueError
+        Says why there are none.
+    """
+    from manifold3d import Manifold
+
+    vertices, loops = np.frombuffer(points).reshape(-1, 3), [list(face) for face in faces]
+    origin, size = vertices[0], float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    drawn = Solids.of_surfaces([((vertices - origin) / size, loops)])
+    planes, flatness = drawn.faces(drawn.vertices), DRAWN_GAP * float(drawn.widths[0])
+    whole = _whole(drawn.vertices, loops, planes.normals)
+    queue, parts, total = [whole], [], 0.0
     while queue:
         piece = queue.pop()
-        cut = None if _is_convex(piece, flatness) else _best_cut(piece, near)
-        if cut is None:
-            hull = _hull(piece.points)
-            if hull is not None and hull.volume > SMALLEST_PART * volume:
-                hulls.append((hull, piece))
+        cut = _best_cut(piece, planes, flatness)
+        if cut is not None:
+            queue += piece.separated(*cut)
         else:
-            for side in _cut(piece, *cut, near):
-                queue += _separate(side, *cut, near)
-        if len(queue) + len(hulls) > MOST_PARTS:
-            raise NoParts(block, f"has more than {MOST_PARTS} convex parts; simplify its surface")
-    total = sum(hull.volume for hull, _ in hulls)
-    if abs(total - volume) > VOLUME_LEFT * volume:
-        raise NoParts(
-            block,
-            f"of {volume:.6g} m³ falls into convex parts of {total:.6g} m³ in all; its surface crosses itself: "
-            "redraw it, or draw it as several blocks",
-        )
-    parts = []
-    for hull, piece in hulls:
-        corners, loops = merged_faces(_surface_of_hull(hull), flatness)
-        parts.append((corners + origin, loops, [_is_inner(corners[loop], piece, flatness) for loop in loops]))
+            hull = Manifold.hull_points(_drawn_corners(piece.corners, drawn.vertices))
+            total += hull.volume()
+            mesh = hull.to_mesh64()
+            corners, rings = merged_faces((mesh.vert_properties, mesh.tri_verts.astype(np.int64).tolist()), flatness)
+            inner = [_is_inner(corners[ring], whole, flatness) for ring in rings]
+            parts.append((corners * size + origin, rings, inner))
+        if len(queue) + len(parts) > MOST_PARTS:
+            raise ValueError(f"has more than {MOST_PARTS} convex parts; simplify its surface")
+    if abs(total - whole.volume) > VOLUME_LEFT * whole.volume:
+        raise ValueError(_why(whole, total, size, origin))
     return parts
 
 
-def _is_inner(face: np.ndarray, piece: _Piece, flatness: float) -> bool:
+def _whole(points: np.ndarray, faces: list[list[int]], normals: np.ndarray) -> _Piece:
+    """Cut the faces of a block into triangles."""
+    from manifold3d import triangulate
+
+    triangles, face = [], []
+    for k, (loop, normal) in enumerate(zip(faces, normals, strict=True)):
+        first = unit(np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())]))
+        flat = points[loop] @ np.stack([first, np.cross(normal, first)], axis=1)
+        triangles.append(np.array(loop)[triangulate([flat])])
+        face.append(np.full(len(triangles[-1]), k))
+    around, which = np.concatenate(triangles), np.concatenate(face)
+    return _Piece(points, around, which, _body(points, around).volume())
+
+
+def _why(whole: _Piece, total: float, size: float, origin: np.ndarray) -> str:
+    """Say why the parts of a block do not fill it."""
+    crossing = _crossing(whole)
+    if crossing is not None:
+        place = "({:.6g}, {:.6g}, {:.6g})".format(*(crossing * size + origin))
+        return (
+            f"cannot be cut into convex parts: its surface crosses itself near {place}; "
+            "redraw it, or draw it as several blocks"
+        )
+    n_holes = 1 - (len(whole.points) - len(whole.triangles) // 2) // 2
+    holes = f"; {n_holes} holes run through it" if n_holes else ""
+    return (
+        f"could not be cut into convex parts (parts hold {total * size**3:.6g} of {whole.volume * size**3:.6g} m³)"
+        f"{holes}: draw it as several blocks"
+    )
+
+
+def _crossing(piece: _Piece) -> np.ndarray | None:
+    """(3,) array: where an edge of a surface passes through one of its triangles; None where none does."""
+    corners = piece.points[piece.triangles]
+    edges = np.unique(np.sort(piece.edges, axis=1), axis=0)
+    start, end = piece.points[edges[:, 0]], piece.points[edges[:, 1]]
+    for (a, b, c), normal, own in zip(corners, piece.normals, piece.triangles, strict=True):
+        before, after = (start - a) @ normal, (end - a) @ normal
+        k = np.flatnonzero((before * after < 0.0) & (np.minimum(np.abs(before), np.abs(after)) > ON_CORNER))
+        k = k[~np.isin(edges[k], own).any(axis=1)]
+        at = start[k] + (before[k] / (before[k] - after[k]))[:, None] * (end[k] - start[k])
+        inside = np.all(
+            [cross((q - p)[None], at - p) @ normal > -ON_CORNER for p, q in ((a, b), (b, c), (c, a))], axis=0
+        )
+        if inside.any():
+            return np.asarray(at[inside][0])
+    return None
+
+
+def _is_inner(face: np.ndarray, whole: _Piece, flatness: float) -> bool:
     """Whether nothing of the surface of the block lies in a face of a part."""
     arms = face - face[0]
-    area = np.cross(arms[1:-1], arms[2:]).sum(axis=0)
-    normal, middle = area / np.linalg.norm(area), face.mean(axis=0)
-    return not any(
-        outward @ normal > ONE_WAY and np.abs((polygon - middle) @ normal).max() <= 2.0 * flatness
-        for polygon, outward in zip(piece.polygons, piece.normals, strict=True)
-    )
+    normal = unit(cross(arms[1:-1], arms[2:]).sum(axis=0))
+    own = whole.points[whole.triangles[whole.normals @ normal > ONE_WAY]]
+    own = own[(np.abs((own - face.mean(axis=0)) @ normal) <= 2.0 * flatness).all(axis=1)]
+    # They lie apart where an edge of one of them has the other on its outer side.
+    apart = np.zeros(len(own), dtype=bool)
+    for ring, other in ((np.broadcast_to(face, (len(own), *face.shape)), own), (own, face[None])):
+        outward = unit(cross(np.roll(ring, -1, axis=1) - ring, normal))
+        inside = dot(ring[:, :, None] - other[:, None], outward[:, :, None]).max(axis=2)
+        apart |= (inside <= OVERLAPS).any(axis=1)
+    return bool(apart.all())
 
 
-#: A part with less than this fraction of the volume of its block is what rounding has left at a cut.
-SMALLEST_PART = 1e-7
+def _drawn_corners(corners: np.ndarray, drawn: np.ndarray) -> np.ndarray:
+    """(n, 3) array: corners of a part, those of the block as they were drawn."""
+    apart = np.abs(corners[:, None] - drawn).max(axis=2)
+    nearest = apart.argmin(axis=1)
+    return np.where((apart.min(axis=1) <= 2.0 * ON_PLANE)[:, None], drawn[nearest], corners)
 
 
-def _piece_of(vertices: np.ndarray, faces: list[list[int]]) -> _Piece:
-    polygons, normals = [], []
-    outward, owner = [], {}
-    for k, face in enumerate(faces):
-        points = vertices[face]
-        arms = points - points[0]
-        area = np.cross(arms[1:-1], arms[2:]).sum(axis=0)
-        normal = area / np.linalg.norm(area)
-        outward.append(normal)
-        for a, b in zip(face, face[1:] + face[:1], strict=True):
-            owner[a, b] = k
-        for triangle in _convex_pieces(points, normal):
-            polygons.append(triangle)
-            normals.append(normal)
-    edges = [
-        vertices[[a, b]]
-        for (a, b), k in owner.items()
-        if a < b
-        and np.cross(outward[k], outward[owner[b, a]]) @ (vertices[b] - vertices[a])
-        < -REENTRANT * np.linalg.norm(vertices[b] - vertices[a])
-    ]
-    return _Piece(polygons, normals, edges)
+def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray, np.ndarray] | None:
+    """Find the plane (normal, point) that leaves two pieces with the smallest hulls; None of a convex piece."""
+    from manifold3d import Manifold
 
-
-def _convex_pieces(points: np.ndarray, normal: np.ndarray) -> Iterator[np.ndarray]:
-    """Give the polygon itself where it is convex, else triangles: its ears are cut off one by one."""
-    if (_turns(points, normal) >= 0.0).all():
-        yield points
-        return
-    left = list(range(len(points)))
-    while len(left) > 3:
-        turn = _turns(points[left], normal)
-        for k in np.argsort(-turn, kind="stable"):
-            a, b, c = (points[left[(k + step) % len(left)]] for step in (-1, 0, 1))
-            others = points[
-                [
-                    left[m]
-                    for m in range(len(left))
-                    if m not in (k - 1, k, (k + 1) % len(left)) and m - len(left) != k - 1
-                ]
-            ]
-            inside = np.ones(len(others), dtype=bool)
-            for p, q in ((a, b), (b, c), (c, a)):
-                inside &= np.cross(q - p, others - p) @ normal >= 0.0
-            if not inside.any():
-                break
-        yield np.stack([a, b, c])
-        del left[int(k)]
-    yield points[left]
-
-
-def _turns(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """(n,) array: sine of the turn at each corner times the edges there, positive at convex corners."""
-    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
-    return np.asarray(np.cross(before, after) @ normal)
-
-
-def _is_convex(piece: _Piece, flatness: float) -> bool:
-    points = piece.points
-    return all(
-        ((points - polygon[0]) @ normal).max() <= flatness
-        for polygon, normal in zip(piece.polygons, piece.normals, strict=True)
-    )
-
-
-def _hull(points: np.ndarray) -> ConvexHull | None:
-    """Convex hull; None of points in a plane."""
-    # Loaded where it is used: blocks in the plane need none, and it takes a tenth of all imports.
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return ConvexHull(points)
-    except (QhullError, ValueError):
+    points, faces = piece.corners, np.unique(piece.face[piece.normals.any(axis=1)])
+    faces = faces[faces < len(planes.normals)]
+    normals, middles = planes.normals[faces], planes.middles[faces]
+    if (points @ normals.T - dot(normals, middles)).max(initial=0.0) <= flatness:
         return None
-
-
-def _best_cut(piece: _Piece, near: float) -> tuple[np.ndarray, np.ndarray] | None:
-    """Find the plane (normal, point) that leaves two pieces with the smallest hulls; None without a re-entrant edge."""
-    edges = sorted(piece.edges, key=lambda edge: -float(np.linalg.norm(edge[1] - edge[0])))[:EDGES_TRIED]
-    points = piece.points
-    points = points[np.unique(np.round(points / (1e3 * near)), axis=0, return_index=True)[1]]
-    starts = np.concatenate(piece.polygons)
-    ends = np.concatenate([np.roll(polygon, -1, axis=0) for polygon in piece.polygons])
-    outward = np.array(piece.normals)
-    counts = np.array([len(polygon) for polygon in piece.polygons])
-    owner, first = np.repeat(np.arange(len(counts)), counts), np.cumsum(counts) - counts
-    best, smallest = None, np.inf
-    for edge in edges:
-        along = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
-        arms = points - edge[0]
-        arms = arms - (arms @ along)[:, None] * along
-        far = np.linalg.norm(arms, axis=1)
-        normals = np.cross(along, arms[far > 1e4 * near] / far[far > 1e4 * near, None])
-        normals = normals * np.where(normals @ [1.0, 1e-3, 1e-6] < 0.0, -1.0, 1.0)[:, None]
-        _, once = np.unique(np.round(normals, 6), axis=0, return_index=True)
-        for normal in normals[np.sort(once)][:CORNERS_TRIED]:
+    starts = piece.points[piece.triangles]
+    ends = np.roll(starts, -1, axis=1)
+    edges = _reentrant_edges(piece, planes.normals)
+    length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+    sharp = piece.face[:, None] != piece.face[piece.twins // 3].reshape(-1, 3)
+    best, smallest, most = None, np.inf, 0.0
+    for edge in edges[:EDGES_TRIED]:
+        for normal in _normals_through(edge, points):
             level, beyond = (starts - edge[0]) @ normal, (ends - edge[0]) @ normal
-            through = (np.minimum(level, beyond) < -near) & (np.maximum(level, beyond) > near)
+            through = (np.minimum(level, beyond) < -ON_PLANE) & (np.maximum(level, beyond) > ON_PLANE)
             part = (level[through] / (level[through] - beyond[through]))[:, None]
             on = starts[through] + part * (ends[through] - starts[through])
-            hulls = []
+            size = 0.0
             for sense in (1.0, -1.0):
                 # Corners in the plane belong to the side on which their face is; a face in the plane bounds a side.
-                reaches = np.maximum.reduceat(sense * level, first) > near
-                lies = (np.maximum.reduceat(np.abs(level), first) <= near) & (sense * (outward @ normal) < 0.0)
-                here = (sense * level >= -near) & (reaches | lies)[owner]
-                hulls.append(_hull(np.concatenate([starts[here], on])))
-            if hulls[0] is None or hulls[1] is None:
-                continue
-            size = hulls[0].volume + hulls[1].volume
-            if size < smallest * (1.0 - 1e-9):
-                best, smallest = (normal, edge[0]), size
+                reaches = (sense * level).max(axis=1) > ON_PLANE
+                lies = (np.abs(level).max(axis=1) <= ON_PLANE) & (sense * (piece.normals @ normal) < -0.5)
+                here = (sense * level >= -ON_PLANE) & (reaches | lies)[:, None]
+                hull = Manifold.hull_points(np.concatenate([starts[here], on])).volume()
+                size += hull if hull > SMALLEST_PART else np.inf
+            # Of cuts that are as good, the one along more re-entrant edges, and through fewer edges.
+            off = (edges - edge[0]) @ normal
+            in_plane, beside = np.abs(off).max(axis=1) <= ON_PLANE, off.min(axis=1) * off.max(axis=1) >= -(ON_PLANE**2)
+            along = length @ (1.0 * in_plane + beside) - THROUGH_EDGE * np.count_nonzero(through & sharp)
+            equal = abs(size - smallest) <= SAME_VOLUME * smallest
+            if size < np.inf and (along > most + ON_PLANE if equal else size < smallest):
+                best, smallest, most = (normal, edge[0]), size, along
     return best
 
 
-def _cut(piece: _Piece, normal: np.ndarray, origin: np.ndarray, near: float) -> tuple[_Piece, _Piece]:
-    """Cut a piece into what is behind a plane and what is in front of it."""
-    sides = _Piece([], [], []), _Piece([], [], [])
-    for polygon, outward in zip(piece.polygons, piece.normals, strict=True):
-        level = (polygon - origin) @ normal
-        level[np.abs(level) <= near] = 0.0
-        if not level.any():
-            # A face in the plane bounds what is behind it; a triangle without an area, across it, bounds nothing.
-            if abs(outward @ normal) < 0.5:
-                continue
-            side = sides[0] if outward @ normal > 0.0 else sides[1]
-            side.polygons.append(polygon)
-            side.normals.append(outward)
-            continue
-        for side, sense in zip(sides, (-1.0, 1.0), strict=True):
-            kept = _half(polygon, sense * level)
-            if len(kept) > 2:
-                side.polygons.append(kept)
-                side.normals.append(outward)
-    for edge in piece.edges:
-        level = (edge - origin) @ normal
-        level[np.abs(level) <= near] = 0.0
-        for side, sense in zip(sides, (-1.0, 1.0), strict=True):
-            a, b = sense * level
-            if max(a, b) <= 0.0:
-                continue
-            ends = edge.copy()
-            if min(a, b) < 0.0:
-                ends[0 if a < 0.0 else 1] = edge[0] + a / (a - b) * (edge[1] - edge[0])
-            side.edges.append(ends)
-    return sides
+def _reentrant_edges(piece: _Piece, normals: np.ndarray) -> np.ndarray:
+    """(n, 2, 3) array: ends of edges, longest first, where faces of the block, (n_faces, 3) normals, turn inwards."""
+    edges, face, twin = piece.edges, np.repeat(piece.face, 3), piece.twins
+    k = np.flatnonzero((edges[:, 0] < edges[:, 1]) & (face < len(normals)) & (face[twin] < len(normals)))
+    ends = piece.points[edges[k]]
+    along = ends[:, 1] - ends[:, 0]
+    length = np.sqrt(dot(along, along))
+    turn = dot(cross(normals[face[k]], normals[face[twin[k]]]), along)
+    bent = np.flatnonzero(turn < -REENTRANT * length)
+    return ends[bent[np.argsort(-length[bent], kind="stable")]]
 
 
-def _half(polygon: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Cut off of a convex polygon what has a negative level; nothing is left of one that only touches the plane."""
-    if level.max() <= 0.0:
-        return polygon[:0]
-    corners = []
-    for k in range(len(polygon)):
-        before = k - 1
-        if level[before] * level[k] < 0.0:
-            part = level[before] / (level[before] - level[k])
-            corners.append(polygon[before] + part * (polygon[k] - polygon[before]))
-        if level[k] >= 0.0:
-            corners.append(polygon[k])
-    return np.array(corners)
-
-
-def _separate(piece: _Piece, normal: np.ndarray, origin: np.ndarray, near: float) -> list[_Piece]:
-    """Tell apart the bodies in which a cut may have left a piece.
-
-    Polygons with an edge in common belong together; where a hole runs through the cut, all do.
-    """
-    if not piece.polygons:
-        return []
-    points = piece.points
-    _, which = np.unique(np.round(points / (1e3 * near)).astype(np.int64), axis=0, return_inverse=True)
-    which = which.ravel()
-    owner = np.repeat(np.arange(len(piece.polygons)), [len(polygon) for polygon in piece.polygons])
-    following = which[_following(owner)]
-    keys = np.minimum(which, following) * np.int64(len(points)) + np.maximum(which, following)
-    # Two bodies that the cut has left may still meet along the edge through which it went.
-    on_plane = np.abs((points - origin) @ normal) <= near
-    in_cut = on_plane & on_plane[_following(owner)]
-    order = np.flatnonzero(~in_cut)[np.argsort(keys[~in_cut], kind="stable")]
-    same = np.flatnonzero(np.diff(keys[order]) == 0)
-    first, second = owner[order[same]].tolist(), owner[order[same + 1]].tolist()
-    # A face in the plane belongs to the body that it bounds: that whose other faces turn away from it.
-    flat = np.logical_and.reduceat(on_plane, np.searchsorted(owner, np.arange(len(piece.polygons))))
-    for face in np.flatnonzero(flat).tolist():
-        middle = piece.polygons[face].mean(axis=0)
-        for k in np.flatnonzero(np.isin(keys, keys[owner == face]) & (owner != face)).tolist():
-            if (middle - points[k]) @ piece.normals[owner[k]] <= near:
-                first.append(face)
-                second.append(int(owner[k]))
-    links = (np.ones(len(first)), (first, second))
-    n = len(piece.polygons)
-    count, body = connected_components(coo_array(links, shape=(n, n)), directed=False)
-    if count == 1:
-        return [piece]
-    bodies = []
-    for number in range(count):
-        polygons = [piece.polygons[k] for k in np.flatnonzero(body == number)]
-        normals = [piece.normals[k] for k in np.flatnonzero(body == number)]
-        own = np.concatenate(polygons)
-        edges = [
-            edge
-            for edge in piece.edges
-            if np.abs(own - edge.mean(axis=0)).max() > 0.0 and _touches(polygons, edge, near)
-        ]
-        bodies.append(_Piece(polygons, normals, edges))
-    return [piece] if any(_is_hole(one, normal, origin, near) for one in bodies) else bodies
-
-
-def _following(owner: np.ndarray) -> np.ndarray:
-    """(n,) int array: the corner that follows each around its polygon, of which ``owner`` gives the number."""
-    return next_vertices(np.append(np.searchsorted(owner, np.unique(owner)), len(owner)))
-
-
-def _touches(polygons: list[np.ndarray], edge: np.ndarray, near: float) -> bool:
-    """Whether an edge is one of those of some polygons."""
-    middle, along = edge.mean(axis=0), (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
-    for polygon in polygons:
-        arms = middle - polygon
-        across = arms - (arms @ along)[:, None] * along
-        on_line = np.linalg.norm(across, axis=1) <= 1e4 * near
-        place = arms[on_line] @ along
-        if on_line.sum() > 1 and place.min() < 0.0 < place.max():
-            return True
-    return False
-
-
-def _is_hole(piece: _Piece, normal: np.ndarray, origin: np.ndarray, near: float) -> bool:
-    """Whether a body is the wall of a hole: its outline in the plane of the cut runs the other way round."""
-    in_front = ((piece.points - origin) @ normal).max() > near
-    area = 0.0
-    for polygon in piece.polygons:
-        ends = np.roll(polygon, -1, axis=0)
-        on = (np.abs((polygon - origin) @ normal) <= near) & (np.abs((ends - origin) @ normal) <= near)
-        if on.all():
-            continue
-        area += float(np.sum(np.cross(polygon[on] - origin, ends[on] - origin) @ normal))
-    return area * (1.0 if in_front else -1.0) < 0.0
-
-
-def _surface_of_hull(hull: ConvexHull) -> tuple[np.ndarray, list[list[int]]]:
-    faces = []
-    for corners, plane in zip(hull.simplices, hull.equations, strict=True):
-        a, b, c = hull.points[corners]
-        faces.append((corners if np.cross(b - a, c - a) @ plane[:3] > 0.0 else corners[::-1]).tolist())
-    return hull.points, faces
+def _normals_through(edge: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(n, 3) array: normals of planes through an edge and another point."""
+    along = unit(edge[1] - edge[0])
+    arms = points - edge[0]
+    arms = arms - (arms @ along)[:, None] * along
+    far = np.sqrt(dot(arms, arms))
+    normals = cross(along[None], arms[far > 10.0 * ON_PLANE] / far[far > 10.0 * ON_PLANE, None])
+    normals = normals * np.where(normals @ [1.0, 1e-3, 1e-6] < 0.0, -1.0, 1.0)[:, None]
+    _, once = np.unique(np.round(normals, 6), axis=0, return_index=True)
+    return normals[np.sort(once)][:CORNERS_TRIED]

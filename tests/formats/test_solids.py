@@ -98,3 +98,13 @@ def test_a_ring_of_many_copies_of_one_point_is_quick(tmp_path):
 
 def _soup(triangles):
     return triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("edges", [3, 4])
+def test_small_holes_of_a_scanned_stone_are_closed_with_a_note(tmp_path, edges):
+    stone = trimesh.creation.icosphere(subdivisions=2)
+    missing = stone.face_adjacency[0][: edges - 2]
+    trimesh.Trimesh(stone.vertices, np.delete(stone.faces, missing, axis=0)).export(tmp_path / "a.ply")
+    layout = read_layout(tmp_path / "a.ply", dimension=3)
+    assert layout.volumes[0] == pytest.approx(stone.volume, rel=5e-3)
+    assert f"small holes in the surface of 'a.ply' ({edges} edges) were closed" in layout.notes

@@ -11,6 +11,8 @@ from structures import box, drawn, fans, layout_of
 import solver
 from blockvis import generators, inspect, read, read_layout, write_layout
 from blockvis.layout.faces import with_plane_faces
+from blockvis.layout.facing import faced, facing_tolerance
+from blockvis.layout.solids import triangles_of
 from solver import mechanics
 
 SMALL = {
@@ -189,3 +191,23 @@ def test_what_touches_has_no_open_joints_and_what_overlaps_is_named(tmp_path):
     assert 0 in found.overlapping[0][:2]
     assert found.overlapping[0][2] == pytest.approx(0.01, rel=1e-6)
     assert "refused: move the blocks apart or raise overlap_tolerance" in str(found)
+
+
+def deepest(solids):
+    """How deep any two blocks overlap, at most."""
+    assembly = solver.Assembly.from_solids(solids)
+    return assembly.shapes.overlaps(assembly.vertices, 1e-9)[2].max(initial=0.0)
+
+
+@pytest.mark.parametrize("tolerance", [None, pytest.param(0.1, marks=pytest.mark.thorough)])
+def test_facing_never_makes_the_deepest_overlap_deeper(tolerance):
+    drawn = generators.build("barrel vault", SMALL["barrel vault"])
+    solids = [with_plane_faces(p, triangles_of(p, f)).solid for p, f in shaken(layout_of(drawn), 2e-3).solids]
+    near = facing_tolerance(solids, 0.0, tolerance)
+    found = faced(solids, drawn.names, near)
+    assert deepest(found.solids) <= max(deepest(solids), 0.5 * near)
+
+
+def test_a_tolerance_does_not_face_less_than_none():
+    solids = layout_of(generators.build("dome", SMALL["dome"])).solids
+    assert facing_tolerance(solids, 0.0, 1e-9) == facing_tolerance(solids) < facing_tolerance(solids, 0.0, 1.0) == 1.0
