@@ -41,8 +41,9 @@ WEDGED = 1e-5
 #: Error of a step, in errors aimed for, at which it is refused.
 REFUSED = 4.0
 
-#: Speed of a block, in speeds of the supports, and movement in a step, in block sizes, at which equilibrium is checked.
-FAST, FAR = 3.0, 0.05
+#: Speed of a block, in speeds of the supports, and movements in a step, in block sizes: equilibrium is checked from the
+#: first on where blocks are fast, and from the second on in any case. Open joints that close move blocks by less.
+FAST, NEAR, FAR = 3.0, 1e-3, 0.05
 
 #: Tolerances beyond a bound that has an equilibrium after all in which the viscosity stays reduced.
 ENCLOSED = 8.0
@@ -333,7 +334,7 @@ class Path:
         """Whether a new place belongs to the path: in equilibrium where blocks move fast or a collapse is enclosed."""
         if self.model.live is not None and new.multiplier <= 0.0 and new.s > self._onset():
             return False
-        fast = error.moved > FAST * length / self.stepper.unit or error.moved > FAR
+        fast = error.moved > min(max(FAST * length / self.stepper.unit, NEAR), FAR)
         if not (fast or refining):
             return True
         if self.checks.in_equilibrium(new, self._closed_gap(refining)):

@@ -12,7 +12,11 @@ from solver.tolerances import ACCEPTED_GAP, ACCEPTED_VIOLATION, RAY_BALANCE
 
 
 class SolveError(RuntimeError):
-    """No route gave a solution that passes its check. Not a statement about the structure."""
+    """No route gave a solution that passes its check, not even ``best``. Not a statement about the structure."""
+
+    def __init__(self, message: str, best: Solution | None = None) -> None:
+        super().__init__(message)
+        self.best = best
 
 
 class Unbounded(Exception):

@@ -74,15 +74,15 @@ def solve_cones(program: ConicProgram) -> Solution:
 
 
 def _first_accepted(runs: Mapping[str, Callable[[], tuple[Solution | None, str]]], what: str) -> Solution:
-    outcomes = []
+    outcomes, best = [], None
     for route, run in runs.items():
         solution, status = run()
         if solution is not None and solution.accepted:
             return solution
         if solution is not None:
-            status += f", violation {solution.violation:.1e}, gap {solution.gap:.1e}"
+            best, status = solution, f"{status}, violation {solution.violation:.1e}, gap {solution.gap:.1e}"
         outcomes.append(f"{route}: {status}")
-    raise SolveError(f"no solution of the {what} passed its check ({'; '.join(outcomes)})")
+    raise SolveError(f"no solution of the {what} passed its check ({'; '.join(outcomes)})", best)
 
 
 def solve_between(
