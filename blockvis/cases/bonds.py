@@ -21,6 +21,7 @@ from .key import NOT_NEGATIVE, PAIR, POSITIVE, TEXTS, Key, Section, one_of, whol
 from .toml_table import Table
 
 _DEFAULT = Pattern()
+_SIZE = replace(PAIR, read=lambda table, key: table.pair(key.name, words="[length, height]"))
 
 BOND = Section(
     "bond",
@@ -32,8 +33,8 @@ BOND = Section(
             "stays a block then", ["A-WIN*", "A-DOOR*"], otherwise="holes, and all outlines in the walls", default=()),
         Key("bond", one_of(PATTERNS), "Pattern; the lengths of the stones of ashlar are random, and the outlines of "
             "rubble", "flemish", default=_DEFAULT.bond),
-        Key("brick", PAIR, "Length and height of a brick with its joint; of ashlar the mean length", [0.25, 0.075], "m",
-            _DEFAULT.brick),
+        Key("brick", _SIZE, "Length and height of a brick with its joint; of ashlar the mean length",
+            [0.25, 0.075], "m", _DEFAULT.brick),
         Key("joint", NOT_NEGATIVE, "Thickness of the mortar that blockvis bond leaves open between stones; a run "
             "closes joints to their middle, so that stones touch", 0.01, "m", _DEFAULT.joint),
         Key("heads", one_of(HEADS), 'Heads over openings: "auto" is a ring of voussoirs around a curved top and a '
@@ -41,8 +42,8 @@ BOND = Section(
             default=_DEFAULT.heads),
         Key("bearing", POSITIVE, "Bearing of lintels on either side, less where there is no room", 0.125, "m",
             otherwise="half a brick"),
-        Key("quoins", PAIR, "Length and height of larger stones at the upright ends of the wall, every second one half "
-            "as long", [0.5, 0.225], "m", otherwise="none"),
+        Key("quoins", _SIZE, "Length and height of larger stones at the upright ends of the wall, every second one "
+            "half as long", [0.5, 0.225], "m", otherwise="none"),
         Key("stone", POSITIVE, "Mean length of the stones of rubble", 0.3, "m", otherwise="the length of a brick"),
         Key("flatness", POSITIVE, "Length over height of the stones of rubble", 1.6, default=_DEFAULT.flatness),
         Key("seed", whole(0, 2**31 - 1), "Of the random lengths and outlines of ashlar and rubble", 1,

@@ -32,6 +32,9 @@ GRID = 1e-12
 #: An opening has wall over it where a strip of this fraction of a course over its top is wall at all.
 OVER = 0.1
 
+#: Parts of a brick narrower than this fraction of its height, and longer than that, are cut off.
+TONGUE = 0.25
+
 #: The stones fill the wall to this fraction of its area.
 KEPT = 1e-9
 
@@ -366,6 +369,8 @@ def _laid(
     pieces, is_whole = [], []
     for unit, shape in zip(units, cut, strict=True):
         parts = in_simple_pieces(shape, grid)
+        if not random and shape.area < (1.0 - 1e-6) * unit.area:
+            parts = [cut for part in parts for cut in _without_tongues(part, height, grid)]
         pieces += parts
         is_whole += [part.area > (1.0 - 1e-6) * unit.area for part in parts]
     if random:
@@ -387,6 +392,21 @@ def _laid(
         course = int(courses[i])
         named.append((f"{'stone' if pattern.bond not in BRICKWORK else 'brick'} {course + 1}-{position}", joined[i]))
     return named
+
+
+def _without_tongues(piece: shapely.Polygon, height: float, grid: float) -> list[shapely.Polygon]:
+    """Cut off strips that a head leaves of a brick, so that they join what they lie on."""
+    if len(piece.exterior.coords) < 6:
+        return [piece]
+    half = TONGUE * height / 2.0
+    body = piece.buffer(-half, join_style="mitre").buffer(half, join_style="mitre")
+    strips = [
+        strip for strip in shapely.get_parts(shapely.difference(piece, body, grid_size=grid))
+        if strip.geom_type == "Polygon" and strip.length > 2.0 * TONGUE * height
+        and strip.area > 0.98 * strip.envelope.area
+    ]  # fmt: skip
+    rest = in_simple_pieces(shapely.difference(piece, shapely.union_all(strips), grid_size=grid), grid)
+    return [*rest, *strips] if strips and len(rest) == 1 else [piece]
 
 
 def _is_sliver(shape: shapely.Polygon, length: float, height: float) -> bool:

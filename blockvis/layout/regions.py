@@ -111,9 +111,16 @@ def regions_of(
     free = [k for k, one in enumerate(drawn) if one.block < 0 or role[one.block] == mechanics.FREE]
     walls: dict[int, int] = {}
     for number, choice in enumerate(choices):
+        for key, patterns in (("walls", choice.walls), ("openings", choice.openings)):
+            for pattern in patterns:
+                if not any(matches(drawn[k].labels, [pattern]) for k in free):
+                    raise ValueError(f"{source}: {_no_outline(layout, drawn, key, pattern)}")
         mine = [k for k in free if k not in walls and matches(drawn[k].labels, choice.walls)]
         if not mine:
-            raise ValueError(f"{source}: {_no_outline(layout, drawn, choice)}")
+            listed = ", ".join(f"'{word}'" for word in choice.walls)
+            raise ValueError(
+                f"{source}: bond: walls = {listed} are filled by another [[bond]]; give each its own layers"
+            )
         walls |= dict.fromkeys(mine, number)
     regions: list[list[Region]] = [[] for _ in choices]
     used = set(walls)
@@ -221,13 +228,12 @@ def _is_same(one: Any, other: Any) -> bool:
     return bool(one.symmetric_difference(other).area < SAME * other.area) if one.intersects(other) else False
 
 
-def _no_outline(layout: Layout, drawn: Sequence[_Drawn], choice: Choice) -> str:
-    """Say why there is no outline to fill."""
-    asked = ", ".join(f"'{word}'" for word in choice.walls)
+def _no_outline(layout: Layout, drawn: Sequence[_Drawn], key: str, pattern: str) -> str:
+    """Say why there is no outline of a wall or opening."""
     lines = [
         one
         for one in layout.left_out
-        if not one.closed and one.kind == "open" and matches((one.layer, one.name), choice.walls)
+        if not one.closed and one.kind == "open" and matches((one.layer, one.name), [pattern])
     ]
     if lines:
         gap, (x, y) = _smallest_gap(lines)
@@ -236,9 +242,9 @@ def _no_outline(layout: Layout, drawn: Sequence[_Drawn], choice: Choice) -> str:
             "join the ends of its lines"
         )
     layers = Counter(one.labels[0] or one.labels[-1] for one in drawn)
-    near = by_similarity(choice.walls[0], list(layers)[:2000])[:12] if choice.walls else list(layers)[:12]
+    near = by_similarity(pattern, list(layers)[:2000])[:12]
     listed = ", ".join(f"'{layer}' ({layers[layer]})" for layer in near) or "no closed outline"
-    return f"bond: walls = {asked} matches no closed outline; the drawing has {listed}"
+    return f"bond: {key} = '{pattern}' matches no closed outline; the drawing has {listed}"
 
 
 def _smallest_gap(lines: Sequence[LeftOut]) -> tuple[float, np.ndarray]:

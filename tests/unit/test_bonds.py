@@ -293,6 +293,10 @@ def test_the_unit_of_the_drawing_holds(tmp_path):
         (["walls=WALL"], r"walls = 'WALL' matches no closed outline; the drawing has .*'A-WALL' \(1\)"),
         (["walls=A-WALL", "brick=[6, 0.25]"], "the wall 'block .*' on layer 'A-WALL': brick is 6 m long"),
         (["walls=A-WALL", "bond=flemisch"], r"\[bond\] bond is 'flemisch' \(did you mean 'flemish'\?\)"),
+        (
+            ["walls=A-WALL", "openings=A-WNI"],
+            r"openings = 'A-WNI' matches no closed outline; the drawing has 'A-WIN' \(2\)",
+        ),
         (["bond=flemish"], r"\[bond\] walls is missing; name layers of the drawing"),
         (["walls=A-WALL", "brik=1"], r"\[bond\] brik is not a key here \(did you mean 'brick'\?\)"),
     ],
