@@ -169,6 +169,9 @@ def _laid(found: Inspection) -> Ground:
     layout, blocks = found.layout, found.kept.tolist()
     depth = rounded_length(0.5 * block_size(found))
     feet = _feet_in_space(found) if layout.dimension == 3 else _feet_in_the_plane(found)
+    if all(foot.bed is None for foot in feet) and len(feet) in (0, len(blocks)):
+        # Without a block that may fall there is no structure: what touches in a point is drawn on a level.
+        feet = [_on_a_level(found)]
     split = _split(feet, 1e-3 * depth + _opening(found))
     springers = [foot for foot in feet if foot.bed is None]
     beds = [foot for foot in feet if foot.bed is not None]
@@ -183,18 +186,26 @@ def _laid(found: Inspection) -> Ground:
         supports = _bedded(found, feet, split, depth)
     where = "on the right" if split.axis == 0 else "on the far side"
     said = f"stands on one side and settles {where}"
-    if supports and roles:
-        says = f"The drawing has no supports: {len(springers)} blocks that end in a slope, an edge or a point become "
-        says += f"supports, and a ground lies below the others; it {said}."
-    elif roles:
-        says = f"The drawing has no supports: the {len(springers)} blocks below, that end in a slope, an edge or a "
-        says += f"point, become supports; what they carry {said}."
+    if roles:
+        lowest = "the lowest blocks, which end in a slope, an edge or a point"
+        ground = ", and a ground below the others" if supports else ""
+        says = f"The drawing has no supports: here {lowest}, are supports{ground}; what is below {said}."
+    elif split.axis:
+        says = f"The drawing has no supports: here the ground below it {said}."
     else:
         says = "The drawing has no supports: here the ground below it stands on the left and settles on the right."
-        if split.axis:
-            says = f"The drawing has no supports: here the ground below it {said}."
     settles = mechanics.MOVING in [*roles.values(), *(support["role"] for support in supports)]
     return Ground(says, roles, tuple(supports), settles)
+
+
+def _on_a_level(found: Inspection) -> _Foot:
+    """Put the lowest block on a level as wide as it is."""
+    block = min(found.kept.tolist(), key=lambda i: float(found.layout.corners(i)[:, -1].min()))
+    level = float(found.layout.corners(block)[:, -1].min())
+    low, high = _plan_box(found.layout, block)
+    flat = [[low[0], level], [high[0], level]]
+    plan = [[low[0], low[-1]], [high[0], low[-1]], [high[0], high[-1]], [low[0], high[-1]]]
+    return _Foot(block, low, high, np.array(flat if len(low) == 1 else plan), level)
 
 
 def _feet_in_the_plane(found: Inspection) -> list[_Foot]:
@@ -315,7 +326,7 @@ def _bedded(found: Inspection, feet: Sequence[_Foot], split: _Split, depth: floa
     ground = shapely.Polygon([[start, floor], [end, floor], *shapely.get_coordinates(line)[::-1]])
     # What leans over its neighbour's bed, and a springer between, keep their place.
     above = [shapely.Polygon(found.layout.corners(i)) for i in found.kept]
-    reach = [shape for shape in above if shape.intersects(ground) and shape.intersection(ground).area > 0.0]
+    reach = [shape for shape in above if shape.intersection(ground).area > (STRAIGHT * depth) ** 2]
     if reach:
         ground = ground.difference(shapely.union_all(reach))
     halves: list[Mapping[str, Any]] = []
@@ -325,7 +336,9 @@ def _bedded(found: Inspection, feet: Sequence[_Foot], split: _Split, depth: floa
     ):
         half = _largest(ground.intersection(shapely.box(left, floor - depth, right, floor + 1e3 * depth)))
         if half is not None:
-            corners = _from_lowest_left(shapely.get_coordinates(half.exterior)[:-1])
+            # Rounding, and the zero that is no negative one, make a file that people read.
+            corners = np.round(shapely.get_coordinates(half.exterior)[:-1], 10 - int(np.floor(np.log10(depth)))) + 0.0
+            corners = _from_lowest_left(corners)
             halves.append({"name": name, "role": role, "outline": corners.tolist()})
     return halves
 
