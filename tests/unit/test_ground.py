@@ -59,10 +59,9 @@ def arch(first, last, voussoirs=9, radius=1.0, thickness=0.25):
 def told(drawing, capsys, *options):
     """The values of the new case of a drawing, and what was said; it stands."""
     case = drawing.with_suffix(".toml")
-    assert main(["new", str(drawing), "-o", str(case), *options]) == 0
+    assert main(["new", str(drawing), "-o", str(case), *options], outputs=()) == 0
     out, err = capsys.readouterr()
     assert "it stands: first equilibrium found" in out, err
-    assert drawing.with_suffix(".supports.png").stat().st_size > 1000
     return tomllib.loads(case.read_text(encoding="utf-8")), out + err
 
 
@@ -88,7 +87,7 @@ def test_a_course_off_level_is_bedded_from_end_to_end(tmp_path, capsys):
     assert right[:, 0].max() == pytest.approx(STONES * WIDTH + 0.2)
     top = np.vstack([left, right])
     for k, (below, _) in enumerate(bottoms):
-        assert np.abs(top - [(k + k % 2) * WIDTH, below]).max(axis=1).min() < 1e-9
+        assert np.abs(top - [(2 * (k // 2) + 1) * WIDTH, below]).max(axis=1).min() < 1e-9
     assert ran(drawing) == 0
 
 
@@ -97,7 +96,7 @@ def test_a_course_off_level_is_bedded_from_end_to_end(tmp_path, capsys):
 @given(st.lists(st.floats(0.0, 0.99 * HEIGHT / 2), min_size=3 * STONES, max_size=3 * STONES))
 def test_rubble_whose_bottoms_lie_within_half_a_stone_stands(tmp_path_factory, bottoms):
     drawing = drawn(tmp_path_factory.mktemp("rubble") / "wall.json", wall(np.reshape(bottoms, (STONES, 3))))
-    assert main(["new", str(drawing), "-o", str(drawing.with_suffix(".toml"))]) == 0
+    assert main(["new", str(drawing), "-o", str(drawing.with_suffix(".toml"))], outputs=()) == 0
     assert ran(drawing) == 0
 
 
@@ -159,6 +158,7 @@ def test_vaults_and_walls_in_space(tmp_path, capsys, name, parameters, moving):
     assert ran(drawing) == 0
 
 
+@pytest.mark.thorough
 def test_all_springers_of_one_side_of_a_vault_move(tmp_path, capsys):
     """A barrel with its springers drawn, three along each side."""
     vault = generators.build("barrel vault", {"embrace": 120.0, "voussoirs": 5, "stones": 1, "springers": 3})
@@ -185,6 +185,7 @@ def test_what_does_not_stand_is_named_with_its_cause(tmp_path, capsys):
     hanging = [(3.0, 1.0), (3.4, 1.0), (3.4, 1.2), (3.0, 1.2)]
     drawing = drawn(tmp_path / "wall.json", [*wall([(0.0, 0.0)] * STONES), hanging])
     assert main(["new", str(drawing), "-o", str(tmp_path / "wall.toml")]) == 0
+    assert (tmp_path / "wall.supports.png").stat().st_size > 10_000
     said = capsys.readouterr().err
     assert "1 of 14 blocks fall ('s13'); 1 of them touch nothing that stands ('s13')" in said
 
