@@ -18,7 +18,7 @@ from .plan import planned
 AS_DRAWN = 0.002
 
 #: Most blocks whose first equilibrium is found in some seconds, in the plane and in space.
-MOST_BLOCKS = {2: 2500, 3: 400}
+MOST_BLOCKS = {2: 2500, 3: 250}
 
 #: The cause is looked for where the first equilibrium took no longer than this [s].
 PATIENCE = 10.0
