@@ -107,5 +107,5 @@ def _cause(case: Case, assembly: solver.Assembly) -> str:
         )
     first, ending = _first_of(replace(case, friction_coefficient=ROUGH, interfaces={}), assembly)
     if ending is None and first is not None and first.status != solver.Status.FALLING:
-        return f"they slide: with more friction than {case.friction_coefficient:g} they would stand"
+        return f"they slide: with more friction than {case.friction_coefficient:g}, or their gaps closed, they would stand"
     return "they tip or drop whatever the friction is: look for gaps below them, a missing stone or a missing support"
