@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Output] | 
     arguments : sequence of str, optional
         Those of the process by default.
     outputs : sequence of Output, optional
-        What runs make beside their numbers, in place of what the arguments say.
+        What runs make beside their numbers, in place of what the arguments say; a new case is drawn without them only.
     """
     parser = _parser()
     options, left = parser.parse_known_args(arguments)
@@ -456,11 +456,11 @@ def _new(options: argparse.Namespace) -> int:
     text = case_text(found, relative_to(target.parent, drawing), unit_says=unit_says, walls=walls, **choice)
     write_whole(target, text)
     print(f"{target} written for {len(found.kept)} blocks; run it: blockvis run {target}")
-    _try_new(text, target)
+    _try_new(text, target, drawing=options.outputs is None)
     return 0
 
 
-def _try_new(text: str, target: Path) -> None:
+def _try_new(text: str, target: Path, *, drawing: bool) -> None:
     """Say whether what a new case describes stands, and draw it with its ground."""
     from dataclasses import replace
 
@@ -475,15 +475,20 @@ def _try_new(text: str, target: Path) -> None:
         case = parse_case(text, target)
         assembly = case_assembly(case)
         found = first_equilibrium(case, assembly)
-    except ValueError as error:
+    except (ValueError, solver.SolveError) as error:
         print(f"blockvis: note: as it is, blockvis run refuses it: {error}", file=sys.stderr)
         return
     if found.stands:
         print(found.says)
     else:
         print(f"blockvis: note: {found.says}", file=sys.stderr)
-    layout = replace(layout_of(assembly), source=str(target))
-    print(f"drawn with its supports in {draw_inspection(inspected(layout), target.with_suffix('.supports.png'))}")
+    if drawing:
+        layout = replace(layout_of(assembly), source=str(target))
+        try:
+            drawn = draw_inspection(inspected(layout), target.with_suffix(".supports.png"))
+            print(f"drawn with its supports in {drawn}")
+        except MissingExtra as missing:
+            print(f"blockvis: note: not drawn: {missing}", file=sys.stderr)
 
 
 def _filled_walls(options: argparse.Namespace, choice: dict[str, Any]) -> tuple[Inspection, tuple[str, ...]] | None:

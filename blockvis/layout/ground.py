@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import shapely
 
+import solver
 from blockvis.text import rounded_length
 from solver import mechanics
 
 from .inspect import Inspection
 from .layout import Layout
 from .outlines import without_collinear
+from .repair import repaired
 from .simplify import default_tolerance, simplified
 
 #: Blocks of the lowest course have their bottom within this fraction of the median height of the lowest.
@@ -168,7 +170,11 @@ def _laid(found: Inspection) -> Ground:
     """Lay a ground under the lowest course, and make supports of the blocks that no ground can lie under."""
     layout, blocks = found.layout, found.kept.tolist()
     depth = rounded_length(0.5 * block_size(found))
-    feet = _feet_in_space(found) if layout.dimension == 3 else _feet_in_the_plane(found)
+    outlines = [] if layout.dimension == 3 else _as_in_a_run(found)
+    feet = _feet_in_the_plane(found, outlines) if outlines else _feet_in_space(found)
+    if all(foot.bed is None for foot in feet) and len(feet) in (0, len(blocks)):
+        # Without a block that may fall there is no structure: what touches in a point is drawn on a level.
+        feet = [_on_a_level(found)]
     split = _split(feet, 1e-3 * depth + _opening(found))
     springers = [foot for foot in feet if foot.bed is None]
     beds = [foot for foot in feet if foot.bed is not None]
@@ -180,29 +186,34 @@ def _laid(found: Inspection) -> Ground:
     if beds and layout.dimension == 3:
         supports = _pads(beds, split) if springers or not _is_level(beds, depth) else _slab(found, beds, split, depth)
     elif beds:
-        supports = _bedded(found, feet, split, depth)
+        supports = _bedded(outlines, feet, split, depth)
     where = "on the right" if split.axis == 0 else "on the far side"
     said = f"stands on one side and settles {where}"
-    if supports and roles:
-        says = f"The drawing has no supports: {len(springers)} blocks that end in a slope, an edge or a point become "
-        says += f"supports, and a ground lies below the others; it {said}."
-    elif roles:
-        says = f"The drawing has no supports: the {len(springers)} blocks below, that end in a slope, an edge or a "
-        says += f"point, become supports; what they carry {said}."
+    if roles:
+        lowest = "the lowest blocks, which end in a slope, an edge or a point"
+        ground = ", and a ground below the others" if supports else ""
+        says = f"The drawing has no supports: here {lowest}, are supports{ground}; what is below {said}."
+    elif split.axis:
+        says = f"The drawing has no supports: here the ground below it {said}."
     else:
         says = "The drawing has no supports: here the ground below it stands on the left and settles on the right."
-        if split.axis:
-            says = f"The drawing has no supports: here the ground below it {said}."
     settles = mechanics.MOVING in [*roles.values(), *(support["role"] for support in supports)]
     return Ground(says, roles, tuple(supports), settles)
 
 
-def _feet_in_the_plane(found: Inspection) -> list[_Foot]:
+def _on_a_level(found: Inspection) -> _Foot:
+    """Put the lowest block on a level as wide as it is."""
+    block = min(found.kept.tolist(), key=lambda i: float(found.layout.corners(i)[:, -1].min()))
+    level = float(found.layout.corners(block)[:, -1].min())
+    low, high = _plan_box(found.layout, block)
+    flat = [[low[0], level], [high[0], level]]
+    plan = [[low[0], low[-1]], [high[0], low[-1]], [high[0], high[-1]], [low[0], high[-1]]]
+    return _Foot(block, low, high, np.array(flat if len(low) == 1 else plan), level)
+
+
+def _feet_in_the_plane(found: Inspection, outlines: Sequence[np.ndarray]) -> list[_Foot]:
     """Find the blocks of the lowest course, from left to right, and the part of each that nothing lower covers."""
     blocks = found.kept.tolist()
-    outlines = [found.layout.corners(i) for i in blocks]
-    # A run drops the same corners: the ground is to touch what is left.
-    outlines = simplified(outlines, default_tolerance(outlines))[0]
     low = np.array([ring.min(axis=0) for ring in outlines])
     high = np.array([ring.max(axis=0) for ring in outlines])
     height = float(np.median(high[:, 1] - low[:, 1]))
@@ -231,6 +242,26 @@ def _feet_in_the_plane(found: Inspection) -> list[_Foot]:
                 continue
         feet.append(_Foot(blocks[k], low[k, :1], high[k, :1], bed, float(low[k, 1])))
     return feet
+
+
+def _as_in_a_run(found: Inspection) -> list[np.ndarray]:
+    """(n, 2) arrays: blocks without the corners that a run drops and, near the ground, with their joints closed."""
+    outlines = [found.layout.corners(i) for i in found.kept]
+    outlines = simplified(outlines, default_tolerance(outlines))[0]
+    if not found.joint_thickness:
+        return outlines
+    low, high = (np.array([pick(ring[:, 1]) for ring in outlines]) for pick in (np.min, np.max))
+    lowest = np.flatnonzero(low <= low.min() + 2.0 * float(np.median(high - low)))
+    assembly = solver.Assembly.from_outlines([outlines[k] for k in lowest])
+    anchored = np.zeros(len(lowest), dtype=bool)
+    try:
+        closed = repaired(assembly, joint_thickness=found.joint_thickness, overlap_tolerance=None, anchored=anchored)[0]
+    except ValueError:
+        # What cannot be closed is told where the case is built.
+        return outlines
+    for k, ring in zip(lowest.tolist(), closed, strict=True):
+        outlines[k] = ring
+    return outlines
 
 
 def _springers_of_arch(touching: Sequence[set[int]], bottoms: np.ndarray) -> list[int]:
@@ -299,7 +330,9 @@ def _widest_free(bed: np.ndarray, taken: Iterable[tuple[float, float]]) -> np.nd
     return np.vstack([ends[:1], inner, ends[1:]])
 
 
-def _bedded(found: Inspection, feet: Sequence[_Foot], split: _Split, depth: float) -> list[Mapping[str, Any]]:
+def _bedded(
+    outlines: Sequence[np.ndarray], feet: Sequence[_Foot], split: _Split, depth: float
+) -> list[Mapping[str, Any]]:
     """Lay two halves whose top follows the beds, with a step half-way between each and the next."""
     beds = sorted((foot.bed for foot in feet if foot.bed is not None), key=lambda bed: float(bed[0, 0]))
     top = [beds[0][0] - [depth, 0.0]]
@@ -314,8 +347,8 @@ def _bedded(found: Inspection, feet: Sequence[_Foot], split: _Split, depth: floa
     line = shapely.simplify(shapely.LineString(top), STRAIGHT * depth)
     ground = shapely.Polygon([[start, floor], [end, floor], *shapely.get_coordinates(line)[::-1]])
     # What leans over its neighbour's bed, and a springer between, keep their place.
-    above = [shapely.Polygon(found.layout.corners(i)) for i in found.kept]
-    reach = [shape for shape in above if shape.intersects(ground) and shape.intersection(ground).area > 0.0]
+    above = [shapely.Polygon(ring) for ring in outlines]
+    reach = [shape for shape in above if shape.intersection(ground).area > (STRAIGHT * depth) ** 2]
     if reach:
         ground = ground.difference(shapely.union_all(reach))
     halves: list[Mapping[str, Any]] = []
@@ -325,7 +358,9 @@ def _bedded(found: Inspection, feet: Sequence[_Foot], split: _Split, depth: floa
     ):
         half = _largest(ground.intersection(shapely.box(left, floor - depth, right, floor + 1e3 * depth)))
         if half is not None:
-            corners = _from_lowest_left(shapely.get_coordinates(half.exterior)[:-1])
+            # Rounding, and the zero that is no negative one, make a file that people read.
+            corners = np.round(shapely.get_coordinates(half.exterior)[:-1], 10 - int(np.floor(np.log10(depth)))) + 0.0
+            corners = _from_lowest_left(corners)
             halves.append({"name": name, "role": role, "outline": corners.tolist()})
     return halves
 

@@ -18,7 +18,7 @@ from .plan import planned
 AS_DRAWN = 0.002
 
 #: Most blocks whose first equilibrium is found in some seconds, in the plane and in space.
-MOST_BLOCKS = {2: 2500, 3: 400}
+MOST_BLOCKS = {2: 2500, 3: 250}
 
 #: The cause is looked for where the first equilibrium took no longer than this [s].
 PATIENCE = 10.0
@@ -107,5 +107,7 @@ def _cause(case: Case, assembly: solver.Assembly) -> str:
         )
     first, ending = _first_of(replace(case, friction_coefficient=ROUGH, interfaces={}), assembly)
     if ending is None and first is not None and first.status != solver.Status.FALLING:
-        return f"they slide: with more friction than {case.friction_coefficient:g} they would stand"
+        return (
+            f"they slide: with more friction than {case.friction_coefficient:g}, or their gaps closed, they would stand"
+        )
     return "they tip or drop whatever the friction is: look for gaps below them, a missing stone or a missing support"

@@ -119,7 +119,7 @@ def test_stones_that_overlap_are_refused_with_the_place(tmp_path):
 def test_new_writes_a_case_in_space(tmp_path, capsys):
     bricks = generators.build("L corner", {"bricks": 2, "across": 2, "courses": 2})
     write_layout(layout_of(bricks).chosen(np.flatnonzero(bricks.free)), tmp_path / "corner.obj")
-    assert main(["new", str(tmp_path / "corner.obj"), "-o", str(tmp_path / "corner.toml")]) == 0
+    assert main(["new", str(tmp_path / "corner.obj"), "-o", str(tmp_path / "corner.toml")], outputs=()) == 0
     assert "refuses it" not in capsys.readouterr().err
     text = (tmp_path / "corner.toml").read_text(encoding="utf-8")
     assert "dimension = 3" in text
@@ -135,7 +135,7 @@ def test_new_writes_a_case_in_space(tmp_path, capsys):
 
 def test_new_names_the_supports_of_a_drawing(tmp_path):
     save_layout(generators.dome(lunes=4, courses=1), tmp_path / "dome.stl")
-    assert main(["new", str(tmp_path / "dome.stl"), "-o", str(tmp_path / "dome.toml")]) == 0
+    assert main(["new", str(tmp_path / "dome.stl"), "-o", str(tmp_path / "dome.toml")], outputs=()) == 0
     text = (tmp_path / "dome.toml").read_text(encoding="utf-8")
     found = assembly_of(case_from(text, tmp_path))
     assert int((~found.free).sum()) == 4

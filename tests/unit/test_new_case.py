@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 
 def _written(drawing, *options):
     case = drawing.with_name("new.toml")
-    assert main(["new", str(drawing), "-o", str(case), *options]) == 0
+    assert main(["new", str(drawing), "-o", str(case), *options], outputs=()) == 0
     return case, tomllib.loads(case.read_text(encoding="utf-8"))
 
 

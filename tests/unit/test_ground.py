@@ -1,0 +1,203 @@
+"""The ground that blockvis new lays: a case stands at its first try, in the plane and in space."""
+
+import json
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from structures import run_command
+
+from blockvis import generators
+from blockvis.cli import main
+from blockvis.formats.read import write_layout
+from blockvis.layout.layout import layout_of
+
+WIDTH, HEIGHT, STONES = 0.5, 0.3, 4
+
+
+def drawn(path, outlines, unit="m"):
+    blocks = [{"name": f"s{k}", "role": "free", "outline": np.array(ring).tolist()} for k, ring in enumerate(outlines)]
+    path.write_text(json.dumps({"format": "blockvis layout", "unit": unit, "blocks": blocks}), encoding="utf-8")
+    return path
+
+
+def without_supports(path, assembly, springers=False):
+    """A drawing that says nothing of roles, names or layers; its springers are stones like the others."""
+    layout = layout_of(assembly)
+    layout = layout if springers else layout.chosen(np.flatnonzero(assembly.free))
+    none = ("",) * layout.n_blocks
+    names = tuple(f"b{k}" for k in range(layout.n_blocks))
+    write_layout(replace(layout, names=names, groups=none, roles=none), path)
+    return path
+
+
+def wall(bottoms, joint=0.0, courses=3):
+    """Ashlar whose lowest stones end at these corners: two or three for each."""
+    rings = []
+    for course in range(courses):
+        shift = course % 2 * WIDTH / 2.0
+        edges = np.unique(np.clip(np.arange(STONES + 2) * WIDTH - shift, 0.0, STONES * WIDTH))
+        for k, (start, end) in enumerate(zip(edges[:-1] + joint / 2, edges[1:] - joint / 2, strict=True)):
+            below = [course * HEIGHT + joint / 2] * 2 if course else bottoms[k]
+            corners = zip(np.linspace(start, end, len(below)), below, strict=True)
+            top = (course + 1) * HEIGHT - joint / 2
+            rings.append([*corners, (end, top), (start, top)])
+    return rings
+
+
+def arch(first, last, voussoirs=9, radius=1.0, thickness=0.25):
+    """Voussoirs between two angles in degrees."""
+    angles = np.radians(np.linspace(last, first, voussoirs + 1))
+    at = np.column_stack([np.cos(angles), np.sin(angles)])
+    rings = [radius * at[:-1], (radius + thickness) * at[:-1], (radius + thickness) * at[1:], radius * at[1:]]
+    return np.stack(rings, axis=1)
+
+
+def told(drawing, capsys, *options):
+    """The values of the new case of a drawing, and what was said; it stands."""
+    case = drawing.with_suffix(".toml")
+    assert main(["new", str(drawing), "-o", str(case), *options], outputs=()) == 0
+    out, err = capsys.readouterr()
+    assert "it stands: first equilibrium found" in out, err
+    return tomllib.loads(case.read_text(encoding="utf-8")), out + err
+
+
+def ran(drawing):
+    increment = tomllib.loads(drawing.with_suffix(".toml").read_text(encoding="utf-8"))["settlement"]["increment"]
+    limit = f"settlement.limit={2.0 * increment}"
+    return run_command(drawing.with_suffix(".toml"), "-o", drawing.parent / "out", "--force", "--set", limit)
+
+
+def roles_of(values):
+    """Names by role, of supports and of blocks."""
+    every = [*values.get("roles", {}).items(), *((one["name"], one["role"]) for one in values.get("supports", ()))]
+    return {role: {name for name, has in every if has == role} for role in ("fixed", "moving")}
+
+
+def test_a_course_off_level_is_bedded_from_end_to_end(tmp_path, capsys):
+    """As ashlar drawn from pixels: three of four stones end a few millimetres above the lowest."""
+    bottoms = [(0.0, 0.0), (0.004, 0.004), (0.002, 0.002), (0.004, 0.004)]
+    drawing = drawn(tmp_path / "wall.json", wall(bottoms))
+    values, _ = told(drawing, capsys)
+    left, right = (np.array(one["outline"]) for one in values["supports"])
+    assert left[:, 0].min() == pytest.approx(-0.2)
+    assert right[:, 0].max() == pytest.approx(STONES * WIDTH + 0.2)
+    top = np.vstack([left, right])
+    for k, (below, _) in enumerate(bottoms):
+        assert np.abs(top - [(2 * (k // 2) + 1) * WIDTH, below]).max(axis=1).min() < 1e-9
+    assert ran(drawing) == 0
+
+
+@pytest.mark.thorough
+@settings(max_examples=8, deadline=None, derandomize=True, database=None)
+@given(st.lists(st.floats(0.0, 0.99 * HEIGHT / 2), min_size=3 * STONES, max_size=3 * STONES))
+def test_rubble_whose_bottoms_lie_within_half_a_stone_stands(tmp_path_factory, bottoms):
+    drawing = drawn(tmp_path_factory.mktemp("rubble") / "wall.json", wall(np.reshape(bottoms, (STONES, 3))))
+    assert main(["new", str(drawing), "-o", str(drawing.with_suffix(".toml"))], outputs=()) == 0
+    assert ran(drawing) == 0
+
+
+@pytest.mark.parametrize("rise", [30.0, pytest.param(70.0, marks=pytest.mark.thorough)])
+def test_springers_on_a_slope_become_supports(tmp_path, capsys, rise):
+    drawing = drawn(tmp_path / "arch.json", arch(rise, 180.0 - rise))
+    values, _ = told(drawing, capsys)
+    assert values["roles"] == {"s0": "fixed", "s8": "moving"}
+    assert "supports" not in values
+    assert ran(drawing) == 0
+
+
+@pytest.mark.thorough
+def test_an_arch_of_which_one_end_is_level_and_higher(tmp_path, capsys):
+    values, _ = told(drawn(tmp_path / "arch.json", arch(0.0, 165.0)), capsys)
+    assert values["roles"] == {"s0": "fixed"}
+    assert [one["role"] for one in values["supports"]] == ["moving"]
+
+
+@pytest.mark.thorough
+def test_mortar_joints(tmp_path, capsys):
+    drawing = drawn(tmp_path / "wall.json", wall([(0.0, 0.0), (0.004, 0.004), (0.0, 0.0), (0.003, 0.003)], joint=0.01))
+    values, _ = told(drawing, capsys)
+    assert values["geometry"]["joint_thickness"] == "auto"
+    assert ran(drawing) == 0
+
+
+def test_gaps_of_rounding_are_no_mortar(tmp_path, capsys):
+    values, _ = told(drawn(tmp_path / "wall.json", wall([(0.0, 0.0)] * STONES, joint=1.7e-7)), capsys)
+    assert "joint_thickness" not in values["geometry"]
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["pointed arch", "basket-handle arch", "arch on piers", "arch", "panel"])
+def test_arches_and_walls_of_the_plane(tmp_path, capsys, name):
+    drawing = without_supports(tmp_path / "drawing.json", generators.build(name, {}))
+    told(drawing, capsys)
+    assert ran(drawing) == 0
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("name", "parameters", "moving"),
+    [
+        ("barrel vault", {"voussoirs": 8, "stones": 2}, 1),
+        ("barrel vault", {"voussoirs": 8, "stones": 2, "embrace": 120.0}, None),
+        ("dome", {"courses": 3}, 1),
+        ("dome", {"courses": 3, "springing": 60.0}, 4),
+        ("cross vault", {"voussoirs": 7}, 1),
+        ("L corner", {"bricks": 2, "across": 2, "courses": 3}, 1),
+    ],
+)
+def test_vaults_and_walls_in_space(tmp_path, capsys, name, parameters, moving):
+    drawing = without_supports(tmp_path / "drawing.obj", generators.build(name, parameters))
+    values, _ = told(drawing, capsys)
+    roles = roles_of(values)
+    assert roles["fixed"]
+    assert moving is None or len(roles["moving"]) == moving
+    assert ran(drawing) == 0
+
+
+@pytest.mark.thorough
+def test_all_springers_of_one_side_of_a_vault_move(tmp_path, capsys):
+    """A barrel with its springers drawn, three along each side."""
+    vault = generators.build("barrel vault", {"embrace": 120.0, "voussoirs": 5, "stones": 1, "springers": 3})
+    drawing = without_supports(tmp_path / "vault.obj", vault, springers=True)
+    roles = roles_of(told(drawing, capsys)[0])
+    sides = [np.sign(vault.centroids[[int(name[1:]) for name in roles[role]], 0]) for role in ("fixed", "moving")]
+    assert [sorted(side) for side in sides] == [[-1.0] * 3, [1.0] * 3]
+
+
+def test_the_supports_that_a_drawing_has_move_by_sides(tmp_path, capsys):
+    vault = generators.build("barrel vault", {"embrace": 120.0, "voussoirs": 5, "stones": 1, "springers": 3})
+    layout = layout_of(vault)
+    names = tuple(f"b{k}" for k in range(layout.n_blocks))
+    roles = tuple("free" if free else "fixed" for free in vault.free)
+    drawing = tmp_path / "vault.json"
+    write_layout(replace(layout, names=names, roles=roles, groups=("",) * layout.n_blocks), drawing)
+    values, _ = told(drawing, capsys)
+    assert set(values["roles"].values()) == {"moving"}
+    assert {np.sign(vault.centroids[int(name[1:]), 0]) for name in values["roles"]} == {1.0}
+    assert len(values["roles"]) == 3
+
+
+def test_what_does_not_stand_is_named_with_its_cause(tmp_path, capsys):
+    hanging = [(3.0, 1.0), (3.4, 1.0), (3.4, 1.2), (3.0, 1.2)]
+    drawing = drawn(tmp_path / "wall.json", [*wall([(0.0, 0.0)] * STONES), hanging])
+    assert main(["new", str(drawing), "-o", str(tmp_path / "wall.toml")]) == 0
+    assert (tmp_path / "wall.supports.png").stat().st_size > 10_000
+    said = capsys.readouterr().err
+    assert "1 of 14 blocks fall ('s13'); 1 of them touch nothing that stands ('s13')" in said
+
+
+def test_a_unit_in_doubt_is_replaced_and_said_above_its_line(tmp_path, capsys):
+    """An SVG of bricks 250 wide whose file states no unit that makes them masonry."""
+    rectangle = '<rect x="{}" y="0" width="250" height="100"/>'
+    text = "".join(rectangle.format(250 * k) for k in range(4))
+    (tmp_path / "wall.svg").write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{text}</svg>', encoding="utf-8")
+    values, said = told(tmp_path / "wall.svg", capsys)
+    assert values["geometry"]["unit"] == "mm"
+    assert "unit m in doubt" in said
+    lines = (tmp_path / "wall.toml").read_text(encoding="utf-8").splitlines()
+    above = lines[lines.index('unit = "mm"') - 3 : lines.index('unit = "mm"')]
+    assert "the file is read in mm here" in " ".join(line[2:] for line in above)
