@@ -280,10 +280,12 @@ def _of_noise(image: Image.Image) -> _Found:
     if len(large) == 0 or flat.mean() < LEAST_FLAT:
         raise Photograph
     weight = np.bincount(pieces.ravel(), minlength=n + 1)[large]
-    deviation = np.sqrt(sum(ndimage.variance(rgb[..., c], pieces, large) for c in range(3)))
+    shown, of_pixel = rgb.reshape(-1, 3).astype(float), pieces.ravel()
+    colour = np.stack([np.bincount(of_pixel, c, n + 1)[large] for c in shown.T], axis=1) / weight[:, None]
+    squares = np.stack([np.bincount(of_pixel, c, n + 1)[large] for c in shown.T**2], axis=1) / weight[:, None]
+    deviation = np.sqrt(np.maximum(squares - colour**2, 0.0).sum(axis=1))
     if float(np.average(deviation, weights=weight)) > NOISE:
         raise Photograph
-    colour = np.stack([ndimage.mean(rgb[..., c], pieces, large) for c in range(3)], axis=1)
     two = _two_colours(rgb, colour, weight)
     if two is not None:
         away = np.stack([np.abs(rgb - one).max(axis=2) for one in two])
