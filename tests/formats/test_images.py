@@ -313,7 +313,13 @@ def test_annotations_are_blocks_with_their_label_as_group(tmp_path, capsys, cont
 def test_packed_runs_and_several_pieces_of_coco_are_read(tmp_path):
     packed = _coco()
     packed["annotations"] = packed["annotations"][:1]
-    packed["annotations"][0]["segmentation"] = {"size": [4, 4], "counts": "54O1N"}
+    packed["annotations"][0]["segmentation"] = {"size": [8, 8], "counts": "b04400000>"}
+    (tmp_path / "w.json").write_text(json.dumps(packed), encoding="utf-8")
+    layout = read_layout(tmp_path / "w.json", pixel=1.0)
+    assert (float(layout.sizes[0]) ** 2, layout.points.min(axis=0).tolist()) == (16.0, [2.0, 194.0])
+    with pytest.raises(ValueError, match="draws no block"):
+        read_layout(tmp_path / "w.json", pixel=1.0, smallest=5.0)
+    packed["annotations"][0]["segmentation"] = {"size": [8, 8], "counts": "b0440000"}
     (tmp_path / "w.json").write_text(json.dumps(packed), encoding="utf-8")
     with pytest.raises(ValueError, match="runs make"):
         read_layout(tmp_path / "w.json", pixel=1.0)
