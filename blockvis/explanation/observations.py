@@ -126,7 +126,8 @@ def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly
         raise ValueError(
             problem + (f"; beside it are {', '.join(near)}" if near else "; give a table (.csv) or a drawing")
         )
-    if path.suffix.lower() in FORMATS:
+    known = FORMATS.get(path.suffix.lower())
+    if known is not None and not known.alone:
         return _of_drawing(path, assembly)
     try:
         text = path.read_text(encoding="utf-8-sig")

@@ -106,14 +106,17 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
         kinds = ", ".join(f"{n} {kind}" for kind, n in found.dropped.items()) or "nothing"
         raise ValueError(f"'{path}' outlines no stone, it has {kinds}; annotate each stone by a polygon or a mask")
     placement = placement_in(path, found, reading)
-    tolerance = reading.image.get("outline_tolerance")
+    smallest, tolerance = (reading.image.get(key) for key in ("smallest", "outline_tolerance"))
     stairs = STAIRS if tolerance is None else tolerance / placement.pixel
+    speck = None if smallest is None else smallest / placement.pixel
     of_label: dict[str, int] = {}
     rings, names, groups, several = [], [], [], 0
     for label, outlines in found.shapes:
         of_label[label] = of_label.get(label, 0) + 1
         name = f"{label or 'stone'} {of_label[label]}"
-        pieces = [ring for outline in outlines for ring in _rings(outline, stairs)]
+        pieces = [ring for outline in outlines for ring in _rings(outline, stairs, speck)]
+        if not pieces:
+            found.drop("masks of a few pixels")
         several += len(pieces) > 1
         for k, ring in enumerate(pieces):
             rings.append(placement.placed(ring))
@@ -162,12 +165,12 @@ def _notes(found: _Annotated, placement: Placement, several: int) -> tuple[str, 
     return tuple(notes)
 
 
-def _rings(outline: np.ndarray | _Mask, stairs: float) -> Iterator[np.ndarray]:
+def _rings(outline: np.ndarray | _Mask, stairs: float, speck: float | None) -> Iterator[np.ndarray]:
     """Yield the outlines of a shape, (n, 2) arrays in columns and rows counted down."""
     if isinstance(outline, np.ndarray):
         yield outline
         return
-    regions = regions_of(outline.pixels.astype(int))
+    regions = regions_of(outline.pixels.astype(int), speck)
     if len(regions.labels):
         for ring in outlined(regions, stairs).rings:
             yield ring * [1.0, -1.0] + outline.corner

@@ -88,15 +88,15 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
         For values that are no labels, and a background that the image does not have.
     """
     opaque, image = _opaque(image)
-    values, words = _values(image)
-    wanted = None if background is None else _value(background, image, words)
+    values, coloured = _values(image)
+    wanted = None if background is None else _value(background, image, coloured)
     exact = _alike(values) >= EXACT and image.format != "JPEG"
     found = _of_values(values, image) if exact else _of_noise(image)
     known = list(found.values)
+    called = [f"#{value:06x}" if coloured else str(value) for value in known]
     if not exact:
-        words = {k: _colour(rgb) for k, rgb in enumerate(found.colours)}
+        called = [_colour(rgb) for rgb in found.colours]
         wanted = None if wanted is None else _nearest_colour(wanted, found.colours, str(background))
-    called = [words.get(value, str(value)) for value in known]
     numbers = found.numbers
     if not opaque.all():
         numbers = np.where(opaque, numbers, len(known))
@@ -111,7 +111,7 @@ def labels_of(image: Image.Image, background: int | str | None = None) -> Labels
     elif mask:
         outer = _background_of_mask(_filled(numbers, found, 0, np.inf)[0])
     else:
-        outer = _background(numbers, known, words)
+        outer = _background(numbers, known, coloured=coloured or not exact)
     numbers, nearest = _filled(numbers, found, outer, np.inf if mask else BORDER)
     moved, said = int((found.numbers < 0).sum()), "" if outer is None else called[outer]
     if not exact and not mask:
@@ -185,24 +185,23 @@ def _opaque(image: Image.Image) -> tuple[np.ndarray, Image.Image]:
     return seen, image
 
 
-def _values(image: Image.Image) -> tuple[np.ndarray, dict[int, str]]:
-    """(height, width) int array: the value of each pixel; and the words for those that are colours."""
+def _values(image: Image.Image) -> tuple[np.ndarray, bool]:
+    """(height, width) int array: the value of each pixel; and whether they are colours."""
     if image.mode == "F":
         real = np.asarray(image)
         if not np.isfinite(real).all() or (real != np.round(real)).any():
             bad = real[~(np.isfinite(real) & (real == np.round(real)))][0]
             raise ValueError(f"has the value {bad:g}; labels are whole numbers: joints 0, stones 1, 2, ...")
-        return real.astype(np.int64), {}
+        return real.astype(np.int64), False
     if image.mode in ("1", "L", "P", "I") or image.mode.startswith("I;16"):
-        return np.asarray(image).astype(np.int64), {}
+        return np.asarray(image).astype(np.int64), False
     rgb = np.asarray(image.convert("RGB")).astype(np.int64)
     if np.ptp(rgb, axis=2).max() <= GREY:
-        return rgb[..., 1], {}
-    packed = rgb @ [65536, 256, 1]
-    return packed, {int(v): f"#{v:06x}" for v in np.unique(packed)[:100_000]}
+        return rgb[..., 1], False
+    return rgb @ [65536, 256, 1], True
 
 
-def _value(background: int | str, image: Image.Image, words: dict[int, str]) -> int:
+def _value(background: int | str, image: Image.Image, coloured: bool) -> int:
     """Find the value of a background: a number, or a colour."""
     if isinstance(background, int) or background.strip().isdecimal():
         return int(background)
@@ -212,7 +211,7 @@ def _value(background: int | str, image: Image.Image, words: dict[int, str]) -> 
         raise ValueError(
             f'has no background {background!r}; give a value, or a colour such as "white" or "#ff8000"'
         ) from None
-    if words or image.format == "JPEG":
+    if coloured or image.format == "JPEG":
         return (r << 16) + (g << 8) + b
     if image.mode == "P":
         near = np.abs(np.array(image.getpalette("RGB")).reshape(-1, 3) - [r, g, b]).sum(axis=1)
@@ -281,10 +280,12 @@ def _of_noise(image: Image.Image) -> _Found:
     if len(large) == 0 or flat.mean() < LEAST_FLAT:
         raise Photograph
     weight = np.bincount(pieces.ravel(), minlength=n + 1)[large]
-    deviation = np.sqrt(sum(ndimage.variance(rgb[..., c], pieces, large) for c in range(3)))
+    shown, of_pixel = rgb.reshape(-1, 3).astype(float), pieces.ravel()
+    colour = np.stack([np.bincount(of_pixel, c, n + 1)[large] for c in shown.T], axis=1) / weight[:, None]
+    squares = np.stack([np.bincount(of_pixel, c, n + 1)[large] for c in shown.T**2], axis=1) / weight[:, None]
+    deviation = np.sqrt(np.maximum(squares - colour**2, 0.0).sum(axis=1))
     if float(np.average(deviation, weights=weight)) > NOISE:
         raise Photograph
-    colour = np.stack([ndimage.mean(rgb[..., c], pieces, large) for c in range(3)], axis=1)
     two = _two_colours(rgb, colour, weight)
     if two is not None:
         away = np.stack([np.abs(rgb - one).max(axis=2) for one in two])
@@ -343,14 +344,14 @@ def _background_of_mask(numbers: np.ndarray) -> int:
     return _outer(numbers) if pieces[0] == pieces[1] else int(pieces[1] > pieces[0])
 
 
-def _background(numbers: np.ndarray, known: list[int], words: dict[int, str]) -> int | None:
+def _background(numbers: np.ndarray, known: list[int], *, coloured: bool) -> int | None:
     """Find the background of a label image: the value 0, or what is on most of the rim; None if there is none."""
     zero = known.index(0) if 0 in known else None
-    if zero is not None and not words:
+    if zero is not None and not coloured:
         return zero
     outer = _outer(numbers)
     sides = [numbers[0], numbers[-1], numbers[:, 0], numbers[:, -1]]
     share = np.concatenate([side == outer for side in sides]).mean()
     if share >= RIM and sum((side == outer).any() for side in sides) >= 3:
         return outer
-    return zero if words.get(0) == "#000000" else None
+    return zero

@@ -23,6 +23,9 @@ from .reading import Reading
 #: More pixels than this are refused before they fill the memory.
 MOST_PIXELS = 60_000_000
 
+#: More of the pixels than this without a label's value, or of the regions with holes, are those of another picture.
+MOST_MOVED, MOST_HOLED = 0.25, 0.5
+
 #: What makes masks of photographs.
 MASK_MAKERS = "by hand GIMP, labelme or CVAT, by a model SAM"
 
@@ -101,11 +104,23 @@ def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: 
             f"'{path}' shows one region of {regions.areas[0] * placement.pixel**2:.4g} m²: in a mask stones that touch "
             "are one; leave a joint of at least a pixel between them, or give each stone a value of its own"
         )
+    if labels.moved > MOST_MOVED * labels.numbers.size:
+        share = f"{100.0 * labels.moved / labels.numbers.size:.2g} %"
+        raise ValueError(
+            f"'{path}' is no mask or label image: {share} of its pixels have no label's value; write it without "
+            "shading and antialiasing, as PNG"
+        )
     found = outlined(regions, STAIRS if tolerance is None else tolerance / placement.pixel)
     names, groups = _named(labels, regions)
     rings = tuple(_turned(placement.placed(ring * [1.0, -1.0])) for ring in found.rings)
     layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit,
                     notes=_notes(labels, regions, found, placement))  # fmt: skip
+    holed = sum(int(regions.areas[k]) for k in found.holes)
+    if holed > MOST_HOLED * regions.areas.sum():
+        raise ValueError(
+            f"'{path}' is no picture of stones: {100.0 * holed / regions.areas.sum():.0f} % of what is not background "
+            f"({labels.background or 'none'}) has holes; if that lies around the stones, give it as background"
+        )
     around = {}
     for k, inner in found.holes.items():
         holes = tuple(placement.placed(hole * [1.0, -1.0]) for hole in inner)

@@ -103,8 +103,21 @@ def regions_of(labels: np.ndarray, smallest: float | None = None, speck: float =
     order = np.zeros(len(of_region), dtype=np.int32)
     order[kept] = np.arange(1, len(kept) + 1)
     numbers = order[numbers]
+    if small.any():
+        numbers = _in_one_piece(numbers)
     after = np.bincount(numbers.ravel(), minlength=len(kept) + 1)[1:]
     return Regions(numbers, of_region[kept], after, (len(specks), int(areas[specks].sum())), float(smallest))
+
+
+def _in_one_piece(numbers: np.ndarray) -> np.ndarray:
+    """Leave the largest piece of each region: specks may have added some that meet it in corners only."""
+    pieces, of_piece = _numbered(numbers)
+    areas = np.bincount(pieces.ravel(), minlength=len(of_piece))
+    order = np.lexsort([areas, of_piece])
+    largest = order[np.append(of_piece[order][1:] != of_piece[order][:-1], True)]
+    kept = np.zeros(len(of_piece), dtype=np.int32)
+    kept[largest] = of_piece[largest]
+    return kept[pieces]
 
 
 def _typical(areas: np.ndarray) -> float:

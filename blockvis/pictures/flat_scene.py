@@ -19,7 +19,7 @@ from .frame import Frame
 from .hatching import hatch_lines
 from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes, part_outlines
 from .swing import MOST_PARTS, Swing
-from .underlay import COVER, Underlay
+from .underlay import COVER, CarriedPhotograph, Underlay
 
 #: The layers, back to front.
 ORDER = (
@@ -51,7 +51,7 @@ class FlatScene:
     block_fill : (n_blocks, 3) uint8 array
         Colours of the blocks.
     underlay : Underlay, optional
-        A photograph, which is seen through the blocks.
+        A photograph, of which the blocks carry their part.
     """
 
     def __init__(
@@ -66,7 +66,10 @@ class FlatScene:
         self.frame = frame.fitted(*size)
         #: Size of a pixel in the world [m].
         self.pixel = float(self.frame.size[0]) / size[0]
-        self._ground = None if underlay is None else underlay.seen(self.frame.low, self.pixel, size)
+        self._photograph = (
+            None if underlay is None else CarriedPhotograph(underlay, assembly, self.frame.low, self.pixel, size)
+        )
+        self._under: np.ndarray | None = None
         self._layers: dict[str, _Layer] = {}
         self._fills: list[_Layer] = []
         self._renderer: RendererAgg | None = None
@@ -96,6 +99,7 @@ class FlatScene:
         """
         if block_fill is not None:
             self._paint(block_fill)
+        self._shown = shown
         corners = mechanics.moved_vertices(self.assembly, shown)
         for layer in (*self._fills, self._layers["outline"]):
             layer.move(corners)
@@ -208,6 +212,7 @@ class FlatScene:
     def image(self) -> Image.Image:
         """Draw the picture."""
         width, height = self.size
+        self._under = None if self._photograph is None else self._photograph.picture(self._shown)
         rows = max(1, min(height, BAND // width))
         if rows == height:
             return self._band(0, height)
@@ -227,8 +232,8 @@ class FlatScene:
         renderer = self._renderer
         pixels = renderer.buffer_rgba()
         np.asarray(pixels).view(np.uint32)[...] = np.array([*palette.PAPER, 255], np.uint8).view(np.uint32)
-        if self._ground is not None:
-            np.asarray(pixels)[..., :3] = self._ground[top : top + rows]
+        if self._under is not None:
+            np.asarray(pixels)[..., :3] = self._under[top : top + rows]
         below = self.size[1] - top - rows
         place = Affine2D().translate(*-self.frame.low).scale(1.0 / self.pixel).translate(0.0, -below)
         for colour, width, cover, path in self._paths():
@@ -263,7 +268,7 @@ class FlatScene:
         colours, which = np.unique(block_fill, axis=0, return_inverse=True)
         corners, codes = self._outlines
         owner = np.repeat(which.ravel(), np.diff(self.assembly.offsets) + 1)
-        cover = 1.0 if self._ground is None else COVER
+        cover = 1.0 if self._photograph is None else COVER
         self._fills = [
             _Layer((int(r), int(g), int(b)), corners[owner == k], codes[owner == k], cover=cover)
             for k, (r, g, b) in enumerate(colours)

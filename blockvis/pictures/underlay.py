@@ -1,19 +1,25 @@
-"""A photograph under the blocks of the plane, at the scale of the drawing."""
+"""A photograph under the blocks of the plane, at the scale of the drawing; they carry their part of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw
+
+import solver
+from solver import mechanics
 
 from . import palette
 
-#: How much of a photograph is paper, so that what is drawn on it stands out.
-PALE = 0.4
+#: How much of a photograph is paper: around the blocks, so that they stand out, and on them.
+PALE, PALE_ON_BLOCKS = 0.7, 0.15
 
-#: How much of the colour of blocks covers it.
-COVER = 0.45
+#: How much of their colour covers what blocks carry of it.
+COVER = 0.3
+
+#: Blocks that move by less are where they were [pixels].
+STILL = 0.5
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,7 @@ class Underlay:
     matrix: np.ndarray
 
     def seen(self, low: np.ndarray, pixel: float, size: tuple[int, int]) -> np.ndarray:
-        """(height, width, 3) uint8 array: what of it is in a picture, pale; paper around it.
+        """(height, width, 3) uint8 array: what of it is in a picture, paper around it.
 
         Parameters
         ----------
@@ -53,4 +59,68 @@ class Underlay:
         within = mask.transform(size, Image.Transform.AFFINE, tuple(place.ravel()), fillcolor=0)
         shown = photograph.transform(size, Image.Transform.AFFINE, tuple(place.ravel()), Image.Resampling.BICUBIC)
         paper = Image.new("RGB", size, palette.PAPER)
-        return np.asarray(Image.composite(Image.blend(shown, paper, PALE), paper, within))
+        return np.asarray(Image.composite(shown, paper, within))
+
+
+class CarriedPhotograph:
+    """A photograph of which each block carries its part to where it moves; pale where they were.
+
+    Parameters
+    ----------
+    underlay : Underlay
+    assembly : solver.Assembly
+    low : (2,) array [m]
+    pixel : float [m]
+    size : (int, int)
+        Of the picture, as in :meth:`Underlay.seen`.
+    """
+
+    def __init__(
+        self, underlay: Underlay, assembly: solver.Assembly, low: np.ndarray, pixel: float, size: tuple[int, int]
+    ) -> None:
+        self._assembly, self._pixel = assembly, pixel
+        seen = Image.fromarray(underlay.seen(low, pixel, size))
+        paper = Image.new("RGB", size, palette.PAPER)
+        self._around, self._own = (Image.blend(seen, paper, pale) for pale in (PALE, PALE_ON_BLOCKS))
+        self._turn = np.diag([pixel, -pixel])
+        self._corner = np.array([low[0], low[1] + pixel * size[1]])
+
+    def picture(self, pose: solver.Pose) -> np.ndarray:
+        """(height, width, 3) uint8 array: the photograph where its blocks are in a pose."""
+        assembly, picture = self._assembly, self._around.copy()
+        moved = mechanics.moved_vertices(assembly, pose)
+        far = np.linalg.norm(moved - assembly.vertices, axis=1)
+        rings = np.split((moved - self._corner) @ np.linalg.inv(self._turn), assembly.offsets[1:-1])
+        moves = np.maximum.reduceat(far, assembly.offsets[:-1]) > STILL * self._pixel
+        standing = Image.new("L", picture.size)
+        draw = ImageDraw.Draw(standing)
+        for block in np.flatnonzero(~moves):
+            draw.polygon([tuple(corner) for corner in rings[block].tolist()], fill=255)
+        picture.paste(self._own, (0, 0), standing)
+        for block in np.flatnonzero(moves):
+            self._paste(picture, rings[block], int(block), pose)
+        return np.asarray(picture)
+
+    def _paste(self, picture: Image.Image, ring: np.ndarray, block: int, pose: solver.Pose) -> None:
+        """Paste what a block carries, whose corners (n, 2) are now at these pixels."""
+        low = np.maximum(np.floor(ring.min(axis=0)), 0).astype(int)
+        high = np.minimum(np.ceil(ring.max(axis=0)) + 1, picture.size).astype(int)
+        if (high <= low).any():
+            return
+        width, height = (high - low).tolist()
+        angle = float(np.ravel(pose.rotations[block])[0])
+        c, s = np.cos(angle), np.sin(angle)
+        back = np.linalg.inv(self._turn) @ np.array([[c, s], [-s, c]])
+        start = self._assembly.centroids[block] - self._corner
+        shift = self._turn @ low + self._corner - pose.positions[block]
+        place = np.column_stack([back @ self._turn, back @ shift + np.linalg.inv(self._turn) @ start])
+        part = self._own.transform(
+            (width, height),
+            Image.Transform.AFFINE,
+            tuple(place.ravel()),
+            Image.Resampling.BILINEAR,
+            fillcolor=palette.PAPER,
+        )
+        mask = Image.new("L", (width, height))
+        ImageDraw.Draw(mask).polygon([tuple(corner) for corner in (ring - low).tolist()], fill=255)
+        picture.paste(part, tuple(low.tolist()), mask)

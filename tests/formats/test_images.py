@@ -4,12 +4,15 @@ import json
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 
 import blockvis
 from blockvis.cli import main
 from blockvis.formats.read import read_layout
 from blockvis.pictures.underlay import Underlay
+from blockvis.runs.underlay import underlay_of
 
 WALL = (300, 160)
 
@@ -101,6 +104,24 @@ def test_labels_that_share_borders_leave_no_gap(tmp_path, turn):
     assert layout.names[0] == "label 1"
 
 
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10**6), st.integers(2, 5), st.sampled_from([None, 0.0]))
+def test_regions_of_any_labels_are_whole_outlines_side_by_side(tmp_path_factory, seed, most, tolerance):
+    import shapely
+
+    labels = np.random.default_rng(seed).integers(0, most, (6, 9)).astype(np.uint8)
+    path = tmp_path_factory.mktemp("labels") / "a.png"
+    Image.fromarray(np.kron(labels, np.ones((4, 4), dtype=np.uint8))).save(path)
+    try:
+        layout = read_layout(path, pixel=1.0, smallest=0.5, outline_tolerance=tolerance)
+    except ValueError:
+        # Of one region, of holes: refused with a word, as other tests say.
+        return
+    shapes = np.array([shapely.Polygon(ring) for ring in layout.outlines])
+    assert shapely.is_valid(shapes).all()
+    assert shapely.area(shapes).sum() == pytest.approx(shapely.union_all(shapes).area, rel=1e-9)
+
+
 @pytest.mark.parametrize("lossy", ["a.jpg", "noisy.jpg", "small.png", "turned.png"])
 def test_antialiased_and_lossy_labels_are_those_of_the_exact_image(tmp_path, lossy, capsys):
     colours = np.random.default_rng(4).integers(70, 255, (40, 3))
@@ -157,6 +178,19 @@ def test_a_world_file_says_where_the_pixels_are(tmp_path, capsys):
     assert read_layout(tmp_path / "wall.png", pixel=0.01).points.min(axis=0) == pytest.approx([0.27, 0.24])
     (tmp_path / "wall.pgw").write_text("0.02\n0\n", encoding="utf-8")
     assert "is no world file; it has six numbers" in informed(capsys, tmp_path / "wall.png")[2]
+
+
+def test_a_photograph_with_a_world_file_lies_under_any_drawing(tmp_path):
+    Image.new("RGB", (30, 20)).save(tmp_path / "photo.jpg")
+    (tmp_path / "photo.jgw").write_text("0.1\n0\n0\n-0.1\n5.05\n6.95\n", encoding="utf-8")
+    case = tmp_path / "case.toml"
+    text = '[geometry]\nfile = "wall.dxf"\n[settlement]\ndirection = [0, -1]\n[output]\nunderlay = "photo.jpg"\n'
+    case.write_text(text, encoding="utf-8")
+    found = underlay_of(blockvis.read_case(case))
+    assert found.matrix == pytest.approx(np.array([[0.1, 0.0, 5.0], [0.0, -0.1, 7.0]]))
+    (tmp_path / "photo.jgw").unlink()
+    with pytest.raises(ValueError, match=r"nothing says where 'photo\.jpg' lies; put a world file beside it"):
+        underlay_of(blockvis.read_case(case))
 
 
 def test_tags_of_a_geotiff_say_where_the_pixels_are(tmp_path, capsys):
@@ -279,7 +313,13 @@ def test_annotations_are_blocks_with_their_label_as_group(tmp_path, capsys, cont
 def test_packed_runs_and_several_pieces_of_coco_are_read(tmp_path):
     packed = _coco()
     packed["annotations"] = packed["annotations"][:1]
-    packed["annotations"][0]["segmentation"] = {"size": [4, 4], "counts": "54O1N"}
+    packed["annotations"][0]["segmentation"] = {"size": [8, 8], "counts": "b04400000>"}
+    (tmp_path / "w.json").write_text(json.dumps(packed), encoding="utf-8")
+    layout = read_layout(tmp_path / "w.json", pixel=1.0)
+    assert (float(layout.sizes[0]) ** 2, layout.points.min(axis=0).tolist()) == (16.0, [2.0, 194.0])
+    with pytest.raises(ValueError, match="draws no block"):
+        read_layout(tmp_path / "w.json", pixel=1.0, smallest=5.0)
+    packed["annotations"][0]["segmentation"] = {"size": [8, 8], "counts": "b0440000"}
     (tmp_path / "w.json").write_text(json.dumps(packed), encoding="utf-8")
     with pytest.raises(ValueError, match="runs make"):
         read_layout(tmp_path / "w.json", pixel=1.0)
