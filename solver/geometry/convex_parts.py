@@ -16,6 +16,7 @@ from .solids import Faces, Solids, cross, dot, unit
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
+    from scipy.spatial import ConvexHull
 
 #: An edge is re-entrant where the outward normals of its faces turn against each other by more than this sine.
 REENTRANT = 1e-4
@@ -294,7 +295,8 @@ def _parts_of(
     ValueError
         Says why there are none.
     """
-    from manifold3d import Manifold
+    # Loaded where it is used: blocks in the plane need none, and it takes a tenth of all imports.
+    from scipy.spatial import ConvexHull
 
     vertices, loops = np.frombuffer(points).reshape(-1, 3), [list(face) for face in faces]
     origin, size = vertices[0], float(np.linalg.norm(np.ptp(vertices, axis=0)))
@@ -308,10 +310,9 @@ def _parts_of(
         if cut is not None:
             queue += piece.separated(*cut)
         else:
-            hull = Manifold.hull_points(_drawn_corners(piece.corners, drawn.vertices))
-            total += hull.volume()
-            mesh = hull.to_mesh64()
-            corners, rings = merged_faces((mesh.vert_properties, mesh.tri_verts.astype(np.int64).tolist()), flatness)
+            hull = ConvexHull(np.unique(_drawn_corners(piece.corners, drawn.vertices), axis=0))
+            total += hull.volume
+            corners, rings = merged_faces((hull.points, _outward_triangles(hull)), flatness)
             inner = [_is_inner(corners[ring], whole, flatness) for ring in rings]
             parts.append((corners * size + origin, rings, inner))
         if len(queue) + len(parts) > MOST_PARTS:
@@ -385,11 +386,16 @@ def _is_inner(face: np.ndarray, whole: _Piece, flatness: float) -> bool:
     return bool(apart.all())
 
 
+def _outward_triangles(hull: ConvexHull) -> list[list[int]]:
+    a, b, c = np.moveaxis(hull.points[hull.simplices], 1, 0)
+    outward = dot(cross(b - a, c - a), hull.equations[:, :3]) > 0.0
+    return np.where(outward[:, None], hull.simplices, hull.simplices[:, ::-1]).tolist()
+
+
 def _drawn_corners(corners: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-    """(n, 3) array: corners of a part, those of the block as they were drawn."""
-    apart = np.abs(corners[:, None] - drawn).max(axis=2)
-    nearest = apart.argmin(axis=1)
-    return np.where((apart.min(axis=1) <= 2.0 * ON_PLANE)[:, None], drawn[nearest], corners)
+    """(n, 3) array: corners of a part, those of the block as they were drawn, and of several at one place the first."""
+    known = np.vstack([drawn, corners])
+    return known[(np.abs(corners[:, None] - known).max(axis=2) <= 2.0 * ON_PLANE).argmax(axis=1)]
 
 
 def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray, np.ndarray] | None:
