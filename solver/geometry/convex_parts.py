@@ -16,7 +16,6 @@ from .solids import Faces, Solids, cross, dot, unit
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
-    from scipy.spatial import ConvexHull
 
 #: An edge is re-entrant where the outward normals of its faces turn against each other by more than this sine.
 REENTRANT = 1e-4
@@ -295,9 +294,6 @@ def _parts_of(
     ValueError
         Says why there are none.
     """
-    # Loaded where it is used: blocks in the plane need none, and it takes a tenth of all imports.
-    from scipy.spatial import ConvexHull
-
     vertices, loops = np.frombuffer(points).reshape(-1, 3), [list(face) for face in faces]
     origin, size = vertices[0], float(np.linalg.norm(np.ptp(vertices, axis=0)))
     drawn = Solids.of_surfaces([((vertices - origin) / size, loops)])
@@ -310,9 +306,8 @@ def _parts_of(
         if cut is not None:
             queue += piece.separated(*cut)
         else:
-            hull = ConvexHull(np.unique(_drawn_corners(piece.corners, drawn.vertices), axis=0))
-            total += hull.volume
-            corners, rings = merged_faces((hull.points, _outward_triangles(hull)), flatness)
+            corners, rings, volume = _hull(_drawn_corners(piece.corners, drawn.vertices), flatness)
+            total += volume
             inner = [_is_inner(corners[ring], whole, flatness) for ring in rings]
             parts.append((corners * size + origin, rings, inner))
         if len(queue) + len(parts) > MOST_PARTS:
@@ -386,10 +381,24 @@ def _is_inner(face: np.ndarray, whole: _Piece, flatness: float) -> bool:
     return bool(apart.all())
 
 
-def _outward_triangles(hull: ConvexHull) -> list[list[int]]:
-    a, b, c = np.moveaxis(hull.points[hull.simplices], 1, 0)
-    outward = dot(cross(b - a, c - a), hull.equations[:, :3]) > 0.0
-    return np.where(outward[:, None], hull.simplices, hull.simplices[:, ::-1]).tolist()
+def _hull(points: np.ndarray, flatness: float) -> tuple[np.ndarray, list[list[int]], float]:
+    """Corners, faces and volume of the convex hull of points."""
+    # Loaded where they are used: blocks in the plane need neither, and they take a tenth of all imports.
+    from manifold3d import Manifold
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(np.unique(points, axis=0))
+        a, b, c = np.moveaxis(hull.points[hull.simplices], 1, 0)
+        outward = dot(cross(b - a, c - a), hull.equations[:, :3]) > 0.0
+        triangles = np.where(outward[:, None], hull.simplices, hull.simplices[:, ::-1])
+        return *merged_faces((hull.points, triangles.tolist()), flatness), float(hull.volume)
+    except (QhullError, KeyError):
+        # Of parts about as thin as rounding; its hull is closed whatever the points.
+        body = Manifold.hull_points(points)
+        mesh = body.to_mesh64()
+        triangles = mesh.tri_verts.astype(np.int64)
+        return *merged_faces((mesh.vert_properties, triangles.tolist()), flatness), body.volume()
 
 
 def _drawn_corners(corners: np.ndarray, drawn: np.ndarray) -> np.ndarray:
