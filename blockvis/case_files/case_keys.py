@@ -308,7 +308,8 @@ GEOMETRY = Section(
             "Corners within this distance of a simpler outline are dropped; 0 keeps every corner", 0.002, "m",
             otherwise="a hundredth of a block where outlines have more than 24 corners in the mean, else 0"),
         Key("overlap_tolerance", POSITIVE, "Overlap of two blocks that is resolved to its midline", 0.001, "m",
-            otherwise="a thousandth of the width of the thinnest block"),
+            otherwise="0.04 of the width of a typical block, of a file in space 0.01, of a parametric layout a "
+            "thousandth of the thinnest one"),
     ),
     required=True,
 )  # fmt: skip

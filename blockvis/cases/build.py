@@ -14,9 +14,11 @@ from blockvis import generators
 from blockvis.formats.read import overlap_remedy, read_layout, read_outlines
 from blockvis.layout import layout
 from blockvis.layout.assemble import assemble
+from blockvis.layout.facing import DEFAULT_FACING
 from blockvis.layout.repair import DeepOverlap
 from blockvis.layout.units import doubt
 from blockvis.text import nearest
+from solver import mechanics
 
 from .bonds import bonded
 from .contents import Case
@@ -178,6 +180,15 @@ def across_blocks(assembly: solver.Assembly) -> np.ndarray:
     first = np.searchsorted(assembly.block_of_vertex, np.arange(assembly.n_blocks))
     low, high = (pick.reduceat(assembly.vertices, first, axis=0) for pick in (np.minimum, np.maximum))
     return np.asarray(np.linalg.norm(high - low, axis=1))
+
+
+def case_controls(case: Case, assembly: solver.Assembly) -> solver.Controls:
+    """Make the controls of a case, by which overlaps that were accepted where its file was read are contacts."""
+    shapes, controls = assembly.shapes, case.controls
+    if not isinstance(shapes, mechanics.Polyhedra) or case.file is None or controls.overlap_tolerance is not None:
+        return controls
+    width = float(np.median(6.0 * shapes.volumes / shapes.surfaces))
+    return replace(controls, overlap_tolerance=DEFAULT_FACING * width)
 
 
 def _case_layout(case: Case) -> layout.Layout:

@@ -22,6 +22,12 @@ from .selection import drawn_mortar
 from .simplify import default_tolerance, simplified
 from .solids import prism
 
+#: Overlaps below this fraction of the width of the thinnest block are contacts without a word.
+DRAWN_GAP = 1e-3
+
+#: Convex parts that hold more than their block, by more than this part of its volume, share some of it.
+CROSSING = 2.5e-3
+
 
 def assemble(
     layout: Layout,
@@ -102,11 +108,11 @@ def assemble(
     if layout.dimension == 3:
         tolerance = facing_tolerance(layout.solids[:n_drawn], float(joint_thickness), overlap_tolerance)
         facing = faced(layout.solids, layout.names, tolerance, anchored)
-        if facing.note:
-            warnings.warn(f"{where}: {facing.note}", stacklevel=2)
         assembly = solver.Assembly.from_solids(facing.solids, **of_blocks)
-        pairs = [pair for pair in overlaps(assembly, tolerance) if assembly.free[list(pair[:2])].any()]
-        refuse_overlaps(assembly, pairs, tolerance)
+        accepted = tolerance if overlap_tolerance is None else overlap_tolerance
+        for note in (facing.note, _left_overlaps(assembly, accepted), _crossings(assembly)):
+            if note:
+                warnings.warn(f"{where}: {note}", stacklevel=2)
         return assembly
     of_blocks["thickness"] = _filled(layout.thickness, thickness, layout.n_blocks)
     outlines, repairs = repaired(
@@ -120,6 +126,37 @@ def assemble(
     for note in repairs:
         warnings.warn(f"{where}: {note}", stacklevel=2)
     return solver.Assembly.from_outlines(outlines, **of_blocks)
+
+
+def _left_overlaps(assembly: solver.Assembly, accepted: float) -> str:
+    """Refuse blocks in space that overlap by more than is accepted [m], and tell which overlap by less."""
+    found = overlaps(assembly, min(accepted, DRAWN_GAP * float(assembly.widths.min())))
+    found = [pair for pair in found if assembly.free[list(pair[:2])].any()]
+    refuse_overlaps(assembly, found, accepted)
+    if not found:
+        return ""
+    i, j, depth = found[0]
+    return (
+        f"{len(found)} pairs of blocks overlap by up to {depth:.3g} m ('{assembly.names[i]}' and "
+        f"'{assembly.names[j]}') and are taken as in contact; lower overlap_tolerance ({accepted:.3g} m) to have them "
+        "refused"
+    )
+
+
+def _crossings(assembly: solver.Assembly) -> str:
+    """Tell which blocks have a surface that crosses itself a little, as the volume of their convex parts shows."""
+    shapes = assembly.shapes
+    if not isinstance(shapes, mechanics.Polyhedra) or shapes.parts.whole:
+        return ""
+    excess = np.bincount(shapes.parts.block_of_part, shapes.parts.solids.volumes) / shapes.volumes - 1.0
+    worst = int(np.abs(excess).argmax())
+    n = int((np.abs(excess) > CROSSING).sum())
+    if not n:
+        return ""
+    return (
+        f"the surfaces of {n} blocks cross themselves: the convex parts of '{assembly.names[worst]}' hold "
+        f"{100.0 * excess[worst]:+.2g} % of its volume more; redraw them"
+    )
 
 
 def _simplified(layout: Layout, tolerance: float | None) -> tuple[Layout, str]:

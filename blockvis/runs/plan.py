@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import solver
-from blockvis.cases.build import case_interfaces, case_loads, case_settlements
+from blockvis.cases.build import case_controls, case_interfaces, case_loads, case_settlements
 from blockvis.cases.contents import Case
 from blockvis.kinds.kind import AnalysisRun, RunInput
 from blockvis.kinds.kinds import KINDS
@@ -39,7 +39,12 @@ def planned(
     kind = KINDS[case.analysis]
     if not isinstance(resume, kind.checkpoint | None):
         raise ValueError(f"a {case.analysis} cannot go on from a {type(resume).__name__}")
-    case = replace(case, settlements=case_settlements(case, assembly), profiles=())
+    case = replace(
+        case,
+        settlements=case_settlements(case, assembly),
+        profiles=(),
+        controls=case_controls(case, assembly),
+    )
     given = RunInput(case, assembly, case_interfaces(case), case_loads(case, assembly))
     if case.settlements:
         mechanics.check_settlement(assembly, case.settlements, case.controls)

@@ -294,8 +294,6 @@ def _parts_of(
     ValueError
         Says why there are none.
     """
-    from manifold3d import Manifold
-
     vertices, loops = np.frombuffer(points).reshape(-1, 3), [list(face) for face in faces]
     origin, size = vertices[0], float(np.linalg.norm(np.ptp(vertices, axis=0)))
     drawn = Solids.of_surfaces([((vertices - origin) / size, loops)])
@@ -308,10 +306,8 @@ def _parts_of(
         if cut is not None:
             queue += piece.separated(*cut)
         else:
-            hull = Manifold.hull_points(_drawn_corners(piece.corners, drawn.vertices))
-            total += hull.volume()
-            mesh = hull.to_mesh64()
-            corners, rings = merged_faces((mesh.vert_properties, mesh.tri_verts.astype(np.int64).tolist()), flatness)
+            corners, rings, volume = _hull(_drawn_corners(piece.corners, drawn.vertices), flatness)
+            total += volume
             inner = [_is_inner(corners[ring], whole, flatness) for ring in rings]
             parts.append((corners * size + origin, rings, inner))
         if len(queue) + len(parts) > MOST_PARTS:
@@ -385,11 +381,30 @@ def _is_inner(face: np.ndarray, whole: _Piece, flatness: float) -> bool:
     return bool(apart.all())
 
 
+def _hull(points: np.ndarray, flatness: float) -> tuple[np.ndarray, list[list[int]], float]:
+    """Corners, faces and volume of the convex hull of points."""
+    # Loaded where they are used: blocks in the plane need neither, and they take a tenth of all imports.
+    from manifold3d import Manifold
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(np.unique(points, axis=0))
+        a, b, c = np.moveaxis(hull.points[hull.simplices], 1, 0)
+        outward = dot(cross(b - a, c - a), hull.equations[:, :3]) > 0.0
+        triangles = np.where(outward[:, None], hull.simplices, hull.simplices[:, ::-1])
+        return *merged_faces((hull.points, triangles.tolist()), flatness), float(hull.volume)
+    except (QhullError, KeyError):
+        # Of parts about as thin as rounding; its hull is closed whatever the points.
+        body = Manifold.hull_points(points)
+        mesh = body.to_mesh64()
+        triangles = mesh.tri_verts.astype(np.int64)
+        return *merged_faces((mesh.vert_properties, triangles.tolist()), flatness), body.volume()
+
+
 def _drawn_corners(corners: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-    """(n, 3) array: corners of a part, those of the block as they were drawn."""
-    apart = np.abs(corners[:, None] - drawn).max(axis=2)
-    nearest = apart.argmin(axis=1)
-    return np.where((apart.min(axis=1) <= 2.0 * ON_PLANE)[:, None], drawn[nearest], corners)
+    """(n, 3) array: corners of a part, those of the block as they were drawn, and of several at one place the first."""
+    known = np.vstack([drawn, corners])
+    return known[(np.abs(corners[:, None] - known).max(axis=2) <= 2.0 * ON_PLANE).argmax(axis=1)]
 
 
 def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray, np.ndarray] | None:

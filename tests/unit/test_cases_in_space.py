@@ -9,8 +9,10 @@ from structures import assembly_of, box, case_from, drawn, layout_of, run_comman
 import blockvis
 import solver
 from blockvis import generators, read, save_layout, write_layout
+from blockvis.cases.build import case_assembly, case_controls
 from blockvis.cli import main
 from solver import mechanics
+from solver.assembly import check_blocks
 
 DOME = '[geometry]\nlayout = "dome"\nparameters = {lunes = 4, courses = 1}\n'
 ARCH = '[geometry]\nlayout = "arch"\nparameters = {voussoirs = 5}\n'
@@ -114,6 +116,22 @@ def test_stones_that_overlap_are_refused_with_the_place(tmp_path):
     with pytest.warns(UserWarning, match="they overlapped by up to 0.1 m"):
         faced = read(path, overlap_tolerance=0.11)
     assert faced.vertices[:8, 2].max() == pytest.approx(0.95)
+
+
+def test_a_small_overlap_that_facing_leaves_is_a_contact_with_a_note(tmp_path):
+    (points, faces), low = box((0, 0, 0.995), (1, 1, 2)), box((0, 0, 0), (1, 1, 1))
+    # Too steep for a joint of two faces: it touches along an edge, 5 mm too deep.
+    steep = np.where(points[:, 2:] < 1, points + np.array([[0.0, 0.0, 0.2]]) * points[:, :1], points)
+    write_layout(Layout((low, (steep, faces)), ("low", "high")), tmp_path / "a.obj")
+    text = '[geometry]\nfile = "a.obj"\ndimension = 3\n[roles]\nlow = "moving"\n'
+    found = case(text + DOWN, tmp_path)
+    with pytest.warns(UserWarning, match=r"1 pairs of blocks overlap by up to 0.0049\d* m .* are taken as in contact"):
+        assembly = case_assembly(found)
+    with pytest.raises(ValueError, match="overlaps block"):
+        check_blocks(assembly)
+    check_blocks(assembly, case_controls(found, assembly).overlap_tolerance)
+    with pytest.raises(ValueError, match=r"raise overlap_tolerance \(0.001 m\)"):
+        case_assembly(case(text.replace("[roles]", "overlap_tolerance = 0.001\n[roles]") + DOWN, tmp_path))
 
 
 def test_new_writes_a_case_in_space(tmp_path, capsys):

@@ -62,20 +62,20 @@ def check(corners, faces, rotation, scale, most):
     assert max(out_of_faces(parts.solids, k) for k in range(len(parts.block_of_part))) < 1e-6 * scale
 
 
-@settings(max_examples=12)
+@settings(max_examples=12, deadline=None)
 @given(st.sampled_from(["L", "U", "T", "star"]), length, length, length, turn, st.sampled_from([1e-3, 1.0, 1e3]))
 def test_prisms_are_filled_by_few_convex_parts(name, a, b, c, rotation, scale):
     outline, most = outline_of(name, a, b, c)
     check(*prism(outline, c), rotation, scale, most)
 
 
-@settings(max_examples=8)
+@settings(max_examples=8, deadline=None)
 @given(length, length, length, turn)
 def test_a_frame_is_cut_through_its_limbs(a, b, c, rotation):
     check(*frame(a, b, c), rotation, 1.0, 6)
 
 
-@settings(max_examples=8)
+@settings(max_examples=8, deadline=None)
 @given(st.floats(0.1, 0.8), st.floats(0.1, 0.8), st.floats(0.1, 0.8), turn)
 def test_a_box_without_one_corner(x, y, z, rotation):
     points = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1) if i + j + k < 3], dtype=float)
