@@ -182,6 +182,8 @@ def _outlines(
     if unit is not None:
         metres_per(unit)
     reading = Reading(unit, chord_tolerance, checked_view(view), ignore, only, {**image})
+    # Who gives the size of an image leaves no doubt about its unit.
+    unit = unit or ("m" if any(image.get(key) for key in ("width", "height", "pixel")) else None)
     files = files_of(path)
     found = [_read_by_suffix(file, reading) for file in files]
     content = found[0] if files == [path] else of_files([_apart(one, path) for one in found], files, path)

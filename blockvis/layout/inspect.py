@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -28,11 +28,9 @@ from .solids import size_of, width_of
 #: Classes of joint thickness in the report.
 CLASSES = 8
 
-#: Gaps between faces that cover each other are joints drawn open between these parts of the width of a typical block.
+#: Gaps between faces that cover each other are joints drawn open between these parts of the width of a typical block;
+#: narrower ones are rounding of coordinates.
 SMALLEST_JOINT, WIDEST_JOINT = 1e-3, 0.2
-
-#: Gaps below this part of the width of a typical block are no joints but rounding of coordinates.
-NO_JOINT = 1e-4
 
 #: Density of blocks for which the layout has none [kg/m³], as of a run.
 DENSITY = 2000.0
@@ -211,17 +209,15 @@ def _in_the_plane(layout: Layout) -> dict[str, Any]:
     outlines = [assembly.outline(i) for i in range(assembly.n_blocks)]
     finer = simplified(outlines, default_tolerance(outlines))[1]
     proposal = proposed(outlines)
-    if proposal.thickness < SMALLEST_JOINT * width:
-        # Rounding of coordinates is no mortar.
-        proposal = replace(proposal, thickness=0.0)
+    smallest = SMALLEST_JOINT * width
     return {
         "sizes": assembly.areas,
         "overlapping": overlaps(assembly, ROUNDING * width),
         "overlap_tolerance": DEFAULT_OVERLAP * width,
-        "joint_thickness": proposal.thickness,
+        "joint_thickness": proposal.thickness if proposal.thickness >= smallest else 0.0,
         "joints": proposal.stretches,
         "rows": (("corners", f"{sum(map(len, layout.outlines))}" + (f"; in a run {finer}" if finer else "")),),
-        "joint_rows": _mortar_rows(proposal, NO_JOINT * width),
+        "joint_rows": _mortar_rows(proposal, smallest),
     }
 
 
@@ -249,9 +245,6 @@ def _mortar_rows(proposal: Proposal, rounding: float) -> tuple[Row, ...]:
     ]
     for k in np.flatnonzero(counts):
         rows.append(("", f"{edges[k]:6.1f} to {edges[k + 1]:6.1f} mm  {counts[k]:6d} stretches  {metres[k]:9.3f} m"))
-    if not proposal.thickness:
-        rows.append(("", f"narrower than {SMALLEST_JOINT:g} of a block: rounding, no joints to close"))
-        return tuple(rows)
     rows.append(("proposed", f'joint_thickness = {proposal.thickness:g}   (m, or "auto")'))
     if proposal.way == "voronoi":
         rows.append(("", 'closing = "voronoi": faces are not straight, mortar goes to the nearest stone'))

@@ -122,8 +122,8 @@ def test_a_small_overlap_that_facing_leaves_is_a_contact_with_a_note(tmp_path):
     (points, faces), low = box((0, 0, 0.995), (1, 1, 2)), box((0, 0, 0), (1, 1, 1))
     # Too steep for a joint of two faces: it touches along an edge, 5 mm too deep.
     steep = np.where(points[:, 2:] < 1, points + np.array([[0.0, 0.0, 0.2]]) * points[:, :1], points)
-    drawn(tmp_path / "a.obj", [low, (steep, faces)], ("low", "high"))
-    text = '[geometry]\nfile = "a.obj"\ndimension = 3\n[roles]\nlow = "moving"\n'
+    drawn(tmp_path / "a.json", [low, (steep, faces)], ("low", "high"))
+    text = '[geometry]\nfile = "a.json"\ndimension = 3\n[roles]\nlow = "moving"\n'
     found = case(text + DOWN, tmp_path)
     with pytest.warns(UserWarning, match=r"1 pairs of blocks overlap by up to 0.0049\d* m .* are taken as in contact"):
         assembly = case_assembly(found)
