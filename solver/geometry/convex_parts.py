@@ -420,6 +420,9 @@ def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray
     ends = np.roll(starts, -1, axis=1)
     edges = _reentrant_edges(piece, planes.normals)
     length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+    widths = np.linalg.norm(ends - starts, axis=2)
+    opposite = np.roll(starts, 1, axis=1).reshape(-1, 3)[piece.twins].reshape(-1, 3, 3)
+    convex = dot(opposite - starts, piece.normals[:, None]) < -ON_PLANE
     sharp = piece.face[:, None] != piece.face[piece.twins // 3].reshape(-1, 3)
     best, smallest, most = None, np.inf, 0.0
     for edge in edges[:EDGES_TRIED]:
@@ -436,10 +439,14 @@ def _best_cut(piece: _Piece, planes: Faces, flatness: float) -> tuple[np.ndarray
                 here = (sense * level >= -ON_PLANE) & (reaches | lies)[:, None]
                 hull = Manifold.hull_points(np.concatenate([starts[here], on])).volume()
                 size += hull if hull > SMALLEST_PART else np.inf
-            # Of cuts that are as good, the one along more re-entrant edges, and through fewer edges.
+            # Of cuts that are as good, the one along more re-entrant edges and faces, and through fewer edges.
             off = (edges - edge[0]) @ normal
             in_plane, beside = np.abs(off).max(axis=1) <= ON_PLANE, off.min(axis=1) * off.max(axis=1) >= -(ON_PLANE**2)
             along = length @ (1.0 * in_plane + beside) - THROUGH_EDGE * np.count_nonzero(through & sharp)
+            # A corner that is cut in two meets its neighbours with faces that end in it.
+            third = np.roll(level, 1, axis=1).ravel()
+            split = convex & (np.maximum(np.abs(level), np.abs(beyond)) <= ON_PLANE)
+            along -= widths[split & (third * third[piece.twins] < -(ON_PLANE**2)).reshape(-1, 3)].sum() / 4.0
             equal = abs(size - smallest) <= SAME_VOLUME * smallest
             if size < np.inf and (along > most + ON_PLANE if equal else size < smallest):
                 best, smallest, most = (normal, edge[0]), size, along

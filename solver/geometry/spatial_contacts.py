@@ -22,7 +22,7 @@ from .solids import Faces, Solids, cross, dot, unit
 from .spatial_features import ACROSS, ON_CORNER, ON_FACE, feature_rows, places_of, read_places
 
 #: Width of a sliver at a cut, as a part of both faces, and its area, as a part of that in which the two blocks touch.
-SLIVER = 0.02
+SLIVER = 0.005
 
 
 def measured_points(
