@@ -296,7 +296,7 @@ class Stepper:
                 return self.step(place, length, in_time=in_time, viscosity=viscosity, candidates=candidates)
         # A larger share alternates where the normal force falls as the bound grows.
         share = 0.9 if in_time else min(0.5, size / (size + min(FRICTION_MEMORY, s / self.unit)))
-        lag, followed = self._updated_bounds(start, np.maximum(gap, 0.0), forces, bound, followed, is_new, share)
+        lag, followed = self._updated_bounds(forces, np.maximum(gap, 0.0), friction, bound, followed, is_new, share)
         motion = np.where(free[:, None], full, place.pose.movement_to(pose))
         new = Place(
             s,
@@ -326,24 +326,22 @@ class Stepper:
 
     def _updated_bounds(
         self,
-        contacts: Contacts,
-        gap: np.ndarray,
         forces: np.ndarray,
+        gap: np.ndarray,
+        friction: np.ndarray,
         bound: np.ndarray,
         followed: np.ndarray,
         is_new: np.ndarray,
         share: float | np.ndarray,
     ) -> tuple[float, np.ndarray]:
-        """Change of the friction bounds of sliding joints, in weights of the structure, and followed normal forces."""
-        shear_force, normal, friction = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0], self.friction(contacts)
+        """Change of the friction bounds of sliding points, in weights of the structure, and followed normal forces."""
+        shear_force, normal = np.linalg.norm(forces[:, 1:], axis=1), forces[:, 0]
         sliding = ((shear_force >= SLIDES * bound) | (shear_force > friction * normal)) & ~is_new
         # In a joint that opens friction vanishes sooner.
         share = np.maximum(share, gap / (gap + OPEN))
         # New contact points have the friction of their normal force at once.
         after = np.where(is_new, normal, followed + share * (normal - followed))
-        # What the points of one joint hand to each other does not change its friction.
-        change = np.bincount(contacts.joints()[1], np.where(sliding, friction * (after - followed), 0.0))
-        return float(np.abs(change).sum()) / self.weight, after
+        return float((friction * np.abs(after - followed))[sliding].sum()) / self.weight, after
 
     def _velocity(self, place: Place, motion: np.ndarray, length: float) -> np.ndarray:
         """(n_blocks, n_dof) array: velocity after a step, averaged with those before."""
