@@ -251,10 +251,12 @@ def _box(contents: Contents) -> tuple[np.ndarray, np.ndarray]:
     every = every[np.isfinite(every).all(axis=1)]
     first_low, first_high = every.min(axis=0), every.max(axis=0)
     size, low, high = first_high - first_low, first_low, first_high
-    for points in beside:
-        # A stray point far off would shrink the blocks to a dot.
-        low = np.minimum(low, np.maximum(points.min(axis=0), first_low - 0.5 * size))
-        high = np.maximum(high, np.minimum(points.max(axis=0), first_high + 0.5 * size))
+    for item in layout.left_out:
+        if len(item.points):
+            # A stray point far off would shrink the blocks to a dot; a wall is larger than its openings.
+            room = (2.0 if item.kind == "background" else 0.5) * size
+            low = np.minimum(low, np.maximum(item.points.min(axis=0), first_low - room))
+            high = np.maximum(high, np.minimum(item.points.max(axis=0), first_high + room))
     return low, high
 
 
