@@ -194,7 +194,7 @@ def _in_the_plane(figure: Any, contents: Contents) -> _Canvas:
     names = {}
     for k in contents.drawn:
         ring = layout.outlines[k]
-        names[k] = np.array([_middle(ring), room_in(ring)])
+        names[k] = np.array([_inside(ring), room_in(ring)])
     return _Canvas(axes, np.eye(2), names, min(across / width, drawn / height))
 
 
@@ -310,6 +310,17 @@ def _add_marks(canvas: _Canvas, contents: Contents) -> list[Any]:
                 bbox={"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": warning},
             )
     return keys
+
+
+def _inside(ring: np.ndarray) -> np.ndarray:
+    """(2,) array [m]: the centroid of an outline, or another place in it where that lies outside."""
+    import shapely
+
+    shape = shapely.Polygon(ring)
+    if not shape.is_valid or not shape.area:
+        return _middle(ring)
+    middle = shape.centroid if shape.contains(shape.centroid) else shape.representative_point()
+    return np.array([middle.x, middle.y])
 
 
 def _middle(corners: np.ndarray) -> np.ndarray:
