@@ -171,7 +171,7 @@ def _parser() -> argparse.ArgumentParser:
     info.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
     _add_view(info)
     _add_choice(info)
-    info.add_argument("--picture", metavar="PNG", help="draw what was found")
+    info.add_argument("--picture", metavar="PNG", help="draw what was found, or why it is refused")
     info.set_defaults(verb=_info)
     convert = verbs.add_parser("convert", help="any layout file to any other")
     convert.add_argument("source", metavar="IN", help="or a folder or a pattern of files, one per stone")
