@@ -489,7 +489,7 @@ def _try_new(text: str, target: Path, *, drawing: bool) -> None:
         try:
             # Its joints are closed: what is wider now is a place between arch and wall, and no mortar.
             shown = replace(inspected(layout), joints=Facing.none())
-            drawn = draw_inspection(shown, target.with_suffix(".supports.png"))
+            drawn = draw_inspection(shown, target.with_suffix(".supports.png"), falling=found.falling)
             print(f"drawn with its supports in {drawn}")
         except MissingExtra as missing:
             print(f"blockvis: note: not drawn: {missing}", file=sys.stderr)
