@@ -39,7 +39,7 @@ def test_a_page_is_followed_literally(page, runs, tmp_path, monkeypatch, capsys)
     printed = ""
     for kind, block in BLOCKS.findall(page.read_text(encoding="utf-8")):
         if kind == "sh":
-            lines = [line.split(" --set ")[0] for line in block.splitlines()]
+            lines = block.splitlines()
             printed = "".join(ran(line, capsys) for line in lines if runs or not line.startswith("blockvis run"))
         elif block.startswith("poly "):
             Path("main.dat").write_text(block, encoding="utf-8")
