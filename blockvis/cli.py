@@ -171,7 +171,7 @@ def _parser() -> argparse.ArgumentParser:
     info.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
     _add_view(info)
     _add_choice(info)
-    info.add_argument("--picture", metavar="PNG", help="draw what was found")
+    info.add_argument("--picture", metavar="PNG", help="draw what was found, or why it is refused")
     info.set_defaults(verb=_info)
     convert = verbs.add_parser("convert", help="any layout file to any other")
     convert.add_argument("source", metavar="IN", help="or a folder or a pattern of files, one per stone")
@@ -455,7 +455,8 @@ def _new(options: argparse.Namespace) -> int:
         print(f"blockvis: note: {unit_says}", file=sys.stderr)
     text = case_text(found, relative_to(target.parent, drawing), unit_says=unit_says, walls=walls, **choice)
     write_whole(target, text)
-    print(f"{target} written for {len(found.kept)} blocks; run it: blockvis run {target}")
+    blocks = f"{len(found.kept)} block{'s' * (len(found.kept) != 1)}"
+    print(f"{target} written for {blocks}; run it: blockvis run {target}")
     _try_new(text, target, drawing=options.outputs is None)
     return 0
 
@@ -467,6 +468,7 @@ def _try_new(text: str, target: Path, *, drawing: bool) -> None:
     from .case_files.read import parse_case
     from .cases.build import case_assembly
     from .layout.inspect import inspected
+    from .layout.joints.facing_edges import Facing
     from .layout.layout import layout_of
     from .pictures.inspection import draw_inspection
     from .runs.first_equilibrium import first_equilibrium
@@ -485,7 +487,9 @@ def _try_new(text: str, target: Path, *, drawing: bool) -> None:
     if drawing:
         layout = replace(layout_of(assembly), source=str(target))
         try:
-            drawn = draw_inspection(inspected(layout), target.with_suffix(".supports.png"))
+            # Its joints are closed: what is wider now is a place between arch and wall, and no mortar.
+            shown = replace(inspected(layout), joints=Facing.none())
+            drawn = draw_inspection(shown, target.with_suffix(".supports.png"), falling=found.falling)
             print(f"drawn with its supports in {drawn}")
         except MissingExtra as missing:
             print(f"blockvis: note: not drawn: {missing}", file=sys.stderr)

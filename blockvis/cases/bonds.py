@@ -134,15 +134,17 @@ def _filled(region: Region, openings: Sequence[shapely.Polygon], pattern: Patter
     try:
         return filled(region.wall, openings, pattern, taken, mortar=mortar)
     except ValueError as error:
-        raise ValueError(f"{where}: the wall '{region.name}' on layer '{region.layer}': {error}") from None
+        on = f" on layer '{region.layer}'" if region.layer else ""
+        raise ValueError(f"{where}: the wall '{region.name}'{on}: {error}") from None
 
 
 def _told(region: Region, openings: int, stones: Layout, pattern: Pattern) -> Note:
     """Say what was filled."""
     wall = sum(float(shapely.Polygon(ring).area) for ring in stones.outlines)
+    where = f"on layer '{region.layer}'" if region.layer else f"called '{region.name}'"
     return Note(
         CHANGED,
-        f"bond: an outline of {region.wall.area:.4g} m² on layer '{region.layer}'{_openings(openings)} was "
+        f"bond: an outline of {region.wall.area:.4g} m² {where}{_openings(openings)} was "
         f"filled with {stones.n_blocks} stones of {wall:.4g} m², {pattern.bond}",
     )
 

@@ -122,7 +122,10 @@ def write(layout: Layout, path: Path) -> None:
         return
     if COMPAS in path.name.lower():
         if layout.dimension == 2:
-            raise ValueError(f"'{path}': COMPAS knows blocks in space only; give dimension 3, or write to .json")
+            # The path is a temporary one, which tells nobody anything.
+            raise ValueError(
+                "a name that ends in .compas.json is for blocks in space; give dimension 3, or write to .json"
+            )
         compas_json.write(layout, path)
         return
     shapes: list[dict[str, Any]]

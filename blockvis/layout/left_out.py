@@ -30,6 +30,9 @@ KINDS = {
     "asked line": ("line, as asked for", "lines, as asked for"),
 }
 
+#: Ends of a line this part of its size apart were meant to meet.
+NEARLY = 0.01
+
 
 @dataclass(frozen=True)
 class LeftOut:
@@ -108,7 +111,8 @@ def in_words(left_out: Sequence[LeftOut]) -> list[Note]:
     for kind, layer in dict.fromkeys((item.kind, item.layer) for item in left_out):
         members = [item for item in left_out if (item.kind, item.layer) == (kind, layer)]
         first = members[0]
-        x, y = first.place
+        # No minus before a zero.
+        x, y = first.place + 0.0
         words = KINDS[kind][len(members) > 1]
         where = f" on layer '{layer}'" if layer else ""
         called = f"'{first.name}' " if first.name and first.name != layer else ""
@@ -116,7 +120,8 @@ def in_words(left_out: Sequence[LeftOut]) -> list[Note]:
         apart = f"{min(misses):.3g} to {max(misses):.3g}" if len(misses) > 1 else "".join(f"{m:.3g}" for m in misses)
         ends = f", {'their' if len(members) > 1 else 'its'} ends {apart} apart" if misses else ""
         at = f", {'the first ' if len(members) > 1 else ''}{called}at ({x:.6g}, {y:.6g})" if len(first.points) else ""
-        text = f"left out: {len(members)} {words}{where}{at}{ends}"
+        nearly = any(item.miss and item.miss < NEARLY * float(np.ptp(item.points, axis=0).max()) for item in members)
+        text = f"left out: {len(members)} {words}{where}{at}{ends}{', nearly an outline: close it' * nearly}"
         lines.append(Note(LEFT_OUT, text))
     return lines
 

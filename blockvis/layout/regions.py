@@ -254,7 +254,7 @@ def _smallest_gap(lines: Sequence[LeftOut]) -> tuple[float, np.ndarray]:
     size = float(np.ptp(np.concatenate([one.points for one in lines]), axis=0).max())
     apart[apart <= 1e-6 * size] = np.inf
     i, j = np.unravel_index(int(np.argmin(apart)), apart.shape)
-    return float(apart[i, j]), ends[i]
+    return float(apart[i, j]), ends[i] + 0.0
 
 
 def _reaching_out(drawn: Sequence[_Drawn], every: Sequence[tuple[Region, int]]) -> list[str]:

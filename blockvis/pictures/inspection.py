@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blockvis.layout.faults import crossings_left_out, faults_of, no_blocks
+from blockvis.layout.unfilled import walls_to_fill
 from solver import mechanics
 
 from . import palette
@@ -91,10 +92,14 @@ def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) 
     wrong = tuple(kept[k] for k in no_blocks(inspection.facing.solids)) if inspection.refused else ()
     sorted_out |= dict.fromkeys(wrong, "refused")
     own = {k: sorted_out.get(k) or inspection.roles[k] for k in kept}
+    walls = walls_to_fill(layout)
+    if walls:
+        # What lies in an outline without stones is an opening: no ground goes under it.
+        ground = None
     kinds = [
         Kind(label, colour, tuple(k for k in kept if own[k] == key), hatch)
         for key, label, colour, hatch in (
-            (mechanics.FREE, "free", palette.DRAWN, ""),
+            (mechanics.FREE, "opening, or block" if walls else "free", palette.DRAWN, ""),
             (mechanics.FIXED, "fixed", palette.SUPPORT, "////"),
             (mechanics.MOVING, "moving", palette.MOVING, "\\\\\\\\"),
             ("twice", "drawn twice", palette.TWICE, ""),
@@ -117,8 +122,8 @@ def _contents(inspection: Inspection, ground: Layout | None, falling: set[int]) 
     in_space = " in space" if layout.dimension == 3 else ""
     return Contents(
         layout=layout,
-        title=f"{_name(layout)}: {len(kept)} blocks{in_space}, read in {layout.unit}",
-        findings=_findings(inspection, deep),
+        title=f"{_name(layout)}: {len(kept)} block{'s' * (len(kept) != 1)}{in_space}, read in {layout.unit}",
+        findings=(*_findings(inspection, deep), *walls.values()),
         kinds=tuple(kind for kind in kinds if kind.blocks),
         named=tuple(kept),
         marked=wrong[:MOST_NAMED],

@@ -194,7 +194,7 @@ def _in_the_plane(figure: Any, contents: Contents) -> _Canvas:
     names = {}
     for k in contents.drawn:
         ring = layout.outlines[k]
-        names[k] = np.array([_middle(ring), room_in(ring)])
+        names[k] = np.array([_inside(ring), room_in(ring)])
     return _Canvas(axes, np.eye(2), names, min(across / width, drawn / height))
 
 
@@ -251,10 +251,12 @@ def _box(contents: Contents) -> tuple[np.ndarray, np.ndarray]:
     every = every[np.isfinite(every).all(axis=1)]
     first_low, first_high = every.min(axis=0), every.max(axis=0)
     size, low, high = first_high - first_low, first_low, first_high
-    for points in beside:
-        # A stray point far off would shrink the blocks to a dot.
-        low = np.minimum(low, np.maximum(points.min(axis=0), first_low - 0.5 * size))
-        high = np.maximum(high, np.minimum(points.max(axis=0), first_high + 0.5 * size))
+    for item in layout.left_out:
+        if len(item.points):
+            # A stray point far off would shrink the blocks to a dot; a wall is larger than its openings.
+            room = (2.0 if item.kind == "background" else 0.5) * size
+            low = np.minimum(low, np.maximum(item.points.min(axis=0), first_low - room))
+            high = np.maximum(high, np.minimum(item.points.max(axis=0), first_high + room))
     return low, high
 
 
@@ -308,6 +310,17 @@ def _add_marks(canvas: _Canvas, contents: Contents) -> list[Any]:
                 bbox={"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": warning},
             )
     return keys
+
+
+def _inside(ring: np.ndarray) -> np.ndarray:
+    """(2,) array [m]: the centroid of an outline, or another place in it where that lies outside."""
+    import shapely
+
+    shape = shapely.Polygon(ring)
+    if not shape.is_valid or not shape.area:
+        return _middle(ring)
+    middle = shape.centroid if shape.contains(shape.centroid) else shape.representative_point()
+    return np.array([middle.x, middle.y])
 
 
 def _middle(corners: np.ndarray) -> np.ndarray:

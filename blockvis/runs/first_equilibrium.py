@@ -36,10 +36,13 @@ class FirstEquilibrium:
     stands : bool or None
         None where it was not tried.
     says : str
+    falling : tuple of int
+        Blocks that fall.
     """
 
     stands: bool | None
     says: str
+    falling: tuple[int, ...] = ()
 
 
 def first_equilibrium(case: Case, assembly: solver.Assembly) -> FirstEquilibrium:
@@ -67,7 +70,8 @@ def first_equilibrium(case: Case, assembly: solver.Assembly) -> FirstEquilibrium
         return FirstEquilibrium(True, note or f"it stands: first equilibrium found in {seconds:.1f} s")
     message = "no first equilibrium was found" if ending is None else ending.message
     cause = _cause(case, assembly) if seconds < PATIENCE else ""
-    return FirstEquilibrium(False, f"{message.partition(';')[0]}; {cause}" if cause else message)
+    says = f"{message.partition(';')[0]}; {cause}" if cause else message
+    return FirstEquilibrium(False, says, () if first is None else _falling(assembly, first))
 
 
 def settled_note(assembly: solver.Assembly, first: solver.Increment) -> str:
@@ -92,6 +96,12 @@ def _first_of(case: Case, assembly: solver.Assembly) -> tuple[solver.Increment |
         return first, steps.ending
     steps.close()
     return first, None
+
+
+def _falling(assembly: solver.Assembly, first: solver.Increment) -> tuple[int, ...]:
+    """Blocks that fall at least half as fast as the fastest, which are those that the message counts."""
+    fast = np.abs(first.velocity[:, : assembly.dimension]).max(axis=1)
+    return tuple(np.flatnonzero(assembly.free & (fast > 0.5 * fast.max())).tolist())
 
 
 def _cause(case: Case, assembly: solver.Assembly) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 from structures import run_command
 
 from blockvis import generators
@@ -181,11 +182,12 @@ def test_the_supports_that_a_drawing_has_move_by_sides(tmp_path, capsys):
     assert len(values["roles"]) == 3
 
 
-def test_what_does_not_stand_is_named_with_its_cause(tmp_path, capsys):
+def test_what_does_not_stand_is_named_with_its_cause_and_marked(tmp_path, capsys):
     hanging = [(3.0, 1.0), (3.4, 1.0), (3.4, 1.2), (3.0, 1.2)]
     drawing = drawn(tmp_path / "wall.json", [*wall([(0.0, 0.0)] * STONES), hanging])
     assert main(["new", str(drawing), "-o", str(tmp_path / "wall.toml")]) == 0
-    assert (tmp_path / "wall.supports.png").stat().st_size > 10_000
+    pixels = np.asarray(Image.open(tmp_path / "wall.supports.png").convert("RGB"))
+    assert (pixels == (244, 176, 97)).all(axis=2).sum() > 1000
     said = capsys.readouterr().err
     assert "1 of 14 blocks fall ('s13'); 1 of them touch nothing that stands ('s13')" in said
 
