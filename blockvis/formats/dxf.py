@@ -28,6 +28,9 @@ from .dxf_bodies import DrawnMesh, drawn_mesh, is_mesh, layout_of_meshes
 from .loose_lines import Faces, Line, faces_note, faces_of_lines, joined_ends, joined_note, nothing_closed
 from .reading import Reading
 
+#: How a binary file begins.
+BINARY = b"AutoCAD Binary DXF"
+
 #: Units by the header variable $INSUNITS.
 UNIT_CODES = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 14: "dm"}
 
@@ -91,7 +94,12 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     from ezdxf import recover
 
     try:
-        document, audit = recover.readfile(path)
+        if path.open("rb").read(len(BINARY)) == BINARY:
+            # recover reads text only.
+            document = ezdxf.readfile(path)
+            audit = document.audit()
+        else:
+            document, audit = recover.readfile(path)
     except (OSError, ezdxf.DXFError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         raise ValueError(
             f"'{path}' is not a readable DXF file ({error}); save it again as DXF R2000 or later"

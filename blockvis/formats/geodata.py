@@ -45,6 +45,9 @@ GEOJSON = (
     "MultiLineString",
 )
 
+#: What a file without a coordinate system draws so many of its widths away from 0 is a park or a country in degrees.
+FAR = 50.0
+
 #: Bytes of the envelope in the header of a geometry of a GeoPackage, by its kind.
 ENVELOPES = {0: 0, 1: 32, 2: 48, 3: 48, 4: 64}
 
@@ -78,7 +81,8 @@ def read_content(content: Any, path: Path, reading: Reading) -> Layout | None:
     crs = content.get("crs")
     name = str(crs.get("properties", {}).get("name", "")) if isinstance(crs, dict) else ""
     says = name if re.search(r"CRS84|4326$", name) else ""
-    return layout_of_features([one for one in features if one is not None], path, reading, degrees=says)
+    known = [one for one in features if one is not None]
+    return layout_of_features(known, path, reading, degrees=says, lengths="crs" in content and crs is None)
 
 
 def _geojson_features(content: Mapping[str, Any], path: Path) -> list[Any]:
@@ -245,6 +249,7 @@ def layout_of_features(
     *,
     unit: str = "",
     degrees: str = "",
+    lengths: bool = False,
     skipped: Mapping[str, int] | None = None,
 ) -> Layout:
     """Make a layout of polygons, and of the faces between lines.
@@ -259,6 +264,8 @@ def layout_of_features(
         Of the coordinates, "" where the file does not say it.
     degrees : str
         Name of the coordinate system if it is one of longitude and latitude.
+    lengths : bool
+        Whether the file says that it has none.
     skipped : mapping, optional
         Numbers of what is no outline, by its kind.
 
@@ -277,7 +284,9 @@ def layout_of_features(
     order, notes = _order(np.concatenate(every), reading.view, path)
     rows = _rows(features)
     rings = [ring[:, order] for ring in found.rings]
-    _check_degrees([*rings, *(holed[0][:, order] for holed, _ in found.holed)], path, reading, degrees, notes)
+    outlines = [*rings, *(holed[0][:, order] for holed, _ in found.holed)]
+    far = not (unit or degrees or lengths) and list(order) == [0, 1]
+    _check_degrees(outlines, path, reading, degrees, notes, far=far)
     if listed:
         notes.append(Note(LEFT_OUT, f"skipped: {listed}"))
     kinds, left_out = _parts(rows, found.of), []
@@ -373,15 +382,17 @@ def _order(points: np.ndarray, view: str | None, path: Path) -> tuple[list[int],
     return [0, 1], list(seen)
 
 
-def _check_degrees(rings: list[np.ndarray], path: Path, reading: Reading, system: str, notes: list[str]) -> None:
-    """Refuse longitudes and latitudes, with the command that turns them into metres."""
+def _check_degrees(
+    rings: list[np.ndarray], path: Path, reading: Reading, system: str, notes: list[str], *, far: bool
+) -> None:
+    """Refuse longitudes and latitudes, with the command that turns them into metres; of places, if they are far."""
     if not rings or (reading.unit is not None and not system):
         return
     median = float(np.median([math.sqrt(abs(ring_area(ring))) for ring in rings]))
     x, y = np.concatenate(rings).T
     # In metres no stone is as small, and in degrees none as large: 2 km.
     possible = np.abs(x).max() <= 360.0 and np.abs(y).max() <= 90.0
-    if possible and 0.0 < median < DOUBTED[0]:
+    if possible and (0.0 < median < DOUBTED[0] or (far and math.hypot(x.mean(), y.mean()) > FAR * np.ptp(x) > 0.0)):
         zone = int((x.mean() + 180.0) % 360.0 // 6.0) + 1
         code = (32600 if y.mean() >= 0.0 else 32700) + zone
         unless = "" if system else "; if they are no degrees, give their unit"

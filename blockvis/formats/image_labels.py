@@ -27,6 +27,9 @@ THIN = 0.005
 #: Two values are those of a mask where the others hold no more than this share.
 MOST_BETWEEN = 0.15
 
+#: Labels of which every channel is more, of 255, are the white of a page to the eye.
+WHITE = 240
+
 #: Channels of grey differ by no more, of 255.
 GREY = 8
 
@@ -253,6 +256,13 @@ def _of_values(values: np.ndarray, image: Image.Image) -> _Found:
         thin = ~label & (share >= THIN)
         # Many values of some share each are a blur, not lines between stones.
         label |= thin & (thin.sum() <= max(2, label.sum()))
+        white = known[label & (known > 255)]
+        if len(white) == label.sum() > 1 and min((white >> shift & 255).min() for shift in (0, 8, 16)) > WHITE:
+            raise ValueError(
+                f"is no mask or label image: all of its {len(white)} flat colours are white (#{white[0]:06x} to "
+                f"#{white[-1]:06x}), and what is drawn on it is thin lines; fill each stone with a colour, or trace "
+                "the lines and export them as .svg or .dxf"
+            )
     if not label.any():
         raise ValueError("has no region of one value three pixels wide; give an image of more pixels")
     unlike = np.abs(known - known[label][0]) > 2 * FLAT

@@ -12,7 +12,7 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 
 from blockvis.layout.layout import Layout
 from blockvis.layout.left_out import LeftOut
-from blockvis.layout.notes import LEFT_OUT, Note
+from blockvis.layout.notes import CHANGED, LEFT_OUT, Note
 from blockvis.layout.outlines import ring_area
 
 from .image_labels import Labels, Photograph, labels_of
@@ -25,6 +25,16 @@ MOST_PIXELS = 60_000_000
 
 #: More of the pixels than this without a label's value, or of the regions with holes, are those of another picture.
 MOST_MOVED, MOST_HOLED = 0.25, 0.5
+
+#: In pictures of stones the smaller half of so many regions holds more of the area than this (0.12 and more in 23
+#: published masks, 0.03 and less in charts, screens and drawings of results, of which letters and strokes are regions).
+FEWEST_OF_CHART, LEAST_OF_SMALL = 20, 0.05
+
+#: More specks than this, and than so many for each region, are those of shading and of hatching.
+MOST_SPECKS, SPECKS_OF_ONE = 200, 4
+
+#: Holes of no more than this fraction of a stone are filled.
+PINHOLES = 0.01
 
 #: What makes masks of photographs.
 MASK_MAKERS = "by hand GIMP, labelme or CVAT, by a model SAM"
@@ -110,23 +120,55 @@ def layout_of_labels(path: Path, labels: Labels, placement: Placement, reading: 
             f"'{path}' is no mask or label image: {share} of its pixels have no label's value; write it without "
             "shading and antialiasing, as PNG"
         )
+    if smallest is None:
+        _check_sizes(path, regions, placement)
     found = outlined(regions, STAIRS if tolerance is None else tolerance / placement.pixel)
+    holes = {k: inner for k, inner in found.holes.items() if _hole_share(found.rings[k], inner) > PINHOLES}
+    filled = [k for k in found.holes if k not in holes]
     names, groups = _named(labels, regions)
     rings = tuple(_turned(placement.placed(ring * [1.0, -1.0])) for ring in found.rings)
-    layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit,
-                    notes=_notes(labels, regions, found, placement))  # fmt: skip
-    holed = sum(int(regions.areas[k]) for k in found.holes)
+    notes = _notes(labels, regions, found, placement)
+    if filled:
+        text = f"pinholes were filled, each less than {100 * PINHOLES:g} % of its stone, of {len(filled)}, the first "
+        notes = (*notes, Note(CHANGED, f"{text}'{names[filled[0]]}'"))
+    layout = Layout(blocks=rings, names=names, groups=groups, unit=placement.unit, notes=notes)
+    holed = sum(int(regions.areas[k]) for k in holes)
     if holed > MOST_HOLED * regions.areas.sum():
+        largest = max(holes, key=lambda k: int(regions.areas[k]))
+        that = f"that ({labels.names[regions.labels[largest] - 1]})" if labels.names else "its other value"
         raise ValueError(
             f"'{path}' is no picture of stones: {100.0 * holed / regions.areas.sum():.0f} % of what is not background "
-            f"({labels.background or 'none'}) has holes; if that lies around the stones, give it as background"
+            f"({labels.background or 'none'}) has holes; if {that} lies around the stones, give it as background"
         )
     around = {}
-    for k, inner in found.holes.items():
-        holes = tuple(placement.placed(hole * [1.0, -1.0]) for hole in inner)
-        message = f"'{names[k]}' has {len(holes)} holes; fill them, or give what lies around the stones as background"
-        around[k] = LeftOut("hole", rings[k], message, holes=holes)
+    for k, inner in holes.items():
+        placed = tuple(placement.placed(hole * [1.0, -1.0]) for hole in inner)
+        message = f"'{names[k]}' has {len(placed)} holes; fill them, or give what lies around the stones as background"
+        around[k] = LeftOut("hole", rings[k], message, holes=placed)
     return layout.leaving_out(around)
+
+
+def _check_sizes(path: Path, regions: Regions, placement: Placement) -> None:
+    """Refuse charts, screens and drawings of results: their regions are mostly letters, strokes and specks."""
+    n, (specks, _) = len(regions.areas), regions.specks
+    small = np.sort(regions.areas)[: n // 2].sum() / regions.areas.sum()
+    if specks > max(MOST_SPECKS, SPECKS_OF_ONE * n):
+        why = f"it has {specks} specks beside {n} regions"
+    elif n >= FEWEST_OF_CHART and small < LEAST_OF_SMALL:
+        why = f"{n // 2} of its {n} regions hold {100.0 * small:.2g} % of the area, as letters and strokes do"
+    else:
+        return
+    size = 0.2 * placement.pixel * float(np.sqrt(np.median(regions.areas[regions.areas >= np.mean(regions.areas)])))
+    raise ValueError(
+        f"'{path}' is no picture of stones but a chart, a screen or a shaded drawing: {why}; make a mask of its stones "
+        f"({MASK_MAKERS}), or, if they are stones and specks, say from what size across they are stones: smallest = "
+        f"{size:.2g} (m)"
+    )
+
+
+def _hole_share(ring: np.ndarray, holes: tuple[np.ndarray, ...]) -> float:
+    """Fraction of an outline that is holes."""
+    return sum(abs(ring_area(hole)) for hole in holes) / abs(ring_area(ring))
 
 
 def _turned(ring: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,8 @@ def read(path: Path, reading: Reading) -> Layout | Bodies:
     suffix = path.suffix.lower()
     if suffix == ".dae":
         return _read_dae(path, reading)
+    # What it would print of a missing texture is no fault of a stone.
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL + 1)
     try:
         options = {"split_objects": True, "group_material": False} if suffix == ".obj" else {}
         scene = trimesh.load_scene(str(path), process=False, **options)

@@ -186,7 +186,8 @@ def _laid(found: Inspection) -> Ground:
     if beds and layout.dimension == 3:
         supports = _pads(beds, split) if springers or not _is_level(beds, depth) else _slab(found, beds, split, depth)
     elif beds:
-        supports = _bedded(outlines, feet, split, depth)
+        # Closing simplifies what it closes: as drawn, a stone may reach lower.
+        supports = _bedded([*outlines, *_as_simplified(found)], feet, split, depth)
     where = "on the right" if split.axis == 0 else "on the far side"
     said = f"stands on one side and settles {where}"
     if roles:
@@ -246,8 +247,7 @@ def _feet_in_the_plane(found: Inspection, outlines: Sequence[np.ndarray]) -> lis
 
 def _as_in_a_run(found: Inspection) -> list[np.ndarray]:
     """(n, 2) arrays: blocks without the corners that a run drops and, near the ground, with their joints closed."""
-    outlines = [found.layout.corners(i) for i in found.kept]
-    outlines = simplified(outlines, default_tolerance(outlines))[0]
+    outlines = _as_simplified(found)
     if not found.joint_thickness:
         return outlines
     low, high = (np.array([pick(ring[:, 1]) for ring in outlines]) for pick in (np.min, np.max))
@@ -262,6 +262,11 @@ def _as_in_a_run(found: Inspection) -> list[np.ndarray]:
     for k, ring in zip(lowest.tolist(), closed, strict=True):
         outlines[k] = ring
     return outlines
+
+
+def _as_simplified(found: Inspection) -> list[np.ndarray]:
+    outlines = [found.layout.corners(i) for i in found.kept]
+    return simplified(outlines, default_tolerance(outlines))[0]
 
 
 def _springers_of_arch(touching: Sequence[set[int]], bottoms: np.ndarray) -> list[int]:

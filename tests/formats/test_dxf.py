@@ -33,6 +33,16 @@ def test_versions(tmp_path, version):
     assert assembly.areas.tolist() == [1.0, 1.0]
 
 
+def test_a_binary_file_is_that_of_text(tmp_path):
+    document = ezdxf.new("R2010", units=6)
+    document.modelspace().add_lwpolyline([(0, 0), (1, 0), (1, 1)], close=True)
+    document.saveas(tmp_path / "a.dxf", fmt="bin")
+    assert read_layout(tmp_path / "a.dxf").n_blocks == 1
+    (tmp_path / "a.dxf").write_bytes((tmp_path / "a.dxf").read_bytes()[:900])
+    with pytest.raises(ValueError, match="is not a readable DXF file"):
+        read_layout(tmp_path / "a.dxf")
+
+
 def test_bulges_and_hatches_become_chords(tmp_path):
     def draw(document, space):
         space.add_lwpolyline([(0, 0), (1, 0, 0, 0, 1.0), (1, 1), (0, 1)], close=True)

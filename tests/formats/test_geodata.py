@@ -136,6 +136,14 @@ def test_degrees_are_refused_with_the_command_that_makes_them_metres(tmp_path):
     assert "EPSG:32728" in said, "south of the equator"
 
 
+def test_a_park_in_degrees_is_no_block_but_what_says_that_it_has_no_system_is(tmp_path):
+    far = [polygon([[x - 106.0, y + 40.0] for x, y in SQUARES[0]])]
+    path = geojson(tmp_path / "park.geojson", far)
+    assert "is in degrees: its median block is" in refusal(path)
+    assert blockvis.read_layout(path, unit="m").n_blocks == 1
+    assert blockvis.read_layout(geojson(path, far, crs=None)).n_blocks == 1
+
+
 def test_metres_that_a_program_calls_degrees_are_read_with_a_note(tmp_path):
     stated = {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}}
     layout = blockvis.read_layout(geojson(tmp_path / "w.geojson", [polygon(ring) for ring in SQUARES], **stated))

@@ -250,6 +250,38 @@ def test_a_blob_an_empty_image_and_a_photograph_are_refused(tmp_path, capsys):
     assert "is no image: width is of images" in informed(capsys, tmp_path / "wall.obj", "--width", 3)[2]
 
 
+def test_charts_and_shaded_drawings_are_refused_unless_their_specks_are_said(tmp_path, capsys):
+    (letters, n), (hatching, _), (page, _) = (drawn_wall(mode="RGB", value=lambda k: (250, 9 * k, 9)) for _ in range(3))
+    draw = ImageDraw.Draw(letters)
+    for k in range(40):
+        draw.rectangle((7 * k + 4, 3, 7 * k + 7, 8), (9, 9, 250))
+    pixels = np.array(hatching)
+    pixels[::5, ::5] = (250, 9, 9)
+    page.paste((255, 255, 255), (0, 0, 300, 160))
+    page.paste((254, 254, 253), (20, 20, 280, 140))
+    ImageDraw.Draw(page).rectangle((50, 50, 90, 90), outline=(90, 80, 200))
+    says = {
+        "28 of its 56 regions hold": letters,
+        "specks beside": Image.fromarray(pixels),
+        "all of its 2 flat colours are white (#fefefd to #ffffff)": page,
+    }
+    for word, image in says.items():
+        image.save(tmp_path / "chart.png")
+        code, _, error = informed(capsys, tmp_path / "chart.png", "--width", 3)
+        assert (code, word in error, error.count("\n")) == (2, True, 1), error
+    letters.save(tmp_path / "chart.png")
+    assert read_layout(tmp_path / "chart.png", width=3.0, smallest=0.1).n_blocks == n
+
+
+def test_a_pinhole_does_not_lose_its_stone(tmp_path):
+    image, n = drawn_wall()
+    ImageDraw.Draw(image).rectangle((40, 30, 43, 33), fill=0)
+    image.save(tmp_path / "wall.png")
+    layout = read_layout(tmp_path / "wall.png", width=3.0, smallest=0.03)
+    assert (layout.n_blocks, len(layout.left_out)) == (n, 0)
+    assert any(note.startswith("pinholes were filled") for note in layout.notes)
+
+
 def test_pictures_beside_files_of_stones_are_no_stones(tmp_path):
     for k in range(2):
         text = f"v {k} 0 0\nv {k + 1} 0 0\nv {k + 1} 1 0\nv {k} 1 0\nf 1 2 3 4\n"

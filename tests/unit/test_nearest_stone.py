@@ -120,6 +120,20 @@ def test_neighbours_share_their_edges_to_the_last_digit(seed):
     assert sum(map(len, closed)) < 15 * len(closed)
 
 
+def test_stones_end_where_an_uneven_ground_begins():
+    x = np.linspace(-0.1, WIDTH + 0.1, 60)
+    top = np.column_stack([x, 0.012 * np.sin(25.0 * x) - 0.012])
+    ground = [*top[::-1].tolist(), [x[0], -0.2], [x[-1], -0.2]]
+    stones = rubble(0)
+    closed = close_joints([*stones, np.array(ground)], 0.05, anchored=np.arange(46) == 45, way="voronoi").outlines
+    shapes = np.array([shapely.Polygon(ring) for ring in closed])
+    assert shapely.is_valid(shapes).all()
+    assert shapely.area(shapes).sum() == pytest.approx(shapely.union_all(shapes).area, rel=1e-9)
+    pockets = [shapely.Polygon(hole) for part in [shapely.union_all(shapes)] for hole in part.interiors]
+    assert sum(pocket.area for pocket in pockets) < 1e-9
+    assert np.array_equal(closed[45], np.array(ground))
+
+
 def test_supports_stay_and_stones_come_to_them():
     stones = rubble(2)
     ground = [np.array(support["outline"]) for support in GROUND]

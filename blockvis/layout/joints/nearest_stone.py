@@ -128,6 +128,8 @@ def share_out(
     cells = [_one(faces[holder == i], shapes[i], grid) for i in range(len(shapes))]
     size = float(np.median(np.sqrt(shapely.area(shapes[growing]))))
     simple = shapely.coverage_simplify(np.array(cells), simpler * size)
+    if anchored.any() and not anchored.all():
+        simple = _along_anchored(simple, np.array(cells), np.flatnonzero(anchored), grid)
     rings = [np.array(shapely.orient_polygons(cell).exterior.coords)[:-1] for cell in simple]
     fixed = np.concatenate([np.zeros((0, 2)), *(rings[i] for i in np.flatnonzero(anchored))])
     found = [ring + origin for ring in _without_short_edges(rings, SHORTEST * size, fixed)]
@@ -280,6 +282,23 @@ def _one(faces: np.ndarray, drawn: Any, grid: float) -> Any:
     return shapely.Polygon(max(pieces, key=lambda piece: float(piece.area)).exterior)
 
 
+def _along_anchored(simple: np.ndarray, cells: np.ndarray, anchored: np.ndarray, grid: float) -> np.ndarray:
+    """Take back what simplifying did to borders with blocks that keep their outline: others end where these begin."""
+    import shapely
+
+    kept, found = shapely.union_all(cells[anchored]), simple.copy()
+    found[anchored] = cells[anchored]
+    covered = shapely.union_all(found)
+    for i in np.flatnonzero(shapely.distance(cells, kept) <= grid):
+        if i in anchored:
+            continue
+        lost = shapely.get_parts(cells[i].difference(covered, grid_size=grid))
+        lost = lost[shapely.distance(lost, kept) <= grid]
+        own = shapely.difference(simple[i], kept, grid_size=grid)
+        found[i] = _one(np.array([own, *lost]), cells[i], grid)
+    return found
+
+
 def _without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.ndarray) -> list[np.ndarray]:
     """Let edges shorter than a length [m] shrink to a point, in all outlines that share them.
 
@@ -298,15 +317,20 @@ def _without_short_edges(rings: list[np.ndarray], shortest: float, fixed: np.nda
     ends = np.concatenate([np.stack([w, np.roll(w, -1)], axis=1) for w in around])
     length = np.hypot(*(corners[ends[:, 0]] - corners[ends[:, 1]]).T)
     stays = {tuple(corner) for corner in fixed}
+    staying = np.array([tuple(corner) in stays for corner in corners], dtype=bool)
+    length[staying[ends].all(axis=1)] = np.inf
     limit = shortest
     # Where shrinking would fold an outline, less of it is done.
     for _ in range(4):
         a, b = ends[length < limit].T
         group = linked(a, b, len(corners))
+        # Of two that stay, none may go to the other.
+        torn = np.bincount(group, staying)[group] > 1
+        group[torn] = group.max() + 1 + np.arange(np.count_nonzero(torn))
         count = np.bincount(group)
-        place = np.stack([np.bincount(group, corners[:, axis]) / count for axis in (0, 1)], axis=1)
+        place = np.stack([np.bincount(group, corners[:, axis]) / np.maximum(count, 1) for axis in (0, 1)], axis=1)
         for k, corner in enumerate(corners):
-            if count[group[k]] == 1 or tuple(corner) in stays:
+            if count[group[k]] == 1 or staying[k]:
                 place[group[k]] = corner
         found = []
         for w in around:
