@@ -80,7 +80,7 @@ def main(arguments: Sequence[str] | None = None, *, outputs: Sequence[Output] | 
         options.parameters += left
     elif left:
         parser.error(f"unrecognized arguments: {' '.join(left)}")
-    warnings.showwarning = _notes_said_once()
+    warnings.showwarning = _notes_without_repeats()
     try:
         code: int = options.verb(options)
     except (ValueError, OSError, MissingExtra) as error:
@@ -437,7 +437,7 @@ def _new(options: argparse.Namespace) -> int:
     from .case_files.new_case import case_text, relative_to, unit_instead
     from .formats.read import inspect
     from .layout.units import metres_per
-    from .system.atomic_files import write_whole
+    from .system.atomic_files import write_atomic
 
     drawing = Path(options.drawing)
     stem = drawing.parent.name if glob.has_magic(drawing.name) else drawing.resolve().stem
@@ -454,7 +454,7 @@ def _new(options: argparse.Namespace) -> int:
         found = inspect(drawing, unit=unit, dimension=_dimension(options), **choice)
         print(f"blockvis: note: {unit_says}", file=sys.stderr)
     text = case_text(found, relative_to(target.parent, drawing), unit_says=unit_says, walls=walls, **choice)
-    write_whole(target, text)
+    write_atomic(target, text)
     blocks = f"{len(found.kept)} block{'s' * (len(found.kept) != 1)}"
     print(f"{target} written for {blocks}; run it: blockvis run {target}")
     _try_new(text, target, drawing=options.outputs is None)
@@ -547,13 +547,13 @@ def _run(options: argparse.Namespace) -> int:
                 print(
                     f"blockvis: this run had finished ({run.response.stop}); nothing was left to solve", file=sys.stderr
                 )
-            return _told(options, run, checking, started)
+            return _report_ending(options, run, checking, started)
     if options.case is None:
         raise ValueError("name a case file: blockvis run CASE.toml, or go on with a run: blockvis run --resume OUT")
     case = read_case(options.case, [*options.set, *(["analysis.range=true"] if options.range else [])])
     with _checking(options, case) as checking:
         run = run_case(case, options.output, overwrite=options.force, outputs=outputs)
-        return _told(options, run, checking, started)
+        return _report_ending(options, run, checking, started)
 
 
 @contextlib.contextmanager
@@ -579,7 +579,7 @@ def _checking(options: argparse.Namespace, case: Case | None) -> Iterator[StepCh
             checking.close()
 
 
-def _told(options: argparse.Namespace, run: Run, checking: StepChecking | None, started: float) -> int:
+def _report_ending(options: argparse.Namespace, run: Run, checking: StepChecking | None, started: float) -> int:
     """Say what a run came to, and how exact it is; gives the exit code."""
     print(_in_words(run.response, run.folder), flush=True)
     for problem in run.missing:
@@ -872,7 +872,7 @@ def _in_words(response: solver.Response, folder: Path) -> str:
         f"{kind.headline(response)}, {sum(i.programs for i in response.increments)} "
         f"programs, {sum(i.seconds for i in response.increments):.2f} s of solver time",
     ]
-    if response.message and not kind.tells_message(response):
+    if response.message and not kind.covers_message(response):
         lines.append(response.message)
     lines += kind.lines(response)
     worst = mechanics.worst_of(i.certificate for i in response.path)
@@ -888,7 +888,7 @@ def _in_words(response: solver.Response, folder: Path) -> str:
     return "\n".join(lines)
 
 
-def _notes_said_once() -> Callable[..., None]:
+def _notes_without_repeats() -> Callable[..., None]:
     """Make what shows warnings as notes, each once: a case may be checked more than once."""
     said: set[str] = set()
 

@@ -13,7 +13,7 @@ from blockvis.cases.key import Key, Section
 from blockvis.generators import LAYOUTS, parameters_of
 from blockvis.generators.catalogue import described
 from blockvis.studies import study_keys
-from blockvis.system.atomic_files import write_whole
+from blockvis.system.atomic_files import write_atomic
 from blockvis.text import as_key, as_toml
 
 _HEAD = "| key | value | unit | default | meaning | example |\n|---|---|---|---|---|---|"
@@ -69,7 +69,7 @@ def write_pages(folder: str | Path) -> list[Path]:
     list of Path
         The files.
     """
-    return [write_whole(Path(folder) / name, page()) for name, page in PAGES.items()]
+    return [write_atomic(Path(folder) / name, page()) for name, page in PAGES.items()]
 
 
 def _section(section: Section) -> list[str]:

@@ -219,14 +219,14 @@ class _Search:
     def usual(self, candidate: Candidate) -> list[tuple[Candidate, Variant]]:
         """Pair a candidate with the variants in which it is looked at first."""
         # Of a ground that bends many candidates open much the same cracks: they stand in for the paths of each.
-        leans = (0,) if candidate.bends else (-1, 1)
-        return [(candidate, Variant(self.frictions[1], lean)) for lean in leans]
+        heavier_sides = (0,) if candidate.bends else (-1, 1)
+        return [(candidate, Variant(self.frictions[1], heavier_side)) for heavier_side in heavier_sides]
 
     def others(self, trial: Trial) -> list[tuple[Candidate, Variant]]:
         """Pair the candidate of a trial with other coefficients of friction."""
-        leans = (-1, 1) if trial.candidate.bends else (trial.variant.lean,) * 2
+        heavier_sides = (-1, 1) if trial.candidate.bends else (trial.variant.heavier_side,) * 2
         frictions = (self.frictions[0], self.frictions[2])
-        return [(trial.candidate, Variant(*both)) for both in zip(frictions, leans, strict=True)]
+        return [(trial.candidate, Variant(*both)) for both in zip(frictions, heavier_sides, strict=True)]
 
     def follow(self, pairs: Sequence[tuple[Candidate, Variant]], processes: Executor | None, progress: bool) -> None:
         """Follow candidates in some variants, and compare them with the observations."""

@@ -59,12 +59,12 @@ class Variant:
     ----------
     friction : float
         Coefficient of [material]; those of pairs of materials follow in proportion.
-    lean : {-1, 0, 1}
+    heavier_side : {-1, 0, 1}
         Whether stones are a little heavier towards the left, nowhere, or towards the right.
     """
 
     friction: float
-    lean: int = 0
+    heavier_side: int = 0
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ def ordered(
     loads = case_loads(case, moving)
     x = moving.centroids[:, 0]
     middle, half = (x.max() + x.min()) / 2.0, max(float(np.ptp(x)) / 2.0, 1e-300)
-    heavier = 1.0 + LEANING * variant.lean * (x - middle) / half
+    heavier = 1.0 + LEANING * variant.heavier_side * (x - middle) / half
     loads = replace(loads, dead=loads.dead * heavier[:, None])
     return Order(RunInput(varied, moving, case_interfaces(varied), loads), reach[1])
 

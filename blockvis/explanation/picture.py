@@ -19,7 +19,7 @@ from blockvis.pictures import palette
 from blockvis.pictures.frame import framed
 from blockvis.results.cracks import SMALLEST_OPENING
 from blockvis.results.joints import faces_at
-from blockvis.system.atomic_files import whole_file
+from blockvis.system.atomic_files import atomic_file
 from blockvis.text import rounded_length
 from solver import mechanics
 
@@ -84,7 +84,7 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
         panel.set_aspect("equal")
         panel.set_axis_off()
     path = Path(path)
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         figure.savefig(partial, dpi=130, facecolor="white")
     return path
 

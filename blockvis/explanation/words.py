@@ -47,7 +47,7 @@ def range_text(cause: Cause) -> str:
     return f"{amount_text(middle, cause.unit)} ({ends})"
 
 
-def how_far(cause: Cause) -> str:
+def cause_with_range(cause: Cause) -> str:
     """Name a cause with its amount, or say that the observations leave this open."""
     low, middle, high = cause.amount
     words = f"{cause_text(cause)}{',' if cause.detail else ''} by"
@@ -94,8 +94,8 @@ def verdict(found: Explanation) -> str:
         return "No candidate makes any of the observed cracks"
     if others:
         more = " or ".join(cause_text(cause) for cause in others)
-        return f"{_capital(how_far(best))}, or else {more}: the observations cannot tell these apart"
-    return _capital(how_far(best))
+        return f"{_capital(cause_with_range(best))}, or else {more}: the observations cannot tell these apart"
+    return _capital(cause_with_range(best))
 
 
 def in_words(found: Explanation) -> str:

@@ -13,7 +13,7 @@ from string import Template
 from typing import TYPE_CHECKING
 
 from blockvis.results.folder import ResultsExist
-from blockvis.system.atomic_files import make_folder, write_whole
+from blockvis.system.atomic_files import make_folder, write_atomic
 
 from .forward import LEANING
 from .likelihood import ELSEWHERE, INDEPENDENT
@@ -69,9 +69,9 @@ def write_explanation(found: Explanation, folder: str | Path, *, overwrite: bool
     refuse_explanation(folder, overwrite)
     folder = Path(folder)
     make_folder(folder)
-    write_whole(folder / "explain.json", json.dumps(values_of(found), indent=2, ensure_ascii=False) + "\n")
+    write_atomic(folder / "explain.json", json.dumps(values_of(found), indent=2, ensure_ascii=False) + "\n")
     picture = draw_explanation(found, folder / "explain.png")
-    write_whole(folder / "explain.html", explanation_html(found, picture.read_bytes()))
+    write_atomic(folder / "explain.html", explanation_html(found, picture.read_bytes()))
     return folder
 
 

@@ -116,7 +116,7 @@ class Bodies:
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _Projection:
     """The bodies as seen along one axis: their outlines and the planes between which they lie, or why it cannot be."""
 
     axis: int
@@ -180,10 +180,10 @@ def layout_of_bodies(
     ValueError
         If the bodies are not prisms side by side.
     """
-    asked = _asked(found, path, ignore, only)
+    asked = _selected(found, path, ignore, only)
     bodies, rows, size = asked.bodies, asked.rows, asked.size
     axes = (2, 1, 0) if view is None else (axis_across(view),)
-    seen = [_seen_along(axis, bodies, size) for axis in axes]
+    seen = [_projected(axis, bodies, size) for axis in axes]
     fitting = [one for one in seen if not one.refused]
     if not fitting:
         raise _not_flat(seen, bodies, path, view)
@@ -235,7 +235,7 @@ def solids_of_bodies(
     ValueError
         For bodies without a volume, or with more faces than a block may have.
     """
-    asked = _asked(found, path, ignore, only)
+    asked = _selected(found, path, ignore, only)
     lying = found.up == "y" if view is None else view == "xy"
     solids, warped, changed = [], [], []
 
@@ -307,7 +307,7 @@ def in_dimension(
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Selection:
     """The bodies that are asked for, with their rows, the size of the drawing, and the others: number and kind."""
 
     bodies: list[Body]
@@ -340,7 +340,7 @@ def _holes_note(bodies: Sequence[Body]) -> tuple[Note, ...]:
     return (Note(CHANGED, f"small holes in the surface of {', '.join(holed[:6])}{more} were closed"),)
 
 
-def _asked(found: Bodies, path: Path | str, ignore: Sequence[str], only: Sequence[str]) -> _Asked:
+def _selected(found: Bodies, path: Path | str, ignore: Sequence[str], only: Sequence[str]) -> _Selection:
     """Choose the bodies that are asked for, and check their coordinates."""
     if not found.bodies:
         raise ValueError(f"'{path}' has no bodies; export the blocks as closed bodies")
@@ -359,7 +359,7 @@ def _asked(found: Bodies, path: Path | str, ignore: Sequence[str], only: Sequenc
     size = float(np.ptp(every, axis=0).max())
     if not 0.0 < size < LARGEST_SIZE:
         raise ValueError(f"'{path}' spreads over {size:.3g} units of length; repair the file")
-    return _Asked(bodies, [_with_role(found.rows[k]) for k in kept], size, dropped)
+    return _Selection(bodies, [_with_role(found.rows[k]) for k in kept], size, dropped)
 
 
 def _mortar(found: Bodies, labels: Sequence[Sequence[str]], only: Sequence[str]) -> list[int]:
@@ -392,12 +392,12 @@ def _with_role(row: dict[str, Any]) -> dict[str, Any]:
     return row
 
 
-def _seen_along(axis: int, bodies: Sequence[Body], size: float) -> _Seen:
+def _projected(axis: int, bodies: Sequence[Body], size: float) -> _Projection:
     """See bodies along an axis, or find the reason why they cannot be outlines in that view."""
     along = "xyz"[axis]
     wrong = next((body for body in bodies if not _is_prism(body, axis, size)), None)
     if wrong is not None:
-        return _Seen(axis, refused=f"body '{wrong.name}' is no extrusion along {along}")
+        return _Projection(axis, refused=f"body '{wrong.name}' is no extrusion along {along}")
     levels = [body.points[np.unique(body.faces), axis] for body in bodies]
     low, high = (np.array([float(pick(level)) for level in levels]) for pick in (np.min, np.max))
     outlines = []
@@ -408,8 +408,8 @@ def _seen_along(axis: int, bodies: Sequence[Body], size: float) -> _Seen:
         try:
             outlines += outlines_of_cells(flat, list(body.faces[cap]), owner, [body.name])
         except ValueError as error:
-            return _Seen(axis, refused=f"seen along {along}, {error}")
-    return _Seen(axis, tuple(outlines), low, high, _hidden(axis, bodies, outlines, low, high, size))
+            return _Projection(axis, refused=f"seen along {along}, {error}")
+    return _Projection(axis, tuple(outlines), low, high, _hidden(axis, bodies, outlines, low, high, size))
 
 
 def _hidden(
@@ -456,7 +456,7 @@ class NotFlat(ValueError):
         self.reason = reason
 
 
-def _not_flat(seen: Sequence[_Seen], bodies: Sequence[Body], path: Path | str, view: str | None) -> NotFlat:
+def _not_flat(seen: Sequence[_Projection], bodies: Sequence[Body], path: Path | str, view: str | None) -> NotFlat:
     """Make the error for bodies that are not prisms side by side, with the reason in every view that was tried."""
     remedy = "dimension = 3 reads them in space; in the plane leave out all but one leaf (ignore), or draw its outlines"
     if view is None and not any(len(one.outlines) for one in seen):
@@ -475,7 +475,7 @@ def _not_flat(seen: Sequence[_Seen], bodies: Sequence[Body], path: Path | str, v
         ordered = sorted(seen, key=lambda one: not len(one.outlines))
         reasons = "; ".join(one.refused for one in ordered)
         return NotFlat(f"'{path}' is three-dimensional: {reasons}; {remedy}", ordered[0].refused)
-    other = next((v for v in VIEWS if v != view and not _seen_along(axis_across(v), bodies, _size(bodies)).refused), "")
+    other = next((v for v in VIEWS if v != view and not _projected(axis_across(v), bodies, _size(bodies)).refused), "")
     remedy = f'view = "{other}" shows them side by side' if other else remedy
     return NotFlat(f"'{path}' cannot be seen as {view}: {seen[0].refused}; {remedy}", seen[0].refused)
 

@@ -53,7 +53,7 @@ _CURVES = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE", "ARC", "LINE
 
 
 @dataclass
-class _Found:
+class _Outlines:
     """Outlines and loose lines found so far, and what was skipped."""
 
     rings: list[np.ndarray] = field(default_factory=list)
@@ -109,7 +109,7 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     tolerance = None if reading.chord_tolerance is None else reading.chord_tolerance / in_metres
     frozen = {layer.dxf.name for layer in document.layers if layer.is_frozen()}
     shut = frozen | {layer.dxf.name for layer in document.layers if layer.is_off()}
-    found = _Found()
+    found = _Outlines()
     # A small file can insert any number of copies: more entities than a quarter of its bytes are refused.
     size = path.stat().st_size
     most = budget = max(size // 4, 1000)
@@ -149,7 +149,7 @@ def _read(path: Path, reading: Reading) -> Layout | Bodies:
     return _layout(found, faces, stated)
 
 
-def _layout(found: _Found, faces: Faces, stated: str) -> Layout:
+def _layout(found: _Outlines, faces: Faces, stated: str) -> Layout:
     """Make a layout of what was found; ``stated`` is the unit that the file states."""
     notes = found.notes + faces.notes + joined_note(found.misses, _size(found))
     notes += _skipped(found)
@@ -168,7 +168,7 @@ def _layout(found: _Found, faces: Faces, stated: str) -> Layout:
     return with_rows(layout, rows)
 
 
-def _chosen_meshes(found: _Found, reading: Reading) -> list[DrawnMesh]:
+def _chosen_meshes(found: _Outlines, reading: Reading) -> list[DrawnMesh]:
     """Take the bodies that are asked for, where no outline is; count the others, or the outlines, as skipped."""
     meshes = [mesh for mesh in found.meshes if reading.wants([mesh.layer, mesh.name])]
     outlines = [layer for layer, name in zip(found.layers, found.names, strict=True) if reading.wants([layer, name])]
@@ -180,7 +180,7 @@ def _chosen_meshes(found: _Found, reading: Reading) -> list[DrawnMesh]:
     return []
 
 
-def _skipped(found: _Found) -> list[str]:
+def _skipped(found: _Outlines) -> list[str]:
     """Count what was skipped in notes."""
     notes = []
     if found.skipped:
@@ -197,7 +197,7 @@ def _faults(audit: Any) -> list[str]:
     return [Note(CHANGED, f"{faults} faults of the file were repaired or passed over")] if faults else []
 
 
-def _elevations(found: _Found, view: str | None) -> list[str]:
+def _elevations(found: _Outlines, view: str | None) -> list[str]:
     """Say in a note that a drawing in space was read as a plane one."""
     upright = any(kind_of(note) == UPRIGHT for note in found.notes)
     if not any(abs(ring[:, 2] - (ring[0, 2] if upright else 0.0)).max() > 0 for ring in found.rings):
@@ -206,7 +206,7 @@ def _elevations(found: _Found, view: str | None) -> list[str]:
     return [Note(CHANGED, f"elevations were ignored: the drawing was read as seen {seen}")]
 
 
-def _turned(found: _Found, view: str | None, path: Path) -> list[str]:
+def _turned(found: _Outlines, view: str | None, path: Path) -> list[str]:
     """Turn a drawing that stands upright into the plane of x and y, and return the note on it.
 
     Of a drawing that lies in no plane, that of x and y is taken unless the caller asks for another.
@@ -285,7 +285,7 @@ def _points(curve: Any, tolerance: float | None) -> np.ndarray:
     return np.array([(p.x, p.y, p.z) for p in curve.flattening(distance, segments=2)])
 
 
-def _add_curve(entity: Any, handle: str, found: _Found, tolerance: float | None) -> None:
+def _add_curve(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
     from ezdxf.path import make_path
 
     kind = entity.dxftype()
@@ -394,7 +394,7 @@ def _hatch_rings(entity: Any, tolerance: float | None) -> list[np.ndarray]:
     return rings
 
 
-def _add_hatch(entity: Any, handle: str, found: _Found, tolerance: float | None) -> None:
+def _add_hatch(entity: Any, handle: str, found: _Outlines, tolerance: float | None) -> None:
     rings = _hatch_rings(entity, tolerance)
     rings = [ring[:-1] if (ring[0] == ring[-1]).all() else ring for ring in rings if len(ring) > 2]
     if not rings:
@@ -425,14 +425,14 @@ def _within(inner: np.ndarray, outer: np.ndarray) -> bool:
     return bool(smaller and (inner.min(0) >= outer.min(0)).all() and (inner.max(0) <= outer.max(0)).all())
 
 
-def _drawn_already(ring: np.ndarray, found: _Found) -> bool:
+def _drawn_already(ring: np.ndarray, found: _Outlines) -> bool:
     """Whether a hatch fills the outline just before it, as drawing programs write them."""
     if not found.rings or len(found.rings[-1]) != len(ring):
         return False
     return bool(np.abs(found.rings[-1].mean(0) - ring.mean(0)).max() <= CLOSES * float(np.ptp(ring, axis=0).max()))
 
 
-def _with_loose(found: _Found, reading: Reading) -> Faces:
+def _with_loose(found: _Outlines, reading: Reading) -> Faces:
     """Add the faces between loose lines, and cut outlines along the lines within them."""
     wanted = []
     layers = {*found.layers, *(line.layer for line in found.loose)}
@@ -475,7 +475,7 @@ def _with_loose(found: _Found, reading: Reading) -> Faces:
     return faces
 
 
-def _size(found: _Found) -> float:
+def _size(found: _Outlines) -> float:
     drawn = [points[:, :2] for points in (*found.rings, *(line.points for line in found.loose))]
     return float(np.ptp(np.concatenate(drawn), axis=0).max()) if drawn else 0.0
 

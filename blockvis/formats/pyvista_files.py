@@ -104,7 +104,7 @@ def _check_xml(path: Path) -> None:
     if not data.lstrip().startswith(b"<"):
         raise _not_vtk(path, data)
     parser = expat.ParserCreate()
-    held = _Held(path, len(data))
+    held = _Announced(path, len(data))
 
     def doctype(*_: object) -> None:
         raise ValueError(f"'{path}' has an XML document type; no VTK file needs one: export it again")
@@ -129,7 +129,7 @@ def _check_xml(path: Path) -> None:
             held.check_offsets(data[start + int(attributes.get("offset", 0)) :], attributes | {"format": way})
 
 
-class _Held:
+class _Announced:
     """Numbers of points, cells and values that an XML file announces, added up element by element."""
 
     def __init__(self, path: Path, size: int) -> None:

@@ -20,11 +20,11 @@ from blockvis.layout.outlines import without_collinear
 from blockvis.layout.refusal import Refused, carrying
 from blockvis.layout.remedies import deep_overlaps, proposed_ignore
 from blockvis.layout.repair import DeepOverlap
-from blockvis.layout.selection import as_asked, noted, sorted_out
+from blockvis.layout.selection import noted, sorted_out, without_ignored
 from blockvis.layout.units import chosen_unit, metres_per
 from blockvis.layout.views import checked_dimension, checked_view
 from blockvis.layout.window import checked_window, within_window
-from blockvis.system.atomic_files import whole_file, write_whole
+from blockvis.system.atomic_files import atomic_file, write_atomic
 
 from .bodies import Bodies, as_drawn, in_dimension
 from .cells import of_files
@@ -165,7 +165,7 @@ def read_outlines(
     """
     ignore, only = ((words,) if isinstance(words, str) else tuple(words) for words in (ignore, only))
     layout = _outlines(Path(path), unit, None, view, ignore, only, "auto", image)
-    return within_window(as_asked(layout, ignore, only), checked_window(window))
+    return within_window(without_ignored(layout, ignore, only), checked_window(window))
 
 
 def _outlines(
@@ -365,7 +365,7 @@ def from_compas(model: Any, **options: Any) -> solver.Assembly:
     texts = [part.to_jsonstring() for part in parts]
     with TemporaryDirectory() as folder:
         text = f"[{','.join(texts)}]" if isinstance(model, Sequence) else texts[0]
-        return read(write_whole(Path(folder) / "model.json", text, durable=False), **options)
+        return read(write_atomic(Path(folder) / "model.json", text, durable=False), **options)
 
 
 def save_layout(assembly: solver.Assembly, path: str | Path, *, pose: solver.Pose | None = None) -> None:
@@ -437,7 +437,7 @@ def _write_by_suffix(layout: Layout, path: Path) -> None:
     if layout.dimension == 3 and not _format(path, "write").writes_space:
         able = " ".join(sorted(suffix for suffix, known in FORMATS.items() if known.writes_space))
         raise ValueError(f"'{path}': {path.suffix} holds no blocks in space; use one of {able}")
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         module.write(layout, partial)
 
 

@@ -52,7 +52,7 @@ MOST_CHORDS = 512
 
 
 @dataclass
-class _Found:
+class _Outlines:
     """Outlines found so far, in user units, y down."""
 
     rings: list[np.ndarray] = field(default_factory=list)
@@ -67,7 +67,7 @@ class _Found:
 
 
 @dataclass(frozen=True)
-class _Where:
+class _Context:
     """Context of an element: transform of its parents, layers, and largest distance of chords from a curve."""
 
     matrix: np.ndarray
@@ -103,8 +103,8 @@ def read(path: Path, reading: Reading) -> Layout:
     tolerance = None
     if reading.chord_tolerance is not None:
         tolerance = reading.chord_tolerance / metres_per(reading.unit or stated or "m")
-    found = _Found(notes=_pattern_fills(root))
-    _walk(root, _Where(np.eye(3), (), tolerance, path), found)
+    found = _Outlines(notes=_pattern_fills(root))
+    _walk(root, _Context(np.eye(3), (), tolerance, path), found)
     faces = _with_loose(found, reading)
     if not found.rings and all(item.kind == "open" for item in found.left_out):
         rest = "; ".join(words for words in (nothing_closed(faces), *_pattern_fills(root)) if words)
@@ -123,7 +123,7 @@ def read(path: Path, reading: Reading) -> Layout:
     return with_rows(layout, found.rows)
 
 
-def _with_loose(found: _Found, reading: Reading) -> Faces:
+def _with_loose(found: _Outlines, reading: Reading) -> Faces:
     """Leave out what is not wanted, add the faces between loose lines, cut outlines along the lines within them."""
     every = [*zip(found.labels, found.looks, strict=True)]
     lines = [(labels, line.looks) for line, labels in zip(found.loose, found.loose_labels, strict=True)]
@@ -201,7 +201,7 @@ def _tag(element: ElementTree.Element) -> str:
     return str(element.tag).rsplit("}", 1)[-1]
 
 
-def _walk(element: ElementTree.Element, where: _Where, found: _Found) -> None:
+def _walk(element: ElementTree.Element, where: _Context, found: _Outlines) -> None:
     if where.depth > DEEPEST:
         raise ValueError(f"'{where.path}' nests groups more than {DEEPEST} deep; ungroup it")
     tag = _tag(element)
@@ -236,7 +236,7 @@ def _called(element: ElementTree.Element) -> str:
     return f"<{_tag(element)}> '{element.get('id', 'without id')}'"
 
 
-def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], where: _Where, found: _Found) -> None:
+def _add(element: ElementTree.Element, parts: list[tuple[np.ndarray, bool]], where: _Context, found: _Outlines) -> None:
     own = element.get("data-blockvis")
     try:
         kept = json.loads(own) if own else {}
@@ -289,7 +289,7 @@ def _style(element: ElementTree.Element, key: str) -> str:
     return "" if word == "inherit" else word
 
 
-def _colour(where: _Where) -> tuple[str, ...]:
+def _colour(where: _Context) -> tuple[str, ...]:
     """Give the colour of a shape as #rrggbb, that of its fill or else of its stroke; none where it has none."""
     from PIL import ImageColor
 
@@ -352,12 +352,12 @@ def _length(element: ElementTree.Element, key: str) -> float:
     return float(match[1])
 
 
-def _rectangle(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
+def _rectangle(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarray, bool]]:
     x, y, w, h = (_length(element, key) for key in ("x", "y", "width", "height"))
     return [(np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]]), True)] if w > 0 and h > 0 else []
 
 
-def _ellipse(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
+def _ellipse(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarray, bool]]:
     centre = np.array([_length(element, "cx"), _length(element, "cy")])
     if _tag(element) == "circle":
         radii = np.full(2, _length(element, "r"))
@@ -370,19 +370,19 @@ def _ellipse(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarr
     return [(centre + radii * np.stack([np.cos(angles), np.sin(angles)], axis=1), True)]
 
 
-def _polygon(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
+def _polygon(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarray, bool]]:
     numbers = [float(x) for x in re.findall(_NUMBER, element.get("points", ""))]
     if len(numbers) % 2:
         raise ValueError(f"has {len(numbers)} coordinates, an odd number; repair it")
     return [(np.array(numbers).reshape(-1, 2), _tag(element) == "polygon")]
 
 
-def _segment(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
+def _segment(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarray, bool]]:
     ends = np.array([[_length(element, f"{axis}{end}") for axis in "xy"] for end in (1, 2)])
     return [(ends, False)]
 
 
-def _chords(sweep: float, radius: float, where: _Where) -> int:
+def _chords(sweep: float, radius: float, where: _Context) -> int:
     allowed = 1e-3 if where.tolerance is None else min(max(where.tolerance / radius, 1e-7), 1.0)
     widest = min(LARGEST_CHORD, 2.0 * math.acos(1.0 - allowed))
     return min(max(1, math.ceil(abs(sweep) / widest - 1e-9)), MOST_CHORDS)
@@ -401,7 +401,7 @@ def _tokens(d: str) -> list[tuple[str, str]]:
     return tokens
 
 
-def _path(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray, bool]]:
+def _path(element: ElementTree.Element, where: _Context) -> list[tuple[np.ndarray, bool]]:
     """Points of each subpath, and whether Z closes it."""
     tokens = _tokens(element.get("d", ""))
     parts: list[tuple[np.ndarray, bool]] = []
@@ -453,7 +453,7 @@ def _path(element: ElementTree.Element, where: _Where) -> list[tuple[np.ndarray,
     return parts
 
 
-def _bezier(controls: list[np.ndarray], where: _Where) -> list[np.ndarray]:
+def _bezier(controls: list[np.ndarray], where: _Context) -> list[np.ndarray]:
     """Points of a quadratic or cubic Bézier curve after its start."""
     c = np.array(controls)
     degree = len(c) - 1
@@ -468,7 +468,7 @@ def _bezier(controls: list[np.ndarray], where: _Where) -> list[np.ndarray]:
     return list(c[0])
 
 
-def _arc(start: np.ndarray, end: np.ndarray, v: list[float], where: _Where) -> list[np.ndarray]:
+def _arc(start: np.ndarray, end: np.ndarray, v: list[float], where: _Context) -> list[np.ndarray]:
     """Points of an elliptical arc after its start; SVG 1.1, appendix F.6.5 and F.6.6."""
     rx, ry, turn = abs(v[0]), abs(v[1]), math.radians(v[2])
     if rx == 0 or ry == 0 or (start == end).all():
@@ -496,7 +496,7 @@ def _arc(start: np.ndarray, end: np.ndarray, v: list[float], where: _Where) -> l
     return [*(middle + local @ rotation.T), end]
 
 
-_SHAPES: dict[str, Callable[[ElementTree.Element, _Where], list[tuple[np.ndarray, bool]]]] = {
+_SHAPES: dict[str, Callable[[ElementTree.Element, _Context], list[tuple[np.ndarray, bool]]]] = {
     "rect": _rectangle,
     "circle": _ellipse,
     "ellipse": _ellipse,

@@ -366,18 +366,18 @@ def _laid(
     else:
         units = coursed(pattern.bond, box[2], box[3], pattern.brick, pattern.seed)
     cut = shapely.intersection(np.array(units), rest, grid_size=grid)
-    pieces, is_whole = [], []
+    pieces, is_complete = [], []
     for unit, shape in zip(units, cut, strict=True):
         parts = in_simple_pieces(shape, grid)
         if not random and shape.area < (1.0 - 1e-6) * unit.area:
             parts = [cut for part in parts for cut in _without_tongues(part, height, grid)]
         pieces += parts
-        is_whole += [part.area > (1.0 - 1e-6) * unit.area for part in parts]
+        is_complete += [part.area > (1.0 - 1e-6) * unit.area for part in parts]
     if random:
         pieces = bedded(pieces, rest)
 
     def too_small(shape: shapely.Polygon, piece: int) -> bool:
-        return not is_whole[piece] and _is_sliver(shape, length, height)
+        return not is_complete[piece] and _is_sliver(shape, length, height)
 
     joined = [shape for shape, _ in without_slivers(pieces, too_small, height, grid)]
     middles = shapely.get_coordinates(shapely.centroid(joined))

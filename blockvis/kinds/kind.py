@@ -212,7 +212,7 @@ class AnalysisKind(ABC):
         """How it ended, for the command line."""
         return f"{response.stop} after {len(response.path)} increments"
 
-    def tells_message(self, response: solver.Response) -> bool:
+    def covers_message(self, response: solver.Response) -> bool:
         """Whether :meth:`lines` say what the message of the response says."""
         return response.collapse is not None
 

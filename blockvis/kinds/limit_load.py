@@ -231,7 +231,7 @@ class LimitLoadKind(AnalysisKind):
         number = len(response.limits)
         return f"{number} limit load{'' if number == 1 else 's'}"
 
-    def tells_message(self, response: solver.Response) -> bool:
+    def covers_message(self, response: solver.Response) -> bool:
         """Whether there is a limit load, which :meth:`lines` describe."""
         return response.collapse is not None or response.stop is solver.Status.COLLAPSED
 

@@ -15,7 +15,7 @@ from solver import mechanics
 from .facing import faced, facing_tolerance
 from .inspect import inspected
 from .layout import Layout
-from .notes import is_told
+from .notes import changes_analysis
 from .repair import duplicates, overlaps, refuse_overlaps, repaired
 from .roles import checked_role, dropped_twins, roles_of, twins_note
 from .selection import drawn_mortar
@@ -83,7 +83,7 @@ def assemble(
     """
     where = layout.source or "layout"
     for note in layout.notes:
-        if is_told(note):
+        if changes_analysis(note):
             warnings.warn(f"{where}: {note}", stacklevel=2)
     if isinstance(joint_thickness, str) and layout.dimension == 3:
         joint_thickness = inspected(layout).joint_thickness

@@ -43,7 +43,7 @@ class Note(str):
         return Note, (self.kind, str(self))
 
 
-def is_told(note: str) -> bool:
+def changes_analysis(note: str) -> bool:
     """Whether a note changes what is analysed."""
     return kind_of(note) in TOLD
 

@@ -80,7 +80,7 @@ def sorted_out(
         If a pattern of ``only`` matches nothing, no block is left, or something cannot be left out unasked.
     """
     where = f"'{layout.source}'" if layout.source else "the drawing"
-    layout = within_window(as_asked(layout, ignore, only), window)
+    layout = within_window(without_ignored(layout, ignore, only), window)
     layout = without_surroundings(without_debris(uncrossed(layout)), only)
     for item in layout.left_out:
         if item.serious:
@@ -106,7 +106,7 @@ def noted(layout: Layout) -> Layout:
     return replace(layout, notes=(*notes, Note(UNIT, doubted)) if doubted else tuple(notes))
 
 
-def as_asked(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:
+def without_ignored(layout: Layout, ignore: Sequence[str], only: Sequence[str]) -> Layout:
     """Leave out what the caller asks to leave out.
 
     Parameters

@@ -25,7 +25,7 @@ MOST_OVER_LOWEST = 8.0
 NOTABLE = 0.05
 
 
-def leaves_rest(response: solver.Response) -> bool:
+def drops_at_start(response: solver.Response) -> bool:
     """Whether the reaction has left that at rest by the first increment: it does so at once, not along a line.
 
     Parameters

@@ -17,15 +17,15 @@ from PIL import Image, ImageDraw
 import solver
 from blockvis.results.about import about, collapse_mechanism, counts_text
 from blockvis.results.reaction_range import ReactionRange
-from blockvis.system.atomic_files import whole_file
+from blockvis.system.atomic_files import atomic_file
 from solver import mechanics
 
 from . import palette
 from .captions import (
     collapse_places,
+    drops_at_start,
     force_unit,
     in_one_unit,
-    leaves_rest,
     lost_text,
     parameter_label,
     parameter_text,
@@ -99,7 +99,7 @@ def draw_curve(
     _draw(axes, response, events=True, band=band)
     name += "" if band is None else f"   ·   band: range of {band.runs.max(initial=0)} runs"
     axes.set_title(name, loc="left", fontsize=TEXT, color=palette.hexadecimal(palette.INK))
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         figure.savefig(partial, dpi=200)
     return path
 
@@ -255,7 +255,7 @@ def _draw_line(
 ) -> None:
     """Draw the path, in a file of its own with a dot at each increment and words of the size of ``text``."""
     blue = palette.hexadecimal(palette.FORCE)
-    first = 1 if leaves_rest(response) else 0
+    first = 1 if drops_at_start(response) else 0
     axes.plot(total[first:], values[first:], "-", color=blue, linewidth=2.0, zorder=3)
     axes.plot(total[: 2 * first], values[: 2 * first], ":", color=blue, linewidth=1.2, zorder=3)
     if text is None:

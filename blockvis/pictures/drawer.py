@@ -96,7 +96,7 @@ class Look:
 
 
 @dataclass
-class _Seen:
+class _Series:
     """What must be the same in all pictures of some increments.
 
     Attributes
@@ -168,7 +168,7 @@ class Drawer:
         # The view of blocks in space is chosen by their mechanism.
         self._swing = swing_of(response) if look.colour_by == "mechanism" or not self._flat else None
         self._view = None if self._swing is None or self._flat else _view_of(response, self._swing)
-        self._seen = _Seen(sampled=sampled([k for k, i in enumerate(increments) if matters(i, response)]))
+        self._seen = _Series(sampled=sampled([k for k, i in enumerate(increments) if matters(i, response)]))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
         self.largest = self._seen.largest

@@ -146,7 +146,7 @@ def draw_contents(contents: Contents, path: str | Path) -> Path:
     """
     from matplotlib.figure import Figure
 
-    from blockvis.system.atomic_files import whole_file
+    from blockvis.system.atomic_files import atomic_file
 
     lines = [line.strip(" ·") for text in contents.findings for line in textwrap.wrap(text, LINE)]
     if len(lines) > MOST_LINES:
@@ -163,7 +163,7 @@ def draw_contents(contents: Contents, path: str | Path) -> Path:
     figure.set_figheight(figure.get_figheight() + 0.5 + 0.19 * (len(lines) + (len(keys) + 3) // 4))
     figure.suptitle("\n".join([contents.title, *lines]), x=0.01, ha="left", fontsize=9.5)
     figure.legend(handles=keys, loc="outside lower center", ncols=4, frameon=False, fontsize=8.5)
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         figure.savefig(partial, dpi=DPI)
     return Path(path)
 

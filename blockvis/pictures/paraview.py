@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from string import Template
 
-from blockvis.system.atomic_files import write_whole
+from blockvis.system.atomic_files import write_atomic
 
 from . import palette
 from .solid_view import ABOVE, AROUND, View
@@ -165,7 +165,7 @@ def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
         force=_fractions(palette.FORCE),
         eye=", ".join(f"{component:.4f}" for component in View(AROUND[0], ABOVE).axes[2]),
     )
-    return write_whole(path, text)
+    return write_atomic(path, text)
 
 
 def _fractions(colour: tuple[int, int, int]) -> str:

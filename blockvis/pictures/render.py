@@ -12,7 +12,7 @@ from PIL import Image
 import solver
 from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.results.about import loss_of
-from blockvis.system.atomic_files import whole_file
+from blockvis.system.atomic_files import atomic_file
 
 from .drawer import Drawer, Look
 from .film import film_of
@@ -192,6 +192,6 @@ def _check_response(response: solver.Response) -> None:
 
 
 def _save(picture: Image.Image, path: str | os.PathLike[str]) -> Path:
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         picture.save(partial)
     return Path(path)

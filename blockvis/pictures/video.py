@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 from blockvis.results.folder import VIDEO_SUFFIXES
-from blockvis.system.atomic_files import whole_file
+from blockvis.system.atomic_files import atomic_file
 
 #: What imageio's writer is given for each format. Quality of x264 is 0 lossless, 51 worst: line drawings show ringing
 #: from about 22 on. A gif has a palette per frame: one of the first frame lacks the colours of cracks that open later.
@@ -105,7 +105,7 @@ def write_film(
         )
     if size[0] % 2 or size[1] % 2:
         raise ValueError(f"an animation of {size[0]} × {size[1]} pixels cannot be encoded; both must be even")
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         try:
             _encode(frames, partial, min(fps, FASTEST_GIF) if suffix == ".gif" else fps, holds)
         except OSError as error:
@@ -127,7 +127,7 @@ def _encode(frames: Iterable[Image.Image], path: Path, fps: float, holds: Sequen
     settings = dict(_ENCODERS[path.suffix.lower()])
     last = 1 if holds is None else holds[-1]
     if holds is not None:
-        settings["output_params"] = _held(settings["output_params"], holds)
+        settings["output_params"] = _with_holds(settings["output_params"], holds)
     writer = imageio.get_writer(
         str(path.absolute()),
         # imageio writes a gif or webp by a writer that holds all frames in memory; its writer of videos holds one.
@@ -147,7 +147,7 @@ def _encode(frames: Iterable[Image.Image], path: Path, fps: float, holds: Sequen
             writer.append_data(np.asarray(frame))
 
 
-def _held(parameters: Sequence[str], holds: Sequence[int]) -> list[str]:
+def _with_holds(parameters: Sequence[str], holds: Sequence[int]) -> list[str]:
     """Add to the parameters of an encoder when each picture comes, in frames: its number and what is held before."""
     waits = [f"{n - 1}*gte(N\\,{k + 1})" for k, n in enumerate(holds[:-1]) if n != 1]
     waits += [f"{holds[-1] - 2}*gte(N\\,{len(holds)})"] if holds[-1] > 1 else []

@@ -23,10 +23,10 @@ from blockvis.pictures.captions import (
     FALL_BADGE,
     badge_of,
     collapse_places,
+    drops_at_start,
     failure_text,
     force_unit,
     in_one_unit,
-    leaves_rest,
     parameter_label,
     parameter_unit,
     shown_range,
@@ -40,7 +40,7 @@ from blockvis.results.about import about, counts_text, loss_of
 from blockvis.results.cracks import SMALLEST_OPENING, crack_rows, cracks_of
 from blockvis.results.joints import initial_joints
 from blockvis.results.reaction_range import WORDS, ReactionRange
-from blockvis.system.atomic_files import write_whole
+from blockvis.system.atomic_files import write_atomic
 from blockvis.text import force_text
 from solver import mechanics
 
@@ -115,7 +115,7 @@ def write_report(
     -------
     pathlib.Path
     """
-    return write_whole(path, report_html(response, case_text, title=title, fall=fall, error=error, band=band))
+    return write_atomic(path, report_html(response, case_text, title=title, fall=fall, error=error, band=band))
 
 
 def add_error(path: str | os.PathLike[str], error: str) -> None:
@@ -128,7 +128,7 @@ def add_error(path: str | os.PathLike[str], error: str) -> None:
         As of :func:`write_report`.
     """
     page = Path(path).read_text(encoding="utf-8")
-    write_whole(path, page.replace(ERROR_UNKNOWN, _error(error), 1))
+    write_atomic(path, page.replace(ERROR_UNKNOWN, _error(error), 1))
 
 
 def _error(error: str) -> str:
@@ -383,7 +383,7 @@ def _curve(response: solver.Response, band: ReactionRange | None) -> dict[str, A
         "settlement": [float(f"{v:.7g}") for v in x],
         "reaction": [float(f"{v:.7g}") if np.isfinite(v) else None for v in y],
         # The reaction leaves that at rest at once: the way to the next one is dotted.
-        "rest": leaves_rest(response),
+        "rest": drops_at_start(response),
         "band": [[float(f"{v:.7g}") for v in row] for row in zip(total, least, most, strict=True)],
         "collapse": collapse,
         "x_min": first,

@@ -8,7 +8,7 @@ import numpy as np
 
 import solver
 from blockvis.dynamics.fall import Fall, falling_increment
-from blockvis.system.atomic_files import make_folder, write_whole
+from blockvis.system.atomic_files import make_folder, write_atomic
 
 from .npz import checked_arrays, compressed, flat, from_flat
 
@@ -42,7 +42,7 @@ def write_fall(fall: Fall, response: solver.Response, folder: Path) -> None:
         entries.append((float(time), f"fall/blocks_{k:05d}.vtu"))
         write_vtu(grid, folder / entries[-1][1], durable=False)
     write_pvd(folder / FALL_LIST, entries, last=False)
-    write_whole(folder / FALL_POSES, compressed(flat(fall)))
+    write_atomic(folder / FALL_POSES, compressed(flat(fall)))
 
 
 def remove_fall(folder: Path) -> None:

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 import solver
-from blockvis.system.atomic_files import PARTIAL, WINDOWS, flush, make_folder, remove, write_whole
+from blockvis.system.atomic_files import PARTIAL, WINDOWS, flush, make_folder, remove, write_atomic
 from solver import mechanics
 
 from .cracks import MOST_LISTED, cracks_of
@@ -120,13 +120,13 @@ class ResultsFolder:
         self._files = StoredIncrements(self.path)
         refuse_results(self.path, overwrite)
         make_folder(self.path / "increments")
-        self._release = _held(self, self.path)
+        self._release = _locked(self, self.path)
         # Lists of files go first, so that none ever names a file that is gone.
         for name in (*_LISTS, *_PICTURES, *_STARTED):
             (self.path / name).unlink(missing_ok=True)
         self._remove_from(0)
-        write_whole(self.path / "assembly.npz", compressed(flat(assembly)))
-        write_whole(self.path / RECORD, self.record.text())
+        write_atomic(self.path / "assembly.npz", compressed(flat(assembly)))
+        write_atomic(self.path / RECORD, self.record.text())
         self._start_table()
         self.viewer = self.own_viewer()
 
@@ -161,7 +161,7 @@ class ResultsFolder:
         results.path, results.parameter, results.shape = Path(path), parameter, shape
         results.record = read_record(results.path)
         results.assembly = stored_assembly(results.path)
-        results._release = _held(results, results.path)
+        results._release = _locked(results, results.path)
         results._files = StoredIncrements(results.path)
         results.increments, checkpoint, count = [], None, 0
         stored = results.path / CHECKPOINT
@@ -190,13 +190,13 @@ class ResultsFolder:
         :mod:`blockvis.results.increments`.
         """
         number = len(self.increments)
-        write_whole(self._files.file(number), packed_increment(increment))
+        write_atomic(self._files.file(number), packed_increment(increment))
         self.increments.append(self._files.without_arrays(number, increment))
         self._add_row(number, increment)
         self.viewer.add(self.increments[-1])
         self._write_table()
         if increment.checkpoint is not None:
-            write_whole(self.path / CHECKPOINT, packed(increment.checkpoint, increments=number + 1))
+            write_atomic(self.path / CHECKPOINT, packed(increment.checkpoint, increments=number + 1))
 
     def finish(
         self,
@@ -222,16 +222,16 @@ class ResultsFolder:
             restore_grids(self.path, self.assembly, self.increments, self.shape)
         self._write_table(durable=True)
         write_lists(self.path, self.increments, durable=True)
-        write_whole(self.path / "joints.csv", self._movements.table())
+        write_atomic(self.path / "joints.csv", self._movements.table())
         for name, text in (tables or {}).items():
-            write_whole(self.path / name, text)
+            write_atomic(self.path / name, text)
         cracks = []
         if response.path:
             last = response.path[-1]
             cracks = cracks_of(self.assembly, last.pose, self._movements.joints, last.fallen)
         listed = {"cracks": [crack.values() for crack in cracks[:MOST_LISTED]]}
         summary = summary_of(response, seconds=seconds, record=self.record, own={**listed, **(own or {})})
-        write_whole(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
+        write_atomic(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
         return summary
 
@@ -251,7 +251,7 @@ class ResultsFolder:
             self._movements.add(increment)
 
     def _write_table(self, *, durable: bool = False) -> None:
-        write_whole(self.path / "response.csv", self._rows.getvalue(), last=False, durable=durable)
+        write_atomic(self.path / "response.csv", self._rows.getvalue(), last=False, durable=durable)
 
     def flush(self) -> None:
         """Flush the VTU files to the disk: each increment waits for its state only, of which they are made."""
@@ -270,7 +270,7 @@ class ResultsFolder:
             remove(half)
 
 
-def _held(owner: ResultsFolder, folder: Path) -> Callable[[], None]:
+def _locked(owner: ResultsFolder, folder: Path) -> Callable[[], None]:
     """Lock the folder for one run, until the returned function is called or the process ends, however it ends."""
     handle = None
     try:
@@ -372,7 +372,7 @@ def add_to_summary(folder: Path, **found: Any) -> None:
     """
     file = folder / "summary.json"
     summary = json.loads(file.read_text(encoding="utf-8"))
-    write_whole(file, json.dumps({**summary, **found}, indent=2, ensure_ascii=False) + "\n")
+    write_atomic(file, json.dumps({**summary, **found}, indent=2, ensure_ascii=False) + "\n")
 
 
 def stored_response(folder: Path) -> tuple[solver.Response, dict[str, Any]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 import solver
-from blockvis.system.vtk_files import is_whole, write_pvd, write_vtu
+from blockvis.system.vtk_files import is_complete, write_pvd, write_vtu
 
 from .joint_faces import InitialJoints, initial_joints
 
@@ -77,7 +77,7 @@ def write_lists(folder: Path, increments: Sequence[solver.Increment], *, durable
     folder : Path
     increments : sequence of solver.Increment
     durable : bool
-        As of :func:`blockvis.system.atomic_files.whole_file`.
+        As of :func:`blockvis.system.atomic_files.atomic_file`.
     """
     times = output_times(increments)
     for kind in GRIDS:
@@ -98,7 +98,7 @@ def restore_grids(folder: Path, assembly: solver.Assembly, increments: Sequence[
         As of the folder.
     """
     for number, increment in enumerate(increments):
-        if not all(is_whole(grid_file(folder, kind, number)) for kind in GRIDS):
+        if not all(is_complete(grid_file(folder, kind, number)) for kind in GRIDS):
             write_grids(folder, number, assembly, increment, shape)
 
 

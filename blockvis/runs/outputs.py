@@ -64,7 +64,7 @@ class Output:
     def close(self) -> None:
         """End what is still at work, whatever has ended the run."""
 
-    def is_there(self, case: Case, folder: Path) -> bool:
+    def is_written(self, case: Case, folder: Path) -> bool:
         """Whether all of it is in the folder of a finished run."""
         return True
 
@@ -104,7 +104,7 @@ class Drawing(Output):
             self._process.follow(results.path, results.assembly, results.shape, len(results.increments))
             results.viewer = self._process
 
-    def is_there(self, case: Case, folder: Path) -> bool:
+    def is_written(self, case: Case, folder: Path) -> bool:
         """Whether the last of what is drawn is there."""
         animation = self._animation(case)
         names = ["report.html", "mechanism.png", *([animation] if animation else [])] if self._pictures else []

@@ -13,7 +13,7 @@ import numpy as np
 from blockvis.cases.contents import Case
 from blockvis.results.folder import RANGE, add_to_summary
 from blockvis.results.reaction_range import COMPLIANCE, FRICTION, WORDS, ReactionRange
-from blockvis.system.atomic_files import write_whole
+from blockvis.system.atomic_files import write_atomic
 from blockvis.system.processes import cores
 from blockvis.text import force_text
 
@@ -170,7 +170,7 @@ def find_range(folder: str | Path, waiting: Callable[[int, int], None] = lambda 
     runs = list(zip((Variation(), *VARIATIONS), (traced(response), *others), strict=True))
     unit = response.settlements[response.path[-1].phase].unit
     found = PathRange(runs, unit, moment=unit == "rad")
-    write_whole(folder / RANGE, found.reaction().table())
+    write_atomic(folder / RANGE, found.reaction().table())
     add_to_summary(folder, range=found.numbers())
     return found
 

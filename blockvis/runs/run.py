@@ -177,7 +177,7 @@ def resume_run(
     if finished is not None:
         response = open_results(folder)
         restore_grids(folder, response.assembly, response.increments, case.vtu)
-        absent = [output for output in outputs if not output.is_there(case, folder)]
+        absent = [output for output in outputs if not output.is_written(case, folder)]
         missing = _made(absent, case, response, folder, Clock())
         return Run(response, folder, finished, missing, had_finished=True)
     for note in record.changes(checksum_of_files):
@@ -228,15 +228,15 @@ def _followed(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Seq
     for output in outputs:
         output.follow(results)
     try:
-        return _solved(case, results, run, outputs, clock)
+        return _follow(case, results, run, outputs, clock)
     except OSError as error:
         for output in outputs:
             # They may have half-written files, too.
             output.close()
-        raise _given_up(results.path, error) from None
+        raise _write_error(results.path, error) from None
 
 
-def _solved(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Sequence[Output], clock: Clock) -> Run:
+def _follow(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Sequence[Output], clock: Clock) -> Run:
     """Follow the increments to their end or to Ctrl-C, write each, and draw what came out."""
     folder = results.path
     progress = Progress(run.course, names=results.assembly.names)
@@ -272,7 +272,7 @@ def _solved(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Seque
     return Run(response, folder, summary, missing, stages=dict(clock.seconds))
 
 
-def _given_up(folder: Path, error: OSError) -> OSError:
+def _write_error(folder: Path, error: OSError) -> OSError:
     """Remove half-written files when the disk is full or gone in the middle of a run; returns the error to raise."""
     for half in folder.rglob(PARTIAL):
         half.unlink(missing_ok=True)

@@ -16,7 +16,7 @@ from blockvis.case_files.read import parse_case
 from blockvis.cases.contents import Case
 from blockvis.results.folder import STEP_CHECK, add_to_summary
 from blockvis.results.record import read_record
-from blockvis.system.atomic_files import write_whole
+from blockvis.system.atomic_files import write_atomic
 
 from .once_more import LINEAR_PROGRAM, OnceMore, Traced, followed, takes_steps, traced
 from .reopen import open_results
@@ -28,7 +28,7 @@ ERROR_OVER_DIFFERENCE = 2.0
 #: Reactions below this part of the first are compared with it: where one passes through zero nothing is a part of it.
 LEAST_REACTION = 0.05
 
-#: Error that is worth a warning, and the smallest that is told, as a fraction and of positions [m].
+#: Error that is worth a warning, and the smallest that is reported, as a fraction and of positions [m].
 NOTABLE, SMALLEST, SMALLEST_PLACE = 0.01, 1e-4, 1e-5
 
 #: Seconds between looks for Ctrl-C while waiting, and after which waiting is worth a word.
@@ -142,7 +142,7 @@ class StepChecking:
         ------
         TimeoutError
         """
-        began, told = time.monotonic(), False
+        began, reported = time.monotonic(), False
         while True:
             with contextlib.suppress(TimeoutError):
                 other = self._other.found(LOOK)
@@ -150,9 +150,9 @@ class StepChecking:
             waited = time.monotonic() - began
             if patience is not None and waited > patience:
                 raise TimeoutError(f"the same path in shorter steps takes longer than {patience:.0f} s more")
-            if waited > WORTH_A_WORD and not told:
+            if waited > WORTH_A_WORD and not reported:
                 waiting()
-                told = True
+                reported = True
         return None if other is None else _written(Path(folder), compared(response, other))
 
     def close(self) -> None:
@@ -228,7 +228,7 @@ def _two_digits(value: float) -> str:
 
 def _written(folder: Path, check: StepCheck) -> StepCheck:
     numbers = {**vars(check), "collapse": None if np.isnan(check.collapse) else check.collapse}
-    write_whole(folder / STEP_CHECK, json.dumps(numbers, indent=2) + "\n")
+    write_atomic(folder / STEP_CHECK, json.dumps(numbers, indent=2) + "\n")
     add_to_summary(folder, step_error=check.step_error)
     return check
 

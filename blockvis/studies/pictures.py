@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 import solver
 from blockvis.pictures import palette
 from blockvis.results.about import LOCAL
-from blockvis.system.atomic_files import whole_file
+from blockvis.system.atomic_files import atomic_file
 
 from .fragility import Fragility, fragility_of
 from .sensitivity import first_order, outcome, swings
@@ -106,7 +106,7 @@ def draw_fragility(study: Study, table: pd.DataFrame, path: str | Path) -> Path:
             va="top", fontsize=0.9 * TEXT, color="#4a4a4a",
         )  # fmt: skip
     axes.set_ylim(0.0, 1.02)
-    axes.set_xlim(0.0, 1.03 * factor * max(_interesting(curve), 1e-12))
+    axes.set_xlim(0.0, 1.03 * factor * max(_axis_end(curve), 1e-12))
     axes.set_xlabel(f"settlement of the support [{unit}]", fontsize=TEXT)
     axes.set_ylabel(curve_name(study), fontsize=TEXT)
     _plain_frame(axes)
@@ -315,7 +315,7 @@ def _frame(shapes: Sequence[dict[str, np.ndarray]]) -> tuple[np.ndarray, np.ndar
     return low - MARGIN * size, high + MARGIN * size
 
 
-def _interesting(curve: Fragility) -> float:
+def _axis_end(curve: Fragility) -> float:
     """End of the axis [m or rad]: the last collapse if all runs collapsed, else the largest settlement of a run."""
     if curve.n_stood == 0 and len(curve.settlement):
         return float(curve.settlement[-1])
@@ -379,6 +379,6 @@ def _plain_frame(axes: Axes) -> None:
 
 def _saved(figure: Figure, path: str | Path) -> Path:
     path = Path(path)
-    with whole_file(path) as partial:
+    with atomic_file(path) as partial:
         figure.savefig(partial, dpi=150)
     return path

@@ -15,7 +15,7 @@ import numpy as np
 
 import solver
 from blockvis.results.npz import compressed
-from blockvis.system.atomic_files import flush, make_folder, whole_file, write_whole
+from blockvis.system.atomic_files import atomic_file, flush, make_folder, write_atomic
 
 from .run_one import FAILED
 from .study_file import RESERVED, Study
@@ -87,7 +87,7 @@ class StudyFolder:
         elif self.folder.is_dir() and any(self.folder.iterdir()):
             raise StudyExists(f"'{self.folder}' holds something that is no study; choose another folder with -o")
         make_folder(self.folder / "mechanisms")
-        write_whole(
+        write_atomic(
             record,
             _json(
                 {
@@ -143,7 +143,7 @@ class StudyFolder:
             self._first[file] = row["run"]
             with np.load(_buffer(shape)) as stored:
                 arrays = {name: stored[name] for name in stored.files}
-            write_whole(file, compressed({**arrays, "run": np.array(row["run"])}))
+            write_atomic(file, compressed({**arrays, "run": np.array(row["run"])}))
 
     def shape_file(self, mechanism_class: str) -> Path:
         """File of the shape of a class of mechanisms."""
@@ -173,14 +173,14 @@ class StudyFolder:
         """Write table.csv and table.parquet, each whole or not at all, and return the table."""
         table = self.table()
         for name, save in (("table.csv", table.to_csv), ("table.parquet", table.to_parquet)):
-            with whole_file(self.folder / name) as partial:
+            with atomic_file(self.folder / name) as partial:
                 save(partial, index=False)
         return table
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
         """Write summary.json."""
         finished = {"finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
-        write_whole(self.folder / "summary.json", _json({**summary, **finished}))
+        write_atomic(self.folder / "summary.json", _json({**summary, **finished}))
 
     def _stored(self) -> dict[int, dict[str, Any]]:
         """Read the rows on the disk; a broken line counts as a run that was never made."""

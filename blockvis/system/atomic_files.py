@@ -24,7 +24,7 @@ CANNOT_FLUSH = (errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.ENOTTY)
 
 
 @contextmanager
-def whole_file(path: str | os.PathLike[str], *, last: bool = True, durable: bool = True) -> Iterator[Path]:
+def atomic_file(path: str | os.PathLike[str], *, last: bool = True, durable: bool = True) -> Iterator[Path]:
     """Yield a temporary name to write a file under; move the file to its place at the end, or remove it on failure.
 
     Parameters
@@ -65,8 +65,10 @@ def whole_file(path: str | os.PathLike[str], *, last: bool = True, durable: bool
         flush(path.parent)
 
 
-def write_whole(path: str | os.PathLike[str], content: str | bytes, *, last: bool = True, durable: bool = True) -> Path:
-    """Write a text in UTF-8, or bytes, whole or not at all; see :func:`whole_file`.
+def write_atomic(
+    path: str | os.PathLike[str], content: str | bytes, *, last: bool = True, durable: bool = True
+) -> Path:
+    """Write a text in UTF-8, or bytes, whole or not at all; see :func:`atomic_file`.
 
     Parameters
     ----------
@@ -78,7 +80,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, last: boo
     -------
     pathlib.Path
     """
-    with whole_file(path, last=last, durable=durable) as partial:
+    with atomic_file(path, last=last, durable=durable) as partial:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)
     return Path(path)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .atomic_files import write_whole
+from .atomic_files import write_atomic
 
 if TYPE_CHECKING:
     # VTK is loaded where its files are written: lists of files need none.
@@ -35,7 +35,7 @@ def write_vtu(
     path : path
         Its folder is made if it does not exist.
     last, durable : bool
-        As of :func:`blockvis.system.atomic_files.whole_file`.
+        As of :func:`blockvis.system.atomic_files.atomic_file`.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def write_vtu(
     if dataset.GetPolyhedronFaces() is not None:
         text = _FACES.sub(lambda _: _face_arrays(dataset), text, count=1)
         text = text.replace('version="2.3"', 'version="1.0"', 1)
-    return write_whole(path, text, last=last, durable=durable)
+    return write_atomic(path, text, last=last, durable=durable)
 
 
 def _face_arrays(dataset: vtkUnstructuredGrid) -> str:
@@ -109,7 +109,7 @@ def write_pvd(
     entries : iterable of (time, file)
         Files as given, relative to the folder of ``path``.
     last, durable : bool
-        As of :func:`blockvis.system.atomic_files.whole_file`.
+        As of :func:`blockvis.system.atomic_files.atomic_file`.
 
     Returns
     -------
@@ -126,10 +126,10 @@ def write_pvd(
         "  </Collection>",
         "</VTKFile>",
     ]
-    return write_whole(path, "\n".join(lines) + "\n", last=last, durable=durable)
+    return write_atomic(path, "\n".join(lines) + "\n", last=last, durable=durable)
 
 
-def is_whole(path: Path) -> bool:
+def is_complete(path: Path) -> bool:
     """Whether a VTK file is there to its last tag."""
     if not path.is_file():
         return False

@@ -107,7 +107,7 @@ class Worker:
             if word == "ended":
                 # Whoever waits next hears it, too.
                 self._heard.put((word, about))
-                raise WorkerEnded(self._process.wait(), self._said())
+                raise WorkerEnded(self._process.wait(), self._error_output())
 
     def close(self, patience: float = 0.0) -> bool:
         """End it, after so many seconds in which it may tidy up; returns whether it was still at work."""
@@ -131,7 +131,7 @@ class Worker:
                 self._heard.put(pickle.load(out))
         self._heard.put(("ended", None))
 
-    def _said(self) -> str:
+    def _error_output(self) -> str:
         if self._errors is None:
             return ""
         self._errors.seek(0)

@@ -15,7 +15,7 @@ import solver
 from blockvis import generators
 from blockvis.results.folder import ResultsFolder
 from blockvis.results.record import Record
-from blockvis.system.atomic_files import PARTIAL, whole_file, write_whole
+from blockvis.system.atomic_files import PARTIAL, atomic_file, write_atomic
 from blockvis.system.vtk_files import write_pvd
 from solver import mechanics
 
@@ -47,7 +47,7 @@ on_linux = pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="the sy
 @on_linux
 def test_a_file_is_flushed_before_it_is_put_in_its_place_and_its_folder_after(tmp_path, done):
     target = tmp_path / "new" / "folder" / "table.csv"
-    assert write_whole(target, "é") == target
+    assert write_atomic(target, "é") == target
     assert target.read_bytes() == "é".encode()
     partial = target.with_name(".table.part.csv")
     assert partial.match(PARTIAL)
@@ -57,10 +57,10 @@ def test_a_file_is_flushed_before_it_is_put_in_its_place_and_its_folder_after(tm
 
 def test_what_fails_leaves_the_file_before(tmp_path):
     target = tmp_path / "picture.png"
-    write_whole(target, b"before")
+    write_atomic(target, b"before")
 
     def broken_off():
-        with whole_file(target) as partial:
+        with atomic_file(target) as partial:
             partial.write_bytes(b"half")
             raise KeyboardInterrupt
 
@@ -165,7 +165,7 @@ def test_there_is_one_way_to_write_a_file():
         for file in sorted((ROOT / "blockvis").rglob("*.py"))
     }
     allowed = {
-        # Their writers get the name that whole_file gives them.
+        # Their writers get the name that atomic_file gives them.
         *(
             f"blockvis/formats/{name}.py"
             for name in ("compas_json", "geodata", "gmsh_mesh", "layout_json", "solids", "svg")

@@ -12,7 +12,7 @@ import solver
 from blockvis import draw_curve
 from blockvis.kinds.kinds import KINDS
 from blockvis.pictures import curves, palette
-from blockvis.pictures.captions import leaves_rest, parameter_text, state_text
+from blockvis.pictures.captions import drops_at_start, parameter_text, state_text
 from blockvis.pictures.curves import CurvePanel, Event, events_of
 
 
@@ -105,14 +105,14 @@ def test_hinges_of_the_arch_stay_the_same_on_its_path():
 def test_a_reaction_that_leaves_that_at_rest_at_once_has_no_line_from_there(tmp_path):
     response = parted(wall(4, 3), 4, 0)
     rest, *others = response.path
-    assert not leaves_rest(response)
+    assert not drops_at_start(response)
     assert "at rest" not in said(response, tmp_path / "curve.svg")
     rest = replace(rest, measured=3500.0, reaction=3500.0, least=1000.0, largest=4000.0)
     response = replace(response, increments=(rest, *others))
-    assert leaves_rest(response)
+    assert drops_at_start(response)
     assert "at rest" in said(response, tmp_path / "curve.svg")
     # A linear program gives the least reaction from the first increment on.
-    assert not leaves_rest(replace(response, increments=(replace(rest, largest=np.nan), *others)))
+    assert not drops_at_start(replace(response, increments=(replace(rest, largest=np.nan), *others)))
 
 
 def test_small_settlements_are_written_in_millimetres():

@@ -65,7 +65,7 @@ def locks(monkeypatch):
 
 
 def test_files_are_flushed_through_a_handle_that_may_write(windows, tmp_path):
-    assert atomic_files.write_whole(tmp_path / "new" / "a.csv", "1\n").read_bytes() == b"1\n"
+    assert atomic_files.write_atomic(tmp_path / "new" / "a.csv", "1\n").read_bytes() == b"1\n"
 
 
 def test_a_file_that_is_open_for_a_moment_is_waited_for(windows, tmp_path, monkeypatch):
@@ -78,7 +78,7 @@ def test_a_file_that_is_open_for_a_moment_is_waited_for(windows, tmp_path, monke
         replace(partial, path)
 
     monkeypatch.setattr(os, "replace", busy)
-    atomic_files.write_whole(tmp_path / "a.csv", "whole")
+    atomic_files.write_atomic(tmp_path / "a.csv", "whole")
     assert (tmp_path / "a.csv").read_text(encoding="utf-8") == "whole"
 
 
@@ -89,7 +89,7 @@ def test_a_file_that_stays_open_is_named(windows, tmp_path, monkeypatch):
     monkeypatch.setattr(atomic_files, "ATTEMPTS", (0.0,))
     monkeypatch.setattr(os, "replace", busy)
     with pytest.raises(PermissionError, match=r"another program has the file open.*a\.csv"):
-        atomic_files.write_whole(tmp_path / "a.csv", "whole")
+        atomic_files.write_atomic(tmp_path / "a.csv", "whole")
     assert list(tmp_path.iterdir()) == [], "nothing half-written stays"
 
 
@@ -120,7 +120,7 @@ def test_macos_flushes_the_memory_of_the_disk_too(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "platform", "darwin")
     monkeypatch.setattr(fcntl, "F_FULLFSYNC", 51, raising=False)
     monkeypatch.setattr(fcntl, "fcntl", lambda handle, what: asked.append(what))
-    atomic_files.write_whole(tmp_path / "a.csv", "1")
+    atomic_files.write_atomic(tmp_path / "a.csv", "1")
     assert asked == [51, 51], "the file and its folder"
 
 

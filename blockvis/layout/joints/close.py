@@ -99,14 +99,14 @@ def proposed(outlines: Sequence[np.ndarray], way: str = "auto") -> Proposal:
     """
     thickness, found = proposed_thickness(outlines)
     if way == "auto":
-        way = chosen_way(outlines, found)
+        way = chosen_method(outlines, found)
     if way == "faces":
         return Proposal(thickness, way, search_reach(outlines), found)
     gap, reach = proposed_gap(outlines)
     return Proposal(rounded_up(gap) if gap else 0.0, way, reach, found)
 
 
-def chosen_way(outlines: Sequence[np.ndarray], found: Facing) -> str:
+def chosen_method(outlines: Sequence[np.ndarray], found: Facing) -> str:
     """Choose the way of closing that fits the faces of a drawing."""
     return "faces" if straight_share(outlines, found) >= STRAIGHT else "voronoi"
 
@@ -178,7 +178,7 @@ def close_joints(
     if way == "auto":
         # Judged as far as joints may reach: corners too blunt for this thickness count, too.
         reach = max(thickness, search_reach(outlines))
-        way = chosen_way(outlines, facing_edges(outlines, reach)) if thickness else "faces"
+        way = chosen_method(outlines, facing_edges(outlines, reach)) if thickness else "faces"
         if way == "faces":
             closing = _between_faces(outlines, thickness, overlap, anchored)
             whole = _folded(outlines, closing.outlines) is None

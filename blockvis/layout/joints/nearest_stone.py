@@ -125,7 +125,7 @@ def share_out(
     faces = np.array(shapely.polygonize([*shapely.get_parts(lines)]).geoms)
     faces = faces[shapely.area(faces) > (10.0 * grid) ** 2]
     holder = _holders(faces, shapes, masonry, points, owner, anchored)
-    cells = [_one(faces[holder == i], shapes[i], grid) for i in range(len(shapes))]
+    cells = [_joined_faces(faces[holder == i], shapes[i], grid) for i in range(len(shapes))]
     size = float(np.median(np.sqrt(shapely.area(shapes[growing]))))
     simple = shapely.coverage_simplify(np.array(cells), simpler * size)
     if anchored.any() and not anchored.all():
@@ -273,7 +273,7 @@ def _holders(
     return holder
 
 
-def _one(faces: np.ndarray, drawn: Any, grid: float) -> Any:
+def _joined_faces(faces: np.ndarray, drawn: Any, grid: float) -> Any:
     """Join the faces of a block: the largest piece, without holes."""
     import shapely
 
@@ -295,7 +295,7 @@ def _along_anchored(simple: np.ndarray, cells: np.ndarray, anchored: np.ndarray,
         lost = shapely.get_parts(cells[i].difference(covered, grid_size=grid))
         lost = lost[shapely.distance(lost, kept) <= grid]
         own = shapely.difference(simple[i], kept, grid_size=grid)
-        found[i] = _one(np.array([own, *lost]), cells[i], grid)
+        found[i] = _joined_faces(np.array([own, *lost]), cells[i], grid)
     return found
 
 
