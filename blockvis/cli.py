@@ -505,7 +505,7 @@ def _filled_walls(options: argparse.Namespace, choice: dict[str, Any]) -> tuple[
     from .layout.unfilled import walls_to_fill
 
     outlines = read_outlines(options.drawing, unit=options.unit, **choice)
-    walls = tuple(walls_to_fill(outlines))
+    walls = tuple(walls_to_fill(outlines, pages=False))
     if not walls:
         return None
     return inspected(bonded(outlines, [Bonding(Choice(walls), Pattern())], options.drawing, mortar=False)), walls

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 #: fraction of their size: stones on a background lie closer.
 COVERED, APART = 0.6, 0.1
 
+#: How an icon draws what it shows, and the page around it.
+WHITE, BLACK = "#ffffff", "#000000"
+
 #: What a run makes of such a drawing.
 COUNTED = "; as it is, what lies in it counts as blocks, and the wall as none"
 
@@ -36,13 +39,15 @@ def unfilled(layout: Layout) -> list[Note]:
     return [Note(LEFT_OUT, words) for words in walls_to_fill(layout).values()]
 
 
-def walls_to_fill(layout: Layout) -> dict[str, str]:
+def walls_to_fill(layout: Layout, *, pages: bool = True) -> dict[str, str]:
     """Find layers, or else names, of walls that a drawing holds as outlines with openings, and say how to fill them.
 
     Parameters
     ----------
     layout : Layout
         With what was left out of the drawing.
+    pages : bool
+        Whether what is black, with all on it white, may be a wall: icons draw stones on a page so.
     """
     if layout.dimension == 3 or layout.n_blocks > MOST:
         return {}
@@ -50,20 +55,23 @@ def walls_to_fill(layout: Layout) -> dict[str, str]:
 
     blocks = [shapely.Polygon(ring) for ring in layout.outlines]
     blocks = [shape if shape.is_valid else shapely.Polygon() for shape in blocks]
-    around: list[tuple[Any, str, tuple[Any, ...]]] = [
-        (shapely.Polygon(item.points), item.layer or item.name, tuple(map(shapely.Polygon, item.holes)))
+    around: list[tuple[Any, str, tuple[Any, ...], bool]] = [
+        (shapely.Polygon(item.points), item.layer or item.name, tuple(map(shapely.Polygon, item.holes)),
+         BLACK in item.looks)
         for item in layout.left_out if _may_be_wall(item)
     ]  # fmt: skip
     labels = [layout.groups[i] or layout.names[i] for i in range(layout.n_blocks)]
-    around += [(shape, label, ()) for shape, label in zip(blocks, labels, strict=True)]
+    around += [(blocks[i], label, (), BLACK in layout.looks[i]) for i, label in enumerate(labels)]
     found: dict[str, str] = {}
     told, walls = np.zeros(layout.n_blocks, bool), list[Any]()
-    for wall, label, holes in sorted(around, key=lambda one: float(one[0].area)):
+    for wall, label, holes, black in sorted(around, key=lambda one: float(one[0].area)):
         # Around a wall there may be a hatch of it, or the frame of the sheet.
         if not wall.is_valid or wall.area == 0.0 or any(_share(one, wall) > 0.99 for one in walls):
             continue
         inside = [i for i in np.flatnonzero(~told).tolist() if _lies_in(blocks[i], wall)]
         if not _are_openings(wall, [blocks[i] for i in inside], holes):
+            continue
+        if black and not pages and inside and all(WHITE in layout.looks[i] for i in inside):
             continue
         told[inside] = True
         walls.append(wall)

@@ -30,6 +30,19 @@ def _ran(case, capsys):
     return json.loads((out / "summary.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.parametrize(("page", "stones"), [("black", True), ("grey", False)])
+def test_white_stones_on_a_black_page_are_stones_and_no_openings_of_a_wall(tmp_path, page, stones):
+    drawn = "".join(f'<path fill="#fff" d="M{x} 300h60v120h-60z"/>' for x in (100, 220, 340))
+    path = tmp_path / "icon.svg"
+    path.write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 512 512"><path fill="{page}" d="M0 0h512v512H0z"/>'
+        f"{drawn}</svg>",
+        encoding="utf-8",
+    )
+    _, values = _written(path, "--unit", "mm")
+    assert ("bond" not in values) == stones
+
+
 def test_a_dxf_with_mortar_and_no_supports_gets_a_ground_of_two_halves(tmp_path, capsys):
     """Three courses of running bond in mm with joints of 10 mm."""
     drawing = ezdxf.new("R2010")
