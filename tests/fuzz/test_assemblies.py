@@ -40,6 +40,7 @@ def test_blocks_wedged_by_rounding_are_no_failure(kind, seed):
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.slow
 def test_what_flies_away_without_drag_warns_of_nothing():
     """Here forces without the drag were looked for of a stack that falls, and numpy said that they are no numbers."""
     finding = tried("stack", 130032)
@@ -83,6 +84,7 @@ def test_a_way_that_turns_back_beyond_its_step_is_followed():
         ("voronoi", 60176),  # Blocks wedged from the start beside light ones.
     ],
 )
+@pytest.mark.slow
 def test_no_equilibrium_is_left_undecided(kind, seed):
     finding = tried(kind, seed)
     assert finding.wrong == []

@@ -41,6 +41,7 @@ def in_space_of(assembly):
         pytest.param("voronoi", 1006, marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.slow
 def test_extruded_structures_go_the_way_of_the_plane(kind, seed):
     given = trial(kind, seed)
     x, up = given.settlement.direction

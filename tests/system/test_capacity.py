@@ -69,6 +69,7 @@ def table(path):
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
 
 
+@pytest.mark.slow
 def test_limit_load_of_a_block_from_its_case_file(tmp_path, capsys):
     text = COLUMN + '[analysis]\nkind = "limit load"\n[output]\nanimation = "swing.gif"\n' + SIDEWAYS
     folder, summary = ran(text, tmp_path, drawn=True)

@@ -52,6 +52,7 @@ def test_another_process_draws_the_same_film(tmp_path):
     assert told[-1][0] == told[-1][1] == len(told)
 
 
+@pytest.mark.slow
 def test_what_fails_in_the_process_is_raised_here(tmp_path):
     process = FilmProcess()
     process.draw(arch_response(), tmp_path / "film.avi", None)
@@ -88,6 +89,7 @@ def test_ctrl_c_is_for_the_first_process_even_before_the_other_has_loaded(arch, 
     assert "KeyboardInterrupt" not in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_process_that_is_ended_leaves_all_but_the_film(case, tmp_path, monkeypatch, capsys):
     def killed():
         process = FilmProcess()

@@ -150,6 +150,7 @@ def test_page_has_the_numbers_and_the_case():
     assert "14 (12 free)" in text
 
 
+@pytest.mark.slow
 def test_a_thousand_blocks_and_sixty_frames_stay_below_two_megabytes(tmp_path):
     response = parted(wall(25, 39), 45, 15)
     assert response.assembly.n_blocks > 990

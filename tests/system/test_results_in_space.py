@@ -71,6 +71,7 @@ def same(one, other):
     return one == other
 
 
+@pytest.mark.slow
 def test_polyhedra_come_back_through_pyvista(tmp_path):
     response = vault_response()
     last, volumes = response.path[-1], response.assembly.shapes.volumes

@@ -222,6 +222,7 @@ def test_killed_run_resumes(whole, tmp_path, moments):
         pytest.param("load that moves", "summary.json", 5, marks=pytest.mark.thorough),
     ],
 )
+@pytest.mark.slow
 def test_killed_limit_loads_and_pushovers_resume(tmp_path, monkeypatch, kind, moment, kept):
     case = tmp_path / "case.toml"
     case.write_text(ARCH + OTHERS[kind], encoding="utf-8")
@@ -294,6 +295,7 @@ def test_resuming_a_finished_run_draws_what_is_missing(whole, tmp_path, capsys):
     assert (out / "response.csv").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_files_that_changed_are_named_and_not_read_again(whole, tmp_path, monkeypatch, capsys):
     case, out = tmp_path / "case.toml", tmp_path / "out"
     case.write_text(CASE, encoding="utf-8")

@@ -143,6 +143,7 @@ def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
     assert shape == b""
 
 
+@pytest.mark.slow
 def test_blocks_in_space_are_studied_and_drawn(tmp_path):
     """An arch with a depth whose springer moves out; its tile shows the faces that are turned to the eye."""
     arch = {

@@ -135,6 +135,7 @@ def test_the_dot_moves_along_the_panel():
     assert end[1] < start[1]
 
 
+@pytest.mark.slow
 def test_phases_in_other_units_share_no_axis(tmp_path):
     """A block on a support that sinks, then tilts until the block falls over its edge."""
     assembly = solver.Assembly.from_outlines(

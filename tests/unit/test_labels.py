@@ -134,6 +134,7 @@ def test_the_legend_of_the_fall_names_no_joints_and_no_forces(words):
     assert any(text.startswith("compression") for text in standing)
 
 
+@pytest.mark.slow
 def test_every_frame_names_what_it_draws_and_nothing_else(monkeypatch):
     """Statics, pseudo-time and fall: an entry stands in the legend where its colour is in the picture."""
     frames = []

@@ -80,6 +80,7 @@ def test_an_arch_collapses_though_its_fall_would_jam(controls):
     assert response.notes == ()
 
 
+@pytest.mark.slow
 def test_a_run_resumes_from_a_checkpoint_before_or_after_a_snap():
     assembly = _bench()
     given = {

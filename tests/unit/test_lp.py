@@ -105,6 +105,7 @@ def test_what_is_no_narrow_band_is_left_to_hipo(too_wide):
     assert found.objective == pytest.approx(known.objective, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_simplex_method_proves_by_a_ray_what_hipo_does_not(too_wide):
     columns = np.random.default_rng(5).standard_normal((len(too_wide.lower), 4))
     ray = sp.csc_array(np.column_stack([columns, -columns.sum(axis=1)]))

@@ -80,6 +80,7 @@ def test_rubble_closes_and_carries_as_the_cells_that_it_was_made_of(seed):
     assert reaction == pytest.approx(first_increment(dry)[1], rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_case_of_rubble_runs(tmp_path):
     import ezdxf
 

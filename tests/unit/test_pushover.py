@@ -58,6 +58,7 @@ def test_the_multiplier_on_the_path_is_the_limit_load_of_the_pose():
         assert increment.load_multiplier == pytest.approx(limit.multiplier, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_the_live_load_does_what_the_weight_gains_and_a_jump_takes():
     """Hinges take no energy: the work of α is the weight's gain, but in the jump of a hinge, where it is more."""
     response = arch(0.001)

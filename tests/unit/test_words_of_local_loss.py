@@ -59,6 +59,7 @@ def test_summary_console_report_and_curve_tell_them_apart(tmp_path):
     assert (other["loss"], other["falling_share"]) == ("structure", pytest.approx(1.0))
 
 
+@pytest.mark.slow
 def test_a_loss_is_in_every_output_and_drawn_pale(tmp_path):
     response = dropped_brick(0.05)
     assert response.stop is solver.Status.LIMIT_REACHED

@@ -79,6 +79,7 @@ def test_collapse_does_not_depend_on_the_increment(increment):
 @pytest.mark.parametrize(
     "increment", [0.01, pytest.param(0.02, **THOROUGH), pytest.param(0.0025, marks=pytest.mark.slow)]
 )
+@pytest.mark.slow
 def test_relocating_hinge_is_met_at_every_increment(increment):
     """A hinge jumps to the next joint at d = 0.12885; the structure finds its new equilibrium and goes on."""
     response = _settle(120, 0.10, 13, (1, 0), increment)

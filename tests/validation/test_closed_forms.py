@@ -124,6 +124,7 @@ def test_block_that_sticks_does_not_creep():
     ("blocks", "friction_coefficient"),
     [(4, 0.45), *(pytest.param(*stack, marks=pytest.mark.thorough) for stack in ((2, 0.9), (4, 0.7), (6, 0.5)))],
 )
+@pytest.mark.slow
 def test_stack_on_a_tilting_support(blocks, friction_coefficient):
     """A stack of n blocks b × h overturns as one, or slides, at θ = atan(min(μ, b/(n h)))."""
     turn = solver.Settlement(rotation_centre=(0.3, -0.5), rotation=-1, increment=0.02, limit=1, tolerance=1e-5)
@@ -263,6 +264,7 @@ def test_keystone_locked_between_approaching_supports(degrees, friction_coeffici
         pytest.param(1.2, 1e-2, 0.6, marks=pytest.mark.thorough),
     ],
 )
+@pytest.mark.slow
 def test_brick_in_a_tray_that_turns(friction_coefficient, clearance, limit):
     """Brick between the walls of its support: it turns with it, and slides out along a wall at 90° + atan μ."""
     brick, tray = rectangle(0, 0, 1, 1), rectangle(-1, -1, 2, 2).tolist()

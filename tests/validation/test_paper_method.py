@@ -167,6 +167,7 @@ def test_stops_are_reported():
     assert response.settlement.tolist() == [0.0, 0.013, 0.02, 0.04, 0.05]
 
 
+@pytest.mark.slow
 def test_goes_on_from_a_checkpoint_bit_for_bit():
     arch = generators.arch(thickness_ratio=0.15, voussoirs=12)
     spread = solver.Settlement(direction=(1, 0), increment=0.02, limit=0.05)
