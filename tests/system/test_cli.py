@@ -304,6 +304,7 @@ def test_materials_of_an_interface_that_no_block_has_are_refused(case, capsys):
     assert "[[interfaces]] material 'stnoe' is that of no block" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_note_is_printed_once(case, capsys):
     case.write_text(case.read_text(encoding="utf-8") + '[[loads]]\nkind = "live"\nforce = [0, -1]\n', encoding="utf-8")
     assert run_command(case, "-o", case.parent / "out") in (0, 4)

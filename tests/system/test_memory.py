@@ -79,6 +79,7 @@ def folder(tmp_path_factory):
 @pytest.mark.parametrize(
     "kind", [pytest.param(kind, marks=() if kind == "settlement" else pytest.mark.thorough) for kind in ANALYSES]
 )
+@pytest.mark.slow
 def test_a_run_forgets_what_it_has_written(kind, tmp_path, monkeypatch):
     seen, most = [], []
     add = ResultsFolder.add

@@ -43,6 +43,7 @@ def path(last, collapse=None, factor=1.0, unit=0.1):
     return Traced(np.zeros(len(s), dtype=int), s, factor * (10.0 + s), np.zeros((len(s), 1, 2)), collapse, "ended")
 
 
+@pytest.mark.slow
 def test_a_range_is_printed_written_and_drawn(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(path_range, "OnceMore", Here)
     monkeypatch.setattr(path_range, "VARIATIONS", VARIATIONS[1:2])

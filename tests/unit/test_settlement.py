@@ -428,6 +428,7 @@ def test_mechanism_at_collapse():
     assert (response.loads.total() * mechanism).sum() > 0
 
 
+@pytest.mark.slow
 def test_same_input_twice_gives_the_same_arrays():
     spread = solver.Settlement(direction=(1, 0), increment=0.05, limit=0.5, tolerance=1e-3)
     few = solver.Controls(falling_frames=5)

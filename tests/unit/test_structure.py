@@ -43,6 +43,7 @@ def test_friction_is_never_assumed(block):
     assert solver.Structure(block, friction_coefficient=0.0).interfaces.default.friction_coefficient == 0.0
 
 
+@pytest.mark.slow
 def test_structure_and_functions_give_the_same():
     arch = generators.arch()
     spread = solver.Settlement(direction=(1, 0))

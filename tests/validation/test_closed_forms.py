@@ -92,6 +92,7 @@ BLOCKS = [(1, 2, 0.7), (1, 1, 0.4), (0.4, 2, 0.6), (1, 1, 0.99), (1, 1, 1.01)]
         ),
     ],
 )
+@pytest.mark.slow
 def test_block_on_a_tilting_support(width, height, friction_coefficient, sense):
     """Overturns or slides at θ = atan(min(μ, b/h)), wherever the support turns about."""
     turn = solver.Settlement(rotation_centre=(0.3, -0.5), rotation=sense, increment=0.02, limit=1, tolerance=1e-5)

@@ -34,7 +34,7 @@ def tilted(order=(0, 1, 2), mirrored=False, local_loss=0.05):
     [
         pytest.param((0, 1, 2), False, id="drawn", marks=pytest.mark.thorough),
         pytest.param((2, 0, 1), False, id="shuffled", marks=pytest.mark.thorough),
-        pytest.param((1, 2, 0), True, id="mirror and shuffled"),
+        pytest.param((1, 2, 0), True, id="mirror and shuffled", marks=pytest.mark.slow),
     ],
 )
 def test_the_path_continues_to_the_collapse_of_the_structure(order, mirrored):
