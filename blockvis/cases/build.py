@@ -6,6 +6,7 @@ import math
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -75,14 +76,8 @@ def case_assembly(case: Case) -> solver.Assembly:
             outline_tolerance=case.outline_tolerance,
         )
     except DeepOverlap as error:
-        chosen = {
-            "view": case.view,
-            "only": case.only,
-            "window": case.window,
-            "dimension": case.dimension,
-            **case.image,
-        }
-        remedy = overlap_remedy(sketch, case.ignore, **chosen) if case.file is not None else ""
+        chosen = _chosen(case)
+        remedy = overlap_remedy(sketch, dimension=case.dimension, **chosen) if case.file is not None else ""
         if not remedy:
             raise
         raise ValueError(f"{error}; {remedy}") from None
@@ -191,32 +186,20 @@ def case_controls(case: Case, assembly: solver.Assembly) -> solver.Controls:
     return replace(controls, overlap_tolerance=DEFAULT_FACING * width)
 
 
+def _chosen(case: Case) -> dict[str, Any]:
+    """What of the file of a case is read, and the scale of an image."""
+    return {"view": case.view, "ignore": case.ignore, "only": case.only, "window": case.window, **case.image}
+
+
 def _case_layout(case: Case) -> layout.Layout:
     thickness = case.thickness or THICKNESS
     if case.file is not None and case.bonds:
-        outlines = read_outlines(
-            case.file,
-            unit=case.unit,
-            view=case.view,
-            ignore=case.ignore,
-            only=case.only,
-            window=case.window,
-            **case.image,
-        )
+        outlines = read_outlines(case.file, unit=case.unit, **_chosen(case))
         walls = bonded(outlines, case.bonds, str(case.source), case.roles, mortar=False)
         return layout.standing(walls, thickness) if case.dimension == 3 else walls
     if case.file is not None:
-        return read_layout(
-            case.file,
-            unit=case.unit,
-            view=case.view,
-            ignore=case.ignore,
-            only=case.only,
-            window=case.window,
-            dimension=case.dimension,
-            thickness=thickness,
-            **case.image,
-        )
+        chosen = _chosen(case)
+        return read_layout(case.file, unit=case.unit, dimension=case.dimension, thickness=thickness, **chosen)
     assert case.layout is not None
     try:
         sketch = layout.layout_of(generators.build(case.layout, case.parameters))
