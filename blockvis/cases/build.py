@@ -187,7 +187,7 @@ def case_controls(case: Case, assembly: solver.Assembly) -> solver.Controls:
 
 
 def _chosen(case: Case) -> dict[str, Any]:
-    """What of the file of a case is read, and the scale of an image."""
+    """Gather what of the file of a case is read, and the scale of an image."""
     return {"view": case.view, "ignore": case.ignore, "only": case.only, "window": case.window, **case.image}
 
 

@@ -98,6 +98,7 @@ def test_a_run_forgets_what_it_has_written(kind, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("use", ["summary", "curve", "report", "film"])
+@pytest.mark.slow
 def test_results_are_read_one_at_a_time(use, folder, tmp_path, monkeypatch):
     seen, most = [], []
     read = StoredIncrements._read

@@ -123,6 +123,7 @@ def test_a_distribution_known_in_closed_form_from_inside_an_event_loop(tmp_path,
         assert (out / name).stat().st_size > 400
 
 
+@pytest.mark.slow
 def test_failed_runs_are_rows_with_their_reason(tmp_path, capsys):
     """On a grid, in one process: a column of no block, and a time too short for any run."""
     given = {
