@@ -207,7 +207,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
-    for add in (_add_bond, _add_explain, _add_sweep, _add_new, _add_schema):
+    for add in (_add_bond, _add_compare, _add_explain, _add_sweep, _add_new, _add_schema):
         add(verbs)
     completion = verbs.add_parser(
         "completion",
@@ -306,6 +306,18 @@ def _add_bond(verbs: Any) -> None:
     bond.set_defaults(verb=_bond)
 
 
+def _add_compare(verbs: Any) -> None:
+    compare = verbs.add_parser(
+        "compare", help="two runs side by side: numbers, curves, cracks, pictures, a film in step"
+    )
+    compare.add_argument("one", metavar="OUT1", help="results folder of one run")
+    compare.add_argument("other", metavar="OUT2", help="and of the other")
+    compare.add_argument("-o", "--output", metavar="OUT", help="folder of the comparison (default: <OUT1>-<OUT2>)")
+    compare.add_argument("--animation", default="compare.mp4", help=".mp4, .gif or .webp in the folder; none to skip")
+    compare.add_argument("--force", action="store_true", help="replace a comparison that is there already")
+    compare.set_defaults(verb=_compare)
+
+
 def _add_explain(verbs: Any) -> None:
     explain = verbs.add_parser(
         "explain",
@@ -373,6 +385,8 @@ def _completion(options: argparse.Namespace) -> int:
         "study",
         "picture",
         "observed",
+        "one",
+        "other",
     }
     for action in parser._actions:
         for verb in (action.choices or {}).values() if isinstance(action.choices, dict) else ():
@@ -382,6 +396,23 @@ def _completion(options: argparse.Namespace) -> int:
                 elif argument.dest in files:
                     argument.complete = shtab.FILE
     print(shtab.complete(parser, options.shell))
+    return 0
+
+
+def _compare(options: argparse.Namespace) -> int:
+    from .comparison.write import compare
+    from .runs.progress import DrawingProgress
+
+    folder = Path(options.output or f"{Path(options.one).name}-{Path(options.other).name}")
+    film = None if options.animation == "none" else options.animation
+    progress = DrawingProgress()
+    try:
+        written = compare(
+            options.one, options.other, folder, film=film, overwrite=options.force, progress=progress.frame
+        )
+    finally:
+        progress.done()
+    print(f"compared in {folder}/: {', '.join(written)}")
     return 0
 
 

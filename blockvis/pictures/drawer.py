@@ -253,8 +253,6 @@ class Drawer:
     def picture(
         self,
         increment: solver.Increment,
-        pose: solver.Pose | None = None,
-        s: float | None = None,
         *,
         title: str = "",
         note: str = "",
@@ -262,15 +260,11 @@ class Drawer:
         blocks_only: bool = False,
         widths: bool = False,
     ) -> Image.Image:
-        """Draw one increment; for frames in between, with its blocks at another pose.
+        """Draw one increment, or a state between two.
 
         Parameters
         ----------
         increment : solver.Increment
-        pose : solver.Pose, optional
-            Where the blocks are in a frame between two increments.
-        s : float, optional [m or rad]
-            The parameter there.
         title, note, badge : str
             First and second line of the caption, and the warning, instead of those of the increment.
         blocks_only : bool
@@ -279,26 +273,24 @@ class Drawer:
             Write the largest width of the widest crack lines beside them [mm]; in space the legend has the scale of
             their colours.
         """
-        increment = increment if pose is not None else self._shown(increment)
-        true = increment.pose if pose is None else pose
-        shown = self._drawn_at or magnified(self.assembly, true, self.look.magnification)
-        at = increment.with_arrays(pose=true, contacts=contacts_at(increment, true)) if pose is not None else increment
-        self.scene.pose(shown, self._block_colours(true, increment.fallen))
+        increment = self._shown(increment)
+        shown = self._drawn_at or magnified(self.assembly, increment.pose, self.look.magnification)
+        self.scene.pose(shown, self._block_colours(increment.pose, increment.fallen))
         dots = np.zeros((0, self.assembly.dimension))
         if blocks_only:
             self.scene.clear(*OF_STATICS)
         else:
-            dots = self._draw_joints(at, shown)
-            self._draw_forces(at, shown)
+            dots = self._draw_joints(increment, shown)
+            self._draw_forces(increment, shown)
             self._draw_bearings(shown)
-            self._draw_settlement(at, shown)
+            self._draw_settlement(increment, shown)
             self._draw_live_load(increment, shown)
         falling = increment.status == solver.Status.FALLING
         failed = self.response.stop == solver.Status.SOLVER_FAILED
         head, detail = caption_of(self.response, increment, self.look.magnification)
         picture = self.scene.image()
         if widths and self.look.joints and not falling and self._flat:
-            self._write_widths(picture, at, shown, dots)
+            self._write_widths(picture, increment, shown, dots)
         return self.sheet.composed(
             picture,
             title=title or head,
@@ -307,7 +299,7 @@ class Drawer:
             keys=self._keys_drawn(increment),
             places=self.keys(),
             pixel=self.scene.pixel,
-            beside=None if self.panel is None else self.panel.image(at if s is None else replace(at, parameter=s)),
+            beside=None if self.panel is None else self.panel.image(increment),
         )
 
     def falling_picture(self, time: float) -> Image.Image:
@@ -542,13 +534,6 @@ def sampled(numbers: list[int]) -> frozenset[int]:
     """Up to ``FORCES_OF`` of the numbers, evenly chosen."""
     chosen = np.linspace(0, len(numbers) - 1, min(len(numbers), FORCES_OF)).round().astype(int)
     return frozenset(numbers[k] for k in chosen)
-
-
-def contacts_at(increment: solver.Increment, pose: solver.Pose) -> mechanics.Contacts:
-    """Contact points of an increment, carried to a pose nearby."""
-    contacts = increment.contacts
-    points = mechanics.carried_between(contacts.points, contacts.block_a, contacts.block_b, increment.pose, pose)
-    return replace(contacts, points=points)
 
 
 def largest_displacement(assembly: solver.Assembly, increment: solver.Increment) -> float:

@@ -1,10 +1,10 @@
-"""The film of a response: which pictures it has, for how many frames each stands, and the order they are drawn in."""
+"""The film of a response: a constant rate, each frame a state of its own while anything moves."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
-from itertools import chain
 from typing import TypeAlias
 
 import numpy as np
@@ -17,9 +17,9 @@ from .captions import matters
 from .drawer import Drawer
 
 #: Seconds for which the last equilibrium and the end of the film are held.
-PAUSE, END = 0.6, 0.8
+PAUSE, END = 0.5, 0.8
 
-#: Nothing moves from one frame to the next where no corner moves by more than this [pixels].
+#: Nothing moves from one frame of a fall to the next where no corner moves by more than this [pixels].
 STILL = 0.3
 
 Draw: TypeAlias = Callable[[], Image.Image]
@@ -27,10 +27,8 @@ Draw: TypeAlias = Callable[[], Image.Image]
 
 def film_of(
     drawer: Drawer, fps: float, seconds: float, progress: Callable[[int, int], None] | None = None
-) -> tuple[list[int], Iterator[Image.Image]]:
+) -> tuple[int, Iterator[Image.Image]]:
     """Plan a film: even motion along the path, a pause, then the fall.
-
-    A picture is drawn where something has moved since the last, and stands till then.
 
     Parameters
     ----------
@@ -40,104 +38,104 @@ def film_of(
     seconds : float [s]
         Of the path.
     progress : callable, optional
-        Called with the pictures drawn and their number.
+        Called with the frames drawn and their number.
 
     Returns
     -------
-    holds : list of int
-        For how many frames each picture stands.
-    pictures : iterator of PIL.Image.Image
-        Drawn as they are asked for.
+    count : int
+        Number of the frames.
+    frames : iterator of PIL.Image.Image
+        Drawn as they are asked for; what stands still is drawn once.
     """
     path = [increment for increment in drawer.increments if matters(increment, drawer.response)]
-    lasting = max(2, round(fps * seconds))
-    distinct = _distinct(drawer, path, lasting) if path else 0
+    along = _along(drawer, path, max(2, round(fps * seconds)))
     falling = _falling(drawer, fps)
-    holds = [int(n) for n in np.diff(np.linspace(0, lasting, distinct + 1).round())]
-    if holds:
-        holds[-1] += round(PAUSE * fps)
-    holds += [hold for _, hold in falling]
-    holds[-1] += round(END * fps)
+    pause = round(PAUSE * fps) if along and falling else 0
+    draws = [*along, *along[-1:] * pause, *falling]
+    draws += draws[-1:] * round(END * fps)
 
-    def pictures() -> Iterator[Image.Image]:
-        along: Iterator[Draw] = (partial(drawer.picture, *place) for place in _places(drawer.response, path, distinct))
-        for number, draw in enumerate(chain(along, (draw for draw, _ in falling)), start=1):
-            picture = draw()
+    def frames() -> Iterator[Image.Image]:
+        before, picture = None, None
+        for number, draw in enumerate(draws, start=1):
+            if picture is None or draw is not before:
+                picture, before = draw(), draw
             if progress is not None:
-                progress(number, len(holds))
+                progress(number, len(draws))
             yield picture
 
-    return holds, pictures()
+    return len(draws), frames()
 
 
-def _distinct(drawer: Drawer, path: list[solver.Increment], most: int) -> int:
-    """How many pictures of the path differ: one for each pixel of the way of the block that goes farthest."""
-    if len(path) == 1 or mechanics.path_parameters(path)[-1] <= mechanics.path_parameters(path)[0]:
-        return 1
-    way, before = 0.0, None
-    for increment in path:
-        corners = mechanics.moved_vertices(drawer.assembly, increment.pose)
-        if before is not None:
-            way += float(np.linalg.norm(corners - before, axis=1).max())
-        before = corners
-    pixels = way * drawer.look.magnification / drawer.scene.pixel
-    return int(np.clip(np.ceil(pixels), min(len(path), most), most))
+def state_at(response: solver.Response, at: float) -> solver.Increment:
+    """Find what is shown at a parameter over all phases [m or rad]: between two increments blocks move evenly.
+
+    Parameters
+    ----------
+    response : solver.Response
+    at : float [m or rad]
+    """
+    return _state_at(response.path, response.parameters, at)
 
 
-def _falling(drawer: Drawer, fps: float) -> list[tuple[Draw, int]]:
-    """List what draws each picture of the fall, and for how many frames it stands: till something moves again."""
-    draws: list[Draw] = []
-    poses: Iterator[solver.Pose]
+def _state_at(path: Sequence[solver.Increment], total: np.ndarray, at: float) -> solver.Increment:
+    k = int(np.clip(np.searchsorted(total, at, side="right") - 1, 0, len(path) - 1))
+    if k == len(path) - 1 or at <= total[k]:
+        return path[k]
+    return _between(path[k], path[k + 1], float((at - total[k]) / (total[k + 1] - total[k])))
+
+
+def _between(before: solver.Increment, after: solver.Increment, part: float) -> solver.Increment:
+    """Make the state at a part of the way from one increment to the next; joints and forces are those before."""
+    a, b = before.pose, after.pose
+    pose = solver.Pose(
+        a.positions + part * (b.positions - a.positions), a.rotations + part * (b.rotations - a.rotations)
+    )
+    start = before.parameter if before.phase == after.phase else 0.0
+    contacts = before.contacts
+    points = mechanics.carried_between(contacts.points, contacts.block_a, contacts.block_b, a, pose)
+    numbers = {
+        name: getattr(before, name) + part * (getattr(after, name) - getattr(before, name))
+        for name in ("measured", "reaction", "load_multiplier")
+    }
+    return replace(
+        before, parameter=start + part * (after.parameter - start), phase=after.phase, checkpoint=None, **numbers
+    ).with_arrays(pose=pose, contacts=replace(contacts, points=points))
+
+
+def _along(drawer: Drawer, path: list[solver.Increment], n: int) -> list[Draw]:
+    """List what draws ``n`` states at even steps of the parameter; of those that stand by themselves, each as long."""
+    if not path:
+        return []
+    total = mechanics.path_parameters(path)
+    if not drawer.response.parameter.is_path or total[-1] <= total[0]:
+        draws: list[Draw] = [partial(drawer.picture, increment) for increment in path]
+        return [draws[k] for k in np.linspace(0, len(path) - 1, n).round().astype(int)]
+    return [partial(_drawn_at, drawer, path, total, float(at)) for at in np.linspace(total[0], total[-1], n)]
+
+
+def _drawn_at(drawer: Drawer, path: Sequence[solver.Increment], total: np.ndarray, at: float) -> Image.Image:
+    # Worked out when it is drawn: increments may read their arrays from files, and a film holds none of them.
+    return drawer.picture(_state_at(path, total, at))
+
+
+def _falling(drawer: Drawer, fps: float) -> list[Draw]:
+    """List what draws each frame of the fall; the same again while nothing moves."""
     fall = drawer.fall
+    found: list[tuple[Draw, solver.Pose]]
     if fall is not None:
         times = [float(k / fps) for k in range(1, int(np.ceil(fall.times[-1] * fps)) + 1)]
-        draws += [partial(drawer.falling_picture, time) for time in times]
-        poses = (fall.at(time) for time in times)
+        found = [(partial(drawer.falling_picture, time), fall.at(time)) for time in times]
     else:
         pseudo = [increment for increment in drawer.increments if increment.status == solver.Status.FALLING]
-        draws += [partial(drawer.picture, increment) for increment in pseudo]
-        poses = (increment.pose for increment in pseudo)
-    shown: list[tuple[Draw, int]] = []
+        found = [(partial(drawer.picture, increment), increment.pose) for increment in pseudo]
+    shown: list[Draw] = []
     drawn = None
-    for draw, pose in zip(draws, poses, strict=True):
+    for draw, pose in found:
         corners = mechanics.moved_vertices(drawer.assembly, pose)
         if drawn is not None and np.abs(corners - drawn).max() <= STILL * drawer.scene.pixel:
-            shown[-1] = shown[-1][0], shown[-1][1] + 1
+            shown.append(shown[-1])
             continue
-        shown.append((draw, 1))
+        shown.append(draw)
         drawn = corners
-    if shown:
-        # Rest at the end is held as long as any end.
-        shown[-1] = shown[-1][0], 1
-    return shown
-
-
-def _places(
-    response: solver.Response, path: list[solver.Increment], n: int
-) -> Iterator[tuple[solver.Increment, solver.Pose | None, float | None]]:
-    """``n`` frames along the path; of states that stand by themselves, some of them: between two there is nothing."""
-    if response.parameter.is_path:
-        return _even_motion(path, n)
-    return ((path[k], None, None) for k in np.linspace(0, len(path) - 1, n).round().astype(int))
-
-
-def _even_motion(
-    path: list[solver.Increment], n: int
-) -> Iterator[tuple[solver.Increment, solver.Pose | None, float | None]]:
-    """``n`` frames at even steps of the parameter: the increment before each, its pose, and its parameter."""
-    if not path:
-        return
-    total = mechanics.path_parameters(path)
-    if total[-1] <= total[0]:
-        yield path[-1], None, None
-        return
-    for at in np.linspace(total[0], total[-1], n) if n > 1 else total[-1:]:
-        k = int(np.clip(np.searchsorted(total, at, side="right") - 1, 0, len(path) - 1))
-        if k == len(path) - 1 or at <= total[k]:
-            yield path[k], None, None
-            continue
-        t = (at - total[k]) / (total[k + 1] - total[k])
-        a, b = path[k].pose, path[k + 1].pose
-        pose = solver.Pose(a.positions + t * (b.positions - a.positions), a.rotations + t * (b.rotations - a.rotations))
-        start = path[k].parameter if path[k].phase == path[k + 1].phase else 0.0
-        yield path[k], pose, start + t * (path[k + 1].parameter - start)
+    # Rest at the end is held as long as any end.
+    return shown[: shown.index(shown[-1]) + 1] if shown else []

@@ -155,11 +155,11 @@ class Sheet:
 
     def _title(self, draw: ImageDraw.ImageDraw, title: str, badge: str) -> None:
         room = (self._badge_box(badge)[0] if badge else self.size[0]) - 2 * self.pad
-        font = _fitting(title, round(1.15 * self.text), room, bold=True)
+        font = fitting_font(title, round(1.15 * self.text), room, bold=True)
         draw.text((self.pad, self.pad + 0.72 * self.text), title, palette.INK, font, anchor="lm")
 
     def _detail(self, draw: ImageDraw.ImageDraw, detail: str) -> None:
-        font = _fitting(detail, round(0.9 * self.text), self.size[0] - 2 * self.pad)
+        font = fitting_font(detail, round(0.9 * self.text), self.size[0] - 2 * self.pad)
         draw.text((self.pad, self.pad + 2.15 * self.text), detail, palette.FAINT, font, anchor="lm")
 
     def _badge(self, draw: ImageDraw.ImageDraw, badge: str) -> None:
@@ -314,7 +314,7 @@ def _swatch(draw: ImageDraw.ImageDraw, key: Key, x: float, y: float, wide: float
         draw.rectangle((x + wide - length, y - half, x + wide, y + half), fill=key.colour)
 
 
-def _fitting(text: str, size: int, room: float, bold: bool = False) -> ImageFont.FreeTypeFont:
+def fitting_font(text: str, size: int, room: float, bold: bool = False) -> ImageFont.FreeTypeFont:
     """Largest font up to ``size`` in which the text fits."""
     font = _font(size, bold)
     while size > 7 and font.getlength(text) > room:

@@ -164,8 +164,8 @@ def animate(
         fall = fall_of(response)
     shown = shown_increments(response) if fall is None else response.path
     drawer = Drawer(response, look, size, shown, curve=curve, fall=fall, underlay=underlay)
-    holds, pictures = film_of(drawer, fps, seconds, progress)
-    return write_film(pictures, path, size=size, fps=fps, holds=holds)
+    _, frames = film_of(drawer, fps, seconds, progress)
+    return write_film(frames, path, size=size, fps=fps)
 
 
 def _mechanism_note(response: solver.Response, parts: np.ndarray) -> str:

@@ -6,7 +6,7 @@ import errno
 import importlib
 import os
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,6 @@ from blockvis.system.atomic_files import atomic_file
 
 #: What imageio's writer is given for each format. Quality of x264 is 0 lossless, 51 worst: line drawings show ringing
 #: from about 22 on. A gif has a palette per frame: one of the first frame lacks the colours of cracks that open later.
-#: Without "-bf 0" x264 looks ahead, and the time for which the last picture stands does not count to the length.
 #: One thread keeps up with what draws, costs less in all, and the film is the same bytes on any number of cores.
 _ENCODERS: dict[str, dict[str, Any]] = {
     ".mp4": {
@@ -32,8 +31,6 @@ _ENCODERS: dict[str, dict[str, Any]] = {
             "veryfast",
             "-threads",
             "1",
-            "-bf",
-            "0",
             "-movflags",
             "+faststart",
             "-f",
@@ -69,7 +66,6 @@ def write_film(
     *,
     size: tuple[int, int],
     fps: float,
-    holds: Sequence[int] | None = None,
 ) -> Path:
     """Write frames as a film, whole or not at all.
 
@@ -83,8 +79,6 @@ def write_film(
         Width and height in pixels, both even.
     fps : float
         Frames per second; a gif counts in hundredths of a second.
-    holds : sequence of int, optional
-        For how many of them each picture stands; one by default. It is encoded once.
 
     Returns
     -------
@@ -107,7 +101,7 @@ def write_film(
         raise ValueError(f"an animation of {size[0]} × {size[1]} pixels cannot be encoded; both must be even")
     with atomic_file(path) as partial:
         try:
-            _encode(frames, partial, min(fps, FASTEST_GIF) if suffix == ".gif" else fps, holds)
+            _encode(frames, partial, min(fps, FASTEST_GIF) if suffix == ".gif" else fps)
         except OSError as error:
             raise _not_written(path, error) from None
         if partial.is_file() and not _reaches_its_end(partial):
@@ -121,13 +115,9 @@ def find_encoder() -> None:
     importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
 
 
-def _encode(frames: Iterable[Image.Image], path: Path, fps: float, holds: Sequence[int] | None) -> None:
+def _encode(frames: Iterable[Image.Image], path: Path, fps: float) -> None:
     import imageio.v2 as imageio
 
-    settings = dict(_ENCODERS[path.suffix.lower()])
-    last = 1 if holds is None else holds[-1]
-    if holds is not None:
-        settings["output_params"] = _with_holds(settings["output_params"], holds)
     writer = imageio.get_writer(
         str(path.absolute()),
         # imageio writes a gif or webp by a writer that holds all frames in memory; its writer of videos holds one.
@@ -136,28 +126,11 @@ def _encode(frames: Iterable[Image.Image], path: Path, fps: float, holds: Sequen
         fps=fps,
         macro_block_size=2,
         ffmpeg_log_level="error",
-        **settings,
+        **_ENCODERS[path.suffix.lower()],
     )
     with closing(writer):
-        frame = None
         for frame in frames:
             writer.append_data(np.asarray(frame))
-        if last > 1 and frame is not None:
-            # A film ends with its last frame: what stands is shown again at the end.
-            writer.append_data(np.asarray(frame))
-
-
-def _with_holds(parameters: Sequence[str], holds: Sequence[int]) -> list[str]:
-    """Add to the parameters of an encoder when each picture comes, in frames: its number and what is held before."""
-    waits = [f"{n - 1}*gte(N\\,{k + 1})" for k, n in enumerate(holds[:-1]) if n != 1]
-    waits += [f"{holds[-1] - 2}*gte(N\\,{len(holds)})"] if holds[-1] > 1 else []
-    times = f"setpts={'+'.join(['N', *waits])}"
-    parameters = list(parameters)
-    if "-vf" in parameters:
-        at = parameters.index("-vf") + 1
-        parameters[at] = f"{times},{parameters[at]}"
-        return parameters
-    return ["-vf", times, *parameters]
 
 
 def _reaches_its_end(path: Path) -> bool:

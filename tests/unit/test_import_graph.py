@@ -19,6 +19,7 @@ ORDER = (
     "blockvis.__main__",
     "blockvis.cli",
     "blockvis.explanation",
+    "blockvis.comparison",
     "blockvis.studies",
     "blockvis.runs",
     "blockvis.views",

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -18,7 +19,7 @@ from blockvis.pictures import flat_scene, palette
 from blockvis.pictures.drawer import Drawer, Look, magnified
 from blockvis.pictures.film import film_of
 from blockvis.pictures.flat_scene import FlatScene
-from blockvis.pictures.frame import Frame, framed
+from blockvis.pictures.frame import Frame, Sheet, framed
 from blockvis.pictures.swing import swing_of
 from solver import mechanics
 
@@ -153,11 +154,11 @@ def test_films_have_their_frames(tmp_path, suffix, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymunk", None)
     response = parted(wall(6, 5), 4, 3)
     path = animate(response, tmp_path / f"film.{suffix}", size=(320, 180), fps=10, seconds=1.0)
-    # 10 on the path, the last of them held for 6, 3 of the fall, held for 8 and shown again at the end.
+    # 10 on the path, the last of them held for 5, 3 of the fall, held for 8.
     if suffix == "mp4":
         frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
-        assert 8 <= frames < 27
-        assert seconds == pytest.approx(2.7, abs=0.05)
+        assert frames == 26
+        assert seconds == pytest.approx(2.6, abs=0.05)
         reader = imageio_ffmpeg.read_frames(str(path))
         assert next(reader)["size"] == (320, 180)
         first = np.frombuffer(next(reader), np.uint8).astype(int)
@@ -217,32 +218,42 @@ def test_magnified_keeps_blocks_rigid():
     np.testing.assert_allclose(moved, 3.0 * response.path[-1].pose.displacements(response.assembly), atol=1e-12)
 
 
-def drawn_frames(response, monkeypatch, **options):
-    """For how many frames each picture of a film stands, the pictures drawn, and what the progress says."""
-    drawn, told = [], []
-    picture = Drawer.picture
-    monkeypatch.setattr(Drawer, "picture", lambda *a, **k: drawn.append(picture(*a, **k)) or drawn[-1])
+def frames_of(response, **options):
+    """Frames of a film of four seconds, and what the progress says."""
+    told = []
     drawer = Drawer(response, Look(colour_by="mechanism"), SMALL, response.increments, **options)
-    holds, pictures = film_of(drawer, 25.0, 4.0, lambda *count: told.append(count))
-    assert len(list(pictures)) == len(holds)
-    return holds, drawn, told
+    count, frames = film_of(drawer, 25.0, 4.0, lambda *counted: told.append(counted))
+    frames = [np.asarray(frame) for frame in frames]
+    assert len(frames) == count
+    return frames, told
 
 
-def test_as_many_frames_are_drawn_as_something_moves(monkeypatch):
+def test_every_frame_of_the_path_is_new_and_nothing_stands_for_long(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymunk", None)
-    still = parted(wall(6, 5), 4, 3, settlement=1e-3)
-    holds, drawn, told = drawn_frames(still, monkeypatch)
-    # A millimetre is less than a pixel: one picture for each of the four increments, three of the fall.
-    assert len(drawn) == 7
-    assert told == [(k + 1, 7) for k in range(7)]
-    assert holds == [25, 25, 25, 25 + 15, 1, 1, 1 + 20]
+    frames, told = frames_of(parted(wall(6, 5), 4, 3, settlement=0.05))
+    # Four seconds of path, half a second before three frames of the fall, and the end.
+    assert len(frames) == 100 + 12 + 3 + 20
+    assert told == [(k + 1, len(frames)) for k in range(len(frames))]
+    differs = [bool((a != b).any()) for a, b in pairwise(frames)]
+    assert all(differs[:99])
+    assert not any(differs[99:111])
+    assert all(differs[111:114])
+    assert not any(differs[114:])
 
 
-def test_frames_of_the_fall_end_where_nothing_moves(monkeypatch):
+def test_the_caption_of_a_frame_is_of_the_frame(monkeypatch):
+    told = []
+    composed = Sheet.composed
+    monkeypatch.setattr(Sheet, "composed", lambda *a, **k: told.append(k["title"]) or composed(*a, **k))
+    frames_of(parted(wall(6, 5), 4, 3, settlement=0.05))
+    settlements = [float(title.split()[1]) for title in told if "Reaction" in title]
+    np.testing.assert_allclose(settlements, np.linspace(0.0, 50.0, 100), atol=0.006)
+
+
+def test_frames_of_the_fall_end_where_nothing_moves():
     falling = parted(wall(6, 5), 4, 3)
     resting = replace(falling, increments=(*falling.increments, *[falling.increments[-1]] * 9))
-    holds, _, told = drawn_frames(falling, monkeypatch)
-    assert drawn_frames(resting, monkeypatch)[::2] == (holds, told)
+    assert frames_of(resting)[1] == frames_of(falling)[1]
 
 
 def test_the_film_has_the_tints_and_dots_of_the_mechanism(tmp_path):

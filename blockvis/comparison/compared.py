@@ -1,0 +1,250 @@
+"""What two runs have in common and what parts them: keys of their cases, numbers, and cracks at the same settlement."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solver
+from blockvis.dynamics.fall import Fall
+from blockvis.pictures.captions import parameter_text
+from blockvis.pictures.film import state_at
+from blockvis.report.page import summary_rows
+from blockvis.results.cracks import Crack, cracks_of
+from blockvis.results.fall_files import stored_fall
+from blockvis.results.folder import stored_case
+from blockvis.results.joints import initial_joints
+from blockvis.runs.reopen import open_results
+from blockvis.text import force_text
+
+#: Cracks that the table lists, the widest first.
+MOST_CRACKS = 10
+
+#: How many settlements have pictures side by side: the last that both reach, and even parts of it.
+STATIONS = 3
+
+#: Layouts are the same where no corner is farther off than this, in block sizes.
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Side:
+    """One of the two runs.
+
+    Attributes
+    ----------
+    label : str
+        What tables and pictures call it.
+    folder : Path
+    response : solver.Response
+        With an increment in equilibrium at least.
+    fall : Fall, optional
+    case : dict
+        Values of its case by key, as "material.friction_coefficient".
+    """
+
+    label: str
+    folder: Path
+    response: solver.Response
+    fall: Fall | None
+    case: dict[str, str]
+
+    @property
+    def end(self) -> float:
+        """Parameter of the last equilibrium, over all phases [m or rad]."""
+        return float(self.response.parameters[-1])
+
+    def measured_at(self, at: float) -> str:
+        """Write what is measured at a parameter over all phases, between two increments on the line between theirs.
+
+        Parameters
+        ----------
+        at : float [m or rad]
+        """
+        value = float(np.interp(at, self.response.parameters, self.response.values))
+        measured = self.response.measured
+        return force_text(value, measured.unit == "N·m") if measured.is_force else f"{value:.5g}"
+
+    def state(self, at: float) -> solver.Increment:
+        """Give the state at a parameter over all phases [m or rad], the last beyond the end."""
+        return state_at(self.response, min(at, self.end))
+
+
+@dataclass(frozen=True)
+class CrackPair:
+    """The same crack in two runs.
+
+    Attributes
+    ----------
+    place : str
+        The two blocks that part most, in the run where it is wider.
+    widths : (float, float) [m]
+        0 where the run has none there.
+    """
+
+    place: str
+    widths: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two runs of the same kind of analysis.
+
+    Attributes
+    ----------
+    sides : (Side, Side)
+    """
+
+    sides: tuple[Side, Side]
+
+    @property
+    def is_path(self) -> bool:
+        """Whether there are states one after another; limit loads stand by themselves."""
+        return self.sides[0].response.parameter.is_path
+
+    @property
+    def common_end(self) -> float:
+        """The last parameter, over all phases, at which both are in equilibrium [m or rad]."""
+        return min(side.end for side in self.sides)
+
+    @property
+    def stations(self) -> np.ndarray:
+        """(n,) array [m or rad]: parameters at which pictures stand side by side."""
+        if self.common_end <= 0.0:
+            return np.zeros(1)
+        return self.common_end * np.arange(1, STATIONS + 1) / STATIONS
+
+    def place_text(self, at: float) -> str:
+        """Write a parameter with its name and unit.
+
+        Parameters
+        ----------
+        at : float [m or rad]
+        """
+        response = max(self.sides, key=lambda side: side.end).response
+        return f"{response.parameter.name} {parameter_text(at, response)}"
+
+    def changed_keys(self) -> list[tuple[str, str, str]]:
+        """List the keys of the cases whose values differ, with both."""
+        one, other = (side.case for side in self.sides)
+        keys = dict.fromkeys([*one, *other])
+        return [(key, one.get(key, "–"), other.get(key, "–")) for key in keys if one.get(key) != other.get(key)]
+
+    def rows(self) -> list[tuple[str, str, str]]:
+        """List the numbers of both runs under one name, as the report of each has them."""
+        tables = [dict(summary_rows(side.response, side.fall)) for side in self.sides]
+        one, other = tables
+        rows = [(name, one.get(name, "–"), other.get(name, "–")) for name in dict.fromkeys([*one, *other])]
+        if self.is_path:
+            name = self.sides[0].response.measured.name
+            for at in self.stations.tolist():
+                first, second = (side.measured_at(at) for side in self.sides)
+                rows.append((f"{name} at {self.place_text(at)}", first, second))
+        return rows
+
+    def same_layout(self) -> bool:
+        """Whether both have the same blocks in the same places."""
+        one, other = (side.response.assembly for side in self.sides)
+        if one.names != other.names or one.vertices.shape != other.vertices.shape:
+            return False
+        return bool(np.abs(one.vertices - other.vertices).max() <= SAME * one.block_size)
+
+    def cracks(self, at: float) -> list[CrackPair]:
+        """Pair the crack lines of both at a parameter, the widest first.
+
+        Parameters
+        ----------
+        at : float [m or rad]
+            Over all phases.
+
+        Notes
+        -----
+        Lines of one layout are the same where they share joints, and those of two layouts where they are widest at
+        the joint of the same two blocks.
+        """
+        found = [_cracks_at(side, at) for side in self.sides]
+        alike = self.same_layout()
+        pairs, taken = [], set()
+        for crack in found[0]:
+            match = next((k for k, c in enumerate(found[1]) if k not in taken and _is_same(crack, c, alike)), None)
+            if match is not None:
+                taken.add(match)
+            width = found[1][match].width if match is not None else 0.0
+            place = crack.widest if match is None or crack.width >= width else found[1][match].widest
+            pairs.append(CrackPair(place, (crack.width, width)))
+        pairs += [CrackPair(crack.widest, (0.0, crack.width)) for k, crack in enumerate(found[1]) if k not in taken]
+        return sorted(pairs, key=lambda pair: -max(pair.widths))[:MOST_CRACKS]
+
+
+def compared(one: str | Path, other: str | Path) -> Comparison:
+    """Open two results folders for a comparison.
+
+    Parameters
+    ----------
+    one, other : str or Path
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    ValueError
+        If a folder holds no results or no equilibrium, if both are the same, or if what they run over differs.
+    """
+    folders = Path(one), Path(other)
+    if folders[0].resolve() == folders[1].resolve():
+        raise ValueError(f"'{one}' and '{other}' are the same folder; give the results of two runs")
+    first, second = (_opened(folder, label) for folder, label in zip(folders, _labels(*folders), strict=True))
+    for what in ("parameter", "measured"):
+        names = [getattr(side.response, what).name for side in (first, second)]
+        if names[0] != names[1]:
+            raise ValueError(
+                f"'{one}' and '{other}' share no axis: the {what} is {names[0]} in one and {names[1]} in the other; "
+                "compare two runs of the same kind of analysis"
+            )
+    return Comparison((first, second))
+
+
+def _opened(folder: Path, label: str) -> Side:
+    response = open_results(folder)
+    if not response.path:
+        raise ValueError(f"'{folder}' has no equilibrium to compare: {response.message or response.stop}")
+    text = stored_case(folder)
+    return Side(label, folder, response, stored_fall(folder), dict(_flat(tomllib.loads(text))) if text else {})
+
+
+def _labels(one: Path, other: Path) -> tuple[str, str]:
+    """Name two folders apart as shortly as can be."""
+    parts = [folder.resolve().parts for folder in (one, other)]
+    depth = next(n for n in range(1, max(map(len, parts)) + 1) if parts[0][-n:] != parts[1][-n:])
+    return "/".join(parts[0][-depth:]), "/".join(parts[1][-depth:])
+
+
+def _flat(values: Any, name: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the values of a table of TOML with the keys that lead to them."""
+    if isinstance(values, Mapping):
+        for key, value in values.items():
+            yield from _flat(value, f"{name}.{key}" if name else str(key))
+    elif isinstance(values, list) and values and all(isinstance(value, Mapping) for value in values):
+        for number, value in enumerate(values, start=1):
+            yield from _flat(value, f"{name} {number}")
+    else:
+        yield name, str(values)
+
+
+def _cracks_at(side: Side, at: float) -> list[Crack]:
+    state = side.state(at)
+    assembly = side.response.assembly
+    return cracks_of(assembly, state.pose, initial_joints(assembly), state.fallen)
+
+
+def _is_same(crack: Crack, other: Crack, same_layout: bool) -> bool:
+    if same_layout:
+        return bool(np.isin(crack.joints, other.joints).any())
+    return set(crack.widest.split(" | ")) == set(other.widest.split(" | "))

@@ -1,0 +1,229 @@
+"""Two runs in pictures: their curves in one plot, their blocks side by side, and a film in step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image, ImageDraw
+
+from blockvis.pictures import palette
+from blockvis.pictures.captions import force_unit, parameter_label, parameter_unit, value_label
+from blockvis.pictures.curves import TEXT
+from blockvis.pictures.drawer import Drawer, Look
+from blockvis.pictures.film import END, PAUSE
+from blockvis.pictures.frame import fitting_font, framed
+from blockvis.pictures.swing import shown_increments
+from blockvis.pictures.video import write_film
+from blockvis.system.atomic_files import atomic_file
+
+from .compared import Comparison, Side
+
+#: Colours and lines of the two curves, told apart without colour, too.
+COLOURS, LINES = (palette.FORCE, palette.OPEN), ("-", "--")
+
+#: Width and height of the picture of one run [pixels], beside each other or, of wide structures, below each other.
+TALL_PANEL, WIDE_PANEL = (800, 620), (1280, 480)
+
+#: Structures wider than this for their height stand below each other.
+WIDE = 1.8
+
+#: Height of the strip with the name of the run [pixels].
+STRIP = 40
+
+
+def draw_curves(comparison: Comparison, path: Path) -> Path:
+    """Draw both curves in one plot, with where each collapses.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    path : Path
+    """
+    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    axes = figure.add_subplot()
+    longest = max(comparison.sides, key=lambda side: side.end).response
+    per_length, _ = parameter_unit(longest)
+    largest = max((side.response for side in comparison.sides), key=lambda r: float(np.nanmax(np.abs(r.values))))
+    factor, _ = force_unit(largest)
+    for side, colour, line in zip(comparison.sides, COLOURS, LINES, strict=True):
+        response, ink = side.response, palette.hexadecimal(colour)
+        x, y = response.parameters * per_length, response.values / factor
+        marker = "o" if len(x) == 1 or not comparison.is_path else ""
+        axes.plot(x, y, line, marker=marker, color=ink, linewidth=2.0, label=side.label)
+        if response.collapse is not None:
+            axes.plot(x[-1:], y[-1:], "X", color=ink, markersize=9)
+            axes.axvline(x[-1], color=ink, linewidth=1.0, linestyle=":")
+    axes.set_xlabel(parameter_label(longest) or "limit load", fontsize=TEXT)
+    axes.set_ylabel(value_label(largest), fontsize=TEXT)
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    axes.ticklabel_format(useOffset=False, style="plain")
+    axes.grid(color="#e4e4e4", linewidth=0.8)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=2, fontsize=TEXT, frameon=False)
+    with atomic_file(path) as partial:
+        figure.savefig(partial, dpi=200)
+    return path
+
+
+class Pair:
+    """What draws both runs in one picture.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    look : Look
+    falls : bool
+        Whether the falls are drawn, which the frame then holds.
+    """
+
+    def __init__(self, comparison: Comparison, look: Look, *, falls: bool = False) -> None:
+        self.sides = comparison.sides
+        self._below = all(_aspect(side) > WIDE for side in self.sides)
+        self._panel = WIDE_PANEL if self._below else TALL_PANEL
+        self.drawers = [
+            Drawer(
+                side.response,
+                look,
+                self._panel,
+                side.response.path if falls and side.fall is not None else shown_increments(side.response),
+                fall=side.fall if falls else None,
+            )
+            for side in self.sides
+        ]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of a picture of both [pixels]."""
+        width, height = self._panel[0], self._panel[1] + STRIP
+        return (width, 2 * height) if self._below else (2 * width, height)
+
+    def picture(self, images: list[Image.Image]) -> Image.Image:
+        """Put the pictures of both beside or below each other, each under its name.
+
+        Parameters
+        ----------
+        images : list of PIL.Image.Image
+        """
+        page = Image.new("RGB", self.size, palette.PAPER)
+        draw = ImageDraw.Draw(page)
+        width, height = self._panel
+        for k, (side, image, colour) in enumerate(zip(self.sides, images, COLOURS, strict=True)):
+            left, top = (0, k * (height + STRIP)) if self._below else (k * width, 0)
+            draw.rectangle((left, top, left + width, top + STRIP - 8), fill=colour)
+            font = fitting_font(side.label, STRIP // 2, width - 24, bold=True)
+            draw.text((left + 12, top + STRIP // 2 - 4), side.label, font=font, fill=palette.PAPER, anchor="lm")
+            page.paste(image, (left, top + STRIP))
+        return page
+
+    def at(self, parameter: float, *, widths: bool = False) -> Image.Image:
+        """Draw both at a parameter over all phases [m or rad].
+
+        Parameters
+        ----------
+        parameter : float [m or rad]
+        widths : bool
+            Write the widths of the main cracks.
+        """
+        return self.picture(
+            [
+                drawer.picture(side.state(parameter), widths=widths)
+                for side, drawer in zip(self.sides, self.drawers, strict=True)
+            ]
+        )
+
+
+def draw_stations(comparison: Comparison, path: Path) -> Path:
+    """Draw both at the same settlements, one row below the other.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    path : Path
+    """
+    pair = Pair(comparison, Look(forces="none"))
+    rows = [pair.at(at, widths=True) for at in comparison.stations.tolist()]
+    page = Image.new("RGB", (pair.size[0], sum(row.height for row in rows)), palette.PAPER)
+    for k, row in enumerate(rows):
+        page.paste(row, (0, k * row.height))
+    with atomic_file(path) as partial:
+        page.save(partial, format="PNG")
+    return path
+
+
+def film_in_step(
+    comparison: Comparison,
+    path: Path,
+    *,
+    fps: float = 25.0,
+    seconds: float = 6.0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Write a film of both at the same settlements; the one that collapses first falls while the other goes on.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Of two paths.
+    path : Path
+        Ending in .mp4, .gif or .webp.
+    fps : float
+        Frames per second.
+    seconds : float [s]
+        For the path to the last equilibrium of both.
+    progress : callable, optional
+        Called with the frames drawn and their number.
+    """
+    pair = Pair(comparison, Look(colour_by="mechanism"), falls=True)
+    end = max(side.end for side in comparison.sides)
+    longest = max(_seconds(side, end, seconds) for side in comparison.sides)
+    count = max(2, int(np.ceil((longest + PAUSE + END) * fps)))
+
+    def pictures() -> Iterator[Image.Image]:
+        last: list[Image.Image | None] = [None, None]
+        shown: list[object] = [None, None]
+        for frame in range(count):
+            time = frame / fps
+            for k, (side, drawer) in enumerate(zip(comparison.sides, pair.drawers, strict=True)):
+                moment = _moment(side, time, end, seconds)
+                if moment != shown[k] or last[k] is None:
+                    last[k], shown[k] = _drawn(side, drawer, moment), moment
+            if progress is not None:
+                progress(frame + 1, count)
+            yield pair.picture([image for image in last if image is not None])
+
+    return write_film(pictures(), path, size=pair.size, fps=fps)
+
+
+def _aspect(side: Side) -> float:
+    width, height = framed(side.response.assembly, [side.response.path[0].pose]).size[[0, -1]]
+    return float(width / height)
+
+
+def _arrival(side: Side, end: float, seconds: float) -> float:
+    """Seconds after which a run is at its last equilibrium."""
+    return seconds * side.end / end if end > 0.0 else 0.0
+
+
+def _seconds(side: Side, end: float, seconds: float) -> float:
+    falls = 0.0 if side.fall is None else PAUSE + float(side.fall.times[-1])
+    return max(_arrival(side, end, seconds) + falls, seconds)
+
+
+def _moment(side: Side, time: float, end: float, seconds: float) -> tuple[str, float]:
+    """Give what a run shows at a time of the film: a place on its path, or a moment of its fall."""
+    arrival = _arrival(side, end, seconds)
+    if time < arrival:
+        return "path", end * time / seconds
+    if side.fall is None or time < arrival + PAUSE:
+        return "path", side.end
+    return "fall", min(time - arrival - PAUSE, float(side.fall.times[-1]))
+
+
+def _drawn(side: Side, drawer: Drawer, moment: tuple[str, float]) -> Image.Image:
+    what, at = moment
+    if what == "fall":
+        return drawer.falling_picture(at)
+    return drawer.picture(side.state(at))

@@ -1,0 +1,101 @@
+"""Two runs side by side, by ``blockvis compare`` and its files."""
+
+import re
+from html import unescape
+from pathlib import Path
+
+import numpy as np
+import pytest
+from structures import arch_response, pixels
+
+import blockvis
+import solver
+from blockvis import generators
+from blockvis.cli import main
+from blockvis.pictures import palette
+
+CASE = Path(__file__).parents[2] / "examples" / "semicircular_arch.toml"
+
+
+@pytest.fixture
+def other(tmp_path):
+    """Results of the same arch whose springer sinks as well."""
+    arch = generators.arch()
+    settlement = solver.Settlement((1, -0.5), increment=0.02, limit=0.06)
+    response = solver.Structure(arch, friction_coefficient=2.0).settle(settlement)
+    return blockvis.write(response, tmp_path / "sinking")
+
+
+def table(page, name):
+    rows = re.search(rf'<table id="{name}">(.*?)</table>', page, re.S).group(1).split("</tr>")
+    return {
+        unescape(cells[0]): cells[1:] for cells in (re.findall(r"<t[hd]>(.*?)</t[hd]>", row) for row in rows) if cells
+    }
+
+
+def test_numbers_curves_and_cracks_stand_side_by_side(arch_results, other, tmp_path, capsys):
+    out = tmp_path / "both"
+    assert main(["compare", str(arch_results), str(other), "-o", str(out), "--animation", "none"]) == 0
+    assert f"compared in {out}/: compare.html, curves.png, side_by_side.png" in capsys.readouterr().out
+    page = (out / "compare.html").read_text(encoding="utf-8")
+    numbers = table(page, "numbers")
+    assert numbers[""] == ["out", "sinking"]
+    assert numbers["status"] == ["collapsed", "limit reached"]
+    one, two = arch_response(), blockvis.open_results(other)
+    # At the last settlement that both reach, on the line between two increments.
+    expected = [np.interp(0.06, r.parameters, r.values) for r in (one, two)]
+    told = next(cells for name, cells in numbers.items() if name.endswith("0.0600 m"))
+    assert [float(cell.removesuffix(" kN")) * 1e3 for cell in told] == pytest.approx(expected, rel=5e-4)
+    cracks = table(page, "cracks")
+    assert all(cell.endswith(" mm") for cell in cracks["voussoirs 6 | voussoirs 7"])
+    curves = pixels(out / "curves.png")
+    for colour in (palette.FORCE, palette.OPEN):
+        assert (np.abs(curves - np.array(colour)).sum(axis=2) == 0).sum() > 1000
+
+
+@pytest.mark.slow
+def test_what_the_cases_differ_in_is_told(tmp_path):
+    folders = []
+    for friction in ("1.5", "2.0"):
+        folders.append(tmp_path / friction)
+        changes = [f"material.friction_coefficient={friction}", "settlement.limit=0.02", "output.animation=false"]
+        blockvis.run_case(blockvis.read_case(CASE, changes=changes), folders[-1], outputs=())
+    assert main(["compare", *map(str, folders), "-o", str(tmp_path / "both"), "--animation", "none"]) == 0
+    page = (tmp_path / "both" / "compare.html").read_text(encoding="utf-8")
+    assert table(page, "keys") == {"": ["1.5", "2.0"], "material.friction_coefficient": ["1.5", "2.0"]}
+
+
+@pytest.mark.slow
+def test_the_film_goes_in_step(arch_results, other, tmp_path):
+    import imageio.v2 as imageio
+
+    out = tmp_path / "both"
+    assert main(["compare", str(arch_results), str(other), "-o", str(out)]) == 0
+    with imageio.get_reader(out / "compare.mp4") as film:
+        frames = [np.asarray(frame).astype(int) for frame in film]
+    assert film.get_meta_data()["fps"] == 25
+    # The sinking arch stops at less than half of the way of the other, which moves to its end.
+    half = len(frames[0]) // 2
+    at_rest = [np.abs(frames[k][half:] - frames[k + 1][half:]).max() < 30 for k in (20, 100)]
+    moving = [np.abs(frames[k][:half] - frames[k + 1][:half]).max() > 30 for k in (20, 100)]
+    assert at_rest == [False, True]
+    assert moving == [True, True]
+
+
+def test_what_cannot_be_compared_is_refused_in_one_line(arch_results, tmp_path, capsys):
+    limit = solver.Structure(generators.arch(), friction_coefficient=2.0).limit_load(acceleration=(1, 0))
+    standing = blockvis.write(limit.response, tmp_path / "limit")
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    for other, words in (
+        (arch_results, "are the same folder; give the results of two runs"),
+        (standing, "share no axis"),
+        (empty, "holds no results"),
+    ):
+        assert main(["compare", str(arch_results), str(other), "-o", str(tmp_path / "both")]) == 2
+        message = capsys.readouterr().err
+        assert words in message
+        assert message.count("\n") == 1
+    assert not (tmp_path / "both").exists()
+    assert main(["compare", str(arch_results), str(standing), "-o", str(arch_results)]) == 2
+    assert "holds results already" in capsys.readouterr().err
