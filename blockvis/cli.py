@@ -207,7 +207,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
-    for add in (_add_bond, _add_compare, _add_explain, _add_sweep, _add_new, _add_schema):
+    for add in (_add_bond, _add_compare, _add_report, _add_explain, _add_sweep, _add_new, _add_schema):
         add(verbs)
     completion = verbs.add_parser(
         "completion",
@@ -316,6 +316,13 @@ def _add_compare(verbs: Any) -> None:
     compare.add_argument("--animation", default="compare.mp4", help=".mp4, .gif or .webp in the folder; none to skip")
     compare.add_argument("--force", action="store_true", help="replace a comparison that is there already")
     compare.set_defaults(verb=_compare)
+
+
+def _add_report(verbs: Any) -> None:
+    report = verbs.add_parser("report", help="the report of a results folder again, as a page or on paper")
+    report.add_argument("results", metavar="OUT")
+    report.add_argument("--pdf", action="store_true", help="write report.pdf, A4, as well")
+    report.set_defaults(verb=_report)
 
 
 def _add_explain(verbs: Any) -> None:
@@ -836,6 +843,34 @@ def _render(options: argparse.Namespace) -> int:
             progress.done()
         drawn.append(options.animation)
     print(f"drawn in {folder}/: {', '.join(drawn)}")
+    return 0
+
+
+def _report(options: argparse.Namespace) -> int:
+    from .runs.reopen import open_results
+
+    folder = Path(options.results)
+    response = open_results(folder)
+    fall = _write_report(response, folder)
+    written = ["report.html"]
+    if options.pdf:
+        from .report.pdf import write_pdf
+        from .results.folder import stored_case
+        from .results.reaction_range import stored_range
+        from .runs.step_check import stored_check
+        from .runs.underlay import stored_underlay
+
+        write_pdf(
+            response,
+            folder / "report.pdf",
+            stored_case(folder),
+            fall=fall,
+            error=str(stored_check(folder) or ""),
+            band=stored_range(folder),
+            underlay=stored_underlay(folder),
+        )
+        written.append("report.pdf")
+    print(f"written in {folder}/: {', '.join(written)}")
     return 0
 
 

@@ -136,9 +136,9 @@ def _error(error: str) -> str:
     return html_rows([(name, value)]) if error else ERROR_UNKNOWN
 
 
-def _band(band: ReactionRange | None) -> str:
+def range_rows(band: ReactionRange | None) -> list[tuple[str, str]]:
     """Say what the band behind the curve is."""
-    return "" if band is None else html_rows([("band behind the curve", f"{band.runs.max(initial=0)} runs: {WORDS}")])
+    return [] if band is None else [("band behind the curve", f"{band.runs.max(initial=0)} runs: {WORDS}")]
 
 
 def report_html(
@@ -176,8 +176,8 @@ def report_html(
         turning=TURNING if response.assembly.dimension == 3 else "Shift with the arrows moves the picture",
         summary=html_rows(summary_rows(response, fall)),
         cracks=_cracks(response),
-        certificate=html_rows(_certificate(response)),
-        error=_error(error) + _band(band),
+        certificate=html_rows(certificate_rows(response)),
+        error=_error(error) + html_rows(range_rows(band)),
         case=html.escape(case_text or "no case file: the analysis was called from Python"),
         case_open=" open" if case_text else "",
         model=data,
@@ -429,7 +429,8 @@ def summary_rows(response: solver.Response, fall: Fall | None = None) -> list[tu
     return rows
 
 
-def _certificate(response: solver.Response) -> list[tuple[str, str]]:
+def certificate_rows(response: solver.Response) -> list[tuple[str, str]]:
+    """List the largest residuals of all equilibria, in words and with their units."""
     worst = mechanics.worst_of(i.certificate for i in response.path or response.increments)
     if worst is None:
         return []

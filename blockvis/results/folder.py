@@ -44,7 +44,7 @@ _LISTS = (
 )
 _STARTED = (RECORD, CHECKPOINT, "assembly.npz")
 _PICTURES = (
-    *("report.html", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
+    *("report.html", "report.pdf", "curve.png", "curve.svg", "mechanism.png", "last.png", "paraview_colours.py"),
     *(f"collapse{suffix}" for suffix in VIDEO_SUFFIXES),
 )
 

@@ -1,0 +1,237 @@
+"""Report on paper: an A4 document with the pictures, the curve, and the tables of the numbers and the cracks."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import matplotlib
+import numpy as np
+from fpdf import FPDF, FontFace
+from fpdf.enums import TableBordersLayout
+
+import solver
+from blockvis.dynamics.fall import Fall
+from blockvis.pictures import palette
+from blockvis.pictures.captions import failure_text, parameter_text
+from blockvis.pictures.curves import draw_curve
+from blockvis.pictures.render import draw_mechanism, draw_still
+from blockvis.pictures.underlay import Underlay
+from blockvis.results.about import about
+from blockvis.results.cracks import Crack, cracks_of
+from blockvis.results.reaction_range import ReactionRange
+from blockvis.system.atomic_files import write_atomic
+from blockvis.text import force_text
+
+from .page import certificate_rows, headline_of, range_rows, summary_rows
+
+#: Width of the text, margin and height of a line [mm]; size of the text [points].
+WIDTH, MARGIN, LINE, TEXT = 174.0, 18.0, 5.2, 9.5
+
+#: Height of a picture and its heading [mm].
+PICTURE = 110.0
+
+#: Cracks and states that the tables list.
+MOST_CRACKS, MOST_STATES = 20, 16
+
+#: Longest case that is printed [lines].
+MOST_LINES = 120
+
+
+def write_pdf(
+    response: solver.Response,
+    path: str | os.PathLike[str],
+    case_text: str = "",
+    *,
+    fall: Fall | None = None,
+    error: str = "",
+    band: ReactionRange | None = None,
+    underlay: Underlay | None = None,
+) -> Path:
+    """Write the report as a document of A4 pages.
+
+    Parameters
+    ----------
+    response : solver.Response
+    path : path
+    case_text : str
+        The case file, shown as it is.
+    fall : Fall, optional
+        What comes after the last equilibrium.
+    error : str
+        What of and how large, "error of the steps: reaction ± 0.2 %".
+    band : ReactionRange, optional
+        Of the reaction, drawn behind the curve.
+    underlay : Underlay, optional
+        A photograph under blocks in the plane.
+
+    Returns
+    -------
+    pathlib.Path
+
+    Raises
+    ------
+    ValueError
+        If there is no increment to show.
+    """
+    if not response.increments:
+        raise ValueError(f"there is no increment to show: {response.message or response.stop}")
+    origin = about(response)
+    paper = _Paper(f"{origin.name} · {origin.version}".strip(" ·"))
+    # A number and its unit stay on one line.
+    title = re.sub(r"(?<=\d) (?=\S)", "\N{NO-BREAK SPACE}", headline_of(response))
+    paper.heading(" · ".join(filter(None, (origin.name, title))), 15.0)
+    paper.faint(" · ".join(filter(None, (origin.file, origin.finished, origin.version))))
+    if response.stop is solver.Status.SOLVER_FAILED:
+        paper.warning(failure_text(response))
+    with TemporaryDirectory() as folder:
+        paper.picture(draw_mechanism(response, Path(folder) / "mechanism.png", underlay=underlay))
+        name, _, value = error.partition(": ")
+        rows = [*summary_rows(response, fall), *([(name, value)] if value else []), *range_rows(band)]
+        paper.tabulate("Numbers", ("", ""), rows, (62.0, 112.0))
+        if response.path:
+            last = response.path[-1]
+            paper.heading("Last equilibrium" if response.parameter.is_path else "Last state", 12.0, PICTURE)
+            paper.picture(draw_still(response, last, Path(folder) / "last.png", underlay=underlay))
+            paper.heading("Curve", 12.0, PICTURE)
+            paper.picture(draw_curve(response, Path(folder) / "curve.png", band=band), 140.0)
+            paper.tabulate("States", *_states(response))
+            cracks = cracks_of(response.assembly, last.pose, fallen=last.fallen)
+            if cracks:
+                paper.tabulate("Cracks at the last equilibrium", *_crack_table(cracks))
+    certificate = certificate_rows(response)
+    if certificate:
+        paper.tabulate("Certificate", ("", ""), certificate, (112.0, 62.0))
+    for note in dict.fromkeys(response.notes):
+        paper.note(note)
+    if case_text:
+        paper.listing("Case", case_text)
+    return write_atomic(path, paper.output())
+
+
+def _states(response: solver.Response) -> tuple[Sequence[str], list[tuple[str, ...]], Sequence[float]]:
+    """Give head, rows and widths [mm] of the table of the path, evenly thinned."""
+    path, weight = response.path, response.total_weight
+    chosen = np.unique(np.linspace(0, len(path) - 1, min(len(path), MOST_STATES)).round().astype(int))
+    measured = response.measured
+    head = [response.parameter.name, measured.name, "of the weight W" if measured.is_force else ""]
+    rows: list[tuple[str, ...]] = []
+    for k in chosen.tolist():
+        increment = path[k]
+        moment = measured.unit == "N·m"
+        value = force_text(increment.measured, moment) if measured.is_force else f"{increment.measured:.5g}"
+        share = f"{increment.measured / weight:.4f}" if measured.is_force and not moment else ""
+        place = parameter_text(increment.parameter, response)
+        several = len(response.settlements) > 1
+        rows.append((f"{place}, phase {increment.phase + 1}" if several else place, value, share))
+    return head, rows, (58.0, 58.0, 58.0)
+
+
+def _crack_table(cracks: Sequence[Crack]) -> tuple[Sequence[str], list[tuple[str, ...]], Sequence[float]]:
+    """Give head, rows and widths [mm] of the table of cracks, the widest first."""
+    plane = len(cracks[0].at) == 2
+    head = ("", "widest", "between", "length" if plane else "area", "inclined", "from", "to [m]")
+    rows = []
+    for number, crack in enumerate(cracks[:MOST_CRACKS], start=1):
+        ends = [", ".join(f"{x:.2f}" for x in end + 0.0) for end in crack.ends]
+        size = f"{crack.size:.3g} {'m' if plane else 'm²'}"
+        rows.append(
+            (str(number), f"{1e3 * crack.width:.3g} mm", crack.widest, size, f"{crack.inclination:.0f}°", *ends)
+        )
+    if len(cracks) > MOST_CRACKS:
+        rows.append(("", "", f"and {len(cracks) - MOST_CRACKS} narrower ones", "", "", "", ""))
+    return head, rows, (8.0, 20.0, 56.0, 18.0, 16.0, 28.0, 28.0)
+
+
+class _Paper(FPDF):
+    """A4 pages with the words of a document at their foot.
+
+    Parameters
+    ----------
+    foot : str
+    """
+
+    def __init__(self, foot: str) -> None:
+        super().__init__(format="A4")
+        self._foot = foot
+        # matplotlib ships the DejaVu fonts, so pages look the same on every machine.
+        fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+        self.add_font("text", "", fonts / "DejaVuSans.ttf")
+        self.add_font("text", "B", fonts / "DejaVuSans-Bold.ttf")
+        self.add_font("code", "", fonts / "DejaVuSansMono.ttf")
+        self.set_margins(MARGIN, MARGIN, MARGIN)
+        self.set_auto_page_break(True, MARGIN)
+        self.add_page()
+
+    def footer(self) -> None:
+        """Write the number of the page and what the document is of."""
+        self.set_y(-12.0)
+        self._write(self._foot, 7.5, palette.FAINT, align="L", ends=False)
+        self.set_y(-12.0)
+        self._write(f"{self.page_no()} of {{nb}}", 7.5, palette.FAINT, align="R", ends=False)
+
+    def _write(
+        self, text: str, size: float, colour: tuple[int, int, int], *, bold: bool = False, align: str = "L",
+        ends: bool = True,
+    ) -> None:  # fmt: skip
+        self.set_font("text", "B" if bold else "", size)
+        self.set_text_color(*colour)
+        if ends:
+            self.multi_cell(WIDTH, size * 0.5, text, align=align, new_x="LMARGIN", new_y="NEXT")
+        else:
+            self.cell(WIDTH, LINE, text, align=align)
+
+    def heading(self, text: str, size: float, follows: float = 30.0) -> None:
+        """Write a heading, on the next page where what follows, so high [mm], does not fit below it."""
+        if self.get_y() > self.h - MARGIN - follows:
+            self.add_page()
+        self.ln(2.0)
+        self._write(text, size, palette.INK, bold=True)
+        self.ln(1.0)
+
+    def faint(self, text: str) -> None:
+        """Write a line of small grey text."""
+        self._write(text, 8.0, palette.FAINT)
+        self.ln(2.0)
+
+    def warning(self, text: str) -> None:
+        """Write a red line."""
+        self._write(text, TEXT, palette.WARNING, bold=True)
+        self.ln(2.0)
+
+    def note(self, text: str) -> None:
+        """Write a note."""
+        self.ln(1.0)
+        self._write(f"Note: {text}", TEXT, palette.INK)
+
+    def picture(self, path: Path, width: float = WIDTH) -> None:
+        """Place a picture of a width [mm], on the next page where it does not fit."""
+        self.image(path, x=MARGIN + (WIDTH - width) / 2.0, w=width)
+        self.ln(2.0)
+
+    def tabulate(self, title: str, head: Sequence[str], rows: Sequence[Sequence[str]], widths: Sequence[float]) -> None:
+        """Write a table, whose head is repeated on each page."""
+        self.heading(title, 12.0)
+        self.set_font("text", "", 8.0)
+        self.set_text_color(*palette.INK)
+        self.set_draw_color(*palette.GHOST)
+        with self.table(
+            col_widths=tuple(widths), width=WIDTH, line_height=LINE, text_align="LEFT", align="LEFT",
+            borders_layout=TableBordersLayout.HORIZONTAL_LINES, first_row_as_headings=any(head),
+            headings_style=FontFace(emphasis="BOLD"),
+        ) as table:  # fmt: skip
+            for cells in ([head] if any(head) else []) + list(rows):
+                table.row(cells)
+        self.ln(2.0)
+
+    def listing(self, title: str, text: str) -> None:
+        """Write lines as they are, in letters of one width."""
+        self.heading(title, 12.0)
+        lines = text.splitlines()
+        self.set_font("code", "", 7.5)
+        self.set_text_color(*palette.INK)
+        shown = lines[:MOST_LINES] + ([f"... {len(lines) - MOST_LINES} more lines"] if len(lines) > MOST_LINES else [])
+        self.multi_cell(WIDTH, 3.6, "\n".join(shown), align="L", new_x="LMARGIN", new_y="NEXT")
