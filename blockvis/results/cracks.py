@@ -1,4 +1,4 @@
-"""Crack lines: joints that meet and have parted or slid, with their largest width, their inclination and ends."""
+"""Cracks: courses of joints that meet and have parted or slid, with their width, their inclination and their ends."""
 
 from __future__ import annotations
 
@@ -9,19 +9,23 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import shapely
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import ConvexHull
 
 import solver
 
 from .joint_faces import InitialJoints, initial_joints
 from .joints import Faces, carried_faces, opening_and_slip
+from .places import Places
 
 #: A joint is open from this fraction of the block size on; on an ordinary brick it is a tenth of a millimetre.
 SMALLEST_OPENING = 1e-3
 
 #: Joints meet where they come this near to each other, in block sizes.
 MEETING = 0.02
+
+#: A crack turns where it leaves a straight line by more than this, in block sizes: the steps of a bond do not.
+TURN = 1.5
 
 #: Most crack lines that a summary lists, the widest first.
 MOST_LISTED = 100
@@ -35,7 +39,9 @@ MANY = 100
 
 @dataclass(frozen=True)
 class Crack:
-    """Joints of the layout that meet and have parted or slid, at least one of them open.
+    """A course of joints of the layout that have parted or slid one after another, at least one of them open.
+
+    In space joints that meet and part alike are one crack.
 
     Attributes
     ----------
@@ -53,6 +59,10 @@ class Crack:
         The two ends that are farthest apart in the layout, the lower first.
     size : float
         Length [m] of all its joints together, in space their area [m²].
+    mean_width : float [m]
+        Opening of its joints, by their sizes.
+    places : (str, str)
+        What its two ends are at, as "the top" and "the upper left corner of opening 2"; empty in space.
     """
 
     joints: np.ndarray
@@ -62,6 +72,8 @@ class Crack:
     at: np.ndarray
     ends: np.ndarray
     size: float
+    mean_width: float
+    places: tuple[str, str] = ("", "")
 
     @property
     def inclination(self) -> float:
@@ -82,6 +94,8 @@ class Crack:
             "inclination_degrees": round(self.inclination, 2),
             "length" if len(self.at) == 2 else "area": round(self.size, 6),
             "n_joints": len(self.joints),
+            "mean_width_mm": round(1e3 * self.mean_width, 4),
+            **({"starts_at": self.places[0], "ends_at": self.places[1]} if any(self.places) else {}),
         }
 
 
@@ -91,7 +105,10 @@ def cracks_of(
     joints: InitialJoints | None = None,
     fallen: np.ndarray | None = None,
 ) -> list[Crack]:
-    """Group the joints of the layout that have parted or slid at a pose into crack lines, the widest first.
+    """Trace the cracks of a layout at a pose, the widest first.
+
+    In the plane joints that have parted or slid are followed from end to end along the widest; where cracks fork, the
+    narrower begins anew, and where one turns, another begins.
 
     Parameters
     ----------
@@ -112,9 +129,13 @@ def cracks_of(
     meeting = _meetings(joints, chosen, MEETING * assembly.block_size)
     if assembly.dimension == 3:
         meeting = meeting[:, _part_alike(carried_faces(assembly, joints, pose), joints, chosen[meeting])]
-    graph = sp.coo_array((np.ones(meeting.shape[1]), (meeting[0], meeting[1])), shape=(len(chosen), len(chosen)))
-    count, group = connected_components(graph, directed=False)
-    found = [_crack(assembly, joints, moved, chosen[group == k]) for k in range(count)]
+    if assembly.dimension == 3:
+        found = [_crack(assembly, joints, moved, chosen[group]) for group in _groups(meeting, np.arange(len(chosen)))]
+    else:
+        courses = _courses(joints, moved[chosen, 0], chosen, meeting, assembly.block_size)
+        open_ones = [course for course in courses if moved[course, 0].max() > least]
+        places = Places(assembly) if open_ones else None
+        found = [_crack(assembly, joints, moved, course, places) for course in open_ones]
     return sorted((crack for crack in found if crack.width > least), key=lambda crack: -crack.width)
 
 
@@ -129,25 +150,96 @@ def crack_rows(cracks: Sequence[Crack], most: int) -> list[tuple[str, str]]:
         size = f"{crack.size:.3g} {'m' if len(crack.at) == 2 else 'm²'}"
         words = f"{1e3 * crack.width:.3g} mm at {crack.widest}; {size}, {crack.inclination:.0f}°, "
         words += f"from {first} to {last} m"
+        if set(crack.places) - {"", "inside"}:
+            words += f": {' to '.join(crack.places)}"
         rows.append((f"crack {number}", words))
     if len(cracks) > most:
         rows.append(("and", f"{len(cracks) - most} narrower ones"))
     return rows
 
 
-def _crack(assembly: solver.Assembly, joints: InitialJoints, moved: np.ndarray, chosen: np.ndarray) -> Crack:
+def _groups(meeting: np.ndarray, members: np.ndarray) -> list[np.ndarray]:
+    """List the joints among some that meet directly or through others of them; ``meeting`` as of :func:`_meetings`."""
+    place = np.full(max(int(meeting.max(initial=-1)), int(members.max(initial=-1))) + 1, -1)
+    place[members] = np.arange(len(members))
+    one, other = place[meeting]
+    both = (one >= 0) & (other >= 0)
+    graph = sp.coo_array((np.ones(int(both.sum())), (one[both], other[both])), shape=(len(members), len(members)))
+    count, group = connected_components(graph, directed=False)
+    return [members[group == k] for k in range(count)]
+
+
+def _courses(
+    joints: InitialJoints, openings: np.ndarray, chosen: np.ndarray, meeting: np.ndarray, block_size: float
+) -> list[np.ndarray]:
+    """Part the chosen joints into courses: numbers of joints, one after another from end to end.
+
+    Of joints that meet the course of the largest area of opening comes first; what it leaves is parted again.
+    """
+    middles, sizes = joints.ends[chosen].mean(axis=1), joints.sizes[chosen]
+    # A joint that only slides is part of a course, too.
+    width = np.maximum(openings, 0.0) + 1e-9 * block_size
+    found, left = [], _groups(meeting, np.arange(len(chosen)))
+    while left:
+        members = left.pop()
+        course = _main_course(meeting, width, width * sizes, members)
+        line = shapely.linestrings(middles[course]) if len(course) > 2 else None
+        turns = [] if line is None else shapely.get_coordinates(shapely.simplify(line, TURN * block_size))[1:-1]
+        cuts = [int(np.linalg.norm(middles[course] - turn, axis=1).argmin()) for turn in turns]
+        found += [chosen[part] for part in np.split(course, cuts)]
+        rest = np.setdiff1d(members, course)
+        if len(rest):
+            left += _groups(meeting, rest)
+    return found
+
+
+def _main_course(meeting: np.ndarray, width: np.ndarray, area: np.ndarray, members: np.ndarray) -> np.ndarray:
+    """Order the joints of the course with the largest area of opening among some that all meet through each other.
+
+    The course is the longest path of the tree that joins all by the widest.
+    """
+    n = len(members)
+    place = np.full(len(width), -1)
+    place[members] = np.arange(n)
+    one, other = place[meeting]
+    pairs = (one >= 0) & (other >= 0) & (one < other)
+    one, other = one[pairs], other[pairs]
+    own, area = width[members], area[members]
+    narrow = 2.0 * own.max() - np.minimum(own[one], own[other])
+    tree = minimum_spanning_tree(sp.coo_array((narrow, (one, other)), shape=(n, n))).tocoo()
+    length = (area[tree.row] + area[tree.col]) / 2.0
+    tree = sp.coo_array((length, (tree.row, tree.col)), shape=(n, n)).tocsr()
+    first = int(np.argmax(dijkstra(tree, directed=False, indices=int(area.argmax())) + area / 2.0))
+    far, before = dijkstra(tree, directed=False, indices=first, return_predecessors=True)
+    course = [int(np.argmax(far + area / 2.0))]
+    while before[course[-1]] >= 0:
+        course.append(int(before[course[-1]]))
+    return members[course]
+
+
+def _crack(
+    assembly: solver.Assembly,
+    joints: InitialJoints,
+    moved: np.ndarray,
+    chosen: np.ndarray,
+    places: Places | None = None,
+) -> Crack:
     chosen = chosen[np.argsort(-moved[chosen, 0], kind="stable")]
     widest = chosen[0]
     rings = joints.rings
     a, b = (assembly.names[int(of[widest])] for of in (joints.block_a, joints.block_b))
+    ends = _farthest(rings.points[np.isin(rings.ring, chosen)])
+    sizes = joints.sizes[chosen]
     return Crack(
         joints=chosen,
         width=float(moved[widest, 0]),
         slip=float(abs(moved[widest, 1])),
         widest=f"{a} | {b}",
         at=rings.middles()[widest],
-        ends=_farthest(rings.points[np.isin(rings.ring, chosen)]),
-        size=float(joints.sizes[chosen].sum()),
+        ends=ends,
+        size=float(sizes.sum()),
+        mean_width=float(np.maximum(moved[chosen, 0], 0.0) @ sizes / sizes.sum()),
+        places=("", "") if places is None else (places.name(ends[0]), places.name(ends[1])),
     )
 
 

@@ -133,3 +133,30 @@ def moved_in_space(assembly, motions):
     for block, by in motions.items():
         pose.positions[block] += by
     return pose
+
+
+def test_cracks_that_fork_and_turn_are_told_one_by_one():
+    """A wall of squares whose upper right goes up and right: a level crack that turns upwards, and a branch."""
+    wall = squares(*((x, y) for y in range(6) for x in range(6)))
+    lifted = {f"block_{6 * y + x}": (0.02 if x >= 3 else 0.0, 0.03, 0.0) for y in range(3, 6) for x in range(6)}
+    cracks = cracks_of(wall, moved(wall, **lifted))
+    level = [crack for crack in cracks if crack.inclination < 1.0]
+    upright = [crack for crack in cracks if abs(crack.inclination - 90.0) < 1.0]
+    assert len(cracks) == len(level) + len(upright)
+    assert len(upright) == 1
+    assert upright[0].size == pytest.approx(3.0)
+    assert upright[0].width == pytest.approx(0.02)
+    assert upright[0].places[1] == "the top"
+    # The branch of the larger area goes on where they meet.
+    assert sum(crack.size for crack in level) == pytest.approx(6.0)
+    assert {place for crack in level for place in crack.places} >= {"the left edge", "the right edge"}
+    assert sum(len(crack.joints) for crack in cracks) == 9
+
+
+def test_places_are_told_by_openings():
+    """A ring of squares around a window whose right column goes."""
+    wall = squares(*((x, y) for y in range(3) for x in range(3) if (x, y) != (1, 1)))
+    column = {f"block_{number}": (0.02, 0.0, 0.0) for number in (2, 4, 7)}
+    above, below = sorted(cracks_of(wall, moved(wall, **column)), key=lambda crack: -crack.at[1])
+    assert above.places == ("the upper right corner of the opening", "the top")
+    assert below.places[1] == "the lower right corner of the opening"

@@ -1,0 +1,73 @@
+"""Where in a structure in the plane something is, in the words of a survey: its edges, the ground, its openings."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+import solver
+
+#: Blocks leave no slit between them wider than this, in block sizes.
+SLIT = 1e-3
+
+#: A place belongs to an edge that is no farther off than this, in block sizes.
+NEAR = 0.75
+
+#: A hole narrower than this, in block sizes, is no opening.
+SMALLEST = 0.5
+
+#: What lies in the outer parts of an opening, of this share of its width or height, is at its side.
+SIDE = 0.25
+
+
+class Places:
+    """Edges and openings of a layout in the plane.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+        In the plane.
+    """
+
+    def __init__(self, assembly: solver.Assembly) -> None:
+        outlines = np.array([shapely.Polygon(assembly.outline(block)) for block in range(assembly.n_blocks)])
+        self._near, slit = NEAR * assembly.block_size, SLIT * assembly.block_size
+        whole = shapely.union_all(shapely.buffer(outlines, slit, join_style="mitre"))
+        holes = [shapely.Polygon(ring) for part in shapely.get_parts(whole) for ring in part.interiors]
+        holes = [hole for hole in holes if hole.area > (SMALLEST * assembly.block_size) ** 2]
+        self._openings = sorted(holes, key=lambda hole: (round(hole.centroid.x / assembly.block_size), hole.centroid.y))
+        free = assembly.free
+        self._ground = shapely.union_all(outlines[~free]) if (~free).any() else None
+        self._box = shapely.bounds(shapely.union_all(outlines[free])) if free.any() else shapely.bounds(whole)
+
+    def name(self, point: np.ndarray) -> str:
+        """Say where a point is.
+
+        Parameters
+        ----------
+        point : (2,) array [m]
+        """
+        place = shapely.Point(point)
+        left, _, right, top = self._box
+        found = [
+            (float(top - point[1]), "the top"),
+            (float(point[0] - left), "the left edge"),
+            (float(right - point[0]), "the right edge"),
+        ]
+        if self._ground is not None:
+            found.append((place.distance(self._ground), "the ground"))
+        for number, opening in enumerate(self._openings, start=1):
+            which = f"opening {number}" if len(self._openings) > 1 else "the opening"
+            side = self._side(point, np.array(shapely.bounds(opening)))
+            found.append((place.distance(opening), f"the {side} of {which}"))
+        distance, words = min(found)
+        return words if distance <= self._near else "inside"
+
+    def _side(self, point: np.ndarray, box: np.ndarray) -> str:
+        """Name the part of an opening, from its bounds, that is nearest to a point."""
+        along = (point - box[:2]) / (box[2:] - box[:2])
+        level = "" if SIDE < along[0] < 1.0 - SIDE else "left" if along[0] <= SIDE else "right"
+        height = "" if SIDE < along[1] < 1.0 - SIDE else "foot" if along[1] <= SIDE else "head"
+        if level and height:
+            return f"{'upper' if height == 'head' else 'lower'} {level} corner"
+        return f"{level} side" if level else height or "edge"
