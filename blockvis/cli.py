@@ -200,7 +200,11 @@ def _parser() -> argparse.ArgumentParser:
     layout.set_defaults(verb=_layout)
     render = verbs.add_parser("render", help="draw again from a results folder, without solving")
     render.add_argument("results", metavar="OUT")
-    render.add_argument("--animation", default="collapse.mp4", help=".mp4, .gif or .webp in the folder; none to skip")
+    render.add_argument(
+        "--animation",
+        default="collapse.mp4",
+        help=".mp4, .gif or .webp in the folder, a folder of pictures such as frames/, or none to skip",
+    )
     render.add_argument("--magnification", type=float, default=1.0, help="of the displacements")
     render.add_argument("--colour-by", choices=("material", "mechanism", "displacement"), default="mechanism")
     render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")

@@ -40,7 +40,7 @@ from blockvis.layout.joints.close import WAYS
 from blockvis.layout.units import UNITS
 from blockvis.layout.views import VIEWS
 from blockvis.layout.window import checked_window
-from blockvis.results.folder import VIDEO_SUFFIXES
+from blockvis.results.folder import FOLDERS, VIDEO_SUFFIXES
 from solver import mechanics
 
 _FRICTION = solver.InterfaceLaw.friction_coefficient
@@ -75,11 +75,13 @@ def _film(table: Table, key: Key) -> str | bool | None:
     if value is False or value is None:
         return value
     name: str = table.text(key.name)
-    if not Path(name).name == name or "\\" in name or not name.lower().endswith(VIDEO_SUFFIXES):
+    bare = name.removesuffix("/")
+    pictures = bare != name and not Path(bare).suffix and bare not in FOLDERS
+    if Path(bare).name != bare or "\\" in name or not (pictures or name.lower().endswith(VIDEO_SUFFIXES)):
         raise table.error(
             key.name,
             f"is {shortened(name)}; give a name ending in {', '.join(VIDEO_SUFFIXES)}, without a folder: "
-            "it is written into the results folder",
+            'it is written into the results folder; or one such as "frames/" for a folder of pictures',
         )
     return name
 
@@ -183,8 +185,8 @@ _THICKNESS_OR_AUTO = ValueKind(
 )
 _endings = "|".join("".join(f"[{c}{c.upper()}]" if c.isalpha() else re.escape(c) for c in s) for s in VIDEO_SUFFIXES)
 _FILM = ValueKind(
-    f"name of a file ending in {', '.join(VIDEO_SUFFIXES)}, or false",
-    {"anyOf": [{"type": "string", "pattern": rf"^[^/\\]*({_endings})$"}, {"const": False}]},
+    f"name of a file ending in {', '.join(VIDEO_SUFFIXES)}, name of a folder ending in /, or false",
+    {"anyOf": [{"type": "string", "pattern": rf"^[^/\\]*({_endings})$|^[^/\\.]+/$"}, {"const": False}]},
     _film,
 )
 _DIMENSION = ValueKind('2, 3 or "auto"', {"anyOf": [{"enum": [2, 3]}, {"const": "auto"}]}, _dimension)
@@ -476,8 +478,8 @@ ANALYSIS = Section(
 OUTPUT = Section(
     "output",
     "What is written beside the results",
-    (Key("animation", _FILM, "Name of the film in the results folder; false for none", "collapse.gif",
-         default="collapse.mp4"),
+    (Key("animation", _FILM, "Name of the film in the results folder, or of a folder of its frames as pictures; "
+         "false for none", "collapse.gif", default="collapse.mp4"),
      Key("vtu", one_of(("moved", "undeformed")), "Where the points of the VTU files are: where the blocks have moved "
          "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved"),
      Key("underlay", TEXT, "Photograph under pictures and film in the plane, relative to the case file, of what the "

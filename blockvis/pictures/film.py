@@ -48,10 +48,10 @@ def film_of(
         Drawn as they are asked for; what stands still is drawn once.
     """
     path = [increment for increment in drawer.increments if matters(increment, drawer.response)]
-    along = _along(drawer, path, max(2, round(fps * seconds)))
+    pause = max(1, round(PAUSE * fps))
+    along = _along(drawer, path, max(2, round(fps * seconds)), pause)
     falling = _falling(drawer, fps)
-    pause = round(PAUSE * fps) if along and falling else 0
-    draws = [*along, *along[-1:] * pause, *falling]
+    draws = [*along, *along[-1:] * (pause if falling else 0), *falling]
     draws += draws[-1:] * round(END * fps)
 
     def frames() -> Iterator[Image.Image]:
@@ -102,14 +102,18 @@ def _between(before: solver.Increment, after: solver.Increment, part: float) -> 
     ).with_arrays(pose=pose, contacts=replace(contacts, points=points))
 
 
-def _along(drawer: Drawer, path: list[solver.Increment], n: int) -> list[Draw]:
-    """List what draws ``n`` states at even steps of the parameter; of those that stand by themselves, each as long."""
+def _along(drawer: Drawer, path: list[solver.Increment], n: int, pause: int) -> list[Draw]:
+    """List what draws ``n`` states at even steps of the parameter.
+
+    Those that stand by themselves stand equally long, for no more than a pause.
+    """
     if not path:
         return []
     total = mechanics.path_parameters(path)
     if not drawer.response.parameter.is_path or total[-1] <= total[0]:
         draws: list[Draw] = [partial(drawer.picture, increment) for increment in path]
-        return [draws[k] for k in np.linspace(0, len(path) - 1, n).round().astype(int)]
+        lasting = min(n, len(path) * pause)
+        return [draws[k] for k in np.linspace(0, len(path) - 1, lasting).round().astype(int)]
     return [partial(_drawn_at, drawer, path, total, float(at)) for at in np.linspace(total[0], total[-1], n)]
 
 
@@ -137,5 +141,8 @@ def _falling(drawer: Drawer, fps: float) -> list[Draw]:
             continue
         shown.append(draw)
         drawn = corners
+    if drawer.response.swings:
+        # Out, back and out again: a mechanism to first order goes either way.
+        return [*shown, *shown[-2::-1], *shown[1:]]
     # Rest at the end is held as long as any end.
     return shown[: shown.index(shown[-1]) + 1] if shown else []

@@ -1,4 +1,4 @@
-"""Frames to a film: mp4, gif or webp, by the suffix of the file."""
+"""Frames to a film: mp4, gif or webp, by the suffix of the file, or to a folder of pictures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 from blockvis.results.folder import VIDEO_SUFFIXES
-from blockvis.system.atomic_files import atomic_file
+from blockvis.system.atomic_files import atomic_file, make_folder, partial_of
 
 #: What imageio's writer is given for each format. Quality of x264 is 0 lossless, 51 worst: line drawings show ringing
 #: from about 22 on. A gif has a palette per frame: one of the first frame lacks the colours of cracks that open later.
@@ -74,7 +74,7 @@ def write_film(
     frames : iterable of PIL.Image.Image
         RGB; drawn one at a time, as they are asked for.
     path : path
-        Ending in .mp4, .gif or .webp.
+        Ending in .mp4, .gif or .webp; a name without an ending is a folder of pictures, frame_00000.png and so on.
     size : (int, int)
         Width and height in pixels, both even.
     fps : float
@@ -93,9 +93,12 @@ def write_film(
     """
     path = Path(path)
     suffix = path.suffix.lower()
+    if not suffix:
+        return _write_pictures(frames, path)
     if suffix not in VIDEO_SUFFIXES:
         raise ValueError(
-            f"'{path.name}' is no animation that blockvis writes; end its name in {', '.join(VIDEO_SUFFIXES)}"
+            f"'{path.name}' is no animation that blockvis writes; end its name in {', '.join(VIDEO_SUFFIXES)}, "
+            "or in / for a folder of pictures"
         )
     if size[0] % 2 or size[1] % 2:
         raise ValueError(f"an animation of {size[0]} × {size[1]} pixels cannot be encoded; both must be even")
@@ -107,6 +110,27 @@ def write_film(
         if partial.is_file() and not _reaches_its_end(partial):
             raise _not_written(path, None)
     return path
+
+
+def _write_pictures(frames: Iterable[Image.Image], folder: Path) -> Path:
+    """Write frames as pictures into a folder of their own, all or none; those of a film before go."""
+    if folder.exists() and not (folder.is_dir() and all(map(_is_frame, folder.iterdir()))):
+        raise ValueError(f"'{folder}' holds what is no frame of a film; choose another name for the folder of pictures")
+    partial = partial_of(folder)
+    shutil.rmtree(partial, ignore_errors=True)
+    make_folder(partial)
+    try:
+        for number, frame in enumerate(frames):
+            frame.save(partial / f"frame_{number:05d}.png")
+        shutil.rmtree(folder, ignore_errors=True)
+        partial.rename(folder)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+    return folder
+
+
+def _is_frame(path: Path) -> bool:
+    return path.name.startswith("frame_") and path.suffix == ".png"
 
 
 def find_encoder() -> None:

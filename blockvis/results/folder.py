@@ -36,6 +36,9 @@ LOCK = ".lock"
 #: Endings of the films that blockvis writes.
 VIDEO_SUFFIXES = (".mp4", ".gif", ".webp")
 
+#: Folders in it.
+FOLDERS = ("increments", "fall")
+
 #: Files that list or sum up others; what a run starts with; pictures of the results.
 STEP_CHECK, RANGE = "step_check.json", "range.csv"
 _LISTS = (

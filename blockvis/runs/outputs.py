@@ -108,7 +108,7 @@ class Drawing(Output):
         """Whether the last of what is drawn is there."""
         animation = self._animation(case)
         names = ["report.html", "mechanism.png", *([animation] if animation else [])] if self._pictures else []
-        return all((folder / name).is_file() for name in names)
+        return all((folder / name).exists() for name in names)
 
     def _shown_underlay(self, case: Case, response: solver.Response) -> Underlay | None:
         """Find the photograph of a run; where there is none to be had, its pictures are drawn all the same."""

@@ -214,7 +214,7 @@ def test_bash_completes_verbs_options_and_layouts(tmp_path, capsys):
         '_shtab_blockvis; echo "${COMPREPLY[@]}"; }; said comp; said layout segm; said run --res'
     )
     done = subprocess.run(["bash", "--norc", "-c", ask], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines() == ["completion", "segmental-arch", "--resume"]
+    assert done.stdout.splitlines() == ["compare completion", "segmental-arch", "--resume"]
 
 
 def test_zsh_gets_a_script_of_its_own(tmp_path, capsys):

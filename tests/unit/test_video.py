@@ -95,3 +95,18 @@ def test_the_rate_is_constant(tmp_path, suffix):
     times = [float(time) for time in re.findall(r"pts_time:([0-9.]+)", told)]
     np.testing.assert_allclose(times, np.arange(len(list(frames()))) / 10.0)
     assert "10 fps" in told
+
+
+def test_frames_are_written_as_pictures_into_a_folder(tmp_path):
+    folder = write_film(frames(), tmp_path / "frames", size=SIZE, fps=10.0)
+    names = [f"frame_{k:05d}.png" for k in range(len(list(frames())))]
+    assert sorted(path.name for path in folder.iterdir()) == names
+    assert [path.name for path in tmp_path.iterdir()] == ["frames"]
+    write_film(list(frames())[:2], folder, size=SIZE, fps=10.0)
+    assert sorted(path.name for path in folder.iterdir()) == names[:2]
+    with Image.open(folder / names[0]) as first:
+        np.testing.assert_array_equal(np.asarray(first), np.asarray(next(iter(frames()))))
+    (folder / "notes.txt").write_text("kept", encoding="utf-8")
+    with pytest.raises(ValueError, match="holds what is no frame of a film"):
+        write_film(frames(), folder, size=SIZE, fps=10.0)
+    assert (folder / "notes.txt").read_text(encoding="utf-8") == "kept"
