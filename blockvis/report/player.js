@@ -34,7 +34,7 @@
   const scaled = (name, unit) => Float64Array.from(raw[name], (v) => v * unit);
   const nBlocks = model.names.length, nFrames = model.frames.length;
   const q = model.unit, norm = Math.hypot;
-  const state = { frame: 0, playing: false, clock: 0, magnify: 1, speed: 1, colours: "material", view: null, hover: -1, joint: -1 };
+  const state = { frame: 0, opened: true, playing: false, clock: 0, magnify: 1, speed: 1, colours: "material", view: null, hover: -1, joint: -1 };
   const layers = { cracks: true, hinges: !model.many, sliding: !model.many, forces: false, thrust: false, start: true };
   const canvas = $("blocks");
   const still = window.matchMedia("(prefers-reduced-motion: reduce)"), dark = window.matchMedia("(prefers-color-scheme: dark)");
@@ -77,7 +77,10 @@
 
   const FONT = "system-ui, DejaVu Sans, sans-serif";
   function scaleBar(pen, w, h, colours) {
-    const most = 0.25 * w / state.view.scale, power = 10 ** Math.floor(Math.log10(most));
+    const most = 0.25 * w / state.view.scale;
+    // A page that is not laid out yet has no scale.
+    if (!(most > 0 && most < Infinity)) return;
+    const power = 10 ** Math.floor(Math.log10(most));
     const length = [5, 2, 1].map((m) => m * power).find((m) => m <= most), wide = length * state.view.scale;
     const x = 14, y = h - 9;
     // On paper of its own: blocks that are dragged there would hide it.
@@ -216,6 +219,7 @@
   }
 
   function show(frame) {
+    state.opened = false;
     state.frame = Math.max(0, Math.min(nFrames - 1, frame));
     draw();
     if (state.hover >= 0 && $("tip").style.display === "block") tell();
@@ -239,7 +243,8 @@
 
   function play() {
     if (state.playing) { stop(); return; }
-    if (state.frame >= nFrames - 1) state.frame = 0;
+    if (state.opened || state.frame >= nFrames - 1) state.frame = 0;
+    state.opened = false;
     const k = Math.floor(state.frame);
     state.playing = true; state.shown = -1e9; state.last = performance.now();
     state.clock = model.times[k] + (state.frame - k) * ((model.times[k + 1] || model.times[k]) - model.times[k]);
@@ -258,8 +263,9 @@
     tip.textContent = blockText(b);
     tip.style.display = "block";
     if (x === undefined) return;
-    tip.style.left = `${Math.max(6, Math.min(x + 14, canvas.clientWidth - tip.offsetWidth - 6))}px`;
-    tip.style.top = `${Math.max(6, Math.min(y + 14, canvas.clientHeight - tip.offsetHeight - 6))}px`;
+    // In the upper corner that is farther away: beside the block it would hide its neighbours.
+    tip.style.left = `${x > canvas.clientWidth / 2 ? 6 : Math.max(6, canvas.clientWidth - tip.offsetWidth - 6)}px`;
+    tip.style.top = "6px";
   }
 
   function letGo() {
@@ -360,14 +366,20 @@
   });
   document.addEventListener("keydown", (e) => {
     const at = e.target.tagName;
-    if (e.ctrlKey || e.metaKey || e.altKey || at === "SELECT" || (at === "INPUT" && e.target.type !== "range" && e.key !== " ")) return;
-    if (e.key === " " && !["BUTTON", "INPUT", "SUMMARY"].includes(at)) { e.preventDefault(); play(); }
+    // A box to tick needs Space, and a list opens by it.
+    const ticked = at === "INPUT" && ["checkbox", "radio"].includes(e.target.type);
+    if (e.ctrlKey || e.metaKey || e.altKey || at === "SELECT") return;
+    if (e.key === " " && !ticked) { e.preventDefault(); play(); return; }
+    if (at === "INPUT" && e.target.type !== "range") return;
     if (at === "INPUT" || e.shiftKey) return;
     const to = { ArrowRight: Math.floor(state.frame) + 1, ArrowLeft: Math.ceil(state.frame) - 1, Home: 0, End: nFrames - 1 }[e.key];
     // Home and End belong to the page, except in the picture.
     if (to === undefined || (e.key.length < 5 && e.target !== canvas)) return;
     e.preventDefault(); stop(); show(to);
   });
+  // A button under the focus would be pressed as Space is let go; one pressed by the mouse hands the focus to the picture.
+  document.addEventListener("keyup", (e) => { if (e.key === " " && e.target.tagName === "BUTTON") e.preventDefault(); });
+  document.addEventListener("click", (e) => { if (e.detail > 0 && e.target.closest("button, label, input[type=checkbox], input[type=radio]") && !e.target.closest("label:has(input[type=number], select)")) canvas.focus({ preventScroll: true }); });
   window.addEventListener("resize", () => { fit(); draw(); });
   dark.addEventListener("change", draw);
 
@@ -452,6 +464,7 @@
     if (["material", "displacement", "mechanism"].includes(asked.get("colours"))) { state.colours = asked.get("colours"); $(state.colours).checked = true; }
     if (Number(asked.get("magnify")) > 0) { state.magnify = Number(asked.get("magnify")); $("magnify").value = state.magnify; }
     show(asked.has("frame") ? Number(asked.get("frame")) || 0 : state.frame);
+    state.opened = !asked.has("frame");
     if (asked.get("play") === "1" && !state.playing) play();
   }
   window.addEventListener("hashchange", wanted);
@@ -466,6 +479,8 @@
   const c = model.curve, known = c.reaction.filter((v) => v !== null);
   if (known.length) $("curve").setAttribute("aria-label", `Curve: ${c.y_label} against ${c.x_label || "the mechanism"}, from ${known[0]} to ${known[known.length - 1]}, at most ${Math.max(...known)}`);
   $("blocks").setAttribute("aria-label", `The blocks: ${nBlocks}, of which ${model.roles.filter((r) => !r).length} are free`);
+  // The page opens on the last equilibrium, and plays from the beginning.
+  state.frame = Math.max(0, model.frames.findLastIndex((f) => !f.falling));
   wanted();
   document.body.dataset.ready = "1";
 })();

@@ -13,6 +13,9 @@ SLIT = 1e-3
 #: A place belongs to an edge that is no farther off than this, in block sizes.
 NEAR = 0.75
 
+#: A wall fills its box by this share at least; an arch has no edges to the left and right.
+FILLED = 0.4
+
 #: A hole narrower than this, in block sizes, is no opening.
 SMALLEST = 0.5
 
@@ -38,7 +41,9 @@ class Places:
         self._openings = sorted(holes, key=lambda hole: (round(hole.centroid.x / assembly.block_size), hole.centroid.y))
         free = assembly.free
         self._ground = shapely.union_all(outlines[~free]) if (~free).any() else None
-        self._box = shapely.bounds(shapely.union_all(outlines[free])) if free.any() else shapely.bounds(whole)
+        drawn = shapely.union_all(outlines[free]) if free.any() else whole
+        self._box = shapely.bounds(drawn)
+        self._edges = drawn.area > FILLED * shapely.box(*self._box).area
 
     def name(self, point: np.ndarray) -> str:
         """Say where a point is.
@@ -49,11 +54,9 @@ class Places:
         """
         place = shapely.Point(point)
         left, _, right, top = self._box
-        found = [
-            (float(top - point[1]), "the top"),
-            (float(point[0] - left), "the left edge"),
-            (float(right - point[0]), "the right edge"),
-        ]
+        found = [(float(top - point[1]), "the top")]
+        if self._edges:
+            found += [(float(point[0] - left), "the left edge"), (float(right - point[0]), "the right edge")]
         if self._ground is not None:
             found.append((place.distance(self._ground), "the ground"))
         for number, opening in enumerate(self._openings, start=1):

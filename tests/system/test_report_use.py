@@ -189,17 +189,20 @@ def test_keyboard_plays_steps_and_zooms_and_the_slider_says_where_it_is(tmp_path
     response = arch_response()
     page = write_report(response, tmp_path / "report.html", fall=fall_of(response))
     script = """const frame = () => Number(document.body.dataset.frame);
-      key("ArrowRight"); key("ArrowRight"); out.two = frame(); key("ArrowLeft"); out.one = frame();
+      out.opened = frame(); out.falls = $("badge").style.display;
+      key("Home"); key("ArrowRight"); key("ArrowRight"); out.two = frame(); key("ArrowLeft"); out.one = frame();
       key("End"); out.last = frame(); out.fall = $("frame").getAttribute("aria-valuetext");
       key("Home"); out.first = frame(); out.start = $("frame").getAttribute("aria-valuetext");
       const was = shown(); key("+"); out.closer = shown() !== was; key("0"); out.fits = shown() === was;
       key("ArrowRight", { shiftKey: true }); out.moved = shown() !== was; out.stays = frame(); key("0");
-      key(" ", {}, document.body); await paused(700); out.played = frame() > 0; key(" ", {}, document.body);
+      key(" ", {}, $("fit")); await paused(700); out.played = frame() > 0; key(" ", {}, document.body);
       out.paused = $("play").textContent;
       $("frame").value = 3; $("frame").dispatchEvent(new Event("input")); out.slid = frame();
       out.live = $("state").getAttribute("aria-live"); out.role = canvas.getAttribute("role");
       out.label = canvas.ariaLabel; out.curve = [$("curve").getAttribute("role"), $("curve").ariaLabel];"""
     found = told(page, tmp_path, script)
+    # The page opens on the last equilibrium.
+    assert (found["opened"], found["falls"]) == (len(response.path) - 1, "none")
     assert (found["two"], found["one"], found["first"], found["stays"], found["slid"]) == (2, 1, 0, 0, 3)
     assert found["last"] > len(response.path)
     assert found["start"].startswith("Settlement 0.0000 m")
