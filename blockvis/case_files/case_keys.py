@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -324,12 +326,33 @@ PARAMETERS = Section(
     example={"span": 4.0, "rise": 1.0, "voussoirs": 15},
 )
 
+_ROLE = {"role": {"enum": list(mechanics.ROLES)}}
+
+
+def _by_place(coordinate: Mapping[str, Any], words: str) -> ValueKind:
+    """Make the kind of tables that choose blocks by coordinates and give them a role."""
+    table = {
+        "type": "object",
+        "properties": {**{axis: dict(coordinate) for axis in "xyz"}, **_ROLE},
+        "additionalProperties": False,
+    }
+    words = f'table of {words} for x, y or z, and role ("fixed" if missing), or a list of such'
+    return ValueKind(words, {"anyOf": [table, {"type": "array", "items": table}, {"enum": list(mechanics.ROLES)}]})
+
+
 ROLES = Section(
     "roles",
-    "Role of blocks by their name, group (layer) or material, or a pattern of them; it holds over what the file says",
+    "Role of blocks by their name, group (layer) or material, or a pattern of them, which holds over what the file "
+    "says; or by their place, for files without names",
+    (Key("below", _by_place(NUMBER.schema, "a number"), "Blocks whose middle lies below", {"z": 0.1}, "m",
+         otherwise="none"),
+     Key("touching", _by_place(NUMBER.schema, "a number"), "Blocks that reach a plane", {"x": 3.0, "role": "moving"},
+         "m", otherwise="none"),
+     Key("box", _by_place(PAIR.schema, "two numbers"), "Blocks whose middle lies between",
+         {"x": [0.0, 1.0], "z": [0.0, 0.2]}, "m", otherwise="none")),
     names=one_of(mechanics.ROLES),
     example={"left springer": "fixed", "right springer": "moving"},
-)
+)  # fmt: skip
 
 SUPPORTS = Section(
     "supports",
