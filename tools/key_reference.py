@@ -78,9 +78,9 @@ def _section(section: Section) -> list[str]:
     if section.names is not None:
         lines = [shown, *(f"{as_key(key)} = {as_toml(value)}" for key, value in section.example.items())]
         choices = ", ".join(f"`{word}`" for word in section.names.schema.get("enum", ()))
-        return [*parts, f"Values: {choices or section.names.words}.", _code(lines)]
+        parts += [f"Values: {choices or section.names.words}.", _code(lines)]
     rows = [_row(key) for key in section.keys]
-    return [*parts, "\n".join([_HEAD, *rows])]
+    return [*parts, "\n".join([_HEAD, *rows])] if rows else parts
 
 
 def _row(key: Key) -> str:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -326,12 +328,33 @@ PARAMETERS = Section(
     example={"span": 4.0, "rise": 1.0, "voussoirs": 15},
 )
 
+_ROLE = {"role": {"enum": list(mechanics.ROLES)}}
+
+
+def _by_place(coordinate: Mapping[str, Any], words: str) -> ValueKind:
+    """Make the kind of tables that choose blocks by coordinates and give them a role."""
+    table = {
+        "type": "object",
+        "properties": {**{axis: dict(coordinate) for axis in "xyz"}, **_ROLE},
+        "additionalProperties": False,
+    }
+    words = f'table of {words} for x, y or z, and role ("fixed" if missing), or a list of such'
+    return ValueKind(words, {"anyOf": [table, {"type": "array", "items": table}, {"enum": list(mechanics.ROLES)}]})
+
+
 ROLES = Section(
     "roles",
-    "Role of blocks by their name, group (layer) or material, or a pattern of them; it holds over what the file says",
+    "Role of blocks by their name, group (layer) or material, or a pattern of them, which holds over what the file "
+    "says; or by their place, for files without names",
+    (Key("below", _by_place(NUMBER.schema, "a number"), "Blocks whose middle lies below", {"z": 0.1}, "m",
+         otherwise="none"),
+     Key("touching", _by_place(NUMBER.schema, "a number"), "Blocks that reach a plane", {"x": 3.0, "role": "moving"},
+         "m", otherwise="none"),
+     Key("box", _by_place(PAIR.schema, "two numbers"), "Blocks whose middle lies between",
+         {"x": [0.0, 1.0], "z": [0.0, 0.2]}, "m", otherwise="none")),
     names=one_of(mechanics.ROLES),
     example={"left springer": "fixed", "right springer": "moving"},
-)
+)  # fmt: skip
 
 SUPPORTS = Section(
     "supports",
@@ -441,8 +464,8 @@ LOADS = Section(
         Key("weight_fraction", VECTOR, "Force as a fraction of each block's weight: a horizontal acceleration",
             [1.0, 0.0], otherwise="none"),
         Key("force", VECTOR, "Force on each of the blocks", [0.0, -500.0], "N", (0.0, 0.0)),
-        Key("point", VECTOR, "Point in the drawing at which the force acts", [1.0, 2.0], "m",
-            otherwise="the centroid of each block"),
+        Key("point", VECTOR, "Point in the drawing at which the force acts, of several blocks on the one that holds it",
+            [1.0, 2.0], "m", otherwise="the centroid of each block"),
         Key("moment", _MOMENT, "Moment on each of the blocks, counter-clockwise; in space about x, y and z", 100.0,
             "N·m", 0.0),
         Key("pressure", NUMBER, "Pressure on the first faces in the way of direction, or on an edge", 1000.0, "Pa",

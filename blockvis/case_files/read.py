@@ -17,6 +17,7 @@ from blockvis.cases.imperfections import Imperfection, read_imperfection
 from blockvis.cases.key import read_keys
 from blockvis.cases.loads import LoadCase
 from blockvis.cases.profiles import Profile
+from blockvis.cases.role_places import PLACES, read_places
 from blockvis.cases.toml_table import Table, shortened, toml_value
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats import FORMATS
@@ -123,7 +124,10 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
     """Make a case of the values of a parsed TOML text; paths in it are relative to the folder of ``source``."""
     top = Table(values, "", source)
     geometry = _geometry(top.table("geometry"))
-    roles = top.table("roles").values
+    placed = read_places(top.table("roles"))
+    roles = {
+        name: role for name, role in top.table("roles").values.items() if name not in PLACES or isinstance(role, str)
+    }
     for name, role in roles.items():
         if role not in mechanics.ROLES:
             raise ValueError(f'{source}: [roles] "{name}" is {shortened(role)}; a role is {", ".join(mechanics.ROLES)}')
@@ -141,7 +145,8 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         text=text,
         **geometry | {"file": None if geometry["file"] is None else source.parent / geometry["file"]},
         bonds=_bonds(top, geometry["file"]),
-        roles=dict(roles),
+        roles=roles,
+        role_places=placed,
         supports=tuple(_support(table) for table in top.tables("supports")),
         **_law(keys.MATERIAL.read(top.table("material"))),
         densities={name: keys.MATERIALS.read(materials.table(name))["density"] for name in materials.values},

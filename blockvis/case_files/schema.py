@@ -62,10 +62,9 @@ def case_values() -> dict[str, Any]:
 def table_schema(section: Section) -> dict[str, Any]:
     """Make the schema of one table."""
     table: dict[str, Any] = {"type": "object", "description": section.meaning}
-    if section.names is not None:
-        return table | {"additionalProperties": dict(section.names.schema)}
-    table["properties"] = {key.name: _value(key) for key in section.keys}
-    table["additionalProperties"] = False
+    if section.keys:
+        table["properties"] = {key.name: _value(key) for key in section.keys}
+    table["additionalProperties"] = False if section.names is None else dict(section.names.schema)
     required = [key.name for key in section.keys if key.required]
     return table | ({"required": required} if required else {})
 

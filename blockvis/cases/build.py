@@ -27,6 +27,7 @@ from .coordinates import check_coordinates
 from .imperfections import imperfect, joint_scatter
 from .loads import loads_of
 from .profiles import cut_ground, with_profiles
+from .role_places import with_roles_by_place
 
 #: The weight of a block lighter than this fraction of the whole may be lost in rounding errors of the other forces.
 LIGHTEST = 1e-14
@@ -59,7 +60,7 @@ def case_assembly(case: Case) -> solver.Assembly:
     ValueError
         For a layout that cannot be read or built, and for settlements without a moving support.
     """
-    sketch = _case_layout(case)
+    sketch = with_roles_by_place(_case_layout(case), case.role_places)
     _note_density(case, sketch)
     if case.densities:
         sketch = _with_densities(case, sketch)

@@ -16,6 +16,7 @@ from .explain_settings import ExplainSettings
 from .imperfections import Imperfection
 from .loads import LoadCase
 from .profiles import Profile
+from .role_places import RolePlace
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class Case:
         The case file; paths in it are relative to its folder.
     text : str
         The case file as it was read.
+    role_places : tuple of RolePlace
+        Roles by place, under those by name.
     bonds : tuple of Bonding
         Walls of the drawing that are filled with stones.
     analysis : str
@@ -65,6 +68,7 @@ class Case:
     outline_tolerance: float | None = None
     overlap_tolerance: float | None = None
     roles: Mapping[str, str] = field(default_factory=dict)
+    role_places: tuple[RolePlace, ...] = ()
     supports: tuple[Mapping[str, Any], ...] = ()
     density: float | None = None
     densities: Mapping[str, float] = field(default_factory=dict)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -10,7 +11,9 @@ from pathlib import Path
 import numpy as np
 
 import solver
-from blockvis.text import nearest
+from blockvis.text import force_text, nearest
+
+from .block_at import block_at
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,7 @@ class LoadCase:
     weight_fraction : (2,) tuple, in space (3,), optional
     force : (2,) tuple, in space (3,) [N]
     point : (2,) tuple, in space (3,) [m], optional
+        Of several blocks the force acts on the one that holds it.
     moment : float, in space (3,) tuple [N·m]
     pressure : float, optional [Pa]
         On the first faces in the way of ``direction``, or on ``edge``.
@@ -77,7 +81,8 @@ def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Pat
     Raises
     ------
     ValueError
-        For a pattern that matches no free block, and for an edge that a block does not have.
+        For a pattern that matches no free block, a point in none of those it matches, and for an edge that a block
+        does not have.
     """
     weight = solver.self_weight(assembly)
     parts = {"dead": weight.dead.copy(), "live": weight.live.copy()}
@@ -87,7 +92,7 @@ def loads_of(entries: Sequence[LoadCase], assembly: solver.Assembly, source: Pat
         chosen = _chosen(load, assembly, f"{source}: [loads {number + 1}] blocks")
         if load.weight_fraction is not None:
             parts[load.kind] += solver.weight_fraction(assembly, load.weight_fraction, chosen)
-        for block in chosen if (load.has_force or load.has_moment) else ():
+        for block in _loaded(load, chosen, assembly, f"{source}: [loads {number + 1}]"):
             force = load.force if load.has_force else None
             parts[load.kind] += solver.point_load(assembly, block, force, point=load.point, moment=load.moment)
         if load.pressure is not None and load.edge is None:
@@ -147,6 +152,22 @@ def with_moving_load(
     if x is None or len(places) == 0:
         return loads
     return solver.Loads(loads.dead, loads.live + live(int(np.argmin(np.abs(places - x)))))
+
+
+def _loaded(load: LoadCase, chosen: np.ndarray, assembly: solver.Assembly, where: str) -> list[int]:
+    """List the blocks on which a force or moment acts: with a point, the one that holds it."""
+    if not (load.has_force or load.has_moment):
+        return []
+    if load.point is not None and len(chosen) > 1:
+        return [block_at(assembly, load.point, chosen, load.force, f"{where} point")]
+    if load.has_force and len(chosen) > 1:
+        total = len(chosen) * float(np.linalg.norm(load.force))
+        warnings.warn(
+            f"{where} acts on each of {len(chosen)} blocks that blocks = '{load.blocks}' names, {force_text(total)} in "
+            "all; give a point for one force",
+            stacklevel=2,
+        )
+    return chosen.tolist()
 
 
 def _chosen(load: LoadCase, assembly: solver.Assembly, where: str) -> np.ndarray:

@@ -1,0 +1,86 @@
+"""Which block a point of the drawing lies in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike
+
+import solver
+
+#: A point on a block's edge or face lies in it, up to this, in block sizes.
+ON_EDGE = 1e-6
+
+
+def distances_to(assembly: solver.Assembly, point: ArrayLike) -> np.ndarray:
+    """(n_blocks,) array [m]: how far each block as drawn is from a point, zero for those that hold it.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    point : (d,) sequence [m]
+
+    Notes
+    -----
+    In space the distance to the plane of the face that is farthest: no more than that to the block itself.
+    """
+    if assembly.dimension == 2:
+        outlines = np.array([shapely.Polygon(assembly.outline(block)) for block in range(assembly.n_blocks)])
+        return np.asarray(shapely.distance(outlines, shapely.Point(point)))
+    parts = assembly.polyhedra.parts
+    faces = parts.solids.faces(parts.solids.vertices)
+    beyond = ((np.asarray(point) - faces.middles) * faces.normals).sum(axis=1)
+    of_part = np.maximum.reduceat(beyond, parts.solids.faces_of_block[:-1])
+    found = np.full(assembly.n_blocks, np.inf)
+    np.minimum.at(found, parts.block_of_part, of_part)
+    return np.maximum(found, 0.0)
+
+
+def block_at(
+    assembly: solver.Assembly, point: Sequence[float], chosen: np.ndarray, towards: Sequence[float], where: str
+) -> int:
+    """Find the block that holds a point.
+
+    Of several that meet there it is the one into which a direction leads, then the one whose centroid is nearest.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    point : (d,) sequence [m]
+    chosen : (n,) int array
+        The blocks it may be.
+    towards : (d,) sequence
+        Of a force at the point.
+    where : str
+        File, table and key, for the message.
+
+    Raises
+    ------
+    ValueError
+        If none of them holds the point; names the nearest and how far it is.
+    """
+    apart = distances_to(assembly, point)
+    holding = chosen[apart[chosen] <= ON_EDGE * assembly.block_size]
+    place = f"({', '.join(f'{x:g}' for x in point)})"
+    if len(holding) == 0:
+        nearest = int(chosen[apart[chosen].argmin()])
+        other = int(apart.argmin())
+        inside = ""
+        if apart[other] <= ON_EDGE * assembly.block_size:
+            what = "support" if not assembly.free[other] else "block"
+            inside = f"; it lies in the {what} '{assembly.names[other]}', which is not meant"
+        raise ValueError(
+            f"{where} {place} m lies in none of the blocks meant; the nearest is '{assembly.names[nearest]}', "
+            f"{apart[nearest]:.3g} m away{inside}"
+        )
+    if len(holding) == 1:
+        return int(holding[0])
+    size = float(np.linalg.norm(towards))
+    ahead = np.asarray(point, dtype=float) + 1e-3 * assembly.block_size * np.asarray(towards, dtype=float) / (
+        size or 1.0
+    )
+    near = np.linalg.norm(assembly.centroids[holding] - np.asarray(point), axis=1)
+    into = np.round(distances_to(assembly, ahead)[holding] / (ON_EDGE * assembly.block_size))
+    return int(holding[np.lexsort((*assembly.centroids[holding].T, near, into))[0]])

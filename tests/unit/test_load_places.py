@@ -1,0 +1,84 @@
+"""A force with a point acts on the block that holds it."""
+
+import numpy as np
+import pytest
+
+import blockvis
+import solver
+from blockvis.cli import main
+
+CASE = """[geometry]
+layout = "wall"
+[geometry.parameters]
+bricks = 4
+courses = 4
+settling = [0.5, 1.0]
+[settlement]
+direction = [0, -1]
+increment = 0.01
+limit = 0.01
+[output]
+animation = false
+[[loads]]
+force = {force}
+{more}
+"""
+
+
+def loads_of(tmp_path, more, force="[0, -500]"):
+    path = tmp_path / "case.toml"
+    path.write_text(CASE.format(force=force, more=more), encoding="utf-8")
+    run = blockvis.run_case(path, tmp_path / "out", overwrite=True, outputs=())
+    assembly = run.response.assembly
+    return assembly, run.response.loads.dead - solver.self_weight(assembly).dead
+
+
+def test_the_sum_is_the_force_however_many_blocks_are_named(tmp_path):
+    assembly, loads = loads_of(tmp_path, "point = [0.3, 0.25]")
+    assert np.flatnonzero(loads.any(axis=1)).size == 1
+    np.testing.assert_allclose(loads[:, :2].sum(axis=0), [0.0, -500.0])
+    (block,) = np.flatnonzero(loads.any(axis=1))
+    assert loads[block, 2] == pytest.approx(-500.0 * (0.3 - assembly.centroids[block, 0]))
+
+
+def test_between_two_blocks_the_force_goes_into_the_one_it_pushes(tmp_path):
+    course = float(np.ptp(blockvis.generators.wall(bricks=4, courses=4).outline(2)[:, 1]))
+    blocks = {}
+    for force in ("[0, -500]", "[0, 500]"):
+        assembly, loads = loads_of(tmp_path, f"point = [0.3, {2 * course}]", force)
+        (block,) = np.flatnonzero(loads.any(axis=1))
+        blocks[force] = assembly.centroids[block, 1]
+    assert blocks["[0, -500]"] < 2 * course < blocks["[0, 500]"]
+
+
+@pytest.mark.slow
+def test_in_space_the_block_is_found_by_its_faces(tmp_path):
+    corner = blockvis.generators.build("L corner", {})
+    chosen = np.flatnonzero(corner.free)[::3]
+    text = '[geometry]\nlayout = "L corner"\n[settlement]\ndirection = [0, 0, -1]\nincrement = 1e-3\nlimit = 1e-3\n'
+    text += "[output]\nanimation = false\n"
+    for block in chosen:
+        text += f"[[loads]]\nforce = [0, 0, {-1e-3 * (block + 1)}]\npoint = {corner.centroids[block].tolist()}\n"
+    path = tmp_path / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    response = blockvis.run_case(path, tmp_path / "out", outputs=()).response
+    added = response.loads.dead[:, 2] - solver.self_weight(response.assembly).dead[:, 2]
+    expected = np.zeros(corner.n_blocks)
+    expected[chosen] = -1e-3 * (chosen + 1)
+    np.testing.assert_allclose(added, expected, atol=1e-9)
+
+
+def test_a_point_in_no_block_names_the_nearest(tmp_path, capsys):
+    path = tmp_path / "case.toml"
+    path.write_text(CASE.format(force="[0, -500]", more="point = [0.3, 5.0]"), encoding="utf-8")
+    assert main(["run", str(path), "-o", str(tmp_path / "out"), "--no-pictures"]) == 2
+    message = capsys.readouterr().err
+    assert "[loads 1] point (0.3, 5) m lies in none of the blocks meant; the nearest is 'brick 4-" in message
+    assert "m away" in message
+    assert message.count("\n") == 1
+
+
+def test_a_force_on_many_blocks_is_told_with_its_sum(tmp_path):
+    with pytest.warns(UserWarning, match=r"acts on each of 18 blocks that blocks = '\*' names, 9 kN in all"):
+        _, loads = loads_of(tmp_path, "")
+    np.testing.assert_allclose(loads[:, :2].sum(axis=0), [0.0, -9000.0])
