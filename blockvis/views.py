@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import weakref
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,11 @@ import solver
 
 if TYPE_CHECKING:
     import pyvista as pv
+
+    from .dynamics.fall import Fall
+
+#: Falls by the id of their response, as long as it lives: to work one out takes seconds.
+_falls: dict[int, Fall | None] = {}
 
 
 @dataclass(frozen=True)
@@ -50,25 +56,57 @@ def html(value: Any) -> str:
     return notebook.assembly_html(value.assembly if isinstance(value, solver.Structure) else value)
 
 
-def blocks(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid:
-    """Make a dataset of the blocks of increment k."""
-    from .results.datasets import block_dataset
+def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.UnstructuredGrid:
+    """Make a dataset of the blocks, joints or contact points of an increment, below 0 one from the end of the path."""
+    from .results.datasets import block_dataset, contact_dataset, joint_dataset
+    from .results.mechanism_arrays import at_last_equilibrium, falling_in
 
-    return block_dataset(response.assembly, response.increments[k], shape=shape)
+    assembly, path = response.assembly, response.path
+    increments = path if path and k < 0 else response.increments
+    increment = increments[k]
+    ends = bool(path) and increment is path[-1] and response.collapse is not None
+    if ends:
+        increment = at_last_equilibrium(response)
+    if of == "blocks":
+        return block_dataset(assembly, increment, shape=shape, falls=falling_in(response) if ends else None)
+    return (joint_dataset if of == "joints" else contact_dataset)(assembly, increment, shape=shape)
 
 
-def joints(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid:
-    """Make a dataset of the joints of increment k."""
-    from .results.datasets import joint_dataset
+def fall(response: solver.Response, time: float, shape: str) -> pv.UnstructuredGrid:
+    """Make a dataset of the blocks at a time [s] of the fall, before it as at the last equilibrium.
 
-    return joint_dataset(response.assembly, response.increments[k], shape=shape)
+    Raises
+    ------
+    ValueError
+        Where nothing falls.
+    """
+    import pyvista as pv
+
+    from .results.fall_files import fall_grid
+    from .results.mechanism_arrays import falling_in
+
+    found = _fall_of(response)
+    if found is None:
+        raise ValueError(
+            f"nothing falls here ({response.stop}): fall(t) is of what collapses; mesh(-1) is the last equilibrium"
+        )
+    time = min(max(float(time), 0.0), float(found.times[-1]))
+    return pv.UnstructuredGrid(fall_grid(response, found.at(time), time, shape, falling_in(response)))
 
 
-def contacts(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid:
-    """Make a dataset of the contact points of increment k."""
-    from .results.datasets import contact_dataset
+def _fall_of(response: solver.Response) -> Fall | None:
+    """Read the fall of a response from its folder, or work it out, once."""
+    from .dynamics.fall import fall_of
+    from .results.fall_files import stored_fall
+    from .results.increments import folder_of
 
-    return contact_dataset(response.assembly, response.increments[k], shape=shape)
+    key = id(response)
+    if key not in _falls:
+        folder = folder_of(response.path[-1]) if response.path else None
+        found = None if folder is None else stored_fall(folder)
+        _falls[key] = fall_of(response) if found is None else found
+        weakref.finalize(response, _falls.pop, key, None)
+    return _falls[key]
 
 
 def animate(response: solver.Response, path: str | os.PathLike[str], **options: Any) -> Path:

@@ -25,6 +25,7 @@ from blockvis.cases.key import (
     TEXT,
     TEXTS,
     TRIPLE,
+    TRUE_OR_FALSE,
     VECTOR,
     Key,
     Section,
@@ -480,6 +481,8 @@ OUTPUT = Section(
          default="collapse.mp4"),
      Key("vtu", one_of(("moved", "undeformed")), "Where the points of the VTU files are: where the blocks have moved "
          "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved"),
+     Key("vtu_strings", TRUE_OR_FALSE, "Whether names in the VTU files are arrays of strings, which meshio does not "
+         "read; false makes them bytes, field arrays of the same names", False, default=True),
      Key("underlay", TEXT, "Photograph under pictures and film in the plane, relative to the case file, of what the "
          "image of the blocks shows, or with a world file", "photo.jpg", otherwise="none")),
 )  # fmt: skip

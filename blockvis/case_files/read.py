@@ -156,6 +156,7 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         explain=read_explain(top.table("explain")),
         animation=output["animation"] or None,
         vtu=output["vtu"],
+        vtu_strings=output["vtu_strings"],
         underlay=output["underlay"],
     )
     top.finish()

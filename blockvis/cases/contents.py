@@ -42,6 +42,8 @@ class Case:
         Scale and labels of a layout file that is an image.
     vtu : {"moved", "undeformed"}
         Shape of the blocks in the VTU files.
+    vtu_strings : bool
+        Whether names are arrays of strings in the VTU files.
     underlay : str or None
         Photograph under the pictures, relative to the case file.
     """
@@ -82,4 +84,5 @@ class Case:
     explain: ExplainSettings = field(default_factory=ExplainSettings)
     animation: str | None = "collapse.mp4"
     vtu: str = "moved"
+    vtu_strings: bool = True
     underlay: str | None = None

@@ -26,7 +26,7 @@ from blockvis.system.atomic_files import PARTIAL
 from solver import mechanics
 
 from .first_equilibrium import settled_note
-from .outputs import Clock, Drawing, Output
+from .outputs import Clock, Drawing, Output, viewer_format
 from .plan import planned
 from .progress import Progress
 from .reopen import open_results
@@ -128,7 +128,7 @@ def run_case(
                 record=record_of(case),
                 overwrite=overwrite,
                 parameter=run.course.parameter,
-                shape=case.vtu,
+                vtu=viewer_format(case),
             )
         except OSError as error:
             raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
@@ -176,7 +176,7 @@ def resume_run(
     finished = _finished(folder)
     if finished is not None:
         response = open_results(folder)
-        restore_grids(folder, response.assembly, response.increments, case.vtu)
+        restore_grids(folder, response.assembly, response.increments, viewer_format(case))
         absent = [output for output in outputs if not output.is_written(case, folder)]
         missing = _made(absent, case, response, folder, Clock())
         return Run(response, folder, finished, missing, had_finished=True)
@@ -184,7 +184,8 @@ def resume_run(
         warnings.warn(note, stacklevel=2)
     kind = KINDS[case.analysis]
     with _begun(case, outputs):
-        results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint, case.vtu)
+        parameter, vtu = kind.course(case).parameter, viewer_format(case)
+        results, checkpoint = ResultsFolder.reopened(folder, parameter, kind.checkpoint, vtu)
         remove_fall(folder)
         run = planned(case, results.assembly, checkpoint, tuple(results.increments))
         return _followed(case, results, run, outputs, Clock())

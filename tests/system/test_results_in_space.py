@@ -106,7 +106,7 @@ def test_results_reach_meshio_as_the_manual_says(response, tmp_path, monkeypatch
     assert sum(len(cells.data) for cells in mesh.cells) == assembly.n_blocks
     numbers = np.concatenate(mesh.cell_data["block_id"])
     assert [read["names"][k] for k in numbers] == [assembly.names[k] for k in numbers]
-    moved = np.concatenate(mesh.cell_data["displacement"])[np.argsort(numbers), : assembly.dimension]
+    moved = np.concatenate(mesh.cell_data["translation"])[np.argsort(numbers), : assembly.dimension]
     np.testing.assert_allclose(moved, increment.pose.positions - assembly.centroids, atol=1e-15)
 
 
