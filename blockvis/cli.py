@@ -47,7 +47,7 @@ EXIT_CODES = f"""exit codes:
   {SOLVER_FAILED}    the solver failed; what it had found is written
   {NO_PICTURES}    everything is written but the pictures
   {NO_EQUILIBRIUM}    no initial equilibrium: the structure does not stand as drawn
-  {INTERRUPTED}  interrupted by Ctrl-C; blockvis run --resume OUT goes on"""
+  {INTERRUPTED}  interrupted by Ctrl-C or increment_seconds; blockvis run --resume OUT goes on"""
 
 #: How long a run waits for the path in shorter steps: so many times what it took itself, and at least so many seconds.
 PATIENCE, LEAST_PATIENCE = 3.0, 60.0
@@ -148,6 +148,12 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--resume", metavar="OUT", help="go on with the run in this results folder, however it was stopped"
     )
+    run.add_argument(
+        "--increment-seconds",
+        metavar="S",
+        help="what an increment of a path may take; a run that needs more says what it was doing and ends, --resume "
+        "goes on (default: [analysis] increment_seconds; with --resume no limit)",
+    )
     run.add_argument("--no-film", action="store_true", help="draw all but the film")
     run.add_argument(
         "--no-pictures", action="store_true", help="draw nothing and write no report; blockvis render OUT does later"
@@ -207,8 +213,12 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
-    for add in (_add_bond, _add_explain, _add_sweep, _add_new, _add_schema):
+    for add in (_add_bond, _add_explain, _add_sweep, _add_new, _add_schema, _add_completion):
         add(verbs)
+    return parser
+
+
+def _add_completion(verbs: Any) -> None:
     completion = verbs.add_parser(
         "completion",
         help="a script that completes verbs and options in a shell",
@@ -216,7 +226,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     completion.add_argument("shell", choices=tuple(SHELLS))
     completion.set_defaults(verb=_completion)
-    return parser
 
 
 class _LayoutHelp(argparse.Action):
@@ -537,12 +546,16 @@ def _run(options: argparse.Namespace) -> int:
     outputs = options.outputs
     if outputs is None:
         outputs = (Drawing(film=not options.no_film, pictures=not options.no_pictures),)
-    started = time.perf_counter()
+    started, seconds = time.perf_counter(), options.increment_seconds
+    if seconds is not None:
+        seconds = _number(seconds)
+        if not seconds > 0.0:
+            raise ValueError(f"--increment-seconds is {seconds:g}; give seconds above 0")
     if options.resume is not None:
         if options.case is not None or options.output is not None or options.force or options.set:
             raise ValueError("--resume takes the results folder alone; the case is stored in it")
         with _checking(options, None) as checking:
-            run = resume_run(options.resume, outputs=outputs)
+            run = resume_run(options.resume, outputs=outputs, increment_seconds=seconds)
             if run.had_finished:
                 print(
                     f"blockvis: this run had finished ({run.response.stop}); nothing was left to solve", file=sys.stderr
@@ -552,7 +565,7 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError("name a case file: blockvis run CASE.toml, or go on with a run: blockvis run --resume OUT")
     case = read_case(options.case, [*options.set, *(["analysis.range=true"] if options.range else [])])
     with _checking(options, case) as checking:
-        run = run_case(case, options.output, overwrite=options.force, outputs=outputs)
+        run = run_case(case, options.output, overwrite=options.force, outputs=outputs, increment_seconds=seconds)
         return _report_ending(options, run, checking, started)
 
 

@@ -190,9 +190,9 @@ def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monke
     monkeypatch.setattr("blockvis.runs.progress.REDRAW", -1.0)
     text = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
     stream, seen = Terminal(), []
-    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), stream, ["ground", "block"])
     outlines = [[[-1, -1], [1, -1], [1, 0], [-1, 0]], [[-0.2, 0], [0.2, 0], [0.2, 1], [-0.2, 1]]]
     assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
+    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), stream, assembly)
     steps = mechanics.settlement_increments(
         assembly,
         [solver.Settlement(direction=(0, -1), increment=0.1, limit=0.1)],
@@ -204,5 +204,6 @@ def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monke
     assert seen == sorted(seen)
     assert len(seen) > 2
     assert re.search(
-        r"settlement 0\.0\d+ of at most 0.4 m, increment 1 in steps of 0\.\d+, '\w+' moves most", stream.getvalue()
+        r"settlement 0\.0\d+ of at most 0.4 m, increment 1 in steps of 0\.\d+, 1 blocks moving, '[\w ]+' moves most",
+        stream.getvalue(),
     )
