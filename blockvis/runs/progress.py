@@ -116,8 +116,8 @@ class Progress:
             with self._writing:
                 if self._line.due and not self._ended.is_set() and still > LINES / 2.0:
                     state = self._state
-                    what = f"increment {self.count + 1}" if state is None else self.doing(state)
-                    self._line.write(f"{what}, in one step for {still:.0f} s")
+                    what = f"increment {self.count + 1}" if state is None else f"{self.doing(state)}, in one step"
+                    self._line.write(f"{what} for {still:.0f} s")
 
     def doing(self, state: mechanics.PathState) -> str:
         """Say in words where an increment is: its parameter, the next step, and what moves."""
