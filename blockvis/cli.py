@@ -55,6 +55,15 @@ PATIENCE, LEAST_PATIENCE = 3.0, 60.0
 #: Pixels below which a picture has no room for its words.
 SMALLEST_PICTURE = 160
 
+#: Options of ``convert`` that say how a layout file is read, with their defaults: results are no layout file.
+_OF_LAYOUTS: dict[str, tuple[Any, ...]] = {
+    **dict.fromkeys(("unit", "view", "window", "width", "height", "pixel", "background", "smallest"), (None,)),
+    "dimension": ("auto",),
+    "ignore": ([],),
+    "only": ([],),
+    "joint_thickness": ("0",),
+}
+
 #: What ``blockvis completion`` writes for, and where it goes.
 SHELLS = {
     "bash": "blockvis completion bash > ~/.local/share/bash-completion/completions/blockvis",
@@ -179,8 +188,12 @@ def _parser() -> argparse.ArgumentParser:
     _add_choice(info)
     info.add_argument("--picture", metavar="PNG", help="draw what was found, or why it is refused")
     info.set_defaults(verb=_info)
-    convert = verbs.add_parser("convert", help="any layout file to any other")
-    convert.add_argument("source", metavar="IN", help="or a folder or a pattern of files, one per stone")
+    convert = verbs.add_parser(
+        "convert", help="any layout file to any other; results to one file, a .vtkhdf, .glb or layout"
+    )
+    convert.add_argument(
+        "source", metavar="IN", help="or a folder or a pattern of files, one per stone; or a results folder"
+    )
     convert.add_argument("target", metavar="OUT")
     convert.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
     _add_view(convert)
@@ -739,6 +752,8 @@ def _convert(options: argparse.Namespace) -> int:
     from .layout.assemble import assemble
 
     target = _new_file(options.target, options.force)
+    if (Path(options.source) / "assembly.npz").is_file():
+        return _convert_results(options, target)
     choice = _choice(options)
     layout = read_layout(options.source, unit=options.unit, dimension=_dimension(options), **choice)
     for note in layout.notes:
@@ -749,6 +764,40 @@ def _convert(options: argparse.Namespace) -> int:
     else:
         save_layout(assemble(layout, joint_thickness=joint if joint == "auto" else _number(joint)), target)
     print(f"{layout.n_blocks} blocks written to {target}")
+    return 0
+
+
+def _convert_results(options: argparse.Namespace, target: Path) -> int:
+    """Write a results folder as one file: a series, an animation, or the blocks where they are at the end."""
+    from .results.fall_files import known_fall
+    from .runs.reopen import open_results
+
+    given = [name for name, value in vars(options).items() if name in _OF_LAYOUTS and value not in _OF_LAYOUTS[name]]
+    if given:
+        raise ValueError(
+            f"--{given[0].replace('_', '-')} is of layout files; '{options.source}' holds results: leave it out"
+        )
+    response = open_results(options.source)
+    if target.suffix.lower() == ".vtkhdf":
+        from .results.vtkhdf import write_vtkhdf
+
+        write_vtkhdf(response, target)
+        print(f"{len(response.path)} increments of {response.assembly.n_blocks} blocks written to {target}")
+        return 0
+    if target.suffix.lower() == ".glb":
+        from .pictures.animated_glb import write_animated_glb
+
+        write_animated_glb(response, target, known_fall(response))
+        print(f"{response.assembly.n_blocks} blocks that move written to {target}")
+        return 0
+    from .formats.read import save_layout
+
+    if not response.path:
+        raise ValueError(f"nothing in '{options.source}' is in equilibrium ({response.stop}): no deformed layout")
+    last = response.path[-1]
+    save_layout(response.assembly, target, pose=last.pose)
+    where = f"{response.parameter.name} {last.parameter:.6g} {response.parameter.unit}".rstrip()
+    print(f"{response.assembly.n_blocks} blocks written to {target}, as they are at {where}")
     return 0
 
 

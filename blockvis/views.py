@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import weakref
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,11 +11,6 @@ import solver
 
 if TYPE_CHECKING:
     import pyvista as pv
-
-    from .dynamics.fall import Fall
-
-#: Falls by the id of their response, as long as it lives: to work one out takes seconds.
-_falls: dict[int, Fall | None] = {}
 
 
 @dataclass(frozen=True)
@@ -82,31 +76,16 @@ def fall(response: solver.Response, time: float, shape: str) -> pv.UnstructuredG
     """
     import pyvista as pv
 
-    from .results.fall_files import fall_grid
+    from .results.fall_files import fall_grid, known_fall
     from .results.mechanism_arrays import falling_in
 
-    found = _fall_of(response)
+    found = known_fall(response)
     if found is None:
         raise ValueError(
             f"nothing falls here ({response.stop}): fall(t) is of what collapses; mesh(-1) is the last equilibrium"
         )
     time = min(max(float(time), 0.0), float(found.times[-1]))
     return pv.UnstructuredGrid(fall_grid(response, found.at(time), time, shape, falling_in(response)))
-
-
-def _fall_of(response: solver.Response) -> Fall | None:
-    """Read the fall of a response from its folder, or work it out, once."""
-    from .dynamics.fall import fall_of
-    from .results.fall_files import stored_fall
-    from .results.increments import folder_of
-
-    key = id(response)
-    if key not in _falls:
-        folder = folder_of(response.path[-1]) if response.path else None
-        found = None if folder is None else stored_fall(folder)
-        _falls[key] = fall_of(response) if found is None else found
-        weakref.finalize(response, _falls.pop, key, None)
-    return _falls[key]
 
 
 def animate(response: solver.Response, path: str | os.PathLike[str], **options: Any) -> Path:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import weakref
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 import solver
-from blockvis.dynamics.fall import Fall, falling_increment
+from blockvis.dynamics.fall import Fall, fall_of, falling_increment
 from blockvis.system.atomic_files import make_folder, write_atomic
 
+from .increments import folder_of
 from .mechanism_arrays import falling_in
 from .npz import checked_arrays, compressed, flat, from_flat
 from .viewer_files import MOVED, ViewerFormat
@@ -20,6 +22,9 @@ if TYPE_CHECKING:
 
 #: List of the VTU files, and the poses.
 FALL_LIST, FALL_POSES = "fall.pvd", "fall.npz"
+
+#: Falls by the id of their response, as long as it lives: to work one out takes seconds.
+_known: dict[int, Fall | None] = {}
 
 
 def write_fall(
@@ -74,6 +79,22 @@ def fall_grid(
         grid.GetFieldData().RemoveArray(name)
     add_arrays(grid.GetFieldData(), {"time": np.array([time])})
     return grid
+
+
+def known_fall(response: solver.Response) -> Fall | None:
+    """Read the fall of a response from its folder, or work it out, once; None where nothing falls.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    key = id(response)
+    if key not in _known:
+        folder = folder_of(response.path[-1]) if response.path else None
+        found = None if folder is None else stored_fall(folder)
+        _known[key] = fall_of(response) if found is None else found
+        weakref.finalize(response, _known.pop, key, None)
+    return _known[key]
 
 
 def remove_fall(folder: Path) -> None:
