@@ -22,11 +22,10 @@ from solver import mechanics
 from .cracks import MOST_LISTED, cracks_of
 from .increments import StoredIncrements, packed_increment
 from .joints import LargestMovements
-from .mechanism_arrays import at_last_equilibrium, falling_in
 from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
-from .viewer_files import MOVED, ViewerFiles, ViewerFormat, ViewerWriter, restore_grids, write_grids, write_lists
+from .viewer_files import MOVED, ViewerFiles, ViewerFormat, ViewerWriter, restore_grids, write_end, write_lists
 
 #: Where a run can go on from, beside the increments it belongs to.
 CHECKPOINT = "checkpoint.npz"
@@ -221,7 +220,8 @@ class ResultsFolder:
         """
         if not self.viewer.finish():
             restore_grids(self.path, self.assembly, self.increments, self.vtu)
-        self._write_end(response)
+        if len(response.path) <= len(self.increments):
+            write_end(self.path, response, self.vtu, self._movements.joints)
         self._write_table(durable=True)
         write_lists(self.path, self.increments, durable=True)
         write_atomic(self.path / "joints.csv", self._movements.table())
@@ -236,13 +236,6 @@ class ResultsFolder:
         write_atomic(self.path / "summary.json", json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
         self._release()
         return summary
-
-    def _write_end(self, response: solver.Response) -> None:
-        """Write the VTU files of the last equilibrium again, now that the collapse that follows is known."""
-        if 0 < len(response.path) <= len(self.increments) and response.collapse is not None:
-            number, joints = len(response.path) - 1, self._movements.joints
-            last, falls = at_last_equilibrium(response), falling_in(response)
-            write_grids(self.path, number, self.assembly, last, self.vtu, joints, falls)
 
     def own_viewer(self) -> ViewerWriter:
         """Make what writes the files for viewers in this process."""

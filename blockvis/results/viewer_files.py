@@ -13,6 +13,7 @@ import solver
 from blockvis.system.vtk_files import is_complete, write_pvd, write_vtu
 
 from .joint_faces import InitialJoints, initial_joints
+from .mechanism_arrays import at_last_equilibrium, falling_in
 
 #: The VTU files of an increment.
 GRIDS = ("blocks", "contacts", "joints")
@@ -112,7 +113,7 @@ def write_lists(folder: Path, increments: Sequence[solver.Increment], *, durable
 
 def restore_grids(
     folder: Path, assembly: solver.Assembly, increments: Sequence[solver.Increment], vtu: ViewerFormat
-) -> None:
+) -> int:
     """Make the VTU files again that a power cut has left empty, or half there.
 
     Parameters
@@ -123,10 +124,36 @@ def restore_grids(
         Of the results.
     vtu : ViewerFormat
         As of the folder.
+
+    Returns
+    -------
+    int
+        How many increments had lost some.
     """
+    lost = 0
     for number, increment in enumerate(increments):
         if not all(is_complete(grid_file(folder, kind, number)) for kind in GRIDS):
             write_grids(folder, number, assembly, increment, vtu)
+            lost += 1
+    return lost
+
+
+def write_end(folder: Path, response: solver.Response, vtu: ViewerFormat, joints: InitialJoints | None = None) -> None:
+    """Write the VTU files of the last equilibrium again, when the collapse that follows it is known.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    response : solver.Response
+    vtu : ViewerFormat
+        As of the folder.
+    joints : InitialJoints, optional
+        Of the assembly, where they are at hand.
+    """
+    if response.path and response.collapse is not None:
+        last, falls = at_last_equilibrium(response), falling_in(response)
+        write_grids(folder, len(response.path) - 1, response.assembly, last, vtu, joints, falls)
 
 
 def write_grids(

@@ -21,7 +21,7 @@ from blockvis.kinds.kinds import KINDS
 from blockvis.results.fall_files import remove_fall
 from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
-from blockvis.results.viewer_files import restore_grids
+from blockvis.results.viewer_files import restore_grids, write_end
 from blockvis.system.atomic_files import PARTIAL
 from solver import mechanics
 
@@ -186,7 +186,8 @@ def resume_run(
     finished = _finished(folder)
     if finished is not None:
         response = open_results(folder)
-        restore_grids(folder, response.assembly, response.increments, viewer_format(case))
+        if restore_grids(folder, response.assembly, response.increments, viewer_format(case)):
+            write_end(folder, response, viewer_format(case))
         absent = [output for output in outputs if not output.is_written(case, folder)]
         missing = _made(absent, case, response, folder, Clock())
         return Run(response, folder, finished, missing, had_finished=True)
