@@ -20,6 +20,9 @@ REDRAW = 0.1
 #: Seconds between two lines where stderr is no terminal: short runs write none.
 LINES = 5.0
 
+#: Seconds between two looks at whether a single step takes long.
+BEAT = 1.0
+
 
 class _Line:
     """One line on stderr that is written again and again; where it is no terminal, lines now and then.
@@ -111,7 +114,7 @@ class Progress:
         threading.Thread(target=self._keep_telling, daemon=True).start()
 
     def _keep_telling(self) -> None:
-        while not self._ended.wait(1.0):
+        while not self._ended.wait(BEAT):
             still = time.perf_counter() - self._at
             with self._writing:
                 if self._line.due and not self._ended.is_set() and still > LINES / 2.0:

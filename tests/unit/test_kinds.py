@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import re
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -184,6 +185,18 @@ def test_the_bar_shows_the_quantities_of_the_kind(analysis, extra, line, tmp_pat
     standing = solver.Increment(0.05, 7.0, 0, 7.0, 7.0, certificate, solver.Status.EQUILIBRIUM, 1, 0.1, state)
     Progress(course, stream).increment(standing)
     assert f"] {line}" in stream.getvalue()
+
+
+def test_a_single_step_that_takes_long_is_told_too(tmp_path, monkeypatch):
+    monkeypatch.setattr("blockvis.runs.progress.BEAT", 0.01)
+    monkeypatch.setattr("blockvis.runs.progress.LINES", 0.0)
+    text = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
+    stream = io.StringIO()
+    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), stream, count=3)
+    bar.watch()
+    while "blockvis: increment 4 for 0 s" not in stream.getvalue():
+        time.sleep(0.01)
+    bar.done()
 
 
 def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monkeypatch):
