@@ -363,7 +363,7 @@ def test_paraview_reads_polyhedra_faces_and_contacts(tmp_path):
     assert done.returncode == 0, done.stderr[-2000:]
     told = json.loads(done.stdout.split("TOLD")[1])
     for part, dataset in (("blocks", block_dataset), ("contacts", contact_dataset), ("joints", joint_dataset)):
-        for (_, cells, names), increment in zip(told[part], response.increments, strict=True):
+        for (_, cells, names), increment in zip(told[part], response.path, strict=True):
             ours = dataset(response.assembly, increment)
             assert cells == ours.n_cells
             assert set(names["Point"]) == set(ours.point_data.keys())
