@@ -47,13 +47,22 @@ EXIT_CODES = f"""exit codes:
   {SOLVER_FAILED}    the solver failed; what it had found is written
   {NO_PICTURES}    everything is written but the pictures
   {NO_EQUILIBRIUM}    no initial equilibrium: the structure does not stand as drawn
-  {INTERRUPTED}  interrupted by Ctrl-C; blockvis run --resume OUT goes on"""
+  {INTERRUPTED}  interrupted by Ctrl-C or increment_seconds; blockvis run --resume OUT goes on"""
 
 #: How long a run waits for the path in shorter steps: so many times what it took itself, and at least so many seconds.
 PATIENCE, LEAST_PATIENCE = 3.0, 60.0
 
 #: Pixels below which a picture has no room for its words.
 SMALLEST_PICTURE = 160
+
+#: Options of ``convert`` that say how a layout file is read, with their defaults: results are no layout file.
+_OF_LAYOUTS: dict[str, tuple[Any, ...]] = {
+    **dict.fromkeys(("unit", "view", "window", "width", "height", "pixel", "background", "smallest"), (None,)),
+    "dimension": ("auto",),
+    "ignore": ([],),
+    "only": ([],),
+    "joint_thickness": ("0",),
+}
 
 #: What ``blockvis completion`` writes for, and where it goes.
 SHELLS = {
@@ -148,6 +157,12 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--resume", metavar="OUT", help="go on with the run in this results folder, however it was stopped"
     )
+    run.add_argument(
+        "--increment-seconds",
+        metavar="S",
+        help="what an increment of a path may take; a run that needs more says what it was doing and ends, --resume "
+        "goes on (default: [analysis] increment_seconds; with --resume no limit)",
+    )
     run.add_argument("--no-film", action="store_true", help="draw all but the film")
     run.add_argument(
         "--no-pictures", action="store_true", help="draw nothing and write no report; blockvis render OUT does later"
@@ -173,8 +188,12 @@ def _parser() -> argparse.ArgumentParser:
     _add_choice(info)
     info.add_argument("--picture", metavar="PNG", help="draw what was found, or why it is refused")
     info.set_defaults(verb=_info)
-    convert = verbs.add_parser("convert", help="any layout file to any other")
-    convert.add_argument("source", metavar="IN", help="or a folder or a pattern of files, one per stone")
+    convert = verbs.add_parser(
+        "convert", help="any layout file to any other; results to one file, a .vtkhdf, .glb or layout"
+    )
+    convert.add_argument(
+        "source", metavar="IN", help="or a folder or a pattern of files, one per stone; or a results folder"
+    )
     convert.add_argument("target", metavar="OUT")
     convert.add_argument("--unit", help="of the file's lengths, where the file does not say or is wrong")
     _add_view(convert)
@@ -211,8 +230,13 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
     render.add_argument("--size", default="1280x720", metavar="WxH")
     render.set_defaults(verb=_render)
-    for add in (_add_bond, _add_compare, _add_report, _add_explain, _add_sweep, _add_new, _add_schema):
+    added = (_add_bond, _add_compare, _add_report, _add_explain, _add_sweep, _add_new, _add_schema, _add_completion)
+    for add in added:
         add(verbs)
+    return parser
+
+
+def _add_completion(verbs: Any) -> None:
     completion = verbs.add_parser(
         "completion",
         help="a script that completes verbs and options in a shell",
@@ -220,7 +244,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     completion.add_argument("shell", choices=tuple(SHELLS))
     completion.set_defaults(verb=_completion)
-    return parser
 
 
 class _LayoutHelp(argparse.Action):
@@ -579,12 +602,16 @@ def _run(options: argparse.Namespace) -> int:
     outputs = options.outputs
     if outputs is None:
         outputs = (Drawing(film=not options.no_film, pictures=not options.no_pictures),)
-    started = time.perf_counter()
+    started, seconds = time.perf_counter(), options.increment_seconds
+    if seconds is not None:
+        seconds = _number(seconds)
+        if not seconds > 0.0:
+            raise ValueError(f"--increment-seconds is {seconds:g}; give seconds above 0")
     if options.resume is not None:
         if options.case is not None or options.output is not None or options.force or options.set:
             raise ValueError("--resume takes the results folder alone; the case is stored in it")
         with _checking(options, None) as checking:
-            run = resume_run(options.resume, outputs=outputs)
+            run = resume_run(options.resume, outputs=outputs, increment_seconds=seconds)
             if run.had_finished:
                 print(
                     f"blockvis: this run had finished ({run.response.stop}); nothing was left to solve", file=sys.stderr
@@ -594,7 +621,7 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError("name a case file: blockvis run CASE.toml, or go on with a run: blockvis run --resume OUT")
     case = read_case(options.case, [*options.set, *(["analysis.range=true"] if options.range else [])])
     with _checking(options, case) as checking:
-        run = run_case(case, options.output, overwrite=options.force, outputs=outputs)
+        run = run_case(case, options.output, overwrite=options.force, outputs=outputs, increment_seconds=seconds)
         return _report_ending(options, run, checking, started)
 
 
@@ -768,6 +795,8 @@ def _convert(options: argparse.Namespace) -> int:
     from .layout.assemble import assemble
 
     target = _new_file(options.target, options.force)
+    if (Path(options.source) / "assembly.npz").is_file():
+        return _convert_results(options, target)
     choice = _choice(options)
     layout = read_layout(options.source, unit=options.unit, dimension=_dimension(options), **choice)
     for note in layout.notes:
@@ -778,6 +807,40 @@ def _convert(options: argparse.Namespace) -> int:
     else:
         save_layout(assemble(layout, joint_thickness=joint if joint == "auto" else _number(joint)), target)
     print(f"{layout.n_blocks} blocks written to {target}")
+    return 0
+
+
+def _convert_results(options: argparse.Namespace, target: Path) -> int:
+    """Write a results folder as one file: a series, an animation, or the blocks where they are at the end."""
+    from .results.fall_files import known_fall
+    from .runs.reopen import open_results
+
+    given = [name for name, value in vars(options).items() if name in _OF_LAYOUTS and value not in _OF_LAYOUTS[name]]
+    if given:
+        raise ValueError(
+            f"--{given[0].replace('_', '-')} is of layout files; '{options.source}' holds results: leave it out"
+        )
+    response = open_results(options.source)
+    if target.suffix.lower() == ".vtkhdf":
+        from .results.vtkhdf import write_vtkhdf
+
+        write_vtkhdf(response, target)
+        print(f"{len(response.path)} increments of {response.assembly.n_blocks} blocks written to {target}")
+        return 0
+    if target.suffix.lower() == ".glb":
+        from .pictures.animated_glb import write_animated_glb
+
+        write_animated_glb(response, target, known_fall(response))
+        print(f"{response.assembly.n_blocks} blocks that move written to {target}")
+        return 0
+    from .formats.read import save_layout
+
+    if not response.path:
+        raise ValueError(f"nothing in '{options.source}' is in equilibrium ({response.stop}): no deformed layout")
+    last = response.path[-1]
+    save_layout(response.assembly, target, pose=last.pose)
+    where = f"{response.parameter.name} {last.parameter:.6g} {response.parameter.unit}".rstrip()
+    print(f"{response.assembly.n_blocks} blocks written to {target}, as they are at {where}")
     return 0
 
 

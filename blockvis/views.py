@@ -50,25 +50,42 @@ def html(value: Any) -> str:
     return notebook.assembly_html(value.assembly if isinstance(value, solver.Structure) else value)
 
 
-def blocks(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid:
-    """Make a dataset of the blocks of increment k."""
-    from .results.datasets import block_dataset
+def dataset(response: solver.Response, of: str, k: int, shape: str) -> pv.UnstructuredGrid:
+    """Make a dataset of the blocks, joints or contact points of an increment, below 0 one from the end of the path."""
+    from .results.datasets import block_dataset, contact_dataset, joint_dataset
+    from .results.mechanism_arrays import at_last_equilibrium, falling_in
 
-    return block_dataset(response.assembly, response.increments[k], shape=shape)
+    assembly, path = response.assembly, response.path
+    increments = path if path and k < 0 else response.increments
+    increment = increments[k]
+    ends = bool(path) and increment is path[-1] and response.collapse is not None
+    if ends:
+        increment = at_last_equilibrium(response)
+    if of == "blocks":
+        return block_dataset(assembly, increment, shape=shape, falls=falling_in(response) if ends else None)
+    return (joint_dataset if of == "joints" else contact_dataset)(assembly, increment, shape=shape)
 
 
-def joints(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid:
-    """Make a dataset of the joints of increment k."""
-    from .results.datasets import joint_dataset
+def fall(response: solver.Response, time: float, shape: str) -> pv.UnstructuredGrid:
+    """Make a dataset of the blocks at a time [s] of the fall, before it as at the last equilibrium.
 
-    return joint_dataset(response.assembly, response.increments[k], shape=shape)
+    Raises
+    ------
+    ValueError
+        Where nothing falls.
+    """
+    import pyvista as pv
 
+    from .results.fall_files import fall_grid, known_fall
+    from .results.mechanism_arrays import falling_in
 
-def contacts(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid:
-    """Make a dataset of the contact points of increment k."""
-    from .results.datasets import contact_dataset
-
-    return contact_dataset(response.assembly, response.increments[k], shape=shape)
+    found = known_fall(response)
+    if found is None:
+        raise ValueError(
+            f"nothing falls here ({response.stop}): fall(t) is of what collapses; mesh(-1) is the last equilibrium"
+        )
+    time = min(max(float(time), 0.0), float(found.times[-1]))
+    return pv.UnstructuredGrid(fall_grid(response, found.at(time), time, shape, falling_in(response)))
 
 
 def animate(response: solver.Response, path: str | os.PathLike[str], **options: Any) -> Path:

@@ -17,14 +17,11 @@ class Views(Protocol):
     def html(self, value: Any) -> str:
         """Give the value as HTML."""
 
-    def blocks(self, response: Any, k: int, shape: str) -> Any:
-        """Give the blocks of increment k as a dataset."""
+    def dataset(self, response: Any, of: str, k: int, shape: str) -> Any:
+        """Give the "blocks", "joints" or "contacts" of increment k as a dataset."""
 
-    def joints(self, response: Any, k: int, shape: str) -> Any:
-        """Give the joints of increment k as a dataset."""
-
-    def contacts(self, response: Any, k: int, shape: str) -> Any:
-        """Give the contact points of increment k as a dataset."""
+    def fall(self, response: Any, time: float, shape: str) -> Any:
+        """Give the blocks so many seconds after the last equilibrium as a dataset."""
 
     def animate(self, response: Any, path: str | os.PathLike[str], **options: Any) -> Any:
         """Write a film."""
@@ -32,10 +29,9 @@ class Views(Protocol):
 
 @cache
 def _views() -> Views | None:
-    for entry in entry_points(group="solver.views"):
-        views: Views = entry.load()
-        return views
-    return None
+    entries = tuple(entry_points(group="solver.views"))
+    first: Views | None = entries[0].load() if entries else None
+    return first
 
 
 def views() -> Views:

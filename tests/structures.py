@@ -200,8 +200,9 @@ def posed(assembly: solver.Assembly, pose: solver.Pose, force=None) -> solver.Re
     contacts = mechanics.find_contacts(assembly, mechanics.moved_vertices(assembly, pose), 1e-3)
     forces = np.zeros((len(contacts), assembly.dimension)) if force is None else force(contacts)
     first = arch_response().path[0]
-    held = replace(first.state, pose=pose, contacts=contacts, forces=forces)
-    return replace(arch_response(), assembly=assembly, increments=(replace(first, held=held),))
+    still = np.zeros((assembly.n_blocks, 3 * assembly.dimension - 3))
+    held = replace(first.state, pose=pose, contacts=contacts, forces=forces, velocity=still)
+    return replace(arch_response(), assembly=assembly, increments=(replace(first, held=held),), collapse=None)
 
 
 @cache

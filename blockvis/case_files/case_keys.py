@@ -27,6 +27,7 @@ from blockvis.cases.key import (
     TEXT,
     TEXTS,
     TRIPLE,
+    TRUE_OR_FALSE,
     VECTOR,
     Key,
     Section,
@@ -490,6 +491,8 @@ ANALYSIS_KEYS = (
         default="coulomb"),
     Key("falling_frames", whole(0, MOST_STEPS), "Frames of the mechanism after collapse", 20,
         otherwise=f"{_CONTROLS.frames(2)} in the plane, {_CONTROLS.frames(3)} in space"),
+    Key("increment_seconds", POSITIVE, "Time that an increment of a path may take: a run that needs more says what it "
+        "was doing and ends, and blockvis run --resume goes on with it", 60.0, "s", otherwise="as long as it takes"),
 )  # fmt: skip
 
 ANALYSIS = Section(
@@ -505,6 +508,8 @@ OUTPUT = Section(
          "false for none", "collapse.gif", default="collapse.mp4"),
      Key("vtu", one_of(("moved", "undeformed")), "Where the points of the VTU files are: where the blocks have moved "
          "to, or in the drawing, for a filter such as Warp By Vector to move", "undeformed", default="moved"),
+     Key("vtu_strings", TRUE_OR_FALSE, "Whether names in the VTU files are arrays of strings, which meshio does not "
+         "read; false makes them bytes, field arrays of the same names", False, default=True),
      Key("underlay", TEXT, "Photograph under pictures and film in the plane, relative to the case file, of what the "
          "image of the blocks shows, or with a world file", "photo.jpg", otherwise="none")),
 )  # fmt: skip

@@ -157,10 +157,12 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         loads=tuple(_load(table) for table in top.tables("loads")),
         analysis=asked["kind"],
         settings=settings[asked["kind"]],
+        increment_seconds=asked["increment_seconds"],
         controls=_controls(asked, phases, top.table("control"), geometry["overlap_tolerance"]),
         explain=read_explain(top.table("explain")),
         animation=output["animation"] or None,
         vtu=output["vtu"],
+        vtu_strings=output["vtu_strings"],
         underlay=output["underlay"],
     )
     top.finish()
@@ -211,7 +213,25 @@ def _checked(case: Case, settings: Mapping[str, Any]) -> Case:
     for name, other in KINDS.items():
         if name != case.analysis:
             other.refuse(settings[name], case)
-    return KINDS[case.analysis].checked(case)
+    case = KINDS[case.analysis].checked(case)
+    refuse_increment_seconds(case, case.increment_seconds)
+    return case
+
+
+def refuse_increment_seconds(case: Case, seconds: float | None) -> None:
+    """Raise ValueError where nothing looks at the time that an increment may take: where there are no steps.
+
+    Parameters
+    ----------
+    case : Case
+    seconds : float or None [s]
+    """
+    has_steps = bool(KINDS[case.analysis].course(case).drivers)
+    if seconds is not None and (not has_steps or case.controls.increments == mechanics.INCREMENTS[1]):
+        raise ValueError(
+            f"{case.source}: [analysis] increment_seconds is {seconds:g}; it is looked at after the steps of a path, "
+            "which a limit load without a settlement and a linear program do not have: leave it out"
+        )
 
 
 def _law(values: dict[str, Any]) -> dict[str, Any]:

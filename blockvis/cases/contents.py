@@ -39,12 +39,16 @@ class Case:
         What that kind has read from its own keys; see :meth:`blockvis.kinds.kind.AnalysisKind.read`.
     profiles : tuple of Profile or None
         Of the settlements along x; :func:`blockvis.cases.build.case_settlements` makes motions of supports of them.
+    increment_seconds : float or None [s]
+        What an increment of a path may take.
     explain : ExplainSettings
         What ``blockvis explain`` looks for; other analyses leave it alone.
     image : ImageKeys
         Scale and labels of a layout file that is an image.
     vtu : {"moved", "undeformed"}
         Shape of the blocks in the VTU files.
+    vtu_strings : bool
+        Whether names are arrays of strings in the VTU files.
     underlay : str or None
         Photograph under the pictures, relative to the case file.
     """
@@ -83,7 +87,9 @@ class Case:
     analysis: str = "settlement"
     settings: Any = None
     controls: solver.Controls = field(default_factory=solver.Controls)
+    increment_seconds: float | None = None
     explain: ExplainSettings = field(default_factory=ExplainSettings)
     animation: str | None = "collapse.mp4"
     vtu: str = "moved"
+    vtu_strings: bool = True
     underlay: str | None = None

@@ -12,7 +12,7 @@ from typing import Any
 import solver
 from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.results.increments import StoredIncrements
-from blockvis.results.viewer_files import ViewerFiles
+from blockvis.results.viewer_files import ViewerFiles, ViewerFormat
 from blockvis.system.atomic_files import partial_of, remove
 from blockvis.system.worker import Say, Worker, WorkerEnded, serve
 
@@ -43,19 +43,18 @@ class FilmProcess:
         self._path: Path | None = None
         self._worker = Worker("blockvis.pictures.film_process")
 
-    def follow(self, folder: Path, assembly: solver.Assembly, shape: str, count: int) -> None:
+    def follow(self, folder: Path, assembly: solver.Assembly, vtu: ViewerFormat, count: int) -> None:
         """Write the files for viewers of a results folder, from an increment on.
 
         Parameters
         ----------
         folder : Path
         assembly : solver.Assembly
-        shape : {"moved", "undeformed"}
-            As of :class:`blockvis.results.viewer_files.ViewerFiles`.
+        vtu : blockvis.results.viewer_files.ViewerFormat
         count : int
             Increments whose files are there already.
         """
-        self._worker.say("follow", (folder, assembly, shape, count))
+        self._worker.say("follow", (folder, assembly, vtu, count))
 
     def add(self, increment: solver.Increment) -> None:
         """Write the files for viewers of the next increment, whose state is in the folder; returns at once.
@@ -196,13 +195,13 @@ class _Followed:
 
     Parameters
     ----------
-    folder, assembly, shape, count
+    folder, assembly, vtu, count
         As of :meth:`FilmProcess.follow`.
     """
 
-    def __init__(self, folder: Path, assembly: solver.Assembly, shape: str, count: int) -> None:
+    def __init__(self, folder: Path, assembly: solver.Assembly, vtu: ViewerFormat, count: int) -> None:
         self._stored, self._count = StoredIncrements(folder), count
-        self._start = folder, assembly, shape
+        self._start = folder, assembly, vtu
         self._files: ViewerFiles | None = None
         self._failed: Exception | None = None
 

@@ -14,9 +14,10 @@ from .solid_view import ABOVE, AROUND, View
 _SCRIPT = Template('''\
 """Opens these results in ParaView: View > Python Shell > Run Script, or paraview --script=paraview_colours.py
 
-Blocks are coloured by displacement [m], with their outlines, open joints by their opening [m]; hinges and sliding
-points by state, with arrows of the contact forces [N]. Cells are triangulated first: ParaView fills bent polygons
-wrongly otherwise. Blocks in space are as of glass, so that the faces of their open joints are seen.
+It opens at the last equilibrium. Blocks are coloured by macro-block, the parts that move together in the motion that
+follows; joints that open by more than 2 % of the widest are lines, the wider and the redder the more they open [m];
+hinges and sliding points by state, with arrows of the contact forces [N]. Cells are triangulated first: ParaView
+fills bent polygons wrongly otherwise. Blocks in space are as of glass, so that the faces of open joints are seen.
 """
 
 import os
@@ -55,19 +56,22 @@ faces = Show(filled, view)
 faces.Representation = "Surface"
 faces.Ambient, faces.Diffuse, faces.Specular = (0.5, 0.6, 0.0) if in_space else (1.0, 0.0, 0.0)
 faces.Opacity = 0.45 if in_space else 1.0
-ColorBy(faces, ("CELLS", "displacement", "Magnitude"))
-scale = GetColorTransferFunction("displacement")
-scale.RGBPoints = [$ramp]
-scale.ColorSpace = "RGB"
+ColorBy(faces, ("CELLS", "macro_block"))
 UpdatePipeline(last, filled)
-scale.RescaleTransferFunction(0.0, max(filled.CellData["displacement"].GetRange(-1)[1], 1e-12))
-faces.SetScalarBarVisibility(view, True)
-bar = GetScalarBar(scale, view)
-bar.Title, bar.ComponentTitle = "displacement [m]", ""
-bar.TitleColor = bar.LabelColor = [0.1, 0.1, 0.1]
-bar.TitleFontSize = bar.LabelFontSize = 12
-bar.AutomaticLabelFormat, bar.LabelFormat, bar.RangeLabelFormat = 0, "%.3g", "%.3g"
-bar.WindowLocation, bar.ScalarBarLength = "Lower Right Corner", 0.35
+parts = int(filled.CellData["macro_block"].GetRange()[1]) + 1
+tints = [$tints]
+bodies = GetColorTransferFunction("macro_block")
+bodies.InterpretValuesAsCategories = 1
+bodies.AnnotationsInitialized = 1
+bodies.Annotations = ["-1", "at rest"] + [word for k in range(parts) for word in (str(k), "part " + str(k + 1))]
+bodies.IndexedColors = [$rest] + [c for k in range(parts) for c in tints[3 * (k % (len(tints) // 3)):][:3]]
+faces.SetScalarBarVisibility(view, 0 < parts <= 8)
+if 0 < parts <= 8:
+    bar = GetScalarBar(bodies, view)
+    bar.Title, bar.ComponentTitle = "macro-block", ""
+    bar.TitleColor = bar.LabelColor = [0.1, 0.1, 0.1]
+    bar.TitleFontSize = bar.LabelFontSize = 12
+    bar.WindowLocation, bar.ScalarBarLength = "Lower Right Corner", 0.25
 
 edges = ExtractEdges(Input=blocks)
 RenameSource("outlines", edges)
@@ -77,17 +81,18 @@ outlines.AmbientColor = outlines.DiffuseColor = [$outline]
 outlines.LineWidth = 1.0
 
 widest = joints.CellData["opening"].GetRange()[1] if joints.CellData.GetNumberOfArrays() else 0.0
-cracks = Threshold(Input=joints, Scalars=["CELLS", "opening"])
-cracks.LowerThreshold, cracks.UpperThreshold = max(0.01 * widest, 1e-9), max(widest, 1e-9)
-RenameSource("open joints", cracks)
-lines = Show(cracks, view)
-lines.LineWidth = 4.0
-ColorBy(lines, ("CELLS", "opening"))
 openings = GetColorTransferFunction("opening")
-openings.RGBPoints = [0.0, $pale, 1.0, $open]
+openings.RGBPoints = [$cracks]
 openings.ColorSpace = "RGB"
-openings.RescaleTransferFunction(0.0, max(widest, 1e-9))
+for share, above, width in ((0.02, 0.1, 1.5), (0.1, 0.3, 3.0), (0.3, 0.6, 5.0), (0.6, 1.0, 8.0)):
+    cracks = Threshold(Input=joints, Scalars=["CELLS", "opening"])
+    cracks.LowerThreshold, cracks.UpperThreshold = max(share * widest, 1e-9), max(above * widest, 1e-9)
+    RenameSource("joints open by more than %.3g mm" % (1000.0 * share * widest), cracks)
+    lines = Show(cracks, view)
+    lines.LineWidth = width
+    ColorBy(lines, ("CELLS", "opening"))
 lines.SetScalarBarVisibility(view, True)
+openings.RescaleTransferFunction(0.0, max(widest, 1e-9))
 crack_bar = GetScalarBar(openings, view)
 crack_bar.Title, crack_bar.ComponentTitle = "opening [m]", ""
 crack_bar.TitleColor = crack_bar.LabelColor = [0.1, 0.1, 0.1]
@@ -151,14 +156,12 @@ def write_paraview_macro(folder: str | os.PathLike[str]) -> Path:
     pathlib.Path
     """
     path = Path(folder) / "paraview_colours.py"
-    ramp = []
-    for k, (r, g, b) in enumerate(palette.RAMP):
-        ramp += [k / (len(palette.RAMP) - 1), r / 255.0, g / 255.0, b / 255.0]
     text = _SCRIPT.substitute(
-        ramp=", ".join(f"{v:.4f}" for v in ramp),
+        tints=", ".join(f"{v / 255.0:.4f}" for v in palette.PARTS.ravel()),
+        rest=_fractions(palette.DRAWN),
         outline=_fractions(palette.OUTLINE),
         open=_fractions(palette.OPEN),
-        pale=_fractions((250, 220, 205)),
+        cracks=", ".join(f"{k / 2.0}, {_fractions(palette.rgb(colour))}" for k, colour in enumerate(palette.CRACKS)),
         sticking=_fractions(palette.FAINT),
         sliding=_fractions(palette.SLIDING),
         hinge=_fractions(palette.HINGE),

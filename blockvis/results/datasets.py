@@ -27,6 +27,7 @@ from solver import mechanics
 
 from .joint_faces import InitialJoints, Rings, initial_joints, lengths_of
 from .joints import joint_states
+from .mechanism_arrays import block_motion, next_places, part_of_friction
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -40,13 +41,18 @@ SHAPES = ("moved", "undeformed")
 
 #: Units of the arrays; those that are not here are names, numbers of blocks or states, or have no unit.
 UNITS = {
-    "displacement": "m", "reference": "m", "to_reference": "m", "rotation": "rad", "force": "N", "normal_force": "N",
-    "shear_force": "N", "gap": "m", "opening": "m", "slip": "m", "length": "m", "area": "m²", "shear": "N",
+    "displacement": "m", "reference": "m", "to_reference": "m", "mechanism": "m", "translation": "m", "rotation": "rad",
+    "force": "N", "normal_force": "N", "shear_force": "N", "shear": "N", "gap": "m", "opening": "m", "slip": "m",
+    "length": "m", "area": "m²",
 }  # fmt: skip
 
 
 def block_dataset(
-    assembly: solver.Assembly, increment: solver.Increment | None = None, *, shape: str = "moved"
+    assembly: solver.Assembly,
+    increment: solver.Increment | None = None,
+    *,
+    shape: str = "moved",
+    falls: np.ndarray | None = None,
 ) -> pv.UnstructuredGrid:
     """Make a dataset of the blocks of one increment, one cell per block: a polygon, or in space a polyhedron.
 
@@ -56,19 +62,24 @@ def block_dataset(
     increment : solver.Increment, optional
         The blocks as laid out by default.
     shape : {"moved", "undeformed"}
-        Whether the points are where the blocks are at the increment, or where the layout has them. Warped by its active
-        vectors, the one gives the other.
+        Whether the points are where the blocks are at the increment, or where the layout has them. The active vectors,
+        by which a viewer warps first, lead from there on: those of the layout to where the blocks are, moved ones along
+        the mechanism that follows.
+    falls : (n_blocks,) bool array, optional
+        Blocks that the collapse takes; by default those that have fallen, in frames of a fall those that move.
 
     Returns
     -------
     pyvista.UnstructuredGrid
         Cell arrays ``block_id``, ``name``, ``role`` (number), ``role_name``, ``material_id``, ``material``,
-        ``fallen`` (1 for blocks that have left for good), ``displacement`` (n_blocks, 3) of the centroids [m] and
-        ``rotation`` [rad], in space a vector; point arrays
-        ``displacement`` (n_vertices, 3) [m], ``reference``, the coordinates in the layout [m], and of moved shapes
-        ``to_reference``, the vector back to them [m]; field arrays ``units`` as "displacement [m]", ``settlement`` (the
-        parameter: of a pushover the control displacement, of a load that moves its position), ``phase``,
-        ``load_multiplier``, ``reaction`` [N or N·m], ``status``, ``role_names`` and ``material_names``.
+        ``fallen`` (1 for blocks that have left for good), ``falls`` (1 for those that collapse takes), ``translation``
+        (n_blocks, 3) of the centroids [m] and ``rotation`` [rad], in space a vector; of the motion that follows
+        ``macro_block``, -1 at rest, and per unit of the parameter ``mechanism_velocity`` (n_blocks, 3) of the centroids
+        and ``mechanism_rotation``; point arrays ``displacement`` (n_vertices, 3) [m], ``reference``, the coordinates in
+        the layout [m], and of moved shapes ``mechanism``, a step along the motion that follows [m], and
+        ``to_reference``, the vector back to the layout [m]; field arrays ``units`` as "displacement [m]",
+        ``settlement`` (the parameter: of a pushover the control displacement, of a load that moves its position),
+        ``phase``, ``load_multiplier``, ``reaction`` [N or N·m], ``status``, ``role_names`` and ``material_names``.
 
     Examples
     --------
@@ -77,11 +88,15 @@ def block_dataset(
     >>> str(block_dataset(one).cell_data["name"][0])
     'lintel'
     """
-    return _as_dataset(block_grid(assembly, increment, shape=shape))
+    return _as_dataset(block_grid(assembly, increment, shape=shape, falls=falls))
 
 
 def block_grid(
-    assembly: solver.Assembly, increment: solver.Increment | None = None, *, shape: str = "moved"
+    assembly: solver.Assembly,
+    increment: solver.Increment | None = None,
+    *,
+    shape: str = "moved",
+    falls: np.ndarray | None = None,
 ) -> vtkUnstructuredGrid:
     """Make what :func:`block_dataset` wraps."""
     pose = solver.Pose.initial(assembly) if increment is None else increment.pose
@@ -96,18 +111,20 @@ def block_grid(
         "block_id": np.arange(assembly.n_blocks, dtype=np.int32),
         "role": np.array([ROLE_NUMBERS[str(role)] for role in assembly.roles], dtype=np.int32),
         "material_id": np.array([number[material] for material in assembly.materials], dtype=np.int32),
-        "displacement": _in_space(pose.positions - assembly.centroids),
+        "translation": _in_space(pose.positions - assembly.centroids),
         "rotation": pose.rotations[:, 0].copy() if assembly.dimension == 2 else pose.rotations.copy(),
     }
     add_arrays(grid.GetCellData(), cells)
     grid.GetCellData().SetActiveScalars("block_id")
     for name, words in (("name", assembly.names), ("role_name", assembly.roles), ("material", assembly.materials)):
         grid.GetCellData().AddArray(_strings(name, words))
-    _give_shape(grid, assembly.vertices, shape)
+    ahead = None if increment is None else next_places(assembly, increment, corners, assembly.block_of_vertex)
+    _give_shape(grid, assembly.vertices, shape, ahead)
     grid.GetFieldData().AddArray(_strings("role_names", mechanics.ROLES))
     grid.GetFieldData().AddArray(_strings("material_names", materials))
     if increment is not None:
-        add_arrays(grid.GetCellData(), {"fallen": increment.fallen.astype(np.int32)})
+        fallen, motion = increment.fallen, block_motion(assembly, increment, falls)
+        add_arrays(grid.GetCellData(), {"fallen": fallen.astype(np.int32), **motion})
         _describe(grid, increment)
     _state_units(grid)
     return grid
@@ -202,11 +219,12 @@ def contact_dataset(
     -------
     pyvista.UnstructuredGrid
         Point arrays ``normal`` and ``tangent`` (n_contacts, 3), ``force`` (n_contacts, 3) on ``block_a`` [N],
-        ``normal_force`` (compression positive) and ``shear_force`` [N], ``gap`` [m], ``friction``, ``state``
-        (number of :class:`solver.mechanics.ContactState`), ``block_a`` and ``block_b``, ``displacement`` and
-        ``reference`` as of :func:`block_dataset`; its field arrays, and ``state_names``. In frames of a fall, which
-        are no equilibrium, forces are 0. In space ``shear_force`` is the size of the vector ``shear`` [N], and
-        ``slip`` [m] is how far block a has moved along block b there since the layout.
+        ``normal_force`` (compression positive) and ``shear_force`` [N], ``gap`` [m], ``friction``,
+        ``utilisation``, the part of the friction that the shear force uses up, ``state``
+        (number of :class:`solver.mechanics.ContactState`), ``carries`` (1 with a force), ``block_a`` and ``block_b``,
+        ``displacement`` and ``reference`` as of :func:`block_dataset`; its field arrays, and ``state_names``. In
+        frames of a fall, which are no equilibrium, forces are 0. In space ``shear_force`` is the size of the vector
+        ``shear`` [N], and ``slip`` [m] is how far block a has moved along block b there since the layout.
     """
     return _as_dataset(contact_grid(assembly, increment, shape=shape))
 
@@ -215,12 +233,13 @@ def contact_grid(
     assembly: solver.Assembly, increment: solver.Increment, *, shape: str = "moved"
 ) -> vtkUnstructuredGrid:
     """Make what :func:`contact_dataset` wraps."""
-    contacts = increment.contacts
+    contacts, states = increment.contacts, increment.states
     blocks = (contacts.block_a, contacts.block_b)
     places = Rings(contacts.points, np.arange(len(contacts) + 1))
     grid = _grid_between(assembly, increment, places, blocks, VTK_VERTEX, shape)
     normal, tangent = contacts.frames[:, 0], contacts.frames[:, 1]
     balanced = increment.forces * (increment.status != solver.Status.FALLING)
+    carries = (states != mechanics.ContactState.OPEN) & (balanced[:, 0] > 0.0)
     shear = np.einsum("ki,kij->kj", balanced[:, 1:], contacts.frames[:, 1:])
     force = balanced[:, :1] * normal + shear
     in_space = assembly.dimension == 3
@@ -232,7 +251,9 @@ def contact_grid(
         "shear_force": np.linalg.norm(shear, axis=1) if in_space else balanced[:, 1],
         "gap": np.asarray(contacts.gaps, dtype=float),
         "friction": np.asarray(increment.friction, dtype=float),
-        "state": increment.states.astype(np.int32),
+        "utilisation": part_of_friction(balanced, increment.friction) * carries,
+        "state": states.astype(np.int32),
+        "carries": carries.astype(np.int32),
         "block_a": contacts.block_a.astype(np.int32),
         "block_b": contacts.block_b.astype(np.int32),
     }
@@ -307,8 +328,8 @@ def _grid_between(
 ) -> vtkUnstructuredGrid:
     """Make a grid of cells whose points lie between two blocks each, (n_points,) int arrays."""
     grid = _grid(rings.points, rings.offsets, kind)
-    initial = solver.Pose.initial(assembly)
-    _give_shape(grid, mechanics.carried_between(rings.points, *blocks, increment.pose, initial), shape)
+    drawn = mechanics.carried_between(rings.points, *blocks, increment.pose, solver.Pose.initial(assembly))
+    _give_shape(grid, drawn, shape, next_places(assembly, increment, rings.points, *blocks))
     return grid
 
 
@@ -337,20 +358,24 @@ def add_arrays(attributes: Any, arrays: Mapping[str, np.ndarray]) -> None:
         attributes.AddArray(values)
 
 
-def _give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str) -> None:
+def _give_shape(grid: vtkUnstructuredGrid, reference: np.ndarray, shape: str, ahead: np.ndarray | None) -> None:
     """Let the points of a moved grid stay or go where the layout has them, (n, d) [m], and say how far they move.
 
-    The active vectors are what Warp By Vector takes first: of moved shapes those that do not move them a second time.
+    The active vectors are what Warp By Vector takes first: of the layout the displacement, of moved shapes what lies
+    ahead, (n, d) [m], which neither undoes the displacement nor doubles it.
     """
     if shape not in SHAPES:
         raise ValueError(f"shape is '{shape}'; choose from {', '.join(SHAPES)}")
     drawn = _in_space(reference)
     moved = vtk_to_numpy(grid.GetPoints().GetData()) - drawn
-    vectors = {"to_reference": -moved} if shape == "moved" else {}
-    add_arrays(grid.GetPointData(), vectors | {"displacement": moved, "reference": drawn})
-    grid.GetPointData().SetActiveVectors("to_reference" if shape == "moved" else "displacement")
-    if shape == "undeformed":
+    arrays = {"displacement": moved, "reference": drawn}
+    if shape == "moved":
+        arrays = {"mechanism": np.zeros_like(moved) if ahead is None else _in_space(ahead)} | arrays
+        arrays["to_reference"] = -moved
+    else:
         grid.GetPoints().SetData(numpy_to_vtk(np.ascontiguousarray(drawn), deep=True))
+    add_arrays(grid.GetPointData(), arrays)
+    grid.GetPointData().SetActiveVectors(next(iter(arrays)))
 
 
 def _state_units(grid: vtkUnstructuredGrid) -> None:

@@ -2,21 +2,37 @@
 
 from __future__ import annotations
 
+import weakref
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import solver
-from blockvis.dynamics.fall import Fall, falling_increment
+from blockvis.dynamics.fall import Fall, fall_of, falling_increment
 from blockvis.system.atomic_files import make_folder, write_atomic
 
+from .increments import folder_of
+from .mechanism_arrays import falling_in
 from .npz import checked_arrays, compressed, flat, from_flat
+from .viewer_files import MOVED, ViewerFormat
+
+if TYPE_CHECKING:
+    from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
 
 #: List of the VTU files, and the poses.
 FALL_LIST, FALL_POSES = "fall.pvd", "fall.npz"
 
+#: Falls by the id of their response, as long as it lives: to work one out takes seconds.
+_known: dict[int, Fall | None] = {}
 
-def write_fall(fall: Fall, response: solver.Response, folder: Path) -> None:
+
+def write_fall(
+    fall: Fall,
+    response: solver.Response,
+    folder: Path,
+    vtu: ViewerFormat = MOVED,
+) -> None:
     """Write the VTU files of a fall, the list of them, and its poses.
 
     Parameters
@@ -26,23 +42,59 @@ def write_fall(fall: Fall, response: solver.Response, folder: Path) -> None:
         Of which it is the fall.
     folder : Path
         Of the results.
+    vtu : ViewerFormat
+        As of the folder.
     """
     from blockvis.system.vtk_files import write_pvd, write_vtu
 
-    from .datasets import add_arrays, block_grid
-
     make_folder(folder / "fall")
-    entries = []
+    entries, falls = [], falling_in(response)
     for k, time in enumerate(fall.times):
-        grid = block_grid(response.assembly, falling_increment(response, fall.pose(k)))
-        # There is no equilibrium here: numbers of the static path would mislead.
-        for name in ("settlement", "load_multiplier", "reaction"):
-            grid.GetFieldData().RemoveArray(name)
-        add_arrays(grid.GetFieldData(), {"time": np.array([time])})
+        grid = fall_grid(response, fall.pose(k), float(time), vtu.shape, falls)
         entries.append((float(time), f"fall/blocks_{k:05d}.vtu"))
-        write_vtu(grid, folder / entries[-1][1], durable=False)
+        write_vtu(grid, folder / entries[-1][1], strings=vtu.strings, durable=False)
     write_pvd(folder / FALL_LIST, entries, last=False)
     write_atomic(folder / FALL_POSES, compressed(flat(fall)))
+
+
+def fall_grid(
+    response: solver.Response, pose: solver.Pose, time: float, shape: str, falls: np.ndarray
+) -> vtkUnstructuredGrid:
+    """Make a grid of the blocks at a time [s] of a fall.
+
+    Parameters
+    ----------
+    response : solver.Response
+    pose : solver.Pose
+    time : float [s]
+    shape : {"moved", "undeformed"}
+    falls : (n_blocks,) bool array
+        Blocks that the collapse takes.
+    """
+    from .datasets import add_arrays, block_grid
+
+    grid = block_grid(response.assembly, falling_increment(response, pose), shape=shape, falls=falls)
+    # There is no equilibrium here: numbers of the static path would mislead.
+    for name in ("settlement", "load_multiplier", "reaction"):
+        grid.GetFieldData().RemoveArray(name)
+    add_arrays(grid.GetFieldData(), {"time": np.array([time])})
+    return grid
+
+
+def known_fall(response: solver.Response) -> Fall | None:
+    """Read the fall of a response from its folder, or work it out, once; None where nothing falls.
+
+    Parameters
+    ----------
+    response : solver.Response
+    """
+    key = id(response)
+    if key not in _known:
+        folder = folder_of(response.path[-1]) if response.path else None
+        found = None if folder is None else stored_fall(folder)
+        _known[key] = fall_of(response) if found is None else found
+        weakref.finalize(response, _known.pop, key, None)
+    return _known[key]
 
 
 def remove_fall(folder: Path) -> None:

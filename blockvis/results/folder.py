@@ -25,7 +25,7 @@ from .joints import LargestMovements
 from .npz import checked_arrays, compressed, flat, packed, unpacked
 from .record import RECORD, Record, read_record, versions
 from .tables import COLUMNS, LIMIT_TABLES, own_columns, row_of_increment, summary_of
-from .viewer_files import ViewerFiles, ViewerWriter, restore_grids, write_lists
+from .viewer_files import MOVED, ViewerFiles, ViewerFormat, ViewerWriter, restore_grids, write_end, write_lists
 
 #: Where a run can go on from, beside the increments it belongs to.
 CHECKPOINT = "checkpoint.npz"
@@ -86,8 +86,8 @@ class ResultsFolder:
         Whether results that are there already may be replaced.
     parameter : solver.mechanics.Quantity
         What the increments run over.
-    shape : {"moved", "undeformed"}
-        Of the blocks in the VTU files; see :func:`blockvis.results.datasets.block_dataset`.
+    vtu : ViewerFormat
+        Of the VTU files.
 
     Attributes
     ----------
@@ -115,9 +115,9 @@ class ResultsFolder:
         record: Record | None = None,
         overwrite: bool = False,
         parameter: mechanics.Quantity = mechanics.SETTLEMENT,
-        shape: str = "moved",
+        vtu: ViewerFormat = MOVED,
     ) -> None:
-        self.parameter, self.shape = parameter, shape
+        self.parameter, self.vtu = parameter, vtu
         self.path, self.assembly, self.record = Path(path), assembly, record or Record(versions=versions())
         self.increments: list[solver.Increment] = []
         self._files = StoredIncrements(self.path)
@@ -135,7 +135,7 @@ class ResultsFolder:
 
     @classmethod
     def reopened(
-        cls, path: str | Path, parameter: mechanics.Quantity, kind: type[C], shape: str = "moved"
+        cls, path: str | Path, parameter: mechanics.Quantity, kind: type[C], vtu: ViewerFormat = MOVED
     ) -> tuple[ResultsFolder, C | None]:
         """Reopen the folder of a run that was stopped, as it was after its last checkpoint.
 
@@ -146,7 +146,7 @@ class ResultsFolder:
             As of the folder.
         kind : type
             Of the checkpoint.
-        shape : {"moved", "undeformed"}
+        vtu : ViewerFormat
             As of the folder.
 
         Returns
@@ -161,7 +161,7 @@ class ResultsFolder:
             If the folder holds no run.
         """
         results = cls.__new__(cls)
-        results.path, results.parameter, results.shape = Path(path), parameter, shape
+        results.path, results.parameter, results.vtu = Path(path), parameter, vtu
         results.record = read_record(results.path)
         results.assembly = stored_assembly(results.path)
         results._release = _locked(results, results.path)
@@ -179,7 +179,7 @@ class ResultsFolder:
         results._start_table()
         for number, increment in enumerate(results.increments):
             results._add_row(number, increment)
-        restore_grids(results.path, results.assembly, results.increments, shape)
+        restore_grids(results.path, results.assembly, results.increments, vtu)
         results._write_table()
         write_lists(results.path, results.increments)
         results._remove_from(count)
@@ -222,7 +222,9 @@ class ResultsFolder:
             Tables of the kind of analysis.
         """
         if not self.viewer.finish():
-            restore_grids(self.path, self.assembly, self.increments, self.shape)
+            restore_grids(self.path, self.assembly, self.increments, self.vtu)
+        if len(response.path) <= len(self.increments):
+            write_end(self.path, response, self.vtu, self._movements.joints)
         self._write_table(durable=True)
         write_lists(self.path, self.increments, durable=True)
         write_atomic(self.path / "joints.csv", self._movements.table())
@@ -240,7 +242,7 @@ class ResultsFolder:
 
     def own_viewer(self) -> ViewerWriter:
         """Make what writes the files for viewers in this process."""
-        return ViewerFiles(self.path, self.assembly, self.shape, self.increments, self._movements.joints)
+        return ViewerFiles(self.path, self.assembly, self.vtu, self.increments, self._movements.joints)
 
     def _start_table(self) -> None:
         self._rows = io.StringIO()

@@ -3,16 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
+
+import numpy as np
 
 import solver
 from blockvis.system.vtk_files import is_complete, write_pvd, write_vtu
 
 from .joint_faces import InitialJoints, initial_joints
+from .mechanism_arrays import at_last_equilibrium, falling_in
 
 #: The VTU files of an increment.
 GRIDS = ("blocks", "contacts", "joints")
+
+
+@dataclass(frozen=True)
+class ViewerFormat:
+    """How the VTU files of a results folder are written.
+
+    Attributes
+    ----------
+    shape : {"moved", "undeformed"}
+        Of the blocks; see :func:`blockvis.results.datasets.block_dataset`.
+    strings : bool
+        As of :func:`blockvis.system.vtk_files.write_vtu`.
+    """
+
+    shape: str = "moved"
+    strings: bool = True
+
+
+#: As viewers show them best.
+MOVED = ViewerFormat()
 
 
 class ViewerWriter(Protocol):
@@ -32,8 +56,7 @@ class ViewerFiles:
     ----------
     folder : Path
     assembly : solver.Assembly
-    shape : {"moved", "undeformed"}
-        Of the blocks; see :func:`blockvis.results.datasets.block_dataset`.
+    vtu : ViewerFormat
     increments : sequence of solver.Increment
         Whose files are there already.
     joints : InitialJoints, optional
@@ -44,11 +67,11 @@ class ViewerFiles:
         self,
         folder: Path,
         assembly: solver.Assembly,
-        shape: str,
+        vtu: ViewerFormat,
         increments: Sequence[solver.Increment] = (),
         joints: InitialJoints | None = None,
     ) -> None:
-        self.folder, self.assembly, self.shape = folder, assembly, shape
+        self.folder, self.assembly, self.vtu = folder, assembly, vtu
         self.joints = initial_joints(assembly) if joints is None else joints
         self._listed = list(increments)
 
@@ -60,7 +83,7 @@ class ViewerFiles:
         increment : solver.Increment
             Kept: its arrays had better be in a file.
         """
-        write_grids(self.folder, len(self._listed), self.assembly, increment, self.shape, self.joints)
+        write_grids(self.folder, len(self._listed), self.assembly, increment, self.vtu, self.joints)
         self._listed.append(increment)
         write_lists(self.folder, self._listed)
 
@@ -70,7 +93,9 @@ class ViewerFiles:
 
 
 def write_lists(folder: Path, increments: Sequence[solver.Increment], *, durable: bool = False) -> None:
-    """Write the lists of the VTU files of all increments, for which the parameter is the time.
+    """Write the lists of the VTU files to the last equilibrium, for which the parameter is the time.
+
+    Where nothing is in equilibrium, they name all there is.
 
     Parameters
     ----------
@@ -79,13 +104,16 @@ def write_lists(folder: Path, increments: Sequence[solver.Increment], *, durable
     durable : bool
         As of :func:`blockvis.system.atomic_files.atomic_file`.
     """
-    times = output_times(increments)
+    path = [increment for increment in increments if increment.status == solver.Status.EQUILIBRIUM]
+    times = output_times(path or increments)
     for kind in GRIDS:
         entries = [(t, f"increments/{kind}_{i:05d}.vtu") for i, t in enumerate(times)]
         write_pvd(folder / f"{kind}.pvd", entries, last=False, durable=durable)
 
 
-def restore_grids(folder: Path, assembly: solver.Assembly, increments: Sequence[solver.Increment], shape: str) -> None:
+def restore_grids(
+    folder: Path, assembly: solver.Assembly, increments: Sequence[solver.Increment], vtu: ViewerFormat
+) -> int:
     """Make the VTU files again that a power cut has left empty, or half there.
 
     Parameters
@@ -94,12 +122,38 @@ def restore_grids(folder: Path, assembly: solver.Assembly, increments: Sequence[
         Of the results.
     assembly, increments
         Of the results.
-    shape : {"moved", "undeformed"}
+    vtu : ViewerFormat
         As of the folder.
+
+    Returns
+    -------
+    int
+        How many increments had lost some.
     """
+    lost = 0
     for number, increment in enumerate(increments):
         if not all(is_complete(grid_file(folder, kind, number)) for kind in GRIDS):
-            write_grids(folder, number, assembly, increment, shape)
+            write_grids(folder, number, assembly, increment, vtu)
+            lost += 1
+    return lost
+
+
+def write_end(folder: Path, response: solver.Response, vtu: ViewerFormat, joints: InitialJoints | None = None) -> None:
+    """Write the VTU files of the last equilibrium again, when the collapse that follows it is known.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    response : solver.Response
+    vtu : ViewerFormat
+        As of the folder.
+    joints : InitialJoints, optional
+        Of the assembly, where they are at hand.
+    """
+    if response.path and response.collapse is not None:
+        last, falls = at_last_equilibrium(response), falling_in(response)
+        write_grids(folder, len(response.path) - 1, response.assembly, last, vtu, joints, falls)
 
 
 def write_grids(
@@ -107,8 +161,9 @@ def write_grids(
     number: int,
     assembly: solver.Assembly,
     increment: solver.Increment,
-    shape: str,
+    vtu: ViewerFormat,
     joints: InitialJoints | None = None,
+    falls: np.ndarray | None = None,
 ) -> None:
     """Write the VTU files of an increment.
 
@@ -120,20 +175,22 @@ def write_grids(
         Of the increment.
     assembly : solver.Assembly
     increment : solver.Increment
-    shape : {"moved", "undeformed"}
+    vtu : ViewerFormat
         As of the folder.
     joints : InitialJoints, optional
         Of the assembly, where they are at hand.
+    falls : (n_blocks,) bool array, optional
+        As of :func:`blockvis.results.datasets.block_dataset`.
     """
     # VTK is loaded where its files are written: another process may do that.
     from .datasets import block_grid, contact_grid, joint_grid
 
     for kind, grid in (
-        ("blocks", block_grid(assembly, increment, shape=shape)),
-        ("contacts", contact_grid(assembly, increment, shape=shape)),
-        ("joints", joint_grid(assembly, increment, shape=shape, joints=joints)),
+        ("blocks", block_grid(assembly, increment, shape=vtu.shape, falls=falls)),
+        ("contacts", contact_grid(assembly, increment, shape=vtu.shape)),
+        ("joints", joint_grid(assembly, increment, shape=vtu.shape, joints=joints)),
     ):
-        write_vtu(grid, grid_file(folder, kind, number), durable=False)
+        write_vtu(grid, grid_file(folder, kind, number), strings=vtu.strings, durable=False)
 
 
 def grid_file(folder: Path, kind: str, number: int) -> Path:

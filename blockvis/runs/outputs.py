@@ -14,6 +14,7 @@ from blockvis.cases.contents import Case
 from blockvis.dynamics.fall import Fall, fall_of
 from blockvis.results.fall_files import stored_fall, write_fall
 from blockvis.results.folder import ResultsFolder
+from blockvis.results.viewer_files import ViewerFormat
 from solver import mechanics
 
 from .progress import DrawingProgress
@@ -101,7 +102,7 @@ class Drawing(Output):
     def follow(self, results: ResultsFolder) -> None:
         """Have the files for viewers written by the process."""
         if self._process is not None:
-            self._process.follow(results.path, results.assembly, results.shape, len(results.increments))
+            self._process.follow(results.path, results.assembly, results.vtu, len(results.increments))
             results.viewer = self._process
 
     def is_written(self, case: Case, folder: Path) -> bool:
@@ -146,7 +147,7 @@ class Drawing(Output):
             fall = _fall(response, apart, progress) if stored is None else stored
             progress.done()
             if fall is not None and stored is None:
-                write_fall(fall, response, folder)
+                write_fall(fall, response, folder, viewer_format(case))
         if not self._pictures:
             return ()
         with clock.counting("report"):
@@ -172,6 +173,11 @@ class Drawing(Output):
                 finally:
                     progress.done()
         return (problem,) if problem else ()
+
+
+def viewer_format(case: Case) -> ViewerFormat:
+    """Say how a case has its VTU files written."""
+    return ViewerFormat(case.vtu, case.vtu_strings)
 
 
 def _underlay(case: Case) -> Underlay | None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
-from collections.abc import Sequence
 from typing import TextIO
 
 import numpy as np
@@ -18,7 +18,10 @@ from solver import mechanics
 REDRAW = 0.1
 
 #: Seconds between two lines where stderr is no terminal: short runs write none.
-LINES = 10.0
+LINES = 5.0
+
+#: Seconds between two looks at whether a single step takes long.
+BEAT = 1.0
 
 
 class _Line:
@@ -84,7 +87,7 @@ class DrawingProgress:
 
 
 class Progress:
-    """A bar that follows the parameter of an analysis towards its limit.
+    """A bar that follows the parameter of an analysis towards its limit, and says what an increment is doing meanwhile.
 
     Parameters
     ----------
@@ -92,32 +95,67 @@ class Progress:
         What the increments run over.
     stream : text stream, optional
         stderr by default.
-    names : sequence of str
-        Of the blocks.
+    assembly : solver.Assembly, optional
+        Whose blocks move.
+    count : int
+        Increments found before.
     """
 
-    def __init__(self, course: Course, stream: TextIO | None = None, names: Sequence[str] = ()) -> None:
-        self.course, self.count, self.names, self._line = course, 0, names, _Line(stream)
+    def __init__(
+        self, course: Course, stream: TextIO | None = None, assembly: solver.Assembly | None = None, count: int = 0
+    ) -> None:
+        self.course, self.count, self.assembly, self._line = course, count, assembly, _Line(stream)
+        self._state: mechanics.PathState | None = None
+        self._at = time.perf_counter()
+        self._ended, self._writing = threading.Event(), threading.Lock()
+
+    def watch(self) -> None:
+        """Write also while a single step takes long, until all is done."""
+        threading.Thread(target=self._keep_telling, daemon=True).start()
+
+    def _keep_telling(self) -> None:
+        while not self._ended.wait(BEAT):
+            still = time.perf_counter() - self._at
+            with self._writing:
+                if self._line.due and not self._ended.is_set() and still > LINES / 2.0:
+                    state = self._state
+                    what = f"increment {self.count + 1}" if state is None else f"{self.doing(state)}, in one step"
+                    self._line.write(f"{what} for {still:.0f} s")
+
+    def doing(self, state: mechanics.PathState) -> str:
+        """Say in words where an increment is: its parameter, the next step, and what moves."""
+        if not self.course.drivers:
+            return f"increment {self.count + 1}"
+        driver = self.course.drivers[min(state.phase, len(self.course.drivers) - 1)]
+        words = (
+            f"{self.course.parameter.name} {state.place.s:.6g} of at most {driver.limit:g} {driver.unit}, increment "
+            f"{self.count + 1} in steps of {state.step:.2g}"
+        )
+        if np.isfinite(state.upper_bound):
+            words += f", no equilibrium at {state.upper_bound:.6g}"
+        return words + self._moving(state.place.velocity)
+
+    def _moving(self, velocity: np.ndarray | None) -> str:
+        """Count the free blocks that move at least a hundredth as fast as the fastest, and name that."""
+        if velocity is None or self.assembly is None:
+            return ""
+        speeds = mechanics.motion_size(velocity, self.assembly.block_size)
+        moving = int((self.assembly.free & (speeds > 0.01 * speeds.max(initial=0.0))).sum())
+        return f", {moving} blocks moving, '{self.assembly.names[int(speeds.argmax())]}' moves most"
 
     def step(self, state: mechanics.PathState) -> None:
-        """Show where an increment is that takes long: its settlement, the next step, and what moves most."""
+        """Show where an increment is that takes long."""
+        self._state, self._at = state, time.perf_counter()
         if not self._line.due or not self.course.drivers:
             return
         driver = self.course.drivers[min(state.phase, len(self.course.drivers) - 1)]
-        s, velocity = state.place.s, state.place.velocity
-        moves = ""
-        if velocity is not None and self.names:
-            dimension = state.place.pose.positions.shape[1]
-            moves = f", '{self.names[int(np.linalg.norm(velocity[:, :dimension], axis=1).argmax())]}' moves most"
-        self._line.write(
-            f"{self.course.parameter.name} {s:.6g} of at most {driver.limit:g} {driver.unit}, increment "
-            f"{self.count + 1} in steps of {state.step:.2g}{moves}",
-            min(s / driver.limit, 1.0),
-        )
+        with self._writing:
+            self._line.write(self.doing(state), min(state.place.s / driver.limit, 1.0))
 
     def increment(self, increment: solver.Increment) -> None:
         """Show an increment."""
         self.count += 1
+        self._state, self._at = None, time.perf_counter()
         if not self._line.due:
             return
         parameter, measured, drivers = self.course.parameter, self.course.measured, self.course.drivers
@@ -125,19 +163,23 @@ class Progress:
         if increment.status == solver.Status.FALLING:
             what = "falls"
         if not drivers:
-            self._line.write(f"{what}, {self.count} increments")
+            with self._writing:
+                self._line.write(f"{what}, {self.count} increments")
             return
         driver = drivers[min(increment.phase, len(drivers) - 1)]
         part = min(increment.parameter / driver.limit, 1.0)
-        self._line.write(
-            f"{parameter.name} {increment.parameter:.4g} of at most {driver.limit:g} {driver.unit}, {what}, "
-            f"{self.count} increments",
-            part,
-        )
+        with self._writing:
+            self._line.write(
+                f"{parameter.name} {increment.parameter:.4g} of at most {driver.limit:g} {driver.unit}, {what}, "
+                f"{self.count} increments",
+                part,
+            )
 
     def done(self) -> None:
         """Clear the bar."""
-        self._line.clear()
+        self._ended.set()
+        with self._writing:
+            self._line.clear()
 
 
 class StudyProgress:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import solver
-from blockvis.case_files.read import parse_case, read_case
+from blockvis.case_files.read import parse_case, read_case, refuse_increment_seconds
 from blockvis.cases.build import case_assembly
 from blockvis.cases.contents import Case
 from blockvis.formats.files import checksum_of_files
@@ -21,12 +21,13 @@ from blockvis.kinds.kinds import KINDS
 from blockvis.results.fall_files import remove_fall
 from blockvis.results.folder import ResultsFolder, refuse_results
 from blockvis.results.record import Record, checksum_of, read_record, versions
-from blockvis.results.viewer_files import restore_grids
+from blockvis.results.viewer_files import restore_grids, write_end
 from blockvis.system.atomic_files import PARTIAL
 from solver import mechanics
 
+from .budget import Budget, IncrementTooLong
 from .first_equilibrium import settled_note
-from .outputs import Clock, Drawing, Output
+from .outputs import Clock, Drawing, Output, viewer_format
 from .plan import planned
 from .progress import Progress
 from .reopen import open_results
@@ -85,6 +86,7 @@ def run_case(
     film: bool = True,
     pictures: bool = True,
     outputs: Sequence[Output] | None = None,
+    increment_seconds: float | None = None,
 ) -> Run:
     """Solve a case and write everything: VTU, PVD, CSV, summary, pictures.
 
@@ -99,11 +101,14 @@ def run_case(
         Draw the film of the case; draw anything at all, the report included.
     outputs : sequence of Output, optional
         What is made beside the numbers, in place of what ``film`` and ``pictures`` say.
+    increment_seconds : float, optional [s]
+        What an increment may take, in place of what the case says.
 
     Returns
     -------
     Run
-        Also after an interruption by Ctrl-C: what was finished is written, with status "interrupted".
+        Also after an interruption by Ctrl-C, or by an increment that takes longer than it may: what was finished is
+        written, with status "interrupted".
 
     Raises
     ------
@@ -113,6 +118,7 @@ def run_case(
     clock = Clock()
     if not isinstance(case, Case):
         case = read_case(case)
+    refuse_increment_seconds(case, increment_seconds)
     folder = Path(f"{case.source.stem}-results") if folder is None else Path(folder)
     refuse_results(folder, overwrite)
     outputs = (Drawing(film=film, pictures=pictures),) if outputs is None else outputs
@@ -128,12 +134,13 @@ def run_case(
                 record=record_of(case),
                 overwrite=overwrite,
                 parameter=run.course.parameter,
-                shape=case.vtu,
+                vtu=viewer_format(case),
             )
         except OSError as error:
             raise OSError(f"cannot write to '{folder}': {_reason(error)}; choose another folder with -o") from None
         remove_fall(folder)
-        return _followed(case, results, run, outputs, clock)
+        limit = case.increment_seconds if increment_seconds is None else increment_seconds
+        return _followed(case, results, run, outputs, clock, limit)
 
 
 def resume_run(
@@ -142,6 +149,7 @@ def resume_run(
     film: bool = True,
     pictures: bool = True,
     outputs: Sequence[Output] | None = None,
+    increment_seconds: float | None = None,
 ) -> Run:
     """Go on with a run that was stopped, from its results folder alone, to the result it would have had.
 
@@ -151,6 +159,8 @@ def resume_run(
         That a run has written, whatever ended it.
     film, pictures, outputs
         As in :func:`run_case`.
+    increment_seconds : float, optional [s]
+        What an increment may take; by default what it takes, whatever the case says.
 
     Returns
     -------
@@ -176,7 +186,8 @@ def resume_run(
     finished = _finished(folder)
     if finished is not None:
         response = open_results(folder)
-        restore_grids(folder, response.assembly, response.increments, case.vtu)
+        if restore_grids(folder, response.assembly, response.increments, viewer_format(case)):
+            write_end(folder, response, viewer_format(case))
         absent = [output for output in outputs if not output.is_written(case, folder)]
         missing = _made(absent, case, response, folder, Clock())
         return Run(response, folder, finished, missing, had_finished=True)
@@ -184,10 +195,11 @@ def resume_run(
         warnings.warn(note, stacklevel=2)
     kind = KINDS[case.analysis]
     with _begun(case, outputs):
-        results, checkpoint = ResultsFolder.reopened(folder, kind.course(case).parameter, kind.checkpoint, case.vtu)
+        parameter, vtu = kind.course(case).parameter, viewer_format(case)
+        results, checkpoint = ResultsFolder.reopened(folder, parameter, kind.checkpoint, vtu)
         remove_fall(folder)
         run = planned(case, results.assembly, checkpoint, tuple(results.increments))
-        return _followed(case, results, run, outputs, Clock())
+        return _followed(case, results, run, outputs, Clock(), increment_seconds)
 
 
 def _finished(folder: Path) -> dict[str, Any] | None:
@@ -223,12 +235,19 @@ def _begun(case: Case, outputs: Sequence[Output]) -> Iterator[None]:
             output.close()
 
 
-def _followed(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Sequence[Output], clock: Clock) -> Run:
+def _followed(
+    case: Case,
+    results: ResultsFolder,
+    run: AnalysisRun,
+    outputs: Sequence[Output],
+    clock: Clock,
+    increment_seconds: float | None,
+) -> Run:
     """Follow the increments of a run, and make what is wanted beside."""
     for output in outputs:
         output.follow(results)
     try:
-        return _follow(case, results, run, outputs, clock)
+        return _follow(case, results, run, outputs, clock, increment_seconds)
     except OSError as error:
         for output in outputs:
             # They may have half-written files, too.
@@ -236,12 +255,21 @@ def _followed(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Seq
         raise _write_error(results.path, error) from None
 
 
-def _follow(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Sequence[Output], clock: Clock) -> Run:
+def _follow(
+    case: Case,
+    results: ResultsFolder,
+    run: AnalysisRun,
+    outputs: Sequence[Output],
+    clock: Clock,
+    increment_seconds: float | None,
+) -> Run:
     """Follow the increments to their end or to Ctrl-C, write each, and draw what came out."""
     folder = results.path
-    progress = Progress(run.course, names=results.assembly.names)
-    run.given.listeners.append(progress.step)
+    progress = Progress(run.course, assembly=results.assembly, count=len(results.increments))
+    budget = Budget(increment_seconds, progress.doing)
+    run.given.listeners.extend([progress.step, budget.step])
     ending = mechanics.Ending(solver.Status.INTERRUPTED, "interrupted by the user")
+    progress.watch()
     try:
         for increment in clock.each("solve", run.steps):
             with clock.counting("write"):
@@ -254,9 +282,12 @@ def _follow(case: Case, results: ResultsFolder, run: AnalysisRun, outputs: Seque
             for note in increment.notes:
                 warnings.warn(note, stacklevel=2)
             progress.increment(increment)
+            budget.next()
         ending = run.steps.ending
     except KeyboardInterrupt:
         run.steps.close()
+    except IncrementTooLong as reason:
+        ending = mechanics.Ending(solver.Status.INTERRUPTED, str(reason))
     finally:
         progress.done()
     response = run.response(results.increments, ending)

@@ -24,7 +24,12 @@ _FACES = re.compile(r'<DataArray [^>]*Name="face_connectivity".*Name="polyhedron
 
 
 def write_vtu(
-    dataset: vtkUnstructuredGrid, path: str | os.PathLike[str], *, last: bool = True, durable: bool = True
+    dataset: vtkUnstructuredGrid,
+    path: str | os.PathLike[str],
+    *,
+    strings: bool = True,
+    last: bool = True,
+    durable: bool = True,
 ) -> Path:
     """Write a dataset as VTU, whole or not at all.
 
@@ -34,6 +39,9 @@ def write_vtu(
         As those of pyvista are.
     path : path
         Its folder is made if it does not exist.
+    strings : bool
+        Whether arrays of strings are written as such, which meshio does not read; otherwise each is a field array of
+        bytes, its strings in UTF-8 with a line feed after each.
     last, durable : bool
         As of :func:`blockvis.system.atomic_files.atomic_file`.
 
@@ -43,13 +51,14 @@ def write_vtu(
 
     Notes
     -----
-    The format is inline binary with zlib and 64-bit headers, which ParaView from 5.11 on and pyvista read; meshio does,
-    too, where no array holds strings.
+    The format is inline binary with zlib and 64-bit headers, which ParaView from 5.11 on, pyvista and meshio read.
     Appended raw data, VTK's default, fails in ParaView 5.11 above some 10 kB. Faces of polyhedra stand in the arrays
     ``faces`` and ``faceoffsets`` of version 1.0: those that VTK writes since 9.4 older ParaViews do not know.
     """
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
+    if not strings:
+        dataset = _with_bytes(dataset)
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(dataset)
     # Written into memory first: on a full disk VTK's own writer ends the process.
@@ -64,6 +73,25 @@ def write_vtu(
         text = _FACES.sub(lambda _: _face_arrays(dataset), text, count=1)
         text = text.replace('version="2.3"', 'version="1.0"', 1)
     return write_atomic(path, text, last=last, durable=durable)
+
+
+def _with_bytes(dataset: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
+    """Make a copy of a dataset with bytes among the field data in place of arrays of strings."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkStringArray
+
+    copy = dataset.NewInstance()
+    copy.ShallowCopy(dataset)
+    for attributes in (copy.GetPointData(), copy.GetCellData(), copy.GetFieldData()):
+        arrays = [attributes.GetAbstractArray(k) for k in range(attributes.GetNumberOfArrays())]
+        for array in arrays:
+            if isinstance(array, vtkStringArray):
+                text = "".join(f"{array.GetValue(k)}\n" for k in range(array.GetNumberOfValues()))
+                written = numpy_to_vtk(np.frombuffer(text.encode(), dtype=np.uint8), deep=True)
+                written.SetName(array.GetName())
+                attributes.RemoveArray(array.GetName())
+                copy.GetFieldData().AddArray(written)
+    return copy
 
 
 def _face_arrays(dataset: vtkUnstructuredGrid) -> str:

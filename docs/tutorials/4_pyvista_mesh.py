@@ -71,5 +71,5 @@ assert abs(response.collapse.displacement - 0.141) < 0.005
 results = blockvis.write(response, folder / "out")
 reader = pv.get_reader(results / "blocks.pvd")
 print(f"{len(reader.time_values)} times, the first {reader.time_values[:3]}")
-assert len(reader.time_values) == len(response.increments)
+assert len(reader.time_values) == len(response.path)
 shutil.rmtree(folder)

@@ -232,29 +232,33 @@ class Response(Shown):
         Parameters
         ----------
         k : int
-            Number of the increment; -1 is the last.
+            Number of the increment; -1 is the last equilibrium, and -2 the one before.
         shape : {"moved", "undeformed"}
             Where the blocks stand at the increment, or where they were drawn, their displacements in arrays.
 
         Returns
         -------
         pyvista.DataSet
-            One cell per block, in space per face; its arrays are those of ``increments/*.vtu``.
+            One cell per block; its arrays are those of ``increments/*.vtu``.
 
         Raises
         ------
         ImportError
             Where no package that draws is installed.
         """
-        return views().blocks(self, k, shape)
+        return views().dataset(self, "blocks", k, shape)
 
     def joints(self, k: int = -1, *, shape: str = "moved") -> Any:
         """Make a PyVista dataset of the joints of an increment: opening, slip, force; as :meth:`mesh`."""
-        return views().joints(self, k, shape)
+        return views().dataset(self, "joints", k, shape)
 
     def contacts(self, k: int = -1, *, shape: str = "moved") -> Any:
         """Make a PyVista dataset of the contact points of an increment and their forces; as :meth:`mesh`."""
-        return views().contacts(self, k, shape)
+        return views().dataset(self, "contacts", k, shape)
+
+    def fall(self, time: float, *, shape: str = "moved") -> Any:
+        """Make a PyVista dataset of the blocks so many seconds after the last equilibrium; as :meth:`mesh`."""
+        return views().fall(self, time, shape)
 
     def animate(self, path: str | os.PathLike[str], **options: Any) -> Any:
         """Write the film of the collapse, its format chosen by the suffix; options of :func:`blockvis.animate`."""

@@ -66,11 +66,13 @@ def test_the_process_writes_what_viewers_open_and_says_what_fails(arch, arch_res
     for path in written:
         path.unlink()
     process = FilmProcess()
-    process.follow(arch_results, arch.assembly, "moved", 0)
+    process.follow(arch_results, arch.assembly, film_process.ViewerFormat(), 0)
     for increment in arch.increments:
         process.add(increment)
     assert process.finish()
-    assert {path: path.read_bytes() for path in written} == written
+    # That a collapse follows the last equilibrium is known at the end of a run only.
+    known = {path: content for path, content in written.items() if f"_{len(arch.path) - 1:05d}." not in path.name}
+    assert {path: path.read_bytes() for path in known} == known
     # An increment more than there are states.
     process.add(arch.increments[-1])
     with pytest.raises(ValueError, match=rf"state_{len(arch.increments):05d}\.npz' cannot be read"):
@@ -82,7 +84,7 @@ def test_the_process_writes_what_viewers_open_and_says_what_fails(arch, arch_res
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends no signal to one process")
 def test_ctrl_c_is_for_the_first_process_even_before_the_other_has_loaded(arch, arch_results, capfd):
     process = FilmProcess()
-    process.follow(arch_results, arch.assembly, "moved", 0)
+    process.follow(arch_results, arch.assembly, film_process.ViewerFormat(), 0)
     process._worker._process.send_signal(signal.SIGINT)
     assert process.finish()
     process.close()

@@ -12,6 +12,7 @@ from structures import arch_response
 import blockvis
 import solver
 from blockvis.pictures.paraview import write_paraview_macro
+from solver import mechanics
 
 PVPYTHON, XVFB = shutil.which("pvpython"), shutil.which("xvfb-run")
 
@@ -36,6 +37,18 @@ print("TOLD" + json.dumps(told))
 """
 
 
+CASE = """
+[geometry]
+layout = "arch"
+[settlement]
+direction = [1, 0]
+increment = 0.02
+limit = 0.3
+[output]
+animation = false
+vtu = "{shape}"
+"""
+
 DATASETS = {
     "blocks": solver.Response.mesh,
     "contacts": solver.Response.contacts,
@@ -45,14 +58,16 @@ DATASETS = {
 WARP = """
 import json, sys
 from paraview.simple import OpenDataFile, WarpByVector, UpdatePipeline
-from paraview import servermanager
-reader = OpenDataFile(f"{sys.argv[1]}/blocks.pvd")
-time = reader.TimestepValues[12]
-UpdatePipeline(time, reader)
-warped = WarpByVector(Input=reader)
-UpdatePipeline(time, warped)
-data = servermanager.Fetch(warped)
-print("TOLD" + json.dumps([list(warped.Vectors), [data.GetPoint(i)[:2] for i in range(data.GetNumberOfPoints())]]))
+told = []
+for part in ("blocks", "joints", "contacts"):
+    reader = OpenDataFile(f"{sys.argv[1]}/{part}.pvd")
+    time = reader.TimestepValues[-1]
+    UpdatePipeline(time, reader)
+    warped = WarpByVector(Input=reader)
+    UpdatePipeline(time, warped)
+    bounds = [of.GetDataInformation().GetBounds() for of in (reader, warped)]
+    told.append([time, list(warped.Vectors), *bounds])
+print("TOLD" + json.dumps(told))
 """
 
 
@@ -73,7 +88,7 @@ def test_paraview_reads_every_increment_and_every_array(folder, tmp_path):
     told = json.loads(done.stdout.split("TOLD")[1])
     response = arch_response()
     for part, dataset in DATASETS.items():
-        assert len(told[part]) == len(response.increments)
+        assert len(told[part]) == len(response.path)
         for k, (_, cells, names) in enumerate(told[part]):
             ours = dataset(response, k)
             assert cells == ours.n_cells
@@ -85,14 +100,37 @@ def test_paraview_reads_every_increment_and_every_array(folder, tmp_path):
 
 @pytest.mark.paraview
 @pytest.mark.skipif(PVPYTHON is None, reason="pvpython is not installed (Debian: python3-paraview)")
-def test_warp_by_vector_as_it_comes_does_not_move_the_blocks_twice(folder, tmp_path):
+@pytest.mark.parametrize("shape", ["moved", "undeformed"])
+def test_apply_and_the_first_warp_show_what_their_names_say(shape, tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text(CASE.format(shape=shape), encoding="utf-8")
+    run = blockvis.run_case(case, tmp_path / "out", outputs=())
     script = tmp_path / "warp.py"
     script.write_text(WARP, encoding="utf-8")
-    done = subprocess.run([PVPYTHON, script, folder], capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run([PVPYTHON, script, run.folder], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
-    (_, vector), points = json.loads(done.stdout.split("TOLD")[1])
-    assert vector == "to_reference"
-    np.testing.assert_allclose(points, arch_response().assembly.vertices, atol=1e-6)
+    response = run.response
+    assembly = response.assembly
+    corners = {
+        "undeformed": assembly.vertices,
+        "moved": mechanics.moved_vertices(assembly, response.path[-1].pose),
+    }
+    blocks, joints, contacts = json.loads(done.stdout.split("TOLD")[1])
+    assert blocks[0] == pytest.approx(response.settlement[-1])
+    applied, warped = (np.reshape(bounds, (3, 2))[:2].T for bounds in blocks[2:])
+    np.testing.assert_allclose(applied, np.stack([corners[shape].min(axis=0), corners[shape].max(axis=0)]), atol=1e-6)
+    vector = "displacement" if shape == "undeformed" else "mechanism"
+    assert [told[1][1] for told in (blocks, joints, contacts)] == [vector] * 3
+    if shape == "undeformed":
+        moved = np.stack([corners["moved"].min(axis=0), corners["moved"].max(axis=0)])
+        np.testing.assert_allclose(warped, moved, atol=1e-6)
+    else:
+        # On, away from the drawing.
+        top = corners["undeformed"][:, 1].max()
+        assert warped[1, 1] < applied[1, 1] - 0.01 < top - 0.01
+    for _, _, _, (x0, x1, y0, y1, *_) in (joints, contacts):
+        assert warped[0, 0] <= x0 + 1e-6 < x1 <= warped[1, 0] + 1e-6
+        assert warped[0, 1] <= y0 + 1e-6 < y1 <= warped[1, 1] + 1e-6
 
 
 @pytest.mark.paraview

@@ -106,7 +106,7 @@ def test_results_reach_meshio_as_the_manual_says(response, tmp_path, monkeypatch
     assert sum(len(cells.data) for cells in mesh.cells) == assembly.n_blocks
     numbers = np.concatenate(mesh.cell_data["block_id"])
     assert [read["names"][k] for k in numbers] == [assembly.names[k] for k in numbers]
-    moved = np.concatenate(mesh.cell_data["displacement"])[np.argsort(numbers), : assembly.dimension]
+    moved = np.concatenate(mesh.cell_data["translation"])[np.argsort(numbers), : assembly.dimension]
     np.testing.assert_allclose(moved, increment.pose.positions - assembly.centroids, atol=1e-15)
 
 
@@ -363,7 +363,7 @@ def test_paraview_reads_polyhedra_faces_and_contacts(tmp_path):
     assert done.returncode == 0, done.stderr[-2000:]
     told = json.loads(done.stdout.split("TOLD")[1])
     for part, dataset in (("blocks", block_dataset), ("contacts", contact_dataset), ("joints", joint_dataset)):
-        for (_, cells, names), increment in zip(told[part], response.increments, strict=True):
+        for (_, cells, names), increment in zip(told[part], response.path, strict=True):
             ours = dataset(response.assembly, increment)
             assert cells == ours.n_cells
             assert set(names["Point"]) == set(ours.point_data.keys())

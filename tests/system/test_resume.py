@@ -462,3 +462,41 @@ def test_stored_values_refuse_what_they_cannot_hold():
     np.savez(buffer, tree=np.array('{"value": {"phase": 1}, "extra": {}}'))
     with pytest.raises(ValueError, match="it has the fields"):
         unpacked(buffer.getvalue(), mechanics.PathState)
+
+
+def test_an_increment_that_takes_longer_than_it_may_is_told_and_goes_on_bit_for_bit(tmp_path, capsys):
+    case = tmp_path / "case.toml"
+    text = '[geometry]\nlayout = "arch"\n[settlement]\ndirection = [1, 0]\nincrement = 0.01\nlimit = 0.02\n'
+    case.write_text(text + "[analysis]\nincrement_seconds = 1e4\n", encoding="utf-8")
+    quiet = ("--no-pictures", "--no-check-steps")
+    assert main(["run", str(case), "-o", str(tmp_path / "straight"), *quiet]) == 0
+    capsys.readouterr()
+    assert main(["run", str(case), "-o", str(tmp_path / "out"), "--increment-seconds", "1e-9", *quiet]) == 130
+    told = capsys.readouterr()
+    stopped = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert stopped["status"] == "interrupted"
+    assert re.search(r"an increment took more than 1e-09 s .*: settlement \S+ of at most .* in steps of", told.out)
+    assert stopped["message"] in told.out
+    assert f"blockvis run --resume {tmp_path / 'out'}" in told.err
+    assert main(["run", "--resume", str(tmp_path / "out"), *quiet]) == 0
+    for name in ("response.csv", "joints.csv", "blocks.pvd"):
+        one, other = ((tmp_path / of / name).read_text(encoding="utf-8") for of in ("straight", "out"))
+        assert _without_seconds(one) == _without_seconds(other), name
+
+
+def _without_seconds(text):
+    rows = list(csv.reader(io.StringIO(text)))
+    left_out = {k for k, name in enumerate(rows[0]) if name == "seconds"}
+    return [[value for k, value in enumerate(row) if k not in left_out] for row in rows]
+
+
+@pytest.mark.parametrize("change", ['increments = "linear program"', 'kind = "limit load"'])
+def test_time_for_increments_is_refused_where_no_step_looks_at_it(change, tmp_path, capsys):
+    live = '[[loads]]\nkind = "live"\nweight_fraction = [1.0, 0.0]\n[analysis]\nincrement_seconds = 5\n'
+    text = CASE.replace("[analysis]", live + change)
+    if "limit load" in change:
+        text = re.sub(r"\[\[settlement\]\][^\[]*\[1.0, 0.0\][^\[]*", "", text)
+        text = re.sub(r"\[\[settlement\]\][^\[]*\[0.0, -1.0\][^\[]*", "", text)
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    assert main(["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "out")]) == 2
+    assert "increment_seconds is 5; it is looked at after the steps of a path" in capsys.readouterr().err

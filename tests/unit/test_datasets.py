@@ -10,6 +10,7 @@ from structures import BENT, arch_response, parted, posed, wall
 
 import blockvis
 import solver
+from solver import mechanics
 
 
 def test_every_block_is_one_polygon_bent_ones_too():
@@ -27,7 +28,7 @@ def test_blocks_carry_what_happened_to_them():
     increment = response.path[-1]
     grid = response.mesh(len(response.path) - 1)
     moved = increment.pose.displacements(response.assembly)
-    np.testing.assert_array_equal(grid.cell_data["displacement"][:, :2], moved[:, :2])
+    np.testing.assert_array_equal(grid.cell_data["translation"][:, :2], moved[:, :2])
     np.testing.assert_array_equal(grid.cell_data["rotation"], moved[:, 2])
     np.testing.assert_allclose(
         grid.points[:, :2] - grid.point_data["displacement"][:, :2], response.assembly.vertices, atol=1e-12
@@ -89,14 +90,13 @@ def times_in(out):
     return list(pv.PVDReader(out / "blocks.pvd").time_values)
 
 
-def test_the_collection_has_every_increment_at_a_time_of_its_own(tmp_path):
+def test_the_collection_ends_with_the_last_equilibrium_at_its_settlement(tmp_path):
     response = arch_response()
     out = blockvis.write(response, tmp_path / "a & b")
     times = times_in(out)
-    assert len(times) == len(response.increments)
     assert (np.diff(times) > 0).all()
     assert times[0] == 0.0
-    assert times[: len(response.path)] == pytest.approx([i.settlement for i in response.path], abs=1e-12)
+    assert times == pytest.approx([i.settlement for i in response.path], abs=1e-12)
     reader = pv.PVDReader(out / "blocks.pvd")
     reader.set_active_time_point(2)
     assert reader.read()[0].n_cells == response.assembly.n_blocks
@@ -110,3 +110,39 @@ def test_a_second_phase_starts_at_the_end_of_the_first(tmp_path):
     end = path[-1].settlement
     assert times[3] > end
     assert times[4:] == pytest.approx([end + i.settlement for i in path[1:]])
+
+
+def test_blocks_say_how_they_move_on_and_what_falls():
+    response = arch_response()
+    assembly, last = response.assembly, response.mesh(-1)
+    falling = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
+    mechanism = mechanics.mechanism_of(assembly, falling)
+    np.testing.assert_array_equal(last["macro_block"], mechanism.parts)
+    np.testing.assert_array_equal(last["falls"], mechanism.parts >= 0)
+    np.testing.assert_allclose(last["mechanism_velocity"][:, :2], response.collapse.mechanism[:, :2])
+    np.testing.assert_allclose(last["mechanism_rotation"], response.collapse.mechanism[:, 2])
+    before, here = (response.path[k].pose.positions for k in (5, 4))
+    velocity, step = response.mesh(4)["mechanism_velocity"][:, :2], response.settlement[5] - response.settlement[4]
+    np.testing.assert_allclose(velocity[assembly.moving] * step, (before - here)[assembly.moving], atol=1e-9)
+    assert not response.mesh(4)["falls"].any()
+
+
+def test_contacts_say_how_much_of_their_friction_is_used_up():
+    contacts = arch_response().contacts(-1)
+    carries, used = contacts["carries"].astype(bool), contacts["utilisation"]
+    normal, shear = contacts["normal_force"], np.abs(contacts["shear_force"])
+    np.testing.assert_allclose(used[carries], shear[carries] / (contacts["friction"] * normal)[carries])
+    assert carries.any()
+    assert 0.0 < used.max() < 1.0 + 1e-6
+    assert not used[~carries].any()
+
+
+def test_the_fall_begins_at_the_last_equilibrium_and_is_found_by_its_seconds():
+    response = arch_response()
+    start, later = response.fall(0.0), response.fall(0.5)
+    np.testing.assert_allclose(start.points, response.mesh(-1).points, atol=1e-12)
+    assert later.field_data["time"][0] == 0.5
+    assert later.points[:, 1].max() < start.points[:, 1].max() - 0.1
+    assert response.fall(99.0).field_data["time"][0] < 99.0
+    with pytest.raises(ValueError, match="nothing falls"):
+        replace(response, collapse=None).fall(0.5)

@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import re
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -186,13 +187,25 @@ def test_the_bar_shows_the_quantities_of_the_kind(analysis, extra, line, tmp_pat
     assert f"] {line}" in stream.getvalue()
 
 
+def test_a_single_step_that_takes_long_is_told_too(tmp_path, monkeypatch):
+    monkeypatch.setattr("blockvis.runs.progress.BEAT", 0.01)
+    monkeypatch.setattr("blockvis.runs.progress.LINES", 0.0)
+    text = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
+    stream = io.StringIO()
+    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), stream, count=3)
+    bar.watch()
+    while "blockvis: increment 4 for 0 s" not in stream.getvalue():
+        time.sleep(0.01)
+    bar.done()
+
+
 def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monkeypatch):
     monkeypatch.setattr("blockvis.runs.progress.REDRAW", -1.0)
     text = TILT.replace('"tilt"\ntilt_step = 0.03', '"settlement"') + "[settlement]\ndirection = [0, -1]\nlimit = 0.4\n"
     stream, seen = Terminal(), []
-    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), stream, ["ground", "block"])
     outlines = [[[-1, -1], [1, -1], [1, 0], [-1, 0]], [[-0.2, 0], [0.2, 0], [0.2, 1], [-0.2, 1]]]
     assembly = solver.Assembly.from_outlines(outlines, roles=["moving", "free"])
+    bar = Progress(KINDS["settlement"].course(case_from(text, tmp_path)), stream, assembly)
     steps = mechanics.settlement_increments(
         assembly,
         [solver.Settlement(direction=(0, -1), increment=0.1, limit=0.1)],
@@ -204,5 +217,6 @@ def test_the_bar_says_what_an_increment_that_takes_long_is_doing(tmp_path, monke
     assert seen == sorted(seen)
     assert len(seen) > 2
     assert re.search(
-        r"settlement 0\.0\d+ of at most 0.4 m, increment 1 in steps of 0\.\d+, '\w+' moves most", stream.getvalue()
+        r"settlement 0\.0\d+ of at most 0.4 m, increment 1 in steps of 0\.\d+, 1 blocks moving, '[\w ]+' moves most",
+        stream.getvalue(),
     )

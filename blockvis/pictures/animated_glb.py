@@ -1,0 +1,182 @@
+"""A response as animated glTF (.glb): a node for each block that moves as it did, for browsers and slides."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+import solver
+from blockvis.dynamics.fall import Fall
+from blockvis.layout.block_table import rows_of
+from blockvis.layout.layout import layout_of
+from blockvis.layout.solids import prism, triangles_of
+from blockvis.system.atomic_files import write_atomic
+
+from . import palette
+
+#: Seconds in which the path passes, that the last equilibrium and the end stand, and of a frame of pseudo-time.
+PATH, STANDS, FRAME = 6.0, 0.5, 0.1
+
+#: Rotation that turns z upwards into y upwards, as glTF has it.
+UPRIGHT = Rotation.from_euler("x", -90, degrees=True)
+
+#: Component type of single precision in glTF, and the tags of its two chunks.
+FLOAT, JSON, BIN = 5126, 0x4E4F534A, 0x004E4942
+
+
+def write_animated_glb(response: solver.Response, path: Path, fall: Fall | None = None) -> Path:
+    """Write the path of a response and what follows it as an animation.
+
+    Parameters
+    ----------
+    response : solver.Response
+    path : Path
+        Ending in .glb.
+    fall : Fall, optional
+        What follows the last equilibrium, in its own time; otherwise the frames of the mechanism do.
+
+    Notes
+    -----
+    The path takes six seconds in proportion to its parameter. Between two poses glTF turns each block about its
+    centroid, and no corner takes a short cut. Blocks in the plane are extruded by their thickness.
+    """
+    times, poses = _played(response, fall)
+    moves = [_as_gltf(pose, response.assembly.dimension) for pose in poses]
+    places, turns = np.array([place for place, _ in moves]), np.array([turn for _, turn in moves])
+    # Of the two quaternions of a rotation the one next to the last: players go the short way.
+    for k in range(1, len(turns)):
+        turns[k] *= np.where((turns[k] * turns[k - 1]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+    tree, binary = _chunks(_still(response.assembly))
+    buffer = _Buffer(tree, binary)
+    numbers = {node["name"]: number for number, node in enumerate(tree["nodes"]) if "mesh" in node}
+    clock = buffer.added(times, "SCALAR")
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
+    for block, name in enumerate(_node_names(response.assembly)):
+        for what, values in (("translation", places[:, block]), ("rotation", turns[:, block])):
+            tree["nodes"][numbers[name]][what] = values[0].tolist()
+            if np.abs(values - values[0]).max() == 0.0:
+                continue
+            kind = "VEC3" if what == "translation" else "VEC4"
+            channels.append({"sampler": len(samplers), "target": {"node": numbers[name], "path": what}})
+            samplers.append({"input": clock, "output": buffer.added(values, kind), "interpolation": "LINEAR"})
+    if channels:
+        tree["animations"] = [{"name": response.analysis, "samplers": samplers, "channels": channels}]
+    return write_atomic(path, buffer.packed())
+
+
+def _played(response: solver.Response, fall: Fall | None) -> tuple[np.ndarray, list[solver.Pose]]:
+    """Seconds, (n,), at which the blocks are at which poses."""
+    path, along = response.path, response.parameters
+    initial = solver.Pose.initial(response.assembly)
+    poses = [increment.pose for increment in path] or [initial]
+    reach = float(along[-1]) if len(along) else 0.0
+    times = list(PATH * along / reach) if reach > 0.0 else [0.1 * k for k in range(len(poses))]
+    start = times[-1] + STANDS
+    if fall is not None:
+        times += [start + float(time) for time in fall.times]
+        poses += [fall.pose(k) for k in range(len(fall))]
+    else:
+        frames = [i.pose for i in response.increments if i.status == solver.Status.FALLING]
+        if frames:
+            times, poses = [*times, start], [*poses, poses[-1]]
+        times += [start + FRAME * (k + 1) for k in range(len(frames))]
+        poses += frames
+    times, poses = [*times, times[-1] + STANDS], [*poses, poses[-1]]
+    kept = np.flatnonzero(np.diff(np.array(times), prepend=-1.0) > 1e-6)
+    return np.array(times)[kept], [poses[k] for k in kept.tolist()]
+
+
+def _as_gltf(pose: solver.Pose, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+    """(n_blocks, 3) places and (n_blocks, 4) quaternions, with y upwards."""
+    if dimension == 3:
+        return UPRIGHT.apply(pose.positions), (UPRIGHT * Rotation.from_rotvec(pose.rotations)).as_quat()
+    flat = np.zeros((len(pose.positions), 1))
+    spins = np.hstack([flat, flat, pose.rotations.reshape(-1, 1)])
+    return np.hstack([pose.positions, flat]), Rotation.from_rotvec(spins).as_quat()
+
+
+def _node_names(assembly: solver.Assembly) -> list[str]:
+    names = list(assembly.names)
+    return [name if names.index(name) == k else f"{name} ({k})" for k, name in enumerate(names)]
+
+
+def _still(assembly: solver.Assembly) -> bytes:
+    """Write the blocks about their centroids as .glb, each a node with its row in the extras."""
+    import trimesh
+
+    layout = layout_of(assembly)
+    if layout.dimension == 3:
+        solids = list(layout.solids)
+    else:
+        depth = np.ones(layout.n_blocks) if layout.thickness is None else np.nan_to_num(layout.thickness, nan=1.0)
+        solids = [prism(ring, -t / 2.0, t / 2.0) for ring, t in zip(layout.outlines, depth.tolist(), strict=True)]
+    colours = palette.block_colours(assembly.materials, assembly.free)
+    scene = trimesh.Scene()
+    rows = zip(_node_names(assembly), solids, rows_of(layout), colours, strict=True)
+    for number, (name, (points, faces), row, colour) in enumerate(rows):
+        about = points.copy()
+        about[:, : assembly.dimension] -= assembly.centroids[number]
+        mesh = trimesh.Trimesh(about, triangles_of(points, faces), process=False, metadata={"blockvis": row})
+        paint = trimesh.visual.material.PBRMaterial(
+            baseColorFactor=[*colour.tolist(), 255], metallicFactor=0.0, roughnessFactor=0.9
+        )
+        mesh.visual = trimesh.visual.TextureVisuals(material=paint)
+        scene.add_geometry(mesh, node_name=name, geom_name=name)
+
+    def signed(tree: dict[str, Any]) -> None:
+        tree["asset"]["generator"] = "blockvis"
+        for node in tree["nodes"]:
+            # What moves has no matrix of its own.
+            node.pop("matrix", None)
+
+    return bytes(scene.export(file_type="glb", tree_postprocessor=signed))
+
+
+def _chunks(glb: bytes) -> tuple[dict[str, Any], bytes]:
+    """Split a .glb into its tree and its numbers."""
+    length = struct.unpack("<I", glb[12:16])[0]
+    return json.loads(glb[20 : 20 + length]), glb[28 + length :]
+
+
+class _Buffer:
+    """The numbers of a .glb, to which others are added.
+
+    Parameters
+    ----------
+    tree : dict
+        Of the file, completed.
+    binary : bytes
+        Its numbers.
+    """
+
+    def __init__(self, tree: dict[str, Any], binary: bytes) -> None:
+        self._tree, self._parts = tree, [binary]
+        self._length = len(binary)
+
+    def added(self, values: np.ndarray, kind: str) -> int:
+        """Add an array in single precision; gives the number of its accessor."""
+        data = np.ascontiguousarray(values, dtype="<f4")
+        views, accessors = self._tree["bufferViews"], self._tree["accessors"]
+        views.append({"buffer": 0, "byteOffset": self._length, "byteLength": data.nbytes})
+        least, most = (np.atleast_1d(of).astype(float).tolist() for of in (data.min(axis=0), data.max(axis=0)))
+        accessor = {"componentType": FLOAT, "count": len(data), "type": kind, "min": least, "max": most}
+        accessors.append({"bufferView": len(views) - 1, **accessor})
+        self._parts.append(data.tobytes())
+        self._length += data.nbytes
+        return len(accessors) - 1
+
+    def packed(self) -> bytes:
+        """Pack the file."""
+        self._tree["buffers"] = [{"byteLength": self._length}]
+        text = json.dumps(self._tree, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        binary = b"".join(self._parts)
+        binary += bytes(-len(binary) % 4)
+        head = struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(binary))
+        return head + struct.pack("<II", len(text), JSON) + text + struct.pack("<II", len(binary), BIN) + binary

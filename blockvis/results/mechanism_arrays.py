@@ -1,0 +1,99 @@
+"""What the datasets say of the motion that follows an increment, of what falls, and of the friction that is used up."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import solver
+from solver import mechanics
+
+from .swinging import swing_factors
+
+#: How far the fastest corner goes by the point array ``mechanism``, in extents of the free blocks: to be seen at once.
+AHEAD = 0.1
+
+
+def block_motion(
+    assembly: solver.Assembly, increment: solver.Increment, falls: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
+    """Make the cell arrays of blocks that describe the motion that follows.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    increment : solver.Increment
+    falls : (n_blocks,) bool array, optional
+        Blocks that the collapse takes; by default those that have fallen, in frames of a fall those that move.
+    """
+    parts, d = mechanics.rigid_parts(assembly, increment), assembly.dimension
+    if falls is None:
+        falls = increment.fallen | ((increment.status == solver.Status.FALLING) & (parts >= 0))
+    velocity = increment.velocity
+    flat = np.zeros((assembly.n_blocks, 3 - d))
+    return {
+        "falls": falls.astype(np.int32),
+        "macro_block": parts.astype(np.int32),
+        "mechanism_velocity": np.hstack([velocity[:, :d], flat]),
+        "mechanism_rotation": velocity[:, 2].copy() if d == 2 else velocity[:, 3:].copy(),
+    }
+
+
+def next_places(
+    assembly: solver.Assembly, increment: solver.Increment, points: np.ndarray, *blocks: np.ndarray
+) -> np.ndarray:
+    """(n_points, d) array [m]: a step of points along the motion that follows, to first order, out of scale.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    increment : solver.Increment
+    points : (n_points, d) array [m]
+    *blocks : (n_points,) int arrays
+        The block each point moves with, or the two between which it stays midway.
+    """
+    factor = swing_factors(assembly, increment, AHEAD, np.ones(1))[0]
+    each = [mechanics.point_velocities(points, block, increment.pose, increment.velocity) for block in blocks]
+    return np.asarray(factor * sum(each[1:], each[0]) / len(each))
+
+
+def part_of_friction(forces: np.ndarray, friction: np.ndarray) -> np.ndarray:
+    """(n_contacts,) array: shear force over what friction allows; 0 where it allows none.
+
+    Parameters
+    ----------
+    forces : (n_contacts, d) array [N]
+        Normal and shear.
+    friction : (n_contacts,) array
+    """
+    allowed = friction * forces[:, 0]
+    shear = np.linalg.norm(forces[:, 1:], axis=1)
+    return np.divide(shear, allowed, out=np.zeros(len(forces)), where=allowed > 0.0)
+
+
+def falling_in(response: solver.Response) -> np.ndarray:
+    """(n_blocks,) bool array: blocks that have fallen by the last equilibrium, or that the collapse takes.
+
+    Parameters
+    ----------
+    response : solver.Response
+        With an increment in equilibrium.
+    """
+    last = at_last_equilibrium(response)
+    falls = last.fallen
+    if response.collapse is not None and response.collapse.lost == "equilibrium":
+        falls = falls | (mechanics.rigid_parts(response.assembly, last) >= 0)
+    return falls
+
+
+def at_last_equilibrium(response: solver.Response) -> solver.Increment:
+    """Give the last increment in equilibrium; of what collapses with the collapse mechanism as its motion.
+
+    Parameters
+    ----------
+    response : solver.Response
+        With an increment in equilibrium.
+    """
+    last, collapse = response.path[-1], response.collapse
+    if collapse is None or not collapse.mechanism.any():
+        return last
+    return mechanics.with_motion(last, collapse.mechanism)

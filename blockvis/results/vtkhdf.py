@@ -1,0 +1,115 @@
+"""All increments in one file: VTKHDF with time, for ParaView from 5.12 on and PyVista."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
+from vtkmodules.vtkCommonCore import vtkStringArray
+from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkMultiBlockDataSet, vtkUnstructuredGrid
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkIOHDF import vtkHDFWriter
+
+import solver
+from blockvis.system.atomic_files import atomic_file
+
+from .datasets import block_grid, contact_grid, joint_grid
+from .joint_faces import initial_joints
+from .mechanism_arrays import at_last_equilibrium, falling_in
+from .viewer_files import GRIDS, output_times
+
+#: Level of zlib.
+COMPRESSION = 4
+
+
+def write_vtkhdf(response: solver.Response, path: Path, *, shape: str = "moved") -> Path:
+    """Write the path of a response as one file: blocks, contact points and joints, time is the parameter.
+
+    Parameters
+    ----------
+    response : solver.Response
+    path : Path
+        Ending in .vtkhdf.
+    shape : {"moved", "undeformed"}
+        As of :func:`blockvis.results.datasets.block_dataset`.
+
+    Raises
+    ------
+    ValueError
+        Where nothing is in equilibrium.
+    OSError
+        Where VTK cannot write the file.
+
+    Notes
+    -----
+    VTK knows no strings in series: names are left out, ``block_id`` counts the blocks.
+    """
+    if not response.path:
+        raise ValueError(f"nothing is in equilibrium ({response.stop}): there is no path to write to '{path}'")
+    source = _Series(response, shape)
+    writer = vtkHDFWriter()
+    writer.SetInputConnection(source.GetOutputPort())
+    writer.SetWriteAllTimeSteps(True)
+    # As many values as a step has: longer pieces leave most of each empty.
+    writer.SetChunkSize(max(len(response.assembly.vertices), 100))
+    writer.SetCompressionLevel(COMPRESSION)
+    with atomic_file(path) as partial:
+        writer.SetFileName(str(partial))
+        if writer.Write() != 1:
+            raise OSError(f"VTK could not write '{path}'")
+    return path
+
+
+class _Series(VTKPythonAlgorithmBase):
+    """The increments of a path as a pipeline of VTK asks for them, by their times.
+
+    Parameters
+    ----------
+    response : solver.Response
+    shape : {"moved", "undeformed"}
+    """
+
+    def __init__(self, response: solver.Response, shape: str) -> None:
+        super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkMultiBlockDataSet")
+        self._response, self._shape, self._joints = response, shape, initial_joints(response.assembly)
+        self._times = output_times(response.path)
+
+    def RequestInformation(self, _request: Any, _inputs: Any, outputs: Any) -> int:
+        """Say which times there are."""
+        about, known = outputs.GetInformationObject(0), vtkStreamingDemandDrivenPipeline
+        about.Set(known.TIME_STEPS(), self._times, len(self._times))
+        about.Set(known.TIME_RANGE(), [self._times[0], self._times[-1]], 2)
+        return 1
+
+    def RequestData(self, _request: Any, _inputs: Any, outputs: Any) -> int:
+        """Give the datasets at a time."""
+        about, asked = outputs.GetInformationObject(0), vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
+        time = about.Get(asked) if about.Has(asked) else self._times[0]
+        number = int(np.abs(np.array(self._times) - time).argmin())
+        together = vtkMultiBlockDataSet.GetData(about)
+        for k, (name, grid) in enumerate(zip(GRIDS, self._grids(number), strict=True)):
+            together.SetBlock(k, _without_strings(grid))
+            together.GetMetaData(k).Set(vtkCompositeDataSet.NAME(), name)
+        return 1
+
+    def _grids(self, number: int) -> Sequence[vtkUnstructuredGrid]:
+        response, shape, falls = self._response, self._shape, None
+        increment, assembly = response.path[number], response.assembly
+        if number == len(response.path) - 1 and response.collapse is not None:
+            increment, falls = at_last_equilibrium(response), falling_in(response)
+        return (
+            block_grid(assembly, increment, shape=shape, falls=falls),
+            contact_grid(assembly, increment, shape=shape),
+            joint_grid(assembly, increment, shape=shape, joints=self._joints),
+        )
+
+
+def _without_strings(grid: vtkUnstructuredGrid) -> vtkUnstructuredGrid:
+    for attributes in (grid.GetPointData(), grid.GetCellData(), grid.GetFieldData()):
+        for array in [attributes.GetAbstractArray(k) for k in range(attributes.GetNumberOfArrays())]:
+            if isinstance(array, vtkStringArray):
+                attributes.RemoveArray(array.GetName())
+    return grid

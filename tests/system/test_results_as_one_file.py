@@ -1,0 +1,117 @@
+"""A results folder as one file: a series for ParaView, an animation for a browser, and the deformed layout."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import pyvista as pv
+from structures import arch_response, vault_response
+from vtkmodules.vtkIOGeometry import vtkGLTFReader
+
+import blockvis
+import solver
+from blockvis.cli import main
+from solver import mechanics
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return blockvis.write(arch_response(), tmp_path_factory.mktemp("results") / "out")
+
+
+def converted(folder, target, *options):
+    assert main(["convert", str(folder), str(target), *options]) == 0
+    return target
+
+
+def at_the_end(response):
+    """Bounds of all blocks at the last equilibrium."""
+    corners = mechanics.moved_vertices(response.assembly, response.path[-1].pose)
+    return np.array([corners.min(axis=0), corners.max(axis=0)])
+
+
+def series(file, step):
+    reader = pv.HDFReader(file)
+    reader.reader.UpdateInformation()
+    times = reader.reader.GetOutputInformation(0).Get(reader.reader.GetExecutive().TIME_STEPS())
+    reader.reader.SetStep(step)
+    return times, reader.read()
+
+
+def shows_each_increment(response, file):
+    times, last = series(file, len(response.path) - 1)
+    assert times == pytest.approx(list(response.settlement))
+    assert set(last.keys()) == {"blocks", "joints", "contacts"}
+    np.testing.assert_array_equal(last["blocks"]["falls"], response.mesh(-1)["falls"])
+    np.testing.assert_allclose(last["blocks"].points, response.mesh(-1).points, atol=1e-12)
+    assert last["joints"].n_cells == response.joints(-1).n_cells
+    _, first = series(file, 0)
+    np.testing.assert_allclose(first["blocks"].points, response.mesh(0).points, atol=1e-12)
+
+
+def test_a_series_shows_each_increment_at_its_settlement(folder, tmp_path):
+    shows_each_increment(arch_response(), converted(folder, tmp_path / "arch.vtkhdf"))
+
+
+@pytest.mark.slow
+def test_a_series_shows_each_increment_in_space(tmp_path):
+    folder = blockvis.write(vault_response(), tmp_path / "out")
+    shows_each_increment(vault_response(), converted(folder, tmp_path / "vault.vtkhdf"))
+
+
+def played(file, time):
+    """Bounds of an animation at a time [s], as VTK plays it."""
+    reader = vtkGLTFReader()
+    reader.SetFileName(str(file))
+    reader.SetFrameRate(50)
+    reader.UpdateInformation()
+    reader.EnableAnimation(0)
+    reader.UpdateInformation()
+    reader.UpdateTimeStep(time)
+    bounds = np.array(pv.wrap(reader.GetOutput()).combine().bounds)
+    return reader.GetAnimationDuration(0), bounds.reshape(3, 2).T
+
+
+def test_an_animation_moves_blocks_as_they_did(tmp_path):
+    response = arch_response()
+    stands = replace(response, increments=response.path[:3], collapse=None, stop=solver.Status.LIMIT_REACHED)
+    file = converted(blockvis.write(stands, tmp_path / "out"), tmp_path / "arch.glb")
+    length, last = played(file, 6.0)
+    assert length == pytest.approx(6.5)
+    np.testing.assert_allclose(last[:, :2], at_the_end(stands), atol=1e-3)
+
+
+@pytest.mark.thorough
+def test_an_animation_lets_blocks_fall(folder, tmp_path):
+    file = converted(folder, tmp_path / "arch.glb")
+    drawn = arch_response().assembly.vertices
+    length, start = played(file, 0.0)
+    np.testing.assert_allclose(start[:, :2], [drawn.min(axis=0), drawn.max(axis=0)], atol=1e-3)
+    _, last = played(file, 6.0)
+    np.testing.assert_allclose(last[:, :2], at_the_end(arch_response()), atol=1e-3)
+    assert length > 7.0
+    _, end = played(file, length)
+    assert end[1, 1] < last[1, 1] - 0.1, "nothing has fallen"
+
+
+@pytest.mark.slow
+def test_an_animation_in_space_has_y_upwards(tmp_path):
+    response = vault_response()
+    file = converted(blockvis.write(response, tmp_path / "out"), tmp_path / "vault.glb")
+    low, high = at_the_end(response)
+    _, last = played(file, 6.0)
+    np.testing.assert_allclose(last, [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]], atol=1e-3)
+
+
+@pytest.mark.parametrize("suffix", [pytest.param(".dxf", marks=pytest.mark.thorough), ".obj"])
+def test_the_deformed_layout_is_that_of_the_last_equilibrium(suffix, folder, tmp_path, capsys):
+    file = converted(folder, tmp_path / f"deformed{suffix}")
+    assert "as they are at settlement 0.141" in capsys.readouterr().out
+    layout = blockvis.read_layout(file)
+    corners = np.concatenate(layout.outlines)
+    np.testing.assert_allclose([corners.min(axis=0), corners.max(axis=0)], at_the_end(arch_response()), atol=1e-6)
+
+
+def test_options_of_layout_files_are_refused_for_results(folder, tmp_path, capsys):
+    assert main(["convert", str(folder), str(tmp_path / "a.dxf"), "--unit", "mm"]) == 2
+    assert "--unit is of layout files" in capsys.readouterr().err
