@@ -26,7 +26,7 @@ class Key:
 
     Attributes
     ----------
-    kind : {"area", "line", "dot", "bar", ""}
+    kind : {"area", "line", "dash", "dot", "bar", ""}
         What stands before the text; nothing before a note.
     text : str
     colour : (int, int, int)
@@ -294,6 +294,11 @@ def write_labels(
             return
 
 
+def write_words(picture: Image.Image, place: tuple[float, float], words: str, text: int) -> None:
+    """Write faint words, their middle at a place of a picture [pixel]."""
+    ImageDraw.Draw(picture).text(place, words, palette.FAINT, _font(round(0.85 * text)), anchor="mm")
+
+
 def room_in(ring: np.ndarray) -> np.ndarray:
     """(2,) array: width and height of a box in the shape of that around an outline (n, 2), as large as the outline."""
     width, height = np.ptp(ring, axis=0)
@@ -305,6 +310,10 @@ def room_in(ring: np.ndarray) -> np.ndarray:
 def _swatch(draw: ImageDraw.ImageDraw, key: Key, x: float, y: float, wide: float, text: float) -> None:
     if key.kind == "area":
         draw.rectangle((x, y - 0.38 * text, x + wide, y + 0.38 * text), fill=key.colour)
+    elif key.kind == "dash":
+        for k in range(3):
+            left = x + (k + 0.15) * wide / 3.0
+            draw.rectangle((left, y - 0.04 * text, left + 0.7 * wide / 3.0, y + 0.04 * text), fill=key.colour)
     elif key.kind == "dot":
         r = 0.3 * text
         draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=key.colour)

@@ -122,11 +122,6 @@ def displacement_colours(fraction: np.ndarray) -> np.ndarray:
     return _on_ramp(RAMP, fraction)
 
 
-def crack_colours(fraction: np.ndarray) -> np.ndarray:
-    """(..., 3) uint8 array: colours of cracks in space by their opening, ``fraction`` from 0 to 1, clamped."""
-    return _on_ramp(CRACKS, fraction)
-
-
 def _on_ramp(ramp: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     place = np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0) * (len(ramp) - 1)
     below = np.minimum(place.astype(int), len(ramp) - 2)

@@ -246,14 +246,16 @@ def test_what_is_where():
     crown = found.hinges[found.hinges[:, 0, 2].argmax()]
     for share in (0.3, 0.5, 0.7):
         assert alike(colour_at(crown[0] + share * (crown[1] - crown[0])), palette.HINGE, 30)
-    # The crack at the crown is widest below: there its colour is the darkest.
+    # The crack at the crown is widest below: its rims have one colour, and between them is air.
     front = found.cracks.mean(axis=1)
     under = np.flatnonzero((np.abs(front[:, 0] - crown[0, 0]) < 0.1) & (front[:, 1] < -0.2))
     wide = under[found.openings[under].max(axis=1).argmax()]
-    inside = (
-        found.cracks[wide][[0, 3]] if found.openings[wide, 0] > found.openings[wide, 1] else found.cracks[wide][[1, 2]]
-    )
-    assert alike(colour_at(0.9 * inside.mean(axis=0) + 0.1 * found.cracks[wide].mean(axis=0)), palette.CRACKS[2], 60)
+    crack = found.cracks[wide]
+    inside = crack[[0, 3]] if found.openings[wide, 0] > found.openings[wide, 1] else crack[[1, 2]]
+    assert alike(colour_at(0.9 * inside.mean(axis=0) + 0.1 * crack.mean(axis=0)), palette.PAPER)
+    for rim in (crack[[0, 1]], crack[[3, 2]]):
+        around = colour_at(rim.mean(axis=0) + 0.5 * drawer.scene.pixel * np.array([0.0, -1.0, 0.0]))
+        assert alike(around, palette.OPEN, 60)
     support = np.flatnonzero(assembly.moving)[0]
     corner = mechanics.moved_vertices(assembly, last.pose)[assembly.block_of_vertex == support]
     face = corner[corner[:, 1] < 0].mean(axis=0)
