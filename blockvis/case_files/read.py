@@ -157,6 +157,8 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         animation=output["animation"] or None,
         vtu=output["vtu"],
         underlay=output["underlay"],
+        sight=output["view"],
+        cut=output["section"],
     )
     top.finish()
     return _checked(case, settings)

@@ -10,6 +10,7 @@ from typing import Any
 
 import solver
 from blockvis.formats.image_scale import ImageKeys
+from blockvis.layout.sights import Cut, Sight
 
 from .bonds import Bonding
 from .explain_settings import ExplainSettings
@@ -44,6 +45,10 @@ class Case:
         Shape of the blocks in the VTU files.
     underlay : str or None
         Photograph under the pictures, relative to the case file.
+    sight : Sight or None
+        From where blocks in space are drawn.
+    cut : Cut or None
+        The plane that cuts them open.
     """
 
     source: Path
@@ -83,3 +88,5 @@ class Case:
     animation: str | None = "collapse.mp4"
     vtu: str = "moved"
     underlay: str | None = None
+    sight: Sight | None = None
+    cut: Cut | None = None

@@ -76,7 +76,7 @@ def read_sight(value: Any) -> Sight:
 
     Parameters
     ----------
-    value : str or mapping
+    value : str, mapping or Sight
 
     Raises
     ------
@@ -88,6 +88,8 @@ def read_sight(value: Any) -> Sight:
     >>> read_sight({"azimuth": 30, "elevation": 20})
     Sight(azimuth=30.0, elevation=20.0, both=False)
     """
+    if isinstance(value, Sight):
+        return value
     if isinstance(value, str) and value in SIGHTS:
         return SIGHTS[value]
     if not isinstance(value, Mapping) or not value:
@@ -108,7 +110,7 @@ def read_cut(value: Any) -> Cut:
 
     Parameters
     ----------
-    value : str or mapping
+    value : str, mapping or Cut
 
     Raises
     ------
@@ -120,13 +122,15 @@ def read_cut(value: Any) -> Cut:
     >>> read_cut("y = 1.2")
     Cut(normal=(0.0, 1.0, 0.0), point=(0.0, 1.2, 0.0))
     """
+    if isinstance(value, Cut):
+        return value
     problem = f"is {value!r}; {_SECTION_REMEDY}"
     if isinstance(value, str):
         axis, equals, place = (word.strip() for word in value.partition("="))
         if axis not in AXES or (equals and not place):
             raise ValueError(problem)
         normal = tuple(float(axis == name) for name in AXES)
-        at = _number(place, problem) if equals else None
+        at = _place(place, problem) if equals else None
         point = None if at is None else tuple(at if axis == name else 0.0 for name in AXES)
         return Cut(normal, point)  # type: ignore[arg-type]
     if not isinstance(value, Mapping) or "normal" not in value or not {"point", "normal"}.issuperset(value):
@@ -139,14 +143,17 @@ def read_cut(value: Any) -> Cut:
     return Cut(unit, _triple(value["point"], problem) if "point" in value else None)
 
 
-def _number(value: Any, problem: str) -> float:
+def _place(text: str, problem: str) -> float:
     try:
-        number = float("nan") if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError):
-        number = float("nan")
-    if not np.isfinite(number):
+        return _number(float(text), problem)
+    except ValueError:
+        raise ValueError(problem) from None
+
+
+def _number(value: Any, problem: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
         raise ValueError(problem)
-    return number
+    return float(value)
 
 
 def _triple(value: Any, problem: str) -> tuple[float, float, float]:

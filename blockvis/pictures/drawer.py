@@ -33,7 +33,7 @@ from .marks import (
     thrust_line,
 )
 from .scene import OF_STATICS, Scene
-from .solid_view import View, hiding_supports, views_of
+from .solid_view import View, hiding_supports, plane_of, views_of
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 from .underlay import Underlay
 
@@ -187,6 +187,10 @@ class Drawer:
         # The view of blocks in space is chosen by their mechanism.
         self._swing = swing_of(response) if look.colour_by == "mechanism" or not self._flat else None
         self._views = self._chosen_views()
+        self._plane = plane_of(assembly, look.cut)
+        if self._plane is not None and self._plane[1] @ self._views[0].axes[2] > 0.0:
+            # What lies between the plane and the eye is left out.
+            self._plane = self._plane * [[1.0], [-1.0]]
         self._seen = _Series(sampled=sampled([k for k, i in enumerate(increments) if matters(i, response)]))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
@@ -231,7 +235,7 @@ class Drawer:
     def _framed(self, poses: Iterable[solver.Pose]) -> Frame:
         if not self._views:
             return framed(self.assembly, poses)
-        return framed(self.assembly, poses, margin=0.02, supports=0.3, axes=self._axes, whole=WHOLE)
+        return framed(self.assembly, poses, margin=0.02, supports=0.3, axes=self._axes, whole=WHOLE, cut=self._plane)
 
     @property
     def _axes(self) -> np.ndarray:
@@ -261,7 +265,7 @@ class Drawer:
                 self.fill,
                 opacity=1.0 if self.look.forces == "none" else GLASS,
                 fine=self._still,
-                cut=self._plane(),
+                cut=self._plane,
                 outlined=hiding_supports(self.assembly, view),
                 hidden_hinges=not several,
             )
@@ -272,24 +276,6 @@ class Drawer:
         from .paired_scenes import PairedScenes
 
         return PairedScenes(scenes, ("from above", "from below"), self.sheet.text)
-
-    def _plane(self) -> np.ndarray | None:
-        """(2, 3) array: a point [m] of the section that is asked for, and its normal."""
-        cut = self.look.cut
-        if cut is None:
-            return None
-        corners = self.assembly.vertices[self.assembly.free[self.assembly.block_of_vertex]]
-        corners = corners if len(corners) else self.assembly.vertices
-        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
-        normal = np.array(cut.normal)
-        point = middle if cut.point is None else np.array(cut.point)
-        heights = (self.assembly.vertices - point) @ normal
-        if not heights.min() < 0.0 < heights.max():
-            raise ValueError(
-                f"section: the plane through ({', '.join(f'{x:.4g}' for x in point)}) m misses the blocks, which lie "
-                f"from {heights.min():.4g} to {heights.max():.4g} m from it; move it"
-            )
-        return np.stack([point, normal])
 
     def _projected(self, points: np.ndarray) -> np.ndarray:
         """(n, d) array [m]: places in the picture, or in each of several, of points (n, d) [m]."""

@@ -393,6 +393,7 @@ def framed(
     supports: float = 0.13,
     axes: np.ndarray | None = None,
     whole: float = 0.0,
+    cut: np.ndarray | None = None,
 ) -> Frame:
     """Frame in which every free block stays over all poses.
 
@@ -410,12 +411,16 @@ def framed(
         Unit vectors to the right and up in the picture; the axes of the drawing by default.
     whole : float
         Supports are shown whole where the picture is then no larger than this many times the free blocks.
+    cut : (2, 3) array, optional
+        A point [m] of a plane and its normal towards what is kept: what is left out takes no room.
     """
     free = assembly.free[assembly.block_of_vertex]
     d = assembly.dimension if axes is None else len(axes)
     inner, outer = _Box(d), _Box(d)
     for pose in poses:
         corners = mechanics.moved_vertices(assembly, pose)
+        if cut is not None:
+            corners = corners - np.minimum((corners - cut[0]) @ cut[1], 0.0)[:, None] * cut[1]
         corners = corners if axes is None else corners @ axes.T
         inner.hold(corners[free] if free.any() else corners)
         outer.hold(corners[~free] if (~free).any() else corners)

@@ -38,8 +38,8 @@ def draw_still(
     joints: bool = True,
     curve: bool = False,
     underlay: Underlay | None = None,
-    view: str | Mapping[str, float] | None = None,
-    section: str | Mapping[str, Any] | None = None,
+    view: str | Mapping[str, float] | Sight | None = None,
+    section: str | Mapping[str, Any] | Cut | None = None,
 ) -> Path:
     """Draw one increment.
 
@@ -117,8 +117,8 @@ def draw_mechanism(
     *,
     size: tuple[int, int] = STILL_SIZE,
     underlay: Underlay | None = None,
-    view: str | Mapping[str, float] | None = None,
-    section: str | Mapping[str, Any] | None = None,
+    view: str | Mapping[str, float] | Sight | None = None,
+    section: str | Mapping[str, Any] | Cut | None = None,
 ) -> Path:
     """Draw the last equilibrium, its hinges and sliding joints, and the motion that follows.
 
@@ -169,6 +169,8 @@ def animate(
     fall: Fall | None = None,
     underlay: Underlay | None = None,
     progress: Callable[[int, int], None] | None = None,
+    view: str | Mapping[str, float] | Sight | None = None,
+    section: str | Mapping[str, Any] | Cut | None = None,
 ) -> Path:
     """Write the settlement and the fall as a film.
 
@@ -195,13 +197,15 @@ def animate(
         A photograph under blocks in the plane.
     progress : callable, optional
         Called with the frames drawn and their number.
+    view, section
+        As of :func:`draw_still`; a film has one view.
 
     Returns
     -------
     pathlib.Path
     """
     _check_response(response)
-    look = Look(magnification, colour_by, forces, joints)
+    look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
     if magnification != 1.0:
         fall = None
     elif fall is None:

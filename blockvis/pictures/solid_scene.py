@@ -36,7 +36,7 @@ LAMP = (-0.45, 0.85, 1.2)
 SAMPLES, OVER = 4, 2
 
 #: Corners darken over this part of the larger side of what is shown; a hair of it keeps plane faces free of grain.
-SHADE_REACH, SHADE_HAIR = 0.1, 0.004
+SHADE_REACH, SHADE_HAIR = 0.1, 0.008
 
 #: Cut faces are so much darker than the faces of their blocks.
 CUT_SHADE = 0.82
@@ -79,7 +79,7 @@ class SolidScene:
     fine : bool
         Whether smooth edges and the shade of corners are worth the time: in stills.
     cut : (2, 3) array, optional
-        A point [m] and the unit normal of a plane; what lies between it and the eye is left out.
+        A point [m] of a plane and its unit normal towards what is kept of the blocks.
     outlined : (n_blocks,) bool array, optional
         Blocks of which the edges alone are drawn.
     hidden_hinges : bool
@@ -113,7 +113,7 @@ class SolidScene:
         self._layers: dict[str, Any] = {}
         self._overlays: dict[str, _Arrows] = {}
         self._look_at()
-        self._cut = cut if cut is None or cut[1] @ view.axes[2] <= 0.0 else np.stack([cut[0], -cut[1]])
+        self._cut = cut
         triangles, blocks = triangles_of(assembly.polyhedra)
         solid = np.ones(len(blocks), dtype=bool) if outlined is None else ~outlined[blocks]
         self._triangles, self._block = triangles[solid], blocks[solid]

@@ -137,6 +137,33 @@ def hiding_supports(assembly: solver.Assembly, view: View) -> np.ndarray:
     return hides
 
 
+def plane_of(assembly: solver.Assembly, cut: Cut | None) -> np.ndarray | None:
+    """(2, 3) array: a point [m] of the plane that cuts blocks open, and its unit normal; None without one.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    cut : Cut, optional
+
+    Raises
+    ------
+    ValueError
+        For a plane that misses the blocks.
+    """
+    if cut is None:
+        return None
+    corners, normal = assembly.vertices, np.array(cut.normal)
+    free = corners[assembly.free[assembly.block_of_vertex]] if assembly.free.any() else corners
+    point = (free.min(axis=0) + free.max(axis=0)) / 2.0 if cut.point is None else np.array(cut.point)
+    heights = (corners - point) @ normal
+    if not heights.min() < 0.0 < heights.max():
+        raise ValueError(
+            f"section: the plane through ({', '.join(f'{x:.4g}' for x in point)}) m misses the blocks, which lie "
+            f"{heights.min():.4g} to {heights.max():.4g} m from it along its normal; move its point there"
+        )
+    return np.stack([point, normal])
+
+
 def _above(assembly: solver.Assembly) -> float:
     """Degrees above the level from which a structure is seen by default."""
     corners = assembly.vertices[assembly.free[assembly.block_of_vertex]]

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import solver
 from blockvis.cases.contents import Case
@@ -134,14 +134,17 @@ class Drawing(Output):
         progress = DrawingProgress()
         stored = stored_fall(folder)
         animation, apart = self._animation(case), self._process
+        seen_from = _seen_from(case, response) if self._pictures else {}
         if apart is not None:
             # It works out the fall as well, and what needs none is drawn here meanwhile.
-            apart.draw(response, folder / str(animation), stored, falls=stored is None, underlay=underlay)
+            apart.draw(
+                response, folder / str(animation), stored, falls=stored is None, underlay=underlay, seen_from=seen_from
+            )
         if self._pictures:
             with clock.counting("mechanism"):
                 from blockvis.pictures.render import draw_mechanism
 
-                draw_mechanism(response, folder / "mechanism.png", underlay=underlay)
+                draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **seen_from)
         with clock.counting("fall"):
             fall = _fall(response, apart, progress) if stored is None else stored
             progress.done()
@@ -168,7 +171,8 @@ class Drawing(Output):
                 from blockvis.pictures.render import animate
 
                 try:
-                    animate(response, folder / animation, fall=fall, underlay=underlay, progress=progress.frame)
+                    look: dict[str, Any] = {"underlay": underlay, **seen_from}
+                    animate(response, folder / animation, fall=fall, progress=progress.frame, **look)
                 finally:
                     progress.done()
         return (problem,) if problem else ()
@@ -181,6 +185,23 @@ def _underlay(case: Case) -> Underlay | None:
     from .underlay import underlay_of
 
     return underlay_of(case)
+
+
+def _seen_from(case: Case, response: solver.Response) -> dict[str, Any]:
+    """Say from where the pictures of a case are drawn; a run is drawn all the same where that makes no sense."""
+    from blockvis.pictures.solid_view import plane_of
+
+    asked = {"view": case.sight, "section": case.cut}
+    if response.assembly.dimension == 2:
+        for key in (key for key, value in asked.items() if value is not None):
+            warnings.warn(f"{case.source}: [output] {key}: blocks in the plane are drawn as they lie", stacklevel=2)
+        return {}
+    try:
+        plane_of(response.assembly, case.cut)
+    except ValueError as error:
+        warnings.warn(f"{case.source}: [output] {error}; drawn whole", stacklevel=2)
+        asked["section"] = None
+    return asked
 
 
 def _awaited(film: FilmProcess, progress: DrawingProgress, clock: Clock) -> str:
