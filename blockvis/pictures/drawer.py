@@ -206,7 +206,10 @@ class Drawer:
             self.panel = CurvePanel(response, size_of(self.sheet.beside), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
         self._arrow = ARROW_IN_SPACE * float(frame.size.max())
-        frame = frame.holding(self._projected(np.concatenate([self.live.tails, *self._arrow_tips(extra)])))
+        ends = np.concatenate([self.live.tails, *self._arrow_tips(extra)])
+        if self._plane is not None:
+            ends = ends[(ends - self._plane[0]) @ self._plane[1] >= 0.0]
+        frame = frame.holding(self._projected(ends))
         # Supports in the plane are hatched, and an outline stays where those that move were; of limit loads none moves.
         plain = self._flat or not response.settlements
         self.fill = (
@@ -220,6 +223,8 @@ class Drawer:
         self.tints: np.ndarray | None = None
         if look.colour_by == "mechanism" and self._swing is not None and self._swing.moves:
             self.tints = mechanism_colours(assembly, self.fill, self._swing)
+        #: Whether the mechanism acts at increments, by phase and parameter.
+        self._acting: dict[tuple[int, float], bool] = {}
         #: Where the blocks are drawn while a mechanism is shown.
         self._drawn_at: solver.Pose | None = None
         self._keys: list[Key] | None = None
@@ -346,7 +351,7 @@ class Drawer:
         true = increment.pose if pose is None else pose
         shown = self._drawn_at or magnified(self.assembly, true, self.look.magnification)
         at = increment.with_arrays(pose=true, contacts=contacts_at(increment, true)) if pose is not None else increment
-        self.scene.pose(shown, self._block_colours(true, increment.fallen))
+        self.scene.pose(shown, self._block_colours(true, increment))
         dots = np.zeros((0, self.assembly.dimension))
         if blocks_only:
             self.scene.clear(*OF_STATICS)
@@ -491,18 +496,29 @@ class Drawer:
         governs = self._swing is not None and increment is self.response.governing
         return self._swing.increment if self._swing is not None and governs else increment
 
-    def _block_colours(self, pose: solver.Pose, fallen: np.ndarray) -> np.ndarray | None:
-        colours = self._standing_colours(pose)
+    def _block_colours(self, pose: solver.Pose, increment: solver.Increment) -> np.ndarray | None:
+        colours = self._standing_colours(pose, increment)
         if not self._loses:
             return colours
-        return palette.pale(self.fill if colours is None else colours, fallen)
+        return palette.pale(self.fill if colours is None else colours, increment.fallen)
 
-    def _standing_colours(self, pose: solver.Pose) -> np.ndarray | None:
+    def _standing_colours(self, pose: solver.Pose, increment: solver.Increment) -> np.ndarray | None:
         if self.look.colour_by != "displacement":
-            return self.tints
+            return self.tints if self.tints is None or self._acts(increment) else self.fill
         moved = np.linalg.norm(pose.positions - self.assembly.centroids, axis=1)
         colours = palette.displacement_colours(moved / (self.largest or 1.0))
         return np.where(self.assembly.free[:, None], colours, self.fill)
+
+    def _acts(self, increment: solver.Increment) -> bool:
+        """Whether the mechanism that is tinted follows an increment: it has colours from there on."""
+        swing = self._swing
+        if swing is None or self._drawn_at is not None or increment.status == solver.Status.FALLING:
+            return True
+        place = increment.phase, increment.parameter
+        if place not in self._acting:
+            same = np.array_equal(mechanics.rigid_parts(self.assembly, increment), swing.parts)
+            self._acting[place] = same or place == (swing.increment.phase, swing.increment.parameter)
+        return self._acting[place]
 
     def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> np.ndarray:
         """Draw open and sliding joints and hinges; returns where hinges are drawn, (n, d) [m]."""
