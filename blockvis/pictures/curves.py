@@ -171,7 +171,7 @@ def _draw(
         return
     _draw_line(axes, response, total, values, text if events else None)
     axes.set_xlabel(parameter_label(response), fontsize=text)
-    axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5))
+    axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5, steps=[1, 2, 2.5, 5, 10]))
     if not moment and response.measured.is_force and response.total_weight > 0:
         weight = response.total_weight / factor
         over_weight = axes.secondary_yaxis(
