@@ -25,7 +25,6 @@ from .frame import ColourBar, Frame, Key, Sheet, framed, write_labels
 from .live_load import LiveLoads
 from .marks import (
     SMALLEST_RESULTANT,
-    Marks,
     joint_forces,
     length_per_force,
     marks_of,
@@ -114,7 +113,7 @@ class _Series:
     largest : float [m]
         Displacement of any free block.
     widest : float [m]
-        Opening of any crack that does not gape.
+        Opening of any crack in equilibrium.
     cracks, sliding, hinges : bool
         Whether there are any anywhere.
     largest_force : float [N]
@@ -303,7 +302,8 @@ class Drawer:
             seen.largest = max(seen.largest, largest_displacement(self.assembly, increment))
             if look.joints:
                 found = marks_of(self.assembly, self.joints, self._shown(increment), increment.pose)
-                seen.widest = max(seen.widest, float(found.openings[self._measured(found)].max(initial=0.0)))
+                if increment.status != solver.Status.FALLING:
+                    seen.widest = max(seen.widest, float(found.openings.max(initial=0.0)))
                 seen.cracks |= len(found.cracks) > 0
                 seen.sliding |= len(found.sliding) > 0
                 seen.hinges |= len(found.hinges) > 0
@@ -313,10 +313,6 @@ class Drawer:
                 if number in seen.sampled:
                     seen.forces.append(sizes)
             yield magnified(self.assembly, increment.pose, look.magnification)
-
-    def _measured(self, found: Marks) -> np.ndarray:
-        """(n,) bool array: cracks whose width the legend names; in the plane those that gape have labels."""
-        return ~found.gapes if self._flat else np.ones(len(found.gapes), dtype=bool)
 
     def picture(
         self,
@@ -344,8 +340,7 @@ class Drawer:
         blocks_only : bool
             Leave out what statics knows: joints, forces, what stands on what, and where supports go.
         widths : bool
-            Write the largest width of the widest crack lines beside them [mm]; in space the legend has the scale of
-            their colours.
+            Write the largest width of the widest crack lines beside them [mm]; in space the legend has the largest.
         """
         increment = increment if pose is not None else self._shown(increment)
         true = increment.pose if pose is None else pose

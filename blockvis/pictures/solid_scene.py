@@ -110,6 +110,8 @@ class SolidScene:
             extent = float(framed(assembly, [solver.Pose.initial(assembly)], axes=view.axes[:2]).size.max())
             self._plotter.enable_ssao(radius=SHADE_REACH * extent, bias=SHADE_HAIR * extent, kernel_size=16)
         self._hidden_hinges = hidden_hinges
+        #: Diagonal of the largest support [m].
+        self._support = _largest_support(assembly)
         self._layers: dict[str, Any] = {}
         self._overlays: dict[str, _Arrows] = {}
         self._look_at()
@@ -240,11 +242,12 @@ class SolidScene:
         """Draw nothing: the blocks show it."""
 
     def arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
-        """Draw arrows from tails (n, 3) [m] to tips (n, 3) [m] over all: none is hidden behind what it moves."""
+        """Draw arrows from tails (n, 3) [m] to tips (n, 3) [m] over all: none is hidden behind its own support."""
         if self._cut is not None:
             kept = (tails - self._cut[0]) @ self._cut[1] >= 0.0
             tails, tips = tails[kept], tips[kept]
-        self._overlays[f"{layer} top"] = _Arrows(tails, tips, colour)
+        # Of many supports those behind the structure would seem to push what is in front of them.
+        self._overlays[f"{layer} top"] = _Arrows(tails, tips, colour, self._support if layer == "arrow" else None)
 
     def show_motion(self, swing: Swing, tails: np.ndarray, tips: np.ndarray) -> solver.Pose:
         """Draw the edges of where few parts of a mechanism were; the blocks go where it takes them."""
@@ -287,9 +290,10 @@ class SolidScene:
     def _shapes(self, arrows: _Arrows) -> list[tuple[tuple[int, int, int], np.ndarray]]:
         """Polygons, (k, 2) pixels each, of arrows in the last picture, with their colours."""
         tails, tips = arrows.tails, arrows.tips
-        if arrows.within is not None:
+        if arrows.within is not None and len(tails):
             seen = self._hidden_by(tails) < arrows.within
-            tails, tips = tails[seen], tips[seen]
+            # One that is hidden still says where a single support goes.
+            tails, tips = (tails[seen], tips[seen]) if seen.any() else (tails, tips)
         return _rimmed_arrows(self.at_pixel(tails), self.at_pixel(tips), self.size[1] / 130.0, arrows.colour)
 
     def at_pixel(self, points: np.ndarray) -> np.ndarray:
@@ -412,6 +416,12 @@ def drawn_forward(actor: Any, by: float) -> None:
     # In units of the smallest difference of depth, which is some 1e-5 of the distance to the structure.
     mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -6.0 * by)
     mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, -6.0 * by)
+
+
+def _largest_support(assembly: solver.Assembly) -> float:
+    corners, owner = assembly.vertices, assembly.block_of_vertex
+    spans = [np.ptp(corners[owner == block], axis=0) for block in np.flatnonzero(~assembly.free)]
+    return max((float(np.linalg.norm(span)) for span in spans), default=0.0)
 
 
 def _line_cells(ends: np.ndarray) -> np.ndarray:
