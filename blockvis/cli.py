@@ -812,7 +812,7 @@ def _render(options: argparse.Namespace) -> int:
         "curve": options.curve,
         "underlay": underlay,
     }
-    seen_from = _seen_from(options, folder)
+    seen_from = _seen_from(options, folder, response)
     last = response.path[-1] if response.path else response.increments[-1]
     draw_still(response, last, folder / "last.png", size=size, **look, **seen_from)
     draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **seen_from)
@@ -829,13 +829,14 @@ def _render(options: argparse.Namespace) -> int:
     return 0
 
 
-def _seen_from(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+def _seen_from(options: argparse.Namespace, folder: Path, response: solver.Response) -> dict[str, Any]:
     """Take view and section from the command line, or from the case of a results folder."""
     from .cases.toml_table import toml_value
-    from .runs.underlay import stored_case
+    from .runs.outputs import seen_from
+    from .runs.underlay import drawn_case
 
-    case = stored_case(folder)
-    found: dict[str, Any] = {} if case is None else {"view": case.sight, "section": case.cut}
+    case = drawn_case(folder)
+    found = {} if case is None else seen_from(case, response)
     if options.view is not None:
         angles = [] if "{" in options.view else [toml_value(angle) for angle in options.view.split(",")]
         two = len(angles) == 2

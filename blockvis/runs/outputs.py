@@ -134,17 +134,17 @@ class Drawing(Output):
         progress = DrawingProgress()
         stored = stored_fall(folder)
         animation, apart = self._animation(case), self._process
-        seen_from = _seen_from(case, response) if self._pictures else {}
+        eye = seen_from(case, response) if self._pictures else {}
         if apart is not None:
             # It works out the fall as well, and what needs none is drawn here meanwhile.
             apart.draw(
-                response, folder / str(animation), stored, falls=stored is None, underlay=underlay, seen_from=seen_from
+                response, folder / str(animation), stored, falls=stored is None, underlay=underlay, seen_from=eye
             )
         if self._pictures:
             with clock.counting("mechanism"):
                 from blockvis.pictures.render import draw_mechanism
 
-                draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **seen_from)
+                draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **eye)
         with clock.counting("fall"):
             fall = _fall(response, apart, progress) if stored is None else stored
             progress.done()
@@ -171,7 +171,7 @@ class Drawing(Output):
                 from blockvis.pictures.render import animate
 
                 try:
-                    look: dict[str, Any] = {"underlay": underlay, **seen_from}
+                    look: dict[str, Any] = {"underlay": underlay, **eye}
                     animate(response, folder / animation, fall=fall, progress=progress.frame, **look)
                 finally:
                     progress.done()
@@ -187,8 +187,19 @@ def _underlay(case: Case) -> Underlay | None:
     return underlay_of(case)
 
 
-def _seen_from(case: Case, response: solver.Response) -> dict[str, Any]:
-    """Say from where the pictures of a case are drawn; a run is drawn all the same where that makes no sense."""
+def seen_from(case: Case, response: solver.Response) -> dict[str, Any]:
+    """Say from where the pictures of a case are drawn; they are drawn all the same where that makes no sense.
+
+    Parameters
+    ----------
+    case : Case
+    response : solver.Response
+
+    Returns
+    -------
+    dict
+        View and section as :func:`blockvis.draw_still` takes them.
+    """
     from blockvis.pictures.solid_view import plane_of
 
     asked = {"view": case.sight, "section": case.cut}
