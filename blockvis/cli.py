@@ -24,6 +24,7 @@ import solver
 from solver import mechanics
 
 from .generators import LAYOUTS, help_text
+from .layout.sights import SIGHTS
 from .layout.views import VIEWS
 from .system.extras import MissingExtra
 from .system.processes import is_broken_pipe
@@ -217,20 +218,10 @@ def _parser() -> argparse.ArgumentParser:
     layout.add_argument("-o", "--output", required=True, metavar="FILE")
     layout.add_argument("--force", action="store_true", help="replace FILE if it is there already")
     layout.set_defaults(verb=_layout)
-    render = verbs.add_parser("render", help="draw again from a results folder, without solving")
-    render.add_argument("results", metavar="OUT")
-    render.add_argument(
-        "--animation",
-        default="collapse.mp4",
-        help=".mp4, .gif or .webp in the folder, a folder of pictures such as frames/, or none to skip",
+    added = (
+        *(_add_render, _add_bond, _add_compare, _add_report, _add_explain, _add_sweep, _add_new, _add_schema),
+        _add_completion,
     )
-    render.add_argument("--magnification", type=float, default=1.0, help="of the displacements")
-    render.add_argument("--colour-by", choices=("material", "mechanism", "displacement"), default="mechanism")
-    render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")
-    render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
-    render.add_argument("--size", default="1280x720", metavar="WxH")
-    render.set_defaults(verb=_render)
-    added = (_add_bond, _add_compare, _add_report, _add_explain, _add_sweep, _add_new, _add_schema, _add_completion)
     for add in added:
         add(verbs)
     return parser
@@ -287,6 +278,35 @@ def _add_view(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--view", choices=tuple(VIEWS), help="coordinates to take, of a drawing in space")
 
 
+def _add_render(verbs: Any) -> None:
+    render = verbs.add_parser("render", help="draw again from a results folder, without solving")
+    render.add_argument("results", metavar="OUT")
+    render.add_argument(
+        "--animation", default="collapse.mp4", help=".mp4, .gif, .webp, a folder such as frames/, or none"
+    )
+    render.add_argument("--magnification", type=float, default=1.0, help="of the displacements")
+    render.add_argument("--colour-by", choices=("material", "mechanism", "displacement"), default="mechanism")
+    render.add_argument("--forces", choices=("auto", "thrust", "points", "none"), default="auto")
+    render.add_argument("--curve", action="store_true", help="the reaction curve beside the blocks")
+    render.add_argument("--size", default="1280x720", metavar="WxH")
+    _add_sight(render)
+    render.set_defaults(verb=_render)
+
+
+def _add_sight(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "--view",
+        metavar="VIEW",
+        help=f"of blocks in space: {', '.join(SIGHTS)}, or AZIMUTH,ELEVATION in degrees (default: that of the case, "
+        "else where the motion is seen best, of vaults from below as well)",
+    )
+    verb.add_argument(
+        "--section",
+        metavar="PLANE",
+        help='that cuts blocks in space open: x, "y = 1.2" (m), or {point = [x, y, z], normal = [x, y, z]}',
+    )
+
+
 def _add_choice(verb: argparse.ArgumentParser) -> None:
     for flag, what in (("--ignore", "leave out"), ("--only", "read nothing but")):
         verb.add_argument(
@@ -340,7 +360,9 @@ def _add_compare(verbs: Any) -> None:
     compare.add_argument("one", metavar="OUT1", help="results folder of one run")
     compare.add_argument("other", metavar="OUT2", help="and of the other")
     compare.add_argument("-o", "--output", metavar="OUT", help="folder of the comparison (default: <OUT1>-<OUT2>)")
-    compare.add_argument("--animation", default="compare.mp4", help=".mp4, .gif or .webp in the folder; none to skip")
+    compare.add_argument(
+        "--animation", default="compare.mp4", help=".mp4, .gif, .webp, a folder such as frames/, or none"
+    )
     compare.add_argument("--force", action="store_true", help="replace a comparison that is there already")
     compare.set_defaults(verb=_compare)
 
@@ -898,13 +920,15 @@ def _render(options: argparse.Namespace) -> int:
         "curve": options.curve,
         "underlay": underlay,
     }
+    seen_from = _seen_from(options, folder, response)
     last = response.path[-1] if response.path else response.increments[-1]
-    draw_still(response, last, folder / "last.png", size=size, **look)
-    draw_mechanism(response, folder / "mechanism.png", underlay=underlay)
+    draw_still(response, last, folder / "last.png", size=size, **look, **seen_from)
+    draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **seen_from)
     drawn += ["last.png", "mechanism.png"]
     if options.animation != "none":
         progress = DrawingProgress()
         try:
+            look |= seen_from
             animate(response, folder / options.animation, size=size, fall=fall, progress=progress.frame, **look)
         finally:
             progress.done()
@@ -939,6 +963,23 @@ def _report(options: argparse.Namespace) -> int:
         written.append("report.pdf")
     print(f"written in {folder}/: {', '.join(written)}")
     return 0
+
+
+def _seen_from(options: argparse.Namespace, folder: Path, response: solver.Response) -> dict[str, Any]:
+    """Take view and section from the command line, or from the case of a results folder."""
+    from .cases.toml_table import toml_value
+    from .runs.outputs import seen_from
+    from .runs.underlay import drawn_case
+
+    case = drawn_case(folder)
+    found = {} if case is None else seen_from(case, response)
+    if options.view is not None:
+        angles = [] if "{" in options.view else [toml_value(angle) for angle in options.view.split(",")]
+        two = len(angles) == 2
+        found["view"] = dict(zip(("azimuth", "elevation"), angles, strict=True)) if two else toml_value(options.view)
+    if options.section is not None:
+        found["section"] = toml_value(options.section)
+    return found
 
 
 def _choice(options: argparse.Namespace) -> dict[str, Any]:

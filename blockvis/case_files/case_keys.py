@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -40,11 +40,14 @@ from blockvis.cases.toml_table import Table, is_number, shortened
 from blockvis.generators import LAYOUTS
 from blockvis.kinds.kinds import KINDS
 from blockvis.layout.joints.close import WAYS
+from blockvis.layout.sights import SIGHTS, Cut, Sight, read_cut, read_sight
 from blockvis.layout.units import UNITS
 from blockvis.layout.views import VIEWS
 from blockvis.layout.window import checked_window
 from blockvis.results.folder import FOLDERS, VIDEO_SUFFIXES
 from solver import mechanics
+
+_Read = TypeVar("_Read")
 
 _FRICTION = solver.InterfaceLaw.friction_coefficient
 _CONTROLS = solver.Controls()
@@ -154,6 +157,22 @@ def _support_names(table: Table, key: Key) -> tuple[str, ...] | None:
     return names
 
 
+def _sight(table: Table, key: Key) -> Sight | None:
+    return _read_by(read_sight, table, key)
+
+
+def _cut(table: Table, key: Key) -> Cut | None:
+    return _read_by(read_cut, table, key)
+
+
+def _read_by(read: Callable[[Any], _Read], table: Table, key: Key) -> _Read | None:
+    value = table.take(key.name)
+    try:
+        return None if value is None else read(value)
+    except ValueError as error:
+        raise table.error(key.name, str(error)) from None
+
+
 _PROFILE = ValueKind(
     "table: kind, centre, inflection, depth; points; or supports",
     {
@@ -212,6 +231,39 @@ _WINDOW = ValueKind(
     "four numbers", {"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4}, _read_window
 )
 _SUPPORT_NAMES = replace(TEXTS, read=_support_names)
+_SIGHT = ValueKind(
+    "a word, or table: azimuth, elevation",
+    {
+        "anyOf": [
+            {"enum": list(SIGHTS)},
+            {
+                "type": "object",
+                "properties": {
+                    "azimuth": {"type": "number", "minimum": -360, "maximum": 360},
+                    "elevation": {"type": "number", "minimum": -90, "maximum": 90},
+                },
+                "additionalProperties": False,
+                "minProperties": 1,
+            },
+        ]
+    },
+    _sight,
+)
+_CUT = ValueKind(
+    'text as "y = 1.2", or table: normal, point',
+    {
+        "anyOf": [
+            {"type": "string", "pattern": "^ *[xyz] *(= *[-+0-9.eE]+ *)?$"},
+            {
+                "type": "object",
+                "properties": {"point": TRIPLE.schema, "normal": TRIPLE.schema},
+                "required": ["normal"],
+                "additionalProperties": False,
+            },
+        ]
+    },
+    _cut,
+)
 
 _NEEDED, _UNLIMITED = "required where the distribution has it", "; normal and lognormal have none"
 
@@ -511,7 +563,12 @@ OUTPUT = Section(
      Key("vtu_strings", TRUE_OR_FALSE, "Whether names in the VTU files are arrays of strings, which meshio does not "
          "read; false makes them bytes, field arrays of the same names", False, default=True),
      Key("underlay", TEXT, "Photograph under pictures and film in the plane, relative to the case file, of what the "
-         "image of the blocks shows, or with a world file", "photo.jpg", otherwise="none")),
+         "image of the blocks shows, or with a world file", "photo.jpg", otherwise="none"),
+     Key("view", _SIGHT, f"From where blocks in space are drawn: {', '.join(SIGHTS)}, or azimuth from x and elevation "
+         "in degrees", {"azimuth": 30.0, "elevation": 20.0},
+         otherwise="where their motion is seen best; of vaults and domes from below beside it"),
+     Key("section", _CUT, "Plane that cuts blocks in space open in pictures: an axis, a place on it in m, or normal "
+         "and point", "y = 1.2", otherwise="none; without a place or a point through the middle of the structure")),
 )  # fmt: skip
 
 #: Every table of the case file with its keys.

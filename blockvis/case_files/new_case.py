@@ -127,7 +127,7 @@ def case_text(
         leaving = _all_but("kind", "blocks", "weight_fraction", section=case_keys.LOADS)
         push = [1.0, *[0.0] * (found.layout.dimension - 1)]
         parts.append(_table(case_keys.LOADS, {"kind": "live", "weight_fraction": push}, leaving=leaving))
-    beside = () if any(image.values()) else ("underlay",)
+    beside = (*(() if any(image.values()) else ("underlay",)), *(() if in_space else ("view", "section")))
     parts.append(_table(case_keys.OUTPUT, {"animation": "collapse.mp4"}, leaving=beside))
     parts.append(_comment("There are more tables and keys: blockvis schema lists them."))
     return "\n".join(parts) + "\n"

@@ -164,6 +164,8 @@ def case_of(values: Mapping[str, Any], source: Path, text: str = "") -> Case:
         vtu=output["vtu"],
         vtu_strings=output["vtu_strings"],
         underlay=output["underlay"],
+        sight=output["view"],
+        cut=output["section"],
     )
     top.finish()
     return _checked(case, settings)

@@ -10,6 +10,7 @@ from typing import Any
 
 import solver
 from blockvis.formats.image_scale import ImageKeys
+from blockvis.layout.sights import Cut, Sight
 
 from .bonds import Bonding
 from .explain_settings import ExplainSettings
@@ -51,6 +52,10 @@ class Case:
         Whether names are arrays of strings in the VTU files.
     underlay : str or None
         Photograph under the pictures, relative to the case file.
+    sight : Sight or None
+        From where blocks in space are drawn.
+    cut : Cut or None
+        The plane that cuts them open.
     """
 
     source: Path
@@ -93,3 +98,5 @@ class Case:
     vtu: str = "moved"
     vtu_strings: bool = True
     underlay: str | None = None
+    sight: Sight | None = None
+    cut: Cut | None = None

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +16,6 @@ import solver
 from blockvis.results.about import about, collapse_mechanism, counts_text
 from blockvis.results.reaction_range import ReactionRange
 from blockvis.system.atomic_files import atomic_file
-from solver import mechanics
 
 from . import palette
 from .captions import (
@@ -37,29 +34,14 @@ from .captions import (
 #: Suffixes of the files that draw_curve writes.
 CURVE_SUFFIXES = (".png", ".svg", ".pdf")
 
-#: More changes of hinges than this are not numbered one by one.
-MOST_EVENTS = 12
+#: Increments have dots where they are no more than this: of more, the dots would be a thick line.
+MOST_DOTS = 25
+
+#: The diagram of one limit load goes so far, as a part of the structure's size: as far as its mechanism is drawn.
+SMALL = 0.05
 
 #: Height of the text of the file [points].
 TEXT = 11.0
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that happens on the path.
-
-    Attributes
-    ----------
-    parameter : float [m or rad]
-        Settlement over all phases, or control displacement.
-    value : float
-        Reaction [N or N·m] or load multiplier.
-    text : str
-    """
-
-    parameter: float
-    value: float
-    text: str
 
 
 def draw_curve(
@@ -69,7 +51,7 @@ def draw_curve(
     size: tuple[float, float] = (8.0, 5.0),
     band: ReactionRange | None = None,
 ) -> Path:
-    """Draw the reaction over the settlement, absolute and divided by the weight, and mark changes of the mechanism.
+    """Draw the reaction over the settlement, absolute and divided by the weight, and mark the collapse.
 
     Limit loads and pushovers have the load multiplier over their parameter: settlement, position of the load or control
     displacement; a single limit load is drawn as a rigid-plastic diagram.
@@ -102,29 +84,6 @@ def draw_curve(
     with atomic_file(path) as partial:
         figure.savefig(partial, dpi=200)
     return path
-
-
-def events_of(response: solver.Response) -> list[Event]:
-    """Where the set of hinges or sliding joints changes along the path; a collapse has a label and a count of its own.
-
-    Parameters
-    ----------
-    response : solver.Response
-    """
-    path = response.path[:-1] if _counts(response) else response.path
-    total, values = response.parameters, response.values
-    found = []
-    # One mechanism per increment: its contact points may come from a file.
-    pairs = (_joints(mechanics.mechanism_of(response.assembly, increment)) for increment in path)
-    for k, (earlier, later) in enumerate(pairwise(pairs), start=1):
-        text = []
-        for word, before, after in zip(("hinge", "sliding joint"), earlier, later, strict=True):
-            if before != after:
-                some = f"{len(after) or 'no'} {word}{'s' if len(after) != 1 else ''}"
-                text.append(some if len(before) != len(after) else f"{word}s move")
-        if text:
-            found.append(Event(float(total[k]), float(values[k]), ", ".join(text)))
-    return found
 
 
 class CurvePanel:
@@ -201,7 +160,6 @@ def _draw(
     if len(known) == 0 and len(path) > 1:
         axes.set_xlim(float(total.min()), float(total.max()))
         axes.set_ylim(0.0, 1.0)
-        axes.set_yticks([])
         axes.text(0.5, 0.5, "unbounded everywhere", transform=axes.transAxes, ha="center", fontsize=text)
     if len(known):
         low, high = shown_range(values, response)
@@ -209,11 +167,11 @@ def _draw(
             low, high = _draw_band(axes, response, band, factor, (low, high))
         axes.set_ylim(low - 0.02 * (high - low), high + 0.16 * (high - low) if high > low else 1.0)
     if not response.parameter.is_path and len(path) == 1:
-        _draw_single(axes, known, text)
+        _draw_single(axes, response, known, text)
         return
     _draw_line(axes, response, total, values, text if events else None)
     axes.set_xlabel(parameter_label(response), fontsize=text)
-    axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5))
+    axes.xaxis.set_major_locator(MaxNLocator(8 if events else 5, steps=[1, 2, 2.5, 5, 10]))
     if not moment and response.measured.is_force and response.total_weight > 0:
         weight = response.total_weight / factor
         over_weight = axes.secondary_yaxis(
@@ -228,8 +186,6 @@ def _draw(
                 "unbounded", (place, 0.88), xycoords=("data", "axes fraction"), ha="center", va="top", rotation=90,
                 fontsize=0.8 * text, color=palette.hexadecimal(palette.FAINT),
             )  # fmt: skip
-    elif events:
-        _mark_events(axes, response, factor, text)
     if response.collapse is not None and len(path):
         _mark_collapse(axes, response, total, values, text, events)
     if response.stop is solver.Status.SOLVER_FAILED:
@@ -253,14 +209,15 @@ def _draw_band(
 def _draw_line(
     axes: Axes, response: solver.Response, total: np.ndarray, values: np.ndarray, text: float | None
 ) -> None:
-    """Draw the path, in a file of its own with a dot at each increment and words of the size of ``text``."""
+    """Draw the path, in a file of its own with dots at few increments and words of the size of ``text``."""
     blue = palette.hexadecimal(palette.FORCE)
     first = 1 if drops_at_start(response) else 0
     axes.plot(total[first:], values[first:], "-", color=blue, linewidth=2.0, zorder=3)
     axes.plot(total[: 2 * first], values[: 2 * first], ":", color=blue, linewidth=1.2, zorder=3)
     if text is None:
         return
-    axes.plot(total, values, "o", color=blue, markersize=3.0, zorder=3)
+    if len(total) <= MOST_DOTS:
+        axes.plot(total, values, "o", color=blue, markersize=3.0, zorder=3)
     if first:
         axes.annotate(
             "at rest", (total[0], values[0]), xytext=(8, 0), textcoords="offset points", va="center",
@@ -283,22 +240,25 @@ def _mark_failure(
     )  # fmt: skip
 
 
-def _draw_single(axes: Axes, known: np.ndarray, text: float) -> None:
-    """Draw one limit load: rigid up to it, then a mechanism of any size."""
-    axes.set_xlim(0.0, 1.0)
-    axes.set_xticks([])
-    axes.set_xlabel("displacement of the mechanism (first order, any size)", fontsize=text)
+def _draw_single(axes: Axes, response: solver.Response, known: np.ndarray, text: float) -> None:
+    """Draw one limit load: rigid up to it, then a mechanism, over displacements as small as first order allows."""
+    reach = SMALL * float(np.ptp(response.assembly.vertices, axis=0).max())
+    factor, unit = (1e3, "mm") if reach < 0.1 else (1.0, "m")
+    reach *= factor
+    axes.set_xlim(0.0, reach)
+    axes.set_xlabel(f"displacement of the fastest block, first order [{unit}]", fontsize=text)
     if len(known) == 0:
         axes.set_ylim(0.0, 1.0)
-        axes.set_yticks([])
         axes.text(0.5, 0.5, "no finite limit load", transform=axes.transAxes, ha="center", fontsize=text)
         return
     alpha = float(known[0])
     blue = palette.hexadecimal(palette.FORCE)
-    axes.plot([0.0, 0.0, 0.97], [0.0, alpha, alpha], "-", color=blue, linewidth=2.5, zorder=3, clip_on=False)
-    axes.annotate("", (1.0, alpha), (0.96, alpha), arrowprops={"arrowstyle": "->", "color": blue, "linewidth": 2.0})
+    ends = [0.0, 0.0, 0.97 * reach], [0.0, alpha, alpha]
+    axes.plot(*ends, "-", color=blue, linewidth=2.5, zorder=3, clip_on=False)
+    arrow = {"arrowstyle": "->", "color": blue, "linewidth": 2.0}
+    axes.annotate("", (reach, alpha), (0.96 * reach, alpha), arrowprops=arrow)
     axes.annotate(
-        f"α = {alpha:.6g}", (0.5, alpha), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=text
+        f"α = {alpha:.6g}", (0.5 * reach, alpha), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=text
     )
 
 
@@ -359,45 +319,3 @@ def _counts(response: solver.Response) -> str:
     if mechanism is None or response.collapse is None or response.collapse.lost != "equilibrium":
         return ""
     return f"\n{counts_text(mechanism)}"
-
-
-def _mark_events(axes: Axes, response: solver.Response, factor: float, text: float) -> None:
-    found = events_of(response)
-    if not found:
-        return
-    ink = palette.hexadecimal(palette.INK)
-    per_length, _ = parameter_unit(response)
-    x, y = [e.parameter * per_length for e in found], [e.value / factor for e in found]
-    if len(found) > MOST_EVENTS:
-        # Circles on nearly every point would hide the curve: ticks at the foot say where.
-        axes.plot(
-            x, [0.012] * len(x), "|", transform=axes.get_xaxis_transform(), color=ink, markersize=7,
-            markeredgewidth=0.8, zorder=4, label=f"{len(found)} times hinges or sliding joints change",
-        )  # fmt: skip
-        axes.legend(loc="upper left", fontsize=0.8 * text, frameon=False)
-        return
-    axes.plot(x, y, "o", color="white", markeredgecolor=ink, markersize=7, zorder=4)
-    low, high = axes.get_xlim()
-    above = True
-    for number in range(1, len(found) + 1):
-        # Under the curve where it would run into the number before.
-        close = number > 1 and abs(x[number - 1] - x[number - 2]) < 0.03 * (high - low)
-        above = not (close and above)
-        axes.annotate(
-            str(number), (x[number - 1], y[number - 1]), xytext=(0, 8 if above else -8),
-            textcoords="offset points", ha="center", va="bottom" if above else "top", fontsize=0.8 * text,
-        )  # fmt: skip
-    lines = [f"{n}  {e.text}" for n, e in enumerate(found, 1)]
-    # On the side of the left half that the curve leaves free.
-    left = (response.values / factor)[response.parameters * per_length < 0.5 * (low + high)]
-    foot = len(left) == 0 or float(np.nanmean(left)) > float(np.mean(axes.get_ylim()))
-    axes.text(
-        0.02, 0.04 if foot else 0.96, "\n".join(lines), transform=axes.transAxes, va="bottom" if foot else "top",
-        fontsize=0.8 * text, linespacing=1.4,
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85},
-    )  # fmt: skip
-
-
-def _joints(mechanism: mechanics.Mechanism) -> list[set[tuple[int, int]]]:
-    """Pairs of blocks of the hinges, and of the sliding joints."""
-    return [set(map(tuple, pairs.tolist())) for pairs in (mechanism.hinges, mechanism.sliding)]

@@ -12,6 +12,7 @@ from PIL import Image
 
 import solver
 from blockvis.dynamics.fall import CAPTION, Fall, falling_increment
+from blockvis.layout.sights import Cut, Sight
 from blockvis.results.cracks import cracks_of
 from blockvis.results.joints import faces_at, initial_joints
 from blockvis.text import force_text, rounded_length
@@ -31,7 +32,7 @@ from .marks import (
     thrust_line,
 )
 from .scene import OF_STATICS, Scene
-from .solid_view import View, chosen_view
+from .solid_view import View, hiding_supports, plane_of, views_of
 from .swing import MOST_PARTS, Swing, mechanism_colours, swing_of
 from .underlay import Underlay
 
@@ -58,7 +59,7 @@ CELL, CELL_IN_SPACE = 0.07, 0.09
 
 #: Supports in space are shown whole where the picture is no larger for it than this many times the blocks: part of a
 #: slab that ends just outside looks like a mistake.
-WHOLE = 1.75
+WHOLE = 1.4
 
 
 @dataclass(frozen=True)
@@ -76,12 +77,18 @@ class Look:
         the plane with up to ``FEW_BLOCKS`` blocks. In space the blocks are then drawn as of glass.
     joints : bool
         Mark open and sliding joints and hinges.
+    sight : Sight, optional
+        From where blocks in space are looked at; by default where their motion is seen best.
+    cut : Cut, optional
+        The plane that cuts blocks in space open.
     """
 
     magnification: float = 1.0
     colour_by: str = "material"
     forces: str = "auto"
     joints: bool = True
+    sight: Sight | None = None
+    cut: Cut | None = None
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -106,7 +113,7 @@ class _Series:
     largest : float [m]
         Displacement of any free block.
     widest : float [m]
-        Opening of any crack that does not gape.
+        Opening of any crack in equilibrium.
     cracks, sliding, hinges : bool
         Whether there are any anywhere.
     largest_force : float [N]
@@ -143,6 +150,14 @@ class Drawer:
         What comes after the last equilibrium; its frames are drawn beside those of the increments.
     underlay : Underlay, optional
         A photograph under blocks in the plane.
+    still : bool
+        Whether this is one picture, worth more time than a frame of a film: in space with smooth edges, shaded corners,
+        and of vaults and domes the intrados beside the extrados.
+
+    Raises
+    ------
+    ValueError
+        For a view or a section of blocks in the plane.
     """
 
     def __init__(
@@ -156,10 +171,13 @@ class Drawer:
         extra: tuple[solver.Pose, ...] = (),
         fall: Fall | None = None,
         underlay: Underlay | None = None,
+        still: bool = False,
     ) -> None:
         assembly = self.assembly = response.assembly
         self._flat = assembly.dimension == 2
-        self._underlay = underlay
+        if self._flat and (look.sight or look.cut):
+            raise ValueError("view and section are of blocks in space; these lie in the plane: leave both out")
+        self._underlay, self._still = underlay, still
         few = self._flat and assembly.n_blocks <= FEW_BLOCKS
         self._forces_hidden = look.forces == "auto" and self._flat and not few
         self.look = look = replace(look, forces="thrust" if few else "none") if look.forces == "auto" else look
@@ -167,7 +185,11 @@ class Drawer:
         self.joints = initial_joints(assembly)
         # The view of blocks in space is chosen by their mechanism.
         self._swing = swing_of(response) if look.colour_by == "mechanism" or not self._flat else None
-        self._view = None if self._swing is None or self._flat else _view_of(response, self._swing)
+        self._views = self._chosen_views()
+        self._plane = plane_of(assembly, look.cut)
+        if self._plane is not None and self._plane[1] @ self._views[0].axes[2] > 0.0:
+            # What lies between the plane and the eye is left out.
+            self._plane = self._plane * [[1.0], [-1.0]]
         self._seen = _Series(sampled=sampled([k for k, i in enumerate(increments) if matters(i, response)]))
         falling = () if fall is None else map(fall.pose, range(len(fall)))
         frame = self._framed(chain([solver.Pose.initial(assembly)], self._surveyed(), extra, falling))
@@ -183,10 +205,15 @@ class Drawer:
             self.panel = CurvePanel(response, size_of(self.sheet.beside), self.sheet.text)
         self.live = LiveLoads(response, increments, float(frame.size.max()))
         self._arrow = ARROW_IN_SPACE * float(frame.size.max())
-        frame = frame.holding(self._projected(np.concatenate([self.live.tails, *self._arrow_tips(extra)])))
-        # Supports in the plane are hatched, and an outline stays where those that move were.
-        flat_fill = palette.block_colours(assembly.materials, assembly.free)
-        self.fill = flat_fill if self._flat else palette.role_colours(assembly)
+        ends = np.concatenate([self.live.tails, *self._arrow_tips(extra)])
+        if self._plane is not None:
+            ends = ends[(ends - self._plane[0]) @ self._plane[1] >= 0.0]
+        frame = frame.holding(self._projected(ends))
+        # Supports in the plane are hatched, and an outline stays where those that move were; of limit loads none moves.
+        plain = self._flat or not response.settlements
+        self.fill = (
+            palette.block_colours(assembly.materials, assembly.free) if plain else palette.role_colours(assembly)
+        )
         self.scene = self._scene(frame)
         if self._flat:
             self._arrow = ARROW * float(self.scene.frame.size.max())
@@ -195,18 +222,33 @@ class Drawer:
         self.tints: np.ndarray | None = None
         if look.colour_by == "mechanism" and self._swing is not None and self._swing.moves:
             self.tints = mechanism_colours(assembly, self.fill, self._swing)
+        #: Whether the mechanism acts at increments, by phase and parameter.
+        self._acting: dict[tuple[int, float], bool] = {}
         #: Where the blocks are drawn while a mechanism is shown.
         self._drawn_at: solver.Pose | None = None
         self._keys: list[Key] | None = None
 
+    def _chosen_views(self) -> tuple[View, ...]:
+        """Find from where blocks in space are drawn; films have one view."""
+        if self._flat or self._swing is None:
+            return ()
+        motion = self._swing.displaced.positions - self._swing.increment.pose.positions
+        views = views_of(self.response, motion, self.joints, self.look.sight, self.look.cut)
+        return views if self._still else views[:1]
+
     def _framed(self, poses: Iterable[solver.Pose]) -> Frame:
-        if self._view is None:
+        if not self._views:
             return framed(self.assembly, poses)
-        return framed(self.assembly, poses, margin=0.05, supports=0.3, axes=self._view.axes[:2], whole=WHOLE)
+        return framed(self.assembly, poses, margin=0.02, supports=0.3, axes=self._axes, whole=WHOLE, cut=self._plane)
+
+    @property
+    def _axes(self) -> np.ndarray:
+        """(2 n_views, 3) array: to the right and up in each view."""
+        return np.concatenate([view.axes[:2] for view in self._views])
 
     def _scene(self, frame: Frame) -> Scene:
         """Set up what draws blocks in the plane, or in space."""
-        if self._view is None:
+        if not self._views:
             scene = FlatScene(self.assembly, frame, self.sheet.inside_size, self.fill, self._underlay)
             scene.show_start()
             if self.fall is not None:
@@ -215,12 +257,33 @@ class Drawer:
         # VTK takes seconds to import, and pictures in the plane need none.
         from .solid_scene import SolidScene
 
-        opacity = 1.0 if self.look.forces == "none" else GLASS
-        return SolidScene(self.assembly, self._view, frame, self.sheet.inside_size, self.fill, opacity=opacity)
+        width, height = self.sheet.inside_size
+        several = len(self._views) > 1
+        frames = alike([Frame(frame.low[k : k + 2], frame.high[k : k + 2]) for k in range(0, len(frame.low), 2)])
+        scenes = [
+            SolidScene(
+                self.assembly,
+                view,
+                seen,
+                (width // len(self._views), height),
+                self.fill,
+                opacity=1.0 if self.look.forces == "none" else GLASS,
+                fine=self._still,
+                cut=self._plane,
+                outlined=hiding_supports(self.assembly, view),
+                hidden_hinges=not several,
+            )
+            for view, seen in zip(self._views, frames, strict=True)
+        ]
+        if not several:
+            return scenes[0]
+        from .paired_scenes import PairedScenes
+
+        return PairedScenes(scenes, ("from above", "from below"), self.sheet.text)
 
     def _projected(self, points: np.ndarray) -> np.ndarray:
-        """(n, 2) array [m]: places in the picture of points (n, d) [m]."""
-        return points if self._view is None else self._view.projected(points)
+        """(n, d) array [m]: places in the picture, or in each of several, of points (n, d) [m]."""
+        return points if not self._views else np.asarray(points @ self._axes.T)
 
     def _arrow_tips(self, extra: tuple[solver.Pose, ...]) -> Iterator[np.ndarray]:
         """Yield where the arrows at supports in space end: at first and last, and at the extra poses."""
@@ -239,7 +302,8 @@ class Drawer:
             seen.largest = max(seen.largest, largest_displacement(self.assembly, increment))
             if look.joints:
                 found = marks_of(self.assembly, self.joints, self._shown(increment), increment.pose)
-                seen.widest = max(seen.widest, float(found.openings[~found.gapes].max(initial=0.0)))
+                if increment.status != solver.Status.FALLING:
+                    seen.widest = max(seen.widest, float(found.openings.max(initial=0.0)))
                 seen.cracks |= len(found.cracks) > 0
                 seen.sliding |= len(found.sliding) > 0
                 seen.hinges |= len(found.hinges) > 0
@@ -270,12 +334,11 @@ class Drawer:
         blocks_only : bool
             Leave out what statics knows: joints, forces, what stands on what, and where supports go.
         widths : bool
-            Write the largest width of the widest crack lines beside them [mm]; in space the legend has the scale of
-            their colours.
+            Write the largest width of the widest crack lines beside them [mm]; in space the legend has the largest.
         """
         increment = self._shown(increment)
         shown = self._drawn_at or magnified(self.assembly, increment.pose, self.look.magnification)
-        self.scene.pose(shown, self._block_colours(increment.pose, increment.fallen))
+        self.scene.pose(shown, self._block_colours(increment.pose, increment))
         dots = np.zeros((0, self.assembly.dimension))
         if blocks_only:
             self.scene.clear(*OF_STATICS)
@@ -339,11 +402,11 @@ class Drawer:
             return [np.flatnonzero(swing.parts == part) for part in range(swing.n_parts)]
         positions = swing.increment.pose.positions
         moves = np.flatnonzero(swing.parts >= 0)
-        if self._view is not None:
+        if self._views:
             # Of the blocks behind each other the first is seen.
-            moves = moves[np.argsort(-self._view.depth(positions[moves]), kind="stable")]
+            moves = moves[np.argsort(-self._views[0].depth(positions[moves]), kind="stable")]
         width = (CELL if self._flat else CELL_IN_SPACE) * self.scene.frame.size.max()
-        cell = np.floor(self._projected(positions) / width).astype(np.int64)
+        cell = np.floor(self._projected(positions)[:, :2] / width).astype(np.int64)
         _, first = np.unique(cell[moves], axis=0, return_index=True)
         return [moves[[k]] for k in first]
 
@@ -351,13 +414,15 @@ class Drawer:
         """Return what is marked in any of the increments, each with its place in the legends of all pictures."""
         if self._keys is None:
             keys = self._keys_of_tints() + self._keys_of_joints() + self._keys_of_forces()
-            if not self._flat and self.assembly.moving.any():
+            if not self._flat and self.response.settlements and self.assembly.moving.any():
                 keys.append(Key("area", "moving support", palette.MOVING))
             if self.live.largest > 0.0:
                 keys.append(Key("line", self.live.words, palette.LIVE, layers=("live top",)))
             if self._drawn_at is not None:
                 layers = ("motion outline", "motion top")
                 keys.append(Key("line", "motion (not to scale)", palette.SETTLEMENT, layers=layers))
+                if self.scene.holds("before"):
+                    keys.append(Key("line", "where they stood", palette.GHOST))
             # In space every picture has the whole legend.
             self._keys = keys if self._flat else [replace(key, layers=()) for key in keys]
         return self._keys
@@ -365,12 +430,14 @@ class Drawer:
     def _keys_of_joints(self) -> list[Key]:
         seen, keys = self._seen, []
         if seen.cracks:
-            widest = f", darkest at {_opening_text(seen.widest)}" if seen.widest > 0.0 and not self._flat else ""
-            keys.append(Key("area", f"open joint{widest}", palette.OPEN, layers=("crack", "crack edge")))
+            kind, widest = ("area", "") if self._flat else ("line", f", up to {_opening_text(seen.widest)}")
+            keys.append(Key(kind, f"open joint{widest}", palette.OPEN, layers=("crack", "crack edge")))
         marked = [
             *([Key("line", "sliding joint", palette.SLIDING, layers=("sliding",))] if seen.sliding else []),
             *([Key("dot" if self._flat else "line", "hinge", palette.HINGE, layers=("hinge",))] if seen.hinges else []),
         ]
+        if seen.hinges and len(self._views) == 1 and not self.many:
+            marked.append(Key("dash", "hidden hinge", palette.HINGE))
         if not self.many:
             return keys + marked
         # They would hide the cracks: in a wall of many blocks nearly every brick turns or slides a little.
@@ -416,18 +483,29 @@ class Drawer:
         governs = self._swing is not None and increment is self.response.governing
         return self._swing.increment if self._swing is not None and governs else increment
 
-    def _block_colours(self, pose: solver.Pose, fallen: np.ndarray) -> np.ndarray | None:
-        colours = self._standing_colours(pose)
+    def _block_colours(self, pose: solver.Pose, increment: solver.Increment) -> np.ndarray | None:
+        colours = self._standing_colours(pose, increment)
         if not self._loses:
             return colours
-        return palette.pale(self.fill if colours is None else colours, fallen)
+        return palette.pale(self.fill if colours is None else colours, increment.fallen)
 
-    def _standing_colours(self, pose: solver.Pose) -> np.ndarray | None:
+    def _standing_colours(self, pose: solver.Pose, increment: solver.Increment) -> np.ndarray | None:
         if self.look.colour_by != "displacement":
-            return self.tints
+            return self.tints if self.tints is None or self._acts(increment) else self.fill
         moved = np.linalg.norm(pose.positions - self.assembly.centroids, axis=1)
         colours = palette.displacement_colours(moved / (self.largest or 1.0))
         return np.where(self.assembly.free[:, None], colours, self.fill)
+
+    def _acts(self, increment: solver.Increment) -> bool:
+        """Whether the mechanism that is tinted follows an increment: it has colours from there on."""
+        swing = self._swing
+        if swing is None or self._drawn_at is not None or increment.status == solver.Status.FALLING:
+            return True
+        place = increment.phase, increment.parameter
+        if place not in self._acting:
+            same = np.array_equal(mechanics.rigid_parts(self.assembly, increment), swing.parts)
+            self._acting[place] = same or place == (swing.increment.phase, swing.increment.parameter)
+        return self._acting[place]
 
     def _draw_joints(self, increment: solver.Increment, shown: solver.Pose) -> np.ndarray:
         """Draw open and sliding joints and hinges; returns where hinges are drawn, (n, d) [m]."""
@@ -518,16 +596,19 @@ class Drawer:
         return (places - half, places + half) if self._flat else (places, places + 2.0 * half)
 
 
-def _view_of(response: solver.Response, swing: Swing) -> View:
-    return chosen_view(response, swing.displaced.positions - swing.increment.pose.positions)
-
-
 def magnified(assembly: solver.Assembly, pose: solver.Pose, magnification: float) -> solver.Pose:
     """Multiply the displacements and rotations of a pose since the layout."""
     if magnification == 1.0:
         return pose
     start = assembly.centroids
     return solver.Pose(start + magnification * (pose.positions - start), magnification * pose.rotations)
+
+
+def alike(frames: list[Frame]) -> list[Frame]:
+    """Grow frames about their middles to the size of the largest, so that all have one scale."""
+    half = np.max([frame.size for frame in frames], axis=0) / 2.0
+    middles = [(frame.low + frame.high) / 2.0 for frame in frames]
+    return [Frame(middle - half, middle + half) for middle in middles]
 
 
 def sampled(numbers: list[int]) -> frozenset[int]:

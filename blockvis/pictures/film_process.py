@@ -88,6 +88,7 @@ class FilmProcess:
         *,
         falls: bool = False,
         underlay: Underlay | None = None,
+        seen_from: dict[str, Any] | None = None,
     ) -> None:
         """Begin to draw the curve, where there is one, as ``curve.png`` beside the film, and the film; returns at once.
 
@@ -100,9 +101,11 @@ class FilmProcess:
             Whether the process works out the fall; :meth:`fall` waits for it.
         underlay : Underlay, optional
             A photograph under blocks in the plane.
+        seen_from : dict, optional
+            View and section of blocks in space, as of :func:`blockvis.animate`.
         """
         self._path = path
-        self._worker.say("draw", (response, path, fall, falls, underlay))
+        self._worker.say("draw", (response, path, fall, falls, underlay, seen_from or {}))
 
     def fall(self, progress: Callable[[float], None]) -> Fall | None:
         """Wait for the fall.
@@ -223,7 +226,13 @@ class _Followed:
 
 
 def _draw(
-    say: Say, response: solver.Response, path: Path, fall: Fall | None, falls: bool, underlay: Underlay | None
+    say: Say,
+    response: solver.Response,
+    path: Path,
+    fall: Fall | None,
+    falls: bool,
+    underlay: Underlay | None,
+    seen_from: dict[str, Any],
 ) -> None:
     """Draw a film, its fall worked out here where it is asked for."""
     from .curves import draw_curve
@@ -234,5 +243,6 @@ def _draw(
         say("fall", fall)
     if response.path:
         draw_curve(response, path.with_name("curve.png"))
-    animate(response, path, fall=fall, underlay=underlay, progress=lambda done, total: say("drawing", (done, total)))
+    look: dict[str, Any] = {"underlay": underlay, **seen_from}
+    animate(response, path, fall=fall, progress=lambda done, total: say("drawing", (done, total)), **look)
     say("drawn", None)

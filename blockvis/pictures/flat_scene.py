@@ -37,6 +37,9 @@ THINNEST = 1.2
 
 Colour = tuple[int, int, int]
 
+#: So many parts of a mechanism have outlines of where it takes them: more would cover the blocks.
+MOST_OUTLINES = 6
+
 
 class FlatScene:
     """Blocks of the plane and their marks, drawn frame after frame; see :class:`blockvis.pictures.scene.Scene`.
@@ -177,10 +180,12 @@ class FlatScene:
             self.polygons(f"{layer} {name}/head", heads, fill)
 
     def show_motion(self, swing: Swing, tails: np.ndarray, tips: np.ndarray) -> solver.Pose:
-        """Draw the parts of a mechanism as outlines where it takes them; the blocks stay where they are."""
+        """Draw the largest parts of a mechanism as outlines where it takes them; the blocks stay where they are."""
         if swing.n_parts <= MOST_PARTS:
             corners = mechanics.moved_vertices(self.assembly, swing.displaced)
-            outlines = part_outlines(self.assembly, corners, swing.parts)
+            # Parts are numbered from the largest on.
+            largest = np.where(swing.parts < MOST_OUTLINES, swing.parts, -1)
+            outlines = part_outlines(self.assembly, corners, largest)
             self.lines("motion outline", outlines, palette.SETTLEMENT, self.size[1] / 600.0)
         self.arrows("motion", tails, tips, palette.SETTLEMENT)
         return swing.increment.pose

@@ -19,6 +19,9 @@ from . import palette
 #: Height of the text as a fraction of the height of the picture, and its least size in pixels.
 TEXT_FRACTION, SMALLEST_TEXT = 1.0 / 36.0, 12
 
+#: Between two entries of the legend, in heights of its letters.
+LEGEND_GAP = 1.3
+
 
 @dataclass(frozen=True)
 class Key:
@@ -26,7 +29,7 @@ class Key:
 
     Attributes
     ----------
-    kind : {"area", "line", "dot", "bar", ""}
+    kind : {"area", "line", "dash", "dot", "bar", ""}
         What stands before the text; nothing before a note.
     text : str
     colour : (int, int, int)
@@ -84,7 +87,7 @@ class Sheet:
         self.text = max(SMALLEST_TEXT, round(min(height, width * 0.7) * TEXT_FRACTION))
         self.pad = max(6, round(0.9 * self.text))
         self.header = round(3.6 * self.text)
-        self.footer = round(2.9 * self.text)
+        self.footer = round(3.3 * self.text)
         self.colour_bar = colour_bar
         right = beside_width + (round(7.6 * self.text) if colour_bar else 0)
         #: Left, top, right, bottom of the blocks' picture, in pixels.
@@ -191,34 +194,38 @@ class Sheet:
 
     def _legend(self, draw: ImageDraw.ImageDraw, keys: Sequence[Key], places: Sequence[Key], left: int) -> None:
         """Draw those of the keys that are in the picture, each where it stands among all."""
-        if not keys:
-            return
-
-        def width(size: int, gap: float) -> float:
-            each = (
-                _font(size).getlength(key.text) + (max(1.7 * size, key.length) + 0.5 * size) * bool(key.kind)
-                for key in places
-            )
-            return sum(each) + gap * size * (len(places) - 1)
-
-        # Small letters are harder to read than near ones.
-        room, size, gap = self.size[0] - self.pad - left, round(0.9 * self.text), 1.5
-        while width(size, gap) > room and gap > 0.9:
-            gap -= 0.1
-        while width(size, gap) > room and size > 8:
+        room, size = self.size[0] - self.pad - left, round(0.9 * self.text)
+        rows = self._rows(places, size, room)
+        # Small letters are harder to read than a second row; only what two rows do not hold is written smaller.
+        while len(rows) > 2 and size > 8:
             size -= 1
-        font, y = _font(size), self.size[1] - self.pad - 0.35 * self.text
-        x = self.size[0] - self.pad - width(size, gap)
+            rows = self._rows(places, size, room)
+        font, gap = _font(size), LEGEND_GAP * size
+        y = self.size[1] - self.pad - 0.35 * self.text - 1.4 * size * (len(rows) - 1)
+        for row in rows:
+            widths = [_width(key, size) for key in row]
+            x = self.size[0] - self.pad - sum(widths) - gap * (len(row) - 1)
+            for key, width in zip(row, widths, strict=True):
+                if key in keys:
+                    wide = max(1.7 * size, key.length)
+                    if key.kind:
+                        _swatch(draw, key, x, y, wide, self.text)
+                    draw.text((x + (wide + 0.5 * size) * bool(key.kind), y), key.text, palette.INK, font, anchor="lm")
+                x += width + gap
+            y += 1.4 * size
+
+    def _rows(self, places: Sequence[Key], size: int, room: float) -> list[list[Key]]:
+        """Break a legend of letters of some size into rows no wider than the room [pixel]."""
+        rows: list[list[Key]] = []
+        used = np.inf
         for key in places:
-            there = key in keys
-            if key.kind:
-                wide = max(1.7 * size, key.length)
-                if there:
-                    _swatch(draw, key, x, y, wide, self.text)
-                x += wide + 0.5 * size
-            if there:
-                draw.text((x, y), key.text, palette.INK, font, anchor="lm")
-            x += font.getlength(key.text) + gap * size
+            width = _width(key, size)
+            if used + LEGEND_GAP * size + width > room:
+                rows.append([])
+                used = -LEGEND_GAP * size
+            rows[-1].append(key)
+            used += LEGEND_GAP * size + width
+        return rows
 
     def _colour_bar(self, page: Image.Image, draw: ImageDraw.ImageDraw, bar: ColourBar) -> None:
         left, top, bottom = self.inside[2] + self.text, self.inside[1], self.inside[3]
@@ -294,6 +301,11 @@ def write_labels(
             return
 
 
+def write_words(picture: Image.Image, place: tuple[float, float], words: str, text: int) -> None:
+    """Write faint words, their middle at a place of a picture [pixel]."""
+    ImageDraw.Draw(picture).text(place, words, palette.FAINT, _font(round(0.85 * text)), anchor="mm")
+
+
 def room_in(ring: np.ndarray) -> np.ndarray:
     """(2,) array: width and height of a box in the shape of that around an outline (n, 2), as large as the outline."""
     width, height = np.ptp(ring, axis=0)
@@ -302,9 +314,18 @@ def room_in(ring: np.ndarray) -> np.ndarray:
     return np.array([width, height]) * np.sqrt(area / (width * height) if width * height else 0.0)
 
 
+def _width(key: Key, size: int) -> float:
+    """Pixels that an entry of the legend takes, in letters of some size."""
+    return _font(size).getlength(key.text) + (max(1.7 * size, key.length) + 0.5 * size) * bool(key.kind)
+
+
 def _swatch(draw: ImageDraw.ImageDraw, key: Key, x: float, y: float, wide: float, text: float) -> None:
     if key.kind == "area":
         draw.rectangle((x, y - 0.38 * text, x + wide, y + 0.38 * text), fill=key.colour)
+    elif key.kind == "dash":
+        for k in range(3):
+            left = x + (k + 0.15) * wide / 3.0
+            draw.rectangle((left, y - 0.04 * text, left + 0.7 * wide / 3.0, y + 0.04 * text), fill=key.colour)
     elif key.kind == "dot":
         r = 0.3 * text
         draw.ellipse((x + wide / 2 - r, y - r, x + wide / 2 + r, y + r), fill=key.colour)
@@ -384,6 +405,7 @@ def framed(
     supports: float = 0.13,
     axes: np.ndarray | None = None,
     whole: float = 0.0,
+    cut: np.ndarray | None = None,
 ) -> Frame:
     """Frame in which every free block stays over all poses.
 
@@ -401,12 +423,16 @@ def framed(
         Unit vectors to the right and up in the picture; the axes of the drawing by default.
     whole : float
         Supports are shown whole where the picture is then no larger than this many times the free blocks.
+    cut : (2, 3) array, optional
+        A point [m] of a plane and its normal towards what is kept: what is left out takes no room.
     """
     free = assembly.free[assembly.block_of_vertex]
     d = assembly.dimension if axes is None else len(axes)
     inner, outer = _Box(d), _Box(d)
     for pose in poses:
         corners = mechanics.moved_vertices(assembly, pose)
+        if cut is not None:
+            corners = corners - np.minimum((corners - cut[0]) @ cut[1], 0.0)[:, None] * cut[1]
         corners = corners if axes is None else corners @ axes.T
         inner.hold(corners[free] if free.any() else corners)
         outer.hold(corners[~free] if (~free).any() else corners)

@@ -42,6 +42,9 @@ PARTS = np.array(
     [(151, 190, 224), (172, 208, 160), (196, 178, 222), (236, 206, 136), (231, 178, 186), (150, 208, 204)], dtype=float
 )
 
+#: Of the colour of blocks that stand still while others move so much is left: the eye goes to what moves.
+STILL = 0.45
+
 #: Blocks of one material differ in lightness by up to this fraction, which distinguishes neighbours.
 SHADE = 0.035
 
@@ -93,15 +96,17 @@ def role_colours(assembly: solver.Assembly) -> np.ndarray:
     return fill
 
 
-def pale(fill: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+def pale(fill: np.ndarray, blocks: np.ndarray, left: float = 0.25) -> np.ndarray:
     """(n_blocks, 3) uint8 array: fills with some blocks, (n_blocks,) bool, nearly as light as the paper.
 
     Parameters
     ----------
     fill : (n_blocks, 3) uint8 array
     blocks : (n_blocks,) bool array
+    left : float
+        Part of their colour that is left.
     """
-    return np.where(blocks[:, None], np.rint(0.25 * fill + 0.75 * np.array(PAPER)), fill).astype(np.uint8)
+    return np.where(blocks[:, None], np.rint(left * fill + (1.0 - left) * np.array(PAPER)), fill).astype(np.uint8)
 
 
 def part_colours(fill: np.ndarray, parts: np.ndarray) -> np.ndarray:
@@ -120,11 +125,6 @@ def part_colours(fill: np.ndarray, parts: np.ndarray) -> np.ndarray:
 def displacement_colours(fraction: np.ndarray) -> np.ndarray:
     """(n, 3) uint8 array: colours of the displacement scale, ``fraction`` (n,) from 0 to 1, clamped."""
     return _on_ramp(RAMP, fraction)
-
-
-def crack_colours(fraction: np.ndarray) -> np.ndarray:
-    """(..., 3) uint8 array: colours of cracks in space by their opening, ``fraction`` from 0 to 1, clamped."""
-    return _on_ramp(CRACKS, fraction)
 
 
 def _on_ramp(ramp: np.ndarray, fraction: np.ndarray) -> np.ndarray:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
 
 import solver
 from blockvis.dynamics.fall import Fall, fall_of
+from blockvis.layout.sights import Cut, Sight, read_cut, read_sight
 from blockvis.results.about import loss_of
 from blockvis.system.atomic_files import atomic_file
 
@@ -36,6 +38,8 @@ def draw_still(
     joints: bool = True,
     curve: bool = False,
     underlay: Underlay | None = None,
+    view: str | Mapping[str, float] | Sight | None = None,
+    section: str | Mapping[str, Any] | Cut | None = None,
 ) -> Path:
     """Draw one increment.
 
@@ -61,17 +65,50 @@ def draw_still(
         Put the reaction curve beside the blocks.
     underlay : Underlay, optional
         A photograph under blocks in the plane.
+    view : str or mapping, optional
+        From where blocks in space are seen: "above", "below", "both", "front", "back", "left", "right", "top",
+        "bottom", or ``{"azimuth": 30, "elevation": 20}`` in degrees. By default where their motion is seen best, and of
+        vaults and domes from below beside it.
+    section : str or mapping, optional
+        A plane that cuts blocks in space open: "x", "y = 1.2" [m], or ``{"point": (x, y, z), "normal": (x, y, z)}``.
 
     Returns
     -------
     pathlib.Path
+
+    Raises
+    ------
+    ValueError
+        For a view or a section of blocks in the plane, and a plane that misses the blocks.
     """
     _check_response(response)
     chosen = response.increments[increment] if isinstance(increment, int) else increment
-    look = Look(magnification, colour_by, forces, joints)
-    return _save(
-        Drawer(response, look, size, (chosen,), curve=curve, underlay=underlay).picture(chosen, widths=True), path
-    )
+    look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
+    drawer = Drawer(response, look, size, (chosen,), curve=curve, underlay=underlay, still=True)
+    return _save(drawer.picture(chosen, widths=True), path)
+
+
+def seen_from(view: Any, section: Any) -> tuple[Sight | None, Cut | None]:
+    """Read from where blocks in space are seen, and what cuts them open.
+
+    Parameters
+    ----------
+    view : str or mapping, optional
+    section : str or mapping, optional
+        Both as of :func:`draw_still`.
+
+    Raises
+    ------
+    ValueError
+        Naming what is wrong and the remedy.
+    """
+    found: list[Any] = []
+    for name, value, read in (("view", view, read_sight), ("section", section, read_cut)):
+        try:
+            found.append(None if value is None else read(value))
+        except ValueError as error:
+            raise ValueError(f"{name} {error}") from None
+    return found[0], found[1]
 
 
 def draw_mechanism(
@@ -80,6 +117,8 @@ def draw_mechanism(
     *,
     size: tuple[int, int] = STILL_SIZE,
     underlay: Underlay | None = None,
+    view: str | Mapping[str, float] | Sight | None = None,
+    section: str | Mapping[str, Any] | Cut | None = None,
 ) -> Path:
     """Draw the last equilibrium, its hinges and sliding joints, and the motion that follows.
 
@@ -94,6 +133,10 @@ def draw_mechanism(
         Width and height in pixels.
     underlay : Underlay, optional
         A photograph under blocks in the plane.
+    view : str or mapping, optional
+        As of :func:`draw_still`.
+    section : str or mapping, optional
+        As of :func:`draw_still`.
 
     Returns
     -------
@@ -102,8 +145,9 @@ def draw_mechanism(
     response = response.response if isinstance(response, solver.LimitLoad) else response
     _check_response(response)
     swing = swing_of(response)
-    look, extra = Look(forces="none"), (swing.displaced,)
-    drawer = Drawer(response, look, size, (swing.increment,), extra=extra, underlay=underlay)
+    sight, cut = seen_from(view, section)
+    look, extra = Look(forces="none", sight=sight, cut=cut), (swing.displaced,)
+    drawer = Drawer(response, look, size, (swing.increment,), extra=extra, underlay=underlay, still=True)
     if swing.moves:
         drawer.show_motion(swing)
     note = _mechanism_note(response, swing.parts)
@@ -125,6 +169,8 @@ def animate(
     fall: Fall | None = None,
     underlay: Underlay | None = None,
     progress: Callable[[int, int], None] | None = None,
+    view: str | Mapping[str, float] | Sight | None = None,
+    section: str | Mapping[str, Any] | Cut | None = None,
 ) -> Path:
     """Write the settlement and the fall as a film.
 
@@ -151,13 +197,15 @@ def animate(
         A photograph under blocks in the plane.
     progress : callable, optional
         Called with the frames drawn and their number.
+    view, section
+        As of :func:`draw_still`; a film has one view.
 
     Returns
     -------
     pathlib.Path
     """
     _check_response(response)
-    look = Look(magnification, colour_by, forces, joints)
+    look = Look(magnification, colour_by, forces, joints, *seen_from(view, section))
     if magnification != 1.0:
         fall = None
     elif fall is None:

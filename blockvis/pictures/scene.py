@@ -15,7 +15,8 @@ from .swing import Swing
 
 #: Layers that hold what statics knows: a fall in time has none of them.
 OF_STATICS = (
-    *("crack", "crack edge", "sliding", "hinge", "hinge top", "force", "force line", "ground"),
+    *("crack", "crack edge", "sliding", "exposed", "hinge", "hinge rim", "hinge top", "hidden hinge"),
+    *("force", "force line", "ground"),
     *("arrow rim", "arrow top", "live rim", "live top"),
 )
 
@@ -41,7 +42,7 @@ class Scene(Protocol):
         """Put the blocks where they are drawn, in new colours (n_blocks, 3) uint8 where these are given."""
 
     def cracks(self, found: Marks, magnification: float, widest: float) -> None:
-        """Draw open joints; in space their colours say how wide they are, the darkest ``widest`` [m]."""
+        """Draw open joints, all in one colour, in pictures whose widest is ``widest`` [m]."""
 
     def sliding(self, found: Marks) -> None:
         """Draw sliding joints."""

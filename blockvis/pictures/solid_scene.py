@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,16 +14,17 @@ from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
 from PIL import Image
 from vtkmodules.vtkCommonCore import vtkLogger
+from vtkmodules.vtkCommonDataModel import vtkPlane
 
 import solver
 from solver import mechanics
 
 from . import palette
 from .frame import Frame, framed, room_in
-from .marks import FINE_CRACK, WIDE_CRACK, Marks, arrow_shapes
+from .marks import Marks, arrow_shapes
 from .solid_view import ABOVE, AROUND, View, showing_faces
-from .surface import sharp_edges, triangles_of
-from .swing import Swing
+from .surface import section_of, sharp_edges, triangles_of
+from .swing import MOST_PARTS, Swing
 
 #: How much of the light comes from all sides, and from the lamp above the left shoulder.
 AMBIENT, DIFFUSE = 0.58, 0.50
@@ -30,8 +32,14 @@ AMBIENT, DIFFUSE = 0.58, 0.50
 #: Where the lamp stands, to the right, up and to the eye.
 LAMP = (-0.45, 0.85, 1.2)
 
-#: Samples of a pixel.
-SAMPLES = 4
+#: Samples of a pixel of frames of a film, and how many times as large a still is drawn, to be made smaller.
+SAMPLES, OVER = 4, 2
+
+#: Corners darken over this part of the larger side of what is shown; a hair of it keeps plane faces free of grain.
+SHADE_REACH, SHADE_HAIR = 0.1, 0.008
+
+#: Cut faces are so much darker than the faces of their blocks.
+CUT_SHADE = 0.82
 
 #: What is seen lies nearer than this part of the picture's size to the point that is looked for.
 SAME_DEPTH = 0.005
@@ -43,14 +51,14 @@ IN_FRONT_OF_ALL = 1_000_000.0
 LONGER = 1.6
 
 
-def _unit_arrow() -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) and triangles (m, 3) of an arrow from the origin along x, of length 1."""
-    arrow = pv.Arrow(tip_length=0.42, tip_radius=0.17, shaft_radius=0.065, tip_resolution=24, shaft_resolution=24)
-    arrow = arrow.triangulate()
-    return np.asarray(arrow.points, dtype=float), np.asarray(arrow.regular_faces)
+@dataclass(frozen=True)
+class _Arrows:
+    """Arrows from tails (n, 3) [m] to tips (n, 3) [m], all of them or those that hide no deeper than ``within`` [m]."""
 
-
-_ARROW = _unit_arrow()
+    tails: np.ndarray
+    tips: np.ndarray
+    colour: tuple[int, int, int]
+    within: float | None = None
 
 
 class SolidScene:
@@ -68,6 +76,14 @@ class SolidScene:
         Colours of the blocks.
     opacity : float
         Of the blocks.
+    fine : bool
+        Whether smooth edges and the shade of corners are worth the time: in stills.
+    cut : (2, 3) array, optional
+        A point [m] of a plane and its unit normal towards what is kept of the blocks.
+    outlined : (n_blocks,) bool array, optional
+        Blocks of which the edges alone are drawn.
+    hidden_hinges : bool
+        Whether hinges behind blocks are dashed.
     """
 
     def __init__(
@@ -79,22 +95,38 @@ class SolidScene:
         block_fill: np.ndarray,
         *,
         opacity: float = 1.0,
+        fine: bool = False,
+        cut: np.ndarray | None = None,
+        outlined: np.ndarray | None = None,
+        hidden_hinges: bool = True,
     ) -> None:
         self.assembly, self.view, self.size = assembly, view, size
         self.frame = frame.fitted(*size)
         #: Size of a pixel in the world [m].
         self.pixel = float(self.frame.size[0]) / size[0]
-        self._plotter = _plotter(size)
+        self._over = OVER if fine else 1
+        self._plotter = _plotter((self._over * size[0], self._over * size[1]))
+        if fine and opacity == 1.0:
+            extent = float(framed(assembly, [solver.Pose.initial(assembly)], axes=view.axes[:2]).size.max())
+            self._plotter.enable_ssao(radius=SHADE_REACH * extent, bias=SHADE_HAIR * extent, kernel_size=16)
+        self._hidden_hinges = hidden_hinges
+        #: Diagonal of the largest support [m].
+        self._support = _largest_support(assembly)
         self._layers: dict[str, Any] = {}
-        self._overlay: list[tuple[tuple[int, int, int], np.ndarray]] = []
+        self._overlays: dict[str, _Arrows] = {}
         self._look_at()
-        triangles, self._block = triangles_of(assembly.polyhedra)
-        self._surface = pv.PolyData.from_regular_faces(np.array(assembly.vertices), triangles)
+        self._cut = cut
+        triangles, blocks = triangles_of(assembly.polyhedra)
+        solid = np.ones(len(blocks), dtype=bool) if outlined is None else ~outlined[blocks]
+        self._triangles, self._block = triangles[solid], blocks[solid]
+        self._fill = block_fill
+        self._surface = pv.PolyData.from_regular_faces(np.array(assembly.vertices), self._triangles)
         self._surface.cell_data["colour"] = block_fill[self._block]
-        self._plotter.add_mesh(
+        surface = self._plotter.add_mesh(
             self._surface, scalars="colour", rgb=True, ambient=AMBIENT, diffuse=DIFFUSE, specular=0.0,
             interpolation="flat", opacity=opacity, reset_camera=False, render=False, show_scalar_bar=False,
         )  # fmt: skip
+        self._clip(surface)
         #: (n, 2) int array: vertices at both ends of the edges that are drawn.
         self.edges = sharp_edges(assembly.polyhedra)
         self._edges = pv.PolyData(np.array(assembly.vertices), lines=_line_cells(self.edges))
@@ -114,7 +146,16 @@ class SolidScene:
         self._surface.points = corners
         self._edges.points = corners
         if block_fill is not None:
+            self._fill = block_fill
             self._surface.cell_data["colour"] = block_fill[self._block]
+        if self._cut is not None:
+            faces, owners = section_of(corners, self._triangles, self._block, *self._cut)
+            shades = (CUT_SHADE * self._fill[owners]).astype(np.uint8)
+            colours = np.repeat(shades, [len(face) for face in faces], axis=0)
+            self.polygons("section", faces, colours, forward=1.0)
+            edges = [np.stack([face, np.roll(face, -1, axis=0)], axis=1) for face in faces]
+            ends = np.concatenate([np.zeros((0, 2, 3)), *edges])
+            self.lines("section edge", ends, palette.INK, max(2.0 * self._thin, 1.2), forward=2.0)
 
     def lines(
         self,
@@ -171,18 +212,9 @@ class SolidScene:
             self._add(layer, pv.PolyData(points, faces=faces), colour, forward=forward)
 
     def cracks(self, found: Marks, magnification: float, widest: float) -> None:
-        """Fill what lies between faces, and draw a line where that would be too thin to see."""
-        size, thin = self.assembly.block_size, self._thin
-        colours = palette.crack_colours(found.openings / (widest or 1.0))
-        narrow = ~found.gapes
-        self.polygons("crack", found.cracks[narrow], colours[:, [0, 1, 1, 0]][narrow].reshape(-1, 3))
-        width = found.openings.max(axis=1, initial=0.0) / size
-        fine, wide = width < FINE_CRACK, width * magnification > WIDE_CRACK
-        line, middle = narrow & ~wide, found.middles
-        self.lines("crack line", middle[line & ~fine], colours[line & ~fine], max(2.2 * thin, 1.2), forward=2.0)
-        self.lines("crack line/fine", middle[line & fine], colours[line & fine], max(1.4 * thin, 1.0), forward=2.0)
-        both = np.tile(colours[found.gapes], (2, 1, 1))
-        self.lines("crack line/faces", found.gaping_faces, both, max(2.4 * thin, 1.2), forward=2.0)
+        """Draw the rims of what is open, all alike: of a hairline they fall into one line, a gap shows between them."""
+        rims = np.concatenate([found.cracks[:, [0, 1]], found.cracks[:, [3, 2]]])
+        self.lines("crack", rims, palette.OPEN, max(3.0 * self._thin, 1.4), forward=2.0)
 
     def sliding(self, found: Marks) -> None:
         """Draw lines around the faces that slide, and what of them is seen."""
@@ -195,6 +227,8 @@ class SolidScene:
         width = max(7.0 * self._thin, 2.4)
         self.lines("hinge rim", found.hinges, palette.PAPER, 1.8 * width, forward=4.0)
         self.lines("hinge", found.hinges, palette.HINGE, width, forward=5.0)
+        if not self._hidden_hinges:
+            return
         dashes = _dashed(found.hinges, 12.0 * max(self._thin, 0.6) * self.pixel)
         self.lines("hidden hinge", dashes, palette.HINGE, 0.22 * width, forward=IN_FRONT_OF_ALL)
 
@@ -208,32 +242,29 @@ class SolidScene:
         """Draw nothing: the blocks show it."""
 
     def arrows(self, layer: str, tails: np.ndarray, tips: np.ndarray, colour: tuple[int, int, int]) -> None:
-        """Draw solid arrows from tails (n, 3) [m] to tips (n, 3) [m]."""
-        self.clear(layer)
-        if len(tails):
-            points, faces = _ARROW
-            long = np.linalg.norm(tips - tails, axis=1)[:, None]
-            directions = (tips - tails) / long
-            across = np.cross(directions, np.where(np.abs(directions[:, 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
-            across /= np.linalg.norm(across, axis=1)[:, None]
-            turns = np.stack([directions, across, np.cross(directions, across)], axis=1)
-            placed = tails[:, None] + long[:, None] * np.einsum("pi,nij->npj", points, turns)
-            every = faces[None] + len(points) * np.arange(len(tails))[:, None, None]
-            mesh = pv.PolyData.from_regular_faces(placed.reshape(-1, 3), every.reshape(-1, 3))
-            self._add(layer, mesh, colour, lit=True)
+        """Draw arrows from tails (n, 3) [m] to tips (n, 3) [m] over all: none is hidden behind its own support."""
+        if self._cut is not None:
+            kept = (tails - self._cut[0]) @ self._cut[1] >= 0.0
+            tails, tips = tails[kept], tips[kept]
+        # Of many supports those behind the structure would seem to push what is in front of them.
+        self._overlays[f"{layer} top"] = _Arrows(tails, tips, colour, self._support if layer == "arrow" else None)
 
     def show_motion(self, swing: Swing, tails: np.ndarray, tips: np.ndarray) -> solver.Pose:
-        """Draw the edges of where the parts of a mechanism were; the blocks go where it takes them."""
-        edges = mechanics.moved_vertices(self.assembly, swing.increment.pose)[self.edges]
-        moving = (swing.parts >= 0)[self.assembly.block_of_vertex[self.edges[:, 0]]]
-        self.lines("before", edges[moving], palette.GHOST, self.size[1] / 900.0)
-        tips = tips + (LONGER - 1.0) * (tips - tails)
-        self._overlay = _rimmed_arrows(self.at_pixel(tails), self.at_pixel(tips), self.size[1] / 130.0)
+        """Draw the edges of where few parts of a mechanism were; the blocks go where it takes them."""
+        if swing.n_parts <= MOST_PARTS:
+            edges = mechanics.moved_vertices(self.assembly, swing.increment.pose)[self.edges]
+            moving = (swing.parts >= 0)[self.assembly.block_of_vertex[self.edges[:, 0]]]
+            self.lines("before", edges[moving], palette.GHOST, self.size[1] / 900.0)
+        self.arrows("motion", tails, tips + (LONGER - 1.0) * (tips - tails), palette.SETTLEMENT)
+        if swing.n_parts > MOST_PARTS:
+            # Of many blocks those behind others would seem to be the ways of what is in front of them.
+            self._overlays["motion top"] = replace(self._overlays["motion top"], within=self.assembly.block_size)
         return swing.displaced
 
     def clear(self, *layers: str) -> None:
         """Remove layers."""
         for name in layers:
+            self._overlays.pop(name, None)
             if name in self._layers:
                 self._plotter.remove_actor(self._layers.pop(name), reset_camera=False, render=False)
 
@@ -244,14 +275,26 @@ class SolidScene:
 
     def holds(self, *layers: str) -> bool:
         """Whether anything is drawn in one of the layers."""
-        return any(layer in self._layers for layer in layers)
+        return any(layer in self._layers or layer in self._overlays for layer in layers)
 
     def image(self) -> Image.Image:
         """Draw the picture."""
         with _quiet():
             self._plotter.render()
             pixels = self._plotter.screenshot(return_img=True)
-        return _painted(Image.fromarray(np.ascontiguousarray(pixels[..., :3])), self._overlay)
+        picture = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
+        if self._over > 1:
+            picture = picture.reduce(self._over)
+        return _painted(picture, [shape for arrows in self._overlays.values() for shape in self._shapes(arrows)])
+
+    def _shapes(self, arrows: _Arrows) -> list[tuple[tuple[int, int, int], np.ndarray]]:
+        """Polygons, (k, 2) pixels each, of arrows in the last picture, with their colours."""
+        tails, tips = arrows.tails, arrows.tips
+        if arrows.within is not None and len(tails):
+            seen = self._hidden_by(tails) < arrows.within
+            # One that is hidden still says where a single support goes.
+            tails, tips = (tails[seen], tips[seen]) if seen.any() else (tails, tips)
+        return _rimmed_arrows(self.at_pixel(tails), self.at_pixel(tips), self.size[1] / 130.0, arrows.colour)
 
     def at_pixel(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array: pixel (column, row) of points (n, 3) [m]."""
@@ -260,14 +303,18 @@ class SolidScene:
 
     def sees(self, points: np.ndarray) -> np.ndarray:
         """(n,) bool array: which points (n, 3) [m] on the blocks nothing hides in the last picture."""
+        return np.asarray(np.abs(self._hidden_by(points)) < SAME_DEPTH * self.frame.size.max())
+
+    def _hidden_by(self, points: np.ndarray) -> np.ndarray:
+        """(n,) array [m]: how far before points (n, 3) [m] what is seen at their pixels lies; nothing lies at -inf."""
         depth = np.nan_to_num(np.asarray(self._plotter.get_image_depth(reset_camera_clipping_range=False)), nan=-np.inf)
-        column, row = np.floor(self.at_pixel(points)).astype(int).T
+        column, row = np.floor(self._over * self.at_pixel(points)).astype(int).T
         inside = (column >= 0) & (row >= 0) & (column < depth.shape[1]) & (row < depth.shape[0])
         found = np.full(len(points), -np.inf)
         found[inside] = depth[row[inside], column[inside]]
         # VTK counts the depth from the eye backwards.
         eye = self.view.depth(np.array(self._plotter.camera.position)[None])[0]
-        return np.asarray(np.abs(found - (self.view.depth(points) - eye)) < SAME_DEPTH * self.frame.size.max())
+        return np.asarray(found - (self.view.depth(points) - eye))
 
     def close(self) -> None:
         """Give the memory of the graphics card back."""
@@ -306,11 +353,19 @@ class SolidScene:
             mesh.point_data["colour"] = np.asarray(colour, dtype=np.uint8).reshape(-1, 3)
             look = {"scalars": "colour", "rgb": True, "show_scalar_bar": False}
         actor = self._plotter.add_mesh(
-            mesh, **look, line_width=width, lighting=lit, ambient=AMBIENT,
+            mesh, **look, line_width=self._over * width, lighting=lit, ambient=AMBIENT,
             diffuse=DIFFUSE, reset_camera=False, render=False,
         )  # fmt: skip
         drawn_forward(actor, forward)
+        # The cut faces lie in the plane, and their edges.
+        if not layer.startswith("section"):
+            self._clip(actor)
         self._layers[layer] = actor
+
+    def _clip(self, actor: Any) -> None:
+        """Leave out what the section leaves out."""
+        if self._cut is not None:
+            actor.mapper.AddClippingPlane(vtkPlane(origin=tuple(self._cut[0]), normal=tuple(self._cut[1])))
 
 
 def blocks_picture(assembly: solver.Assembly, size: tuple[int, int], fill: np.ndarray) -> Image.Image:
@@ -363,6 +418,12 @@ def drawn_forward(actor: Any, by: float) -> None:
     mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, -6.0 * by)
 
 
+def _largest_support(assembly: solver.Assembly) -> float:
+    corners, owner = assembly.vertices, assembly.block_of_vertex
+    spans = [np.ptp(corners[owner == block], axis=0) for block in np.flatnonzero(~assembly.free)]
+    return max((float(np.linalg.norm(span)) for span in spans), default=0.0)
+
+
 def _line_cells(ends: np.ndarray) -> np.ndarray:
     return np.column_stack([np.full(len(ends), 2), ends]).ravel()
 
@@ -399,11 +460,13 @@ def _dashed(ends: np.ndarray, length: float) -> np.ndarray:
     return ends[line, :1] + shares[:, :, None] * along[line][:, None]
 
 
-def _rimmed_arrows(tails: np.ndarray, tips: np.ndarray, thick: float) -> list[tuple[tuple[int, int, int], np.ndarray]]:
+def _rimmed_arrows(
+    tails: np.ndarray, tips: np.ndarray, thick: float, colour: tuple[int, int, int]
+) -> list[tuple[tuple[int, int, int], np.ndarray]]:
     """Polygons of arrows from tails (n, 2) to tips (n, 2) [pixels] with a white rim, back to front."""
     shapes: list[tuple[tuple[int, int, int], np.ndarray]] = []
-    for grown, colour in ((0.35 * thick, palette.PAPER), (0.0, palette.SETTLEMENT)):
-        shapes += [(colour, polygon) for kind in arrow_shapes(tails, tips, thick, grown) for polygon in kind]
+    for grown, paint in ((0.35 * thick, palette.PAPER), (0.0, colour)):
+        shapes += [(paint, polygon) for kind in arrow_shapes(tails, tips, thick, grown) for polygon in kind]
     return shapes
 
 

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import shapely
 
 import solver
+from blockvis.layout.sights import BELOW, Cut, Sight
+from blockvis.results.joint_faces import InitialJoints
 from solver import mechanics
 
 #: Directions that are tried, from the structure to the eye: three-quarter views, in degrees around and above the level.
@@ -22,6 +25,16 @@ IN_FRONT, FROM_THE_FRONT = 0.35, 0.04
 
 #: Directions in which a motion is seen as well as in the best one, within this part, are equal.
 ALIKE = 0.02
+
+#: Degrees above the level for what a level plane cuts; other planes are seen from where at least this cosine of the
+#: angle to their normal is left.
+ABOVE_CUT, ACROSS = 50.0, 0.6
+
+#: Structures have an intrados where so large a part of their plan hangs over air.
+OVER_AIR = 0.4
+
+#: Supports that hide more of a structure than this, seen from below, are drawn by their edges.
+HIDING = 0.12
 
 
 @dataclass(frozen=True)
@@ -54,7 +67,111 @@ class View:
         return np.asarray(points @ self.axes[2])
 
 
-def chosen_view(response: solver.Response, motion: np.ndarray) -> View:
+def views_of(
+    response: solver.Response, motion: np.ndarray, joints: InitialJoints, sight: Sight | None, cut: Cut | None
+) -> tuple[View, ...]:
+    """Find from where a structure is drawn: as asked for; vaults and domes from above and, beside that, from below.
+
+    Parameters
+    ----------
+    response : solver.Response
+    motion : (n_blocks, 3) array [m]
+        As of :func:`chosen_view`.
+    joints : InitialJoints
+    sight : Sight, optional
+        As asked for.
+    cut : Cut, optional
+        The plane that has to be seen.
+    """
+    sight = sight or Sight(both=cut is None and has_intrados(response.assembly, joints))
+    level = cut is not None and abs(cut.normal[2]) > ACROSS
+    above = sight.elevation if sight.elevation is not None else ABOVE_CUT if level else _above(response.assembly)
+    if sight.azimuth is not None:
+        view = View(sight.azimuth, above)
+    else:
+        views = [View(around, above) for around in AROUND]
+        if cut is not None and not level:
+            facing = [abs(float(view.axes[2] @ cut.normal)) for view in views]
+            views = [view for view, cosine in zip(views, facing, strict=True) if cosine >= min(ACROSS, max(facing))]
+        view = chosen_view(response, motion, views)
+    return (view, View(view.around, BELOW)) if sight.both else (view,)
+
+
+def has_intrados(assembly: solver.Assembly, joints: InitialJoints) -> bool:
+    """Whether free blocks hang over air as vaults do: faces that look down and rest on nothing cover their plan.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    joints : InitialJoints
+    """
+    shapes, free = assembly.polyhedra, assembly.free
+    heights = shapes.face_areas * shapes.faces(shapes.vertices).normals[:, 2]
+    heights = heights[free[shapes.block_of_face]]
+    down, up = -float(heights[heights < 0.0].sum()), float(heights[heights > 0.0].sum())
+    # The normal of a joint points into block a: where it points up, b has a face that looks up, and a one down.
+    plan = joints.sizes * joints.normals[:, 2]
+    upper = np.where(plan > 0.0, joints.block_a, joints.block_b)
+    lower = np.where(plan > 0.0, joints.block_b, joints.block_a)
+    down -= float(np.abs(plan)[free[upper]].sum())
+    up -= float(np.abs(plan)[free[lower]].sum())
+    return down > OVER_AIR * up > 0.0
+
+
+def hiding_supports(assembly: solver.Assembly, view: View) -> np.ndarray:
+    """(n_blocks,) bool array: supports that hide the structure from an eye below it.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    view : View
+    """
+    hides = np.zeros(assembly.n_blocks, dtype=bool)
+    if view.above >= 0.0 or not assembly.free.any():
+        return hides
+    flat, owner = view.projected(assembly.vertices), assembly.block_of_vertex
+    whole = shapely.MultiPoint(flat[assembly.free[owner]]).convex_hull
+    for block in np.flatnonzero(~assembly.free).tolist():
+        shadow = shapely.MultiPoint(flat[owner == block]).convex_hull
+        hides[block] = shadow.intersection(whole).area > HIDING * whole.area
+    return hides
+
+
+def plane_of(assembly: solver.Assembly, cut: Cut | None) -> np.ndarray | None:
+    """(2, 3) array: a point [m] of the plane that cuts blocks open, and its unit normal; None without one.
+
+    Parameters
+    ----------
+    assembly : solver.Assembly
+    cut : Cut, optional
+
+    Raises
+    ------
+    ValueError
+        For a plane that misses the blocks.
+    """
+    if cut is None:
+        return None
+    corners, normal = assembly.vertices, np.array(cut.normal)
+    free = corners[assembly.free[assembly.block_of_vertex]] if assembly.free.any() else corners
+    point = (free.min(axis=0) + free.max(axis=0)) / 2.0 if cut.point is None else np.array(cut.point)
+    heights = (corners - point) @ normal
+    if not heights.min() < 0.0 < heights.max():
+        raise ValueError(
+            f"section: the plane through ({', '.join(f'{x:.4g}' for x in point)}) m misses the blocks, which lie "
+            f"{heights.min():.4g} to {heights.max():.4g} m from it along its normal; move its point there"
+        )
+    return np.stack([point, normal])
+
+
+def _above(assembly: solver.Assembly) -> float:
+    """Degrees above the level from which a structure is seen by default."""
+    corners = assembly.vertices[assembly.free[assembly.block_of_vertex]]
+    size = np.ptp(corners if len(corners) else assembly.vertices, axis=0)
+    return ABOVE_LOW if size[2] < LOW * min(size[:2]) else ABOVE
+
+
+def chosen_view(response: solver.Response, motion: np.ndarray, views: list[View] | None = None) -> View:
     """Choose from where the motion of a structure is seen best: across it, with what moves in front.
 
     Parameters
@@ -62,11 +179,12 @@ def chosen_view(response: solver.Response, motion: np.ndarray) -> View:
     response : solver.Response
     motion : (n_blocks, 3) array [m]
         Of the centroids, in any scale: of the mechanism.
+    views : list of View, optional
+        Among which it is chosen; three-quarter views by default.
     """
     assembly = response.assembly
     corners = assembly.vertices[assembly.free[assembly.block_of_vertex]]
     size = np.ptp(corners if len(corners) else assembly.vertices, axis=0)
-    above = ABOVE_LOW if size[2] < LOW * min(size[:2]) else ABOVE
     weights = assembly.shapes.volumes * np.linalg.norm(motion, axis=1)
     path = response.path
     if path:
@@ -75,7 +193,7 @@ def chosen_view(response: solver.Response, motion: np.ndarray) -> View:
         own = assembly.shapes.volumes * np.linalg.norm(moved, axis=1)
         motion = _scaled(motion, weights) + _scaled(moved, own)
         weights = assembly.shapes.volumes * np.linalg.norm(motion, axis=1)
-    views = [View(around, above) for around in AROUND]
+    views = views or [View(around, _above(assembly)) for around in AROUND]
     if not weights.any():
         return views[0]
     middle = assembly.centroids[assembly.free].mean(axis=0) if assembly.free.any() else assembly.centroids.mean(axis=0)

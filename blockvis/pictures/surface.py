@@ -81,3 +81,51 @@ def sharp_edges(shapes: mechanics.Polyhedra) -> np.ndarray:
     # Of two unit vectors, half the square of their sum is one more than their product.
     flat = (counts == 2) & (0.5 * (total**2).sum(axis=1) - 1.0 >= FLAT)
     return np.asarray(ends[once[~flat]])
+
+
+def section_of(
+    corners: np.ndarray, triangles: np.ndarray, blocks: np.ndarray, point: np.ndarray, normal: np.ndarray
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Cut blocks by a plane.
+
+    Parameters
+    ----------
+    corners : (n_vertices, 3) array [m]
+    triangles : (n, 3) int array
+    blocks : (n,) int array
+        The block of each, as :func:`triangles_of` gives them.
+    point, normal : (3,) arrays
+        On the plane [m], and its unit normal.
+
+    Returns
+    -------
+    outlines : list of (k, 3) arrays [m]
+        What of each block lies in the plane; several of a block that is bent.
+    owners : (n_outlines,) int array
+        The block of each.
+    """
+    across = np.eye(3)[int(np.abs(normal).argmin())]
+    u = np.cross(normal, across)
+    u /= np.linalg.norm(u)
+    v = np.cross(normal, u)
+    height = (corners - point) @ normal
+    # A corner that lies in the plane belongs to its upper side, so that every triangle has none or two edges across.
+    height = np.where(height == 0.0, 1e-300, height)
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)
+    # Both triangles at an edge cut it from the same end: their points are the same to the last digit.
+    ends = np.sort(ends, axis=2)
+    crosses = (height[ends] > 0.0).sum(axis=2) == 1
+    cut = crosses.any(axis=1)
+    first, last = np.moveaxis(ends[cut][crosses[cut]].reshape(-1, 2, 2), 2, 0)
+    share = (height[first] / (height[first] - height[last]))[..., None]
+    places = corners[first] + share * (corners[last] - corners[first])
+    flat = np.stack([(places - point) @ u, (places - point) @ v], axis=2)
+    outlines, owners = [], []
+    owner = blocks[cut]
+    for block in np.unique(owner).tolist():
+        lines = shapely.linestrings(flat[owner == block])
+        for piece in shapely.get_parts(shapely.polygonize(lines)):
+            ring = shapely.get_coordinates(shapely.get_exterior_ring(piece))[:-1]
+            outlines.append(point + ring[:, :1] * u + ring[:, 1:] * v)
+            owners.append(block)
+    return outlines, np.array(owners, dtype=int)

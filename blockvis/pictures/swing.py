@@ -100,6 +100,8 @@ def shown_increments(response: solver.Response) -> tuple[solver.Increment, ...]:
 def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing) -> np.ndarray:
     """(n_blocks, 3) uint8 array: fills with the parts of a mechanism tinted, or darker where they are faster.
 
+    What stands still is pale.
+
     Parameters
     ----------
     assembly : solver.Assembly
@@ -108,7 +110,8 @@ def mechanism_colours(assembly: solver.Assembly, fill: np.ndarray, swing: Swing)
     swing : Swing
     """
     if swing.n_parts <= MOST_PARTS:
-        return palette.part_colours(fill, swing.parts)
+        still = palette.pale(fill, assembly.free & (swing.parts < 0), palette.STILL)
+        return palette.part_colours(still, swing.parts)
     travel = np.linalg.norm(swing.displaced.positions - swing.increment.pose.positions, axis=1)
     tints = palette.displacement_colours(0.75 * travel / travel[assembly.free].max())
     return np.where(assembly.free[:, None], tints, fill)

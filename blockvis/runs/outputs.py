@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import solver
 from blockvis.cases.contents import Case
@@ -135,14 +135,17 @@ class Drawing(Output):
         progress = DrawingProgress()
         stored = stored_fall(folder)
         animation, apart = self._animation(case), self._process
+        eye = seen_from(case, response) if self._pictures else {}
         if apart is not None:
             # It works out the fall as well, and what needs none is drawn here meanwhile.
-            apart.draw(response, folder / str(animation), stored, falls=stored is None, underlay=underlay)
+            apart.draw(
+                response, folder / str(animation), stored, falls=stored is None, underlay=underlay, seen_from=eye
+            )
         if self._pictures:
             with clock.counting("mechanism"):
                 from blockvis.pictures.render import draw_mechanism
 
-                draw_mechanism(response, folder / "mechanism.png", underlay=underlay)
+                draw_mechanism(response, folder / "mechanism.png", underlay=underlay, **eye)
         with clock.counting("fall"):
             fall = _fall(response, apart, progress) if stored is None else stored
             progress.done()
@@ -169,7 +172,8 @@ class Drawing(Output):
                 from blockvis.pictures.render import animate
 
                 try:
-                    animate(response, folder / animation, fall=fall, underlay=underlay, progress=progress.frame)
+                    look: dict[str, Any] = {"underlay": underlay, **eye}
+                    animate(response, folder / animation, fall=fall, progress=progress.frame, **look)
                 finally:
                     progress.done()
         return (problem,) if problem else ()
@@ -187,6 +191,34 @@ def _underlay(case: Case) -> Underlay | None:
     from .underlay import underlay_of
 
     return underlay_of(case)
+
+
+def seen_from(case: Case, response: solver.Response) -> dict[str, Any]:
+    """Say from where the pictures of a case are drawn; they are drawn all the same where that makes no sense.
+
+    Parameters
+    ----------
+    case : Case
+    response : solver.Response
+
+    Returns
+    -------
+    dict
+        View and section as :func:`blockvis.draw_still` takes them.
+    """
+    from blockvis.pictures.solid_view import plane_of
+
+    asked = {"view": case.sight, "section": case.cut}
+    if response.assembly.dimension == 2:
+        for key in (key for key, value in asked.items() if value is not None):
+            warnings.warn(f"{case.source}: [output] {key}: blocks in the plane are drawn as they lie", stacklevel=2)
+        return {}
+    try:
+        plane_of(response.assembly, case.cut)
+    except ValueError as error:
+        warnings.warn(f"{case.source}: [output] {error}; drawn whole", stacklevel=2)
+        asked["section"] = None
+    return asked
 
 
 def _awaited(film: FilmProcess, progress: DrawingProgress, clock: Clock) -> str:

@@ -71,9 +71,14 @@ def _pixels(image: Image.Image) -> np.ndarray:
 
 def stored_underlay(folder: Path) -> Underlay | None:
     """Read the photograph under the pictures of a results folder, if its case names one."""
-    record = read_record(folder) if (folder / RECORD).is_file() else Record()
-    case = parse_case(record.case, Path(record.case_file or folder / "case.toml")) if record.case else None
+    case = drawn_case(folder)
     return None if case is None else underlay_of(case)
+
+
+def drawn_case(folder: Path) -> Case | None:
+    """Read the case of a results folder, if it has one."""
+    record = read_record(folder) if (folder / RECORD).is_file() else Record()
+    return parse_case(record.case, Path(record.case_file or folder / "case.toml")) if record.case else None
 
 
 def _drawing(case: Case) -> tuple[Placement, tuple[float, float] | None] | None:

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import pyvista as pv
 from PIL import Image
-from structures import alike, arch_response, pixels, vault_response
+from structures import alike, arch_response, box, pixels, vault_response
 from test_paraview import PVPYTHON, READ
 from test_report import browser, visited
 
 import blockvis
 import solver
-from blockvis import animate, draw_mechanism, write_report
+from blockvis import animate, draw_mechanism, draw_still, write_report
 from blockvis.cli import main
 from blockvis.pictures import palette
 from blockvis.pictures.drawer import Drawer, Look
@@ -246,14 +246,16 @@ def test_what_is_where():
     crown = found.hinges[found.hinges[:, 0, 2].argmax()]
     for share in (0.3, 0.5, 0.7):
         assert alike(colour_at(crown[0] + share * (crown[1] - crown[0])), palette.HINGE, 30)
-    # The crack at the crown is widest below: there its colour is the darkest.
+    # The crack at the crown is widest below: its rims have one colour, and between them is air.
     front = found.cracks.mean(axis=1)
     under = np.flatnonzero((np.abs(front[:, 0] - crown[0, 0]) < 0.1) & (front[:, 1] < -0.2))
     wide = under[found.openings[under].max(axis=1).argmax()]
-    inside = (
-        found.cracks[wide][[0, 3]] if found.openings[wide, 0] > found.openings[wide, 1] else found.cracks[wide][[1, 2]]
-    )
-    assert alike(colour_at(0.9 * inside.mean(axis=0) + 0.1 * found.cracks[wide].mean(axis=0)), palette.CRACKS[2], 60)
+    crack = found.cracks[wide]
+    inside = crack[[0, 3]] if found.openings[wide, 0] > found.openings[wide, 1] else crack[[1, 2]]
+    assert alike(colour_at(0.9 * inside.mean(axis=0) + 0.1 * crack.mean(axis=0)), palette.PAPER)
+    for rim in (crack[[0, 1]], crack[[3, 2]]):
+        x, y = drawer.scene.at_pixel(rim.mean(axis=0)[None])[0].round().astype(int)
+        assert alike(picture[top + y - 1 : top + y + 2, left + x - 1 : left + x + 2], palette.OPEN, 40).any()
     support = np.flatnonzero(assembly.moving)[0]
     corner = mechanics.moved_vertices(assembly, last.pose)[assembly.block_of_vertex == support]
     face = corner[corner[:, 1] < 0].mean(axis=0)
@@ -261,6 +263,97 @@ def test_what_is_where():
     assert np.ptp(shade) < 0.05
     assert 0.5 < shade.mean() <= 1.05
     assert alike(colour_at([0.0, 0.0, 0.2]), palette.PAPER)
+
+
+def drawn_vault(tmp_path, **seen_from):
+    """Pixels of the picture of the vault's last equilibrium."""
+    response = vault_response()
+    path = draw_still(response, -1, tmp_path / "still.png", size=SMALL, **seen_from)
+    return pixels(path)[45:310]
+
+
+def ink_in(picture):
+    """(rows, columns): where the paper is covered, of a picture without its words."""
+    return np.nonzero((picture < 235).any(axis=2))
+
+
+def test_a_vault_is_seen_from_both_sides_and_fills_the_picture(tmp_path):
+    """By default the intrados stands beside the extrados; each view alone has the whole width."""
+    both = drawn_vault(tmp_path)
+    middle = both[:, 305:335]
+    assert (middle == 255).all(axis=2).mean() > 0.9
+    for half in (both[:, :320], both[:, 320:]):
+        rows, columns = ink_in(half)
+        assert np.ptp(columns) > 0.85 * 320 or np.ptp(rows) > 0.85 * len(half)
+    # Both are of the same stones, from other sides.
+    assert (np.abs(both[:, :320] - both[:, 320:]).max(axis=2) > 60).mean() > 0.1
+
+
+@pytest.mark.slow
+def test_a_view_alone_has_the_whole_picture(tmp_path):
+    above, below = (drawn_vault(tmp_path, view=view) for view in ("above", "below"))
+    for alone in (above, below):
+        rows, columns = ink_in(alone)
+        assert np.ptp(columns) > 0.85 * 640 or np.ptp(rows) > 0.85 * len(alone)
+    assert (np.abs(above - below).max(axis=2) > 60).mean() > 0.1
+
+
+@pytest.mark.slow
+def test_a_wall_has_no_intrados_to_be_seen(tmp_path):
+    wall = solver.Assembly.from_solids(
+        [box((0, 0, k), (2, 0.5, k + 1)) for k in range(3)], roles=["moving", "free", "free"]
+    )
+    down = solver.Settlement(direction=(0, 0, -1), increment=0.1, limit=0.1)
+    response = solver.settle(wall, down, friction_coefficient=0.6)
+    default, above = (
+        pixels(draw_still(response, -1, tmp_path / "still.png", size=SMALL, **of)) for of in ({}, {"view": "above"})
+    )
+    np.testing.assert_array_equal(default, above)
+
+
+@pytest.mark.slow
+def test_a_section_leaves_out_what_lies_before_it_and_closes_the_stones(tmp_path):
+    """From the front, cut along the span: half the depth is gone, and no hollow stone shows its inside."""
+    front = {"view": "front"}
+    whole, cut = drawn_vault(tmp_path, **front), drawn_vault(tmp_path, **front, section="y")
+    aside = drawn_vault(tmp_path, view={"azimuth": 0, "elevation": 90})
+    half = drawn_vault(tmp_path, view={"azimuth": 0, "elevation": 90}, section={"normal": (0, 1, 0)})
+    assert (whole < 235).any(axis=2).mean() == pytest.approx((cut < 235).any(axis=2).mean(), rel=0.1)
+    proportions = [np.ptp(columns) / np.ptp(rows) for rows, columns in map(ink_in, (aside, half))]
+    assert proportions[1] == pytest.approx(proportions[0] / 2.0, rel=0.25)
+
+
+def test_corners_of_a_still_lie_in_shade(tmp_path):
+    """Where two faces meet at a hollow corner both are darker than away from it."""
+    step = [box((0, 0, 0), (4, 4, 1)), box((0, 2, 1), (4, 4, 3))]
+    structure = solver.Structure(solver.Assembly.from_solids(step, roles=["fixed", "free"]), friction_coefficient=0.6)
+    response = structure.limit_load(acceleration=(0, 1, 0)).response
+    eye = {"azimuth": -90, "elevation": 60}
+    picture = pixels(
+        draw_still(response, -1, tmp_path / "still.png", size=SMALL, view=eye, forces="none", joints=False)
+    )
+    column = picture[:, 320].sum(axis=1)
+    rows = np.flatnonzero(column < 700)
+    lower = column[rows.min() : rows.max()]
+    tread = lower[np.abs(lower - np.median(lower)) < 200]
+    assert tread.max() - tread.min() > 40
+
+
+def test_views_that_cannot_be_are_refused_with_the_remedy(tmp_path):
+    response, path = vault_response(), tmp_path / "still.png"
+    for of, words in (
+        ({"view": "belwo"}, r"view is 'belwo' \(did you mean 'below'\?\); choose from above, below"),
+        ({"view": {"azimut": 3}}, r"view has 'azimut' \(did you mean 'azimuth'\?\)"),
+        ({"view": {"elevation": 91}}, r"view has elevation = 91; give degrees from -90 to 90"),
+        ({"section": "w = 1"}, r"section is 'w = 1'; give \"x\", \"y\" or \"z\""),
+        ({"section": {"normal": (0, 0, 0)}}, r"section has a normal of length 0"),
+        ({"section": "z = 50"}, r"section: the plane through \(0, 0, 50\) m misses the blocks"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            draw_still(response, -1, path, **of)
+    with pytest.raises(ValueError, match="view and section are of blocks in space"):
+        draw_still(arch_response(), -1, path, view="below")
+    assert not path.exists()
 
 
 def test_nothing_leaves_the_picture_and_all_frames_look_the_same_way(tmp_path):
@@ -387,6 +480,10 @@ def test_one_command_from_case_to_pictures_and_again(tmp_path, monkeypatch, caps
     capsys.readouterr()
     assert main(["render", "out", "--animation", "none", "--colour-by", "displacement", "--forces", "thrust"]) == 0
     assert (out / "last.png").stat().st_size > 1000
+    # A picture from another side; the case says from which where the command line does not.
+    before = pixels(out / "mechanism.png")
+    assert main(["render", "out", "--animation", "none", "--view", "30,-20", "--section", "y = 0.1"]) == 0
+    assert (pixels(out / "mechanism.png") != before).any(axis=2).mean() > 0.05
     # A run that was stopped goes on to the same end.
     (out / "summary.json").unlink()
     before = (out / "response.csv").read_text(encoding="utf-8")

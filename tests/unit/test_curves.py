@@ -11,9 +11,9 @@ import blockvis
 import solver
 from blockvis import draw_curve
 from blockvis.kinds.kinds import KINDS
-from blockvis.pictures import curves, palette
+from blockvis.pictures import palette
 from blockvis.pictures.captions import drops_at_start, parameter_text, state_text
-from blockvis.pictures.curves import CurvePanel, Event, events_of
+from blockvis.pictures.curves import CurvePanel
 
 
 def test_png_has_a_curve_and_the_collapse(tmp_path):
@@ -79,9 +79,6 @@ def test_a_collapse_is_counted_once(tmp_path):
     told = said(replace(response, increments=increments), tmp_path / "curve.svg")
     assert "4 moving parts, 5 hinges" in told
     assert not any("no hinges" in line for line in told)
-    # Without a collapse it is a change like any other.
-    ends = replace(response, increments=(*response.path[:-1], still), collapse=None)
-    assert events_of(ends)[-1].text == "no hinges"
 
 
 def test_ticks_are_plain_numbers(tmp_path):
@@ -91,15 +88,25 @@ def test_ticks_are_plain_numbers(tmp_path):
     assert not [line for line in told if re.search(r"\de[+−-]?\d|10\^|×|mathdefault", line)], told
 
 
-def test_where_many_joints_change_the_curve_stays_free_of_circles(tmp_path, monkeypatch):
-    response = parted(wall(4, 3), 30, 0)
-    events = [Event(i.parameter, i.measured, "1 hinge") for i in response.path]
-    monkeypatch.setattr(curves, "events_of", lambda _: events)
-    assert "30 times hinges or sliding joints change" in said(response, tmp_path / "curve.svg")
+def test_a_curve_of_many_increments_is_a_line_without_dots(tmp_path):
+    """Dots stand at few increments; no list of hinges over the plot, however often they change."""
+    few, many = (parted(wall(4, 3), n, 0) for n in (10, 60))
+    blue, path = palette.hexadecimal(palette.FORCE), tmp_path / "curve.svg"
+    uses = [draw_curve(response, path).read_text(encoding="utf-8").count(blue) for response in (few, many)]
+    assert uses[0] >= 10
+    assert uses[1] <= 4
+    assert not any("hinge" in line for line in said(few, tmp_path / "few.svg"))
 
 
-def test_hinges_of_the_arch_stay_the_same_on_its_path():
-    assert events_of(arch_response()) == []
+def test_a_single_limit_load_has_numbers_on_both_axes(tmp_path):
+    assembly = solver.Assembly.from_outlines(
+        [[(-2, -1), (2, -1), (2, 0), (-2, 0)], [(-0.25, 0), (0.25, 0), (0.25, 1), (-0.25, 1)]],
+        roles=["fixed", "free"],
+    )
+    limit = solver.Structure(assembly, friction_coefficient=0.8).limit_load(acceleration=(1, 0))
+    told = said(limit.response, tmp_path / "curve.svg")
+    assert "displacement of the fastest block, first order [m]" in told
+    assert sum(bool(re.fullmatch(r"0\.\d+", line)) for line in told) >= 6
 
 
 def test_a_reaction_that_leaves_that_at_rest_at_once_has_no_line_from_there(tmp_path):
