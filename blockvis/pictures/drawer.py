@@ -216,7 +216,10 @@ class Drawer:
         from .solid_scene import SolidScene
 
         opacity = 1.0 if self.look.forces == "none" else GLASS
-        return SolidScene(self.assembly, self._view, frame, self.sheet.inside_size, self.fill, opacity=opacity)
+        solid = SolidScene(self.assembly, self._view, frame, self.sheet.inside_size, self.fill, opacity=opacity)
+        if self.fall is not None:
+            solid.show_ground(self.fall.ground)
+        return solid
 
     def _projected(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) array [m]: places in the picture of points (n, d) [m]."""
