@@ -2,7 +2,7 @@
 
 from .analysis.increments import Increments
 from .analysis.pushover import pushover_increments
-from .analysis.settlement import check_settlement, settlement_increments
+from .analysis.settlement import check_settlement, model_of, settlement_increments
 from .assembly import FIXED, FREE, MOVING, ROLES, find_contacts, measure_contacts
 from .equilibrium import block_forces
 from .geometry.contacts import Contacts
@@ -13,7 +13,8 @@ from .geometry.polyhedra import Polyhedra
 from .geometry.shapes import Shapes
 from .kinematics import carried, carried_between, motion_size, moved_vertices, point_velocities, swung, turned
 from .path.controls import INCREMENTS, Ending
-from .path.state import PathState
+from .path.state import PathState, Place
+from .path.stepping import NotSolved, Stepper
 from .results.certificate import worst_of
 from .results.increment import ContactState, State, StoredState
 from .results.mechanism import Mechanism, mechanism_of, rigid_parts, with_motion
@@ -46,12 +47,15 @@ __all__ = [
     "Ending",
     "Increments",
     "Mechanism",
+    "NotSolved",
     "PathState",
+    "Place",
     "Polygons",
     "Polyhedra",
     "Quantity",
     "Shapes",
     "State",
+    "Stepper",
     "StoredState",
     "block_forces",
     "carried",
@@ -62,6 +66,7 @@ __all__ = [
     "find_contacts",
     "measure_contacts",
     "mechanism_of",
+    "model_of",
     "motion_size",
     "moved_vertices",
     "overlap_depths",

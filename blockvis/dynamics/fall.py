@@ -17,6 +17,8 @@ from blockvis.layout.triangulation import cells_of_ring
 from blockvis.system.extras import is_installed
 from solver import mechanics
 
+from .in_space import Engine, ground_below
+
 if TYPE_CHECKING:
     import pymunk
 
@@ -63,8 +65,8 @@ class Fall:
     ----------
     times : (n,) array [s]
         Since the last equilibrium.
-    positions : (n, n_blocks, 2) array [m]
-    rotations : (n, n_blocks) array [rad]
+    positions : (n, n_blocks, d) array [m]
+    rotations : (n, n_blocks) array, in space (n, n_blocks, 3) [rad]
     ground : float [m]
         Height of the ground line.
     """
@@ -80,7 +82,8 @@ class Fall:
 
     def pose(self, number: int) -> solver.Pose:
         """Return one of the poses."""
-        return solver.Pose(self.positions[number], self.rotations[number][:, None])
+        turns = self.rotations[number]
+        return solver.Pose(self.positions[number], turns.reshape(len(turns), -1))
 
     def at(self, time: float) -> solver.Pose:
         """Return the pose at a time [s], in between those kept."""
@@ -88,8 +91,8 @@ class Fall:
         if len(self) == 1 or time >= self.times[-1]:
             return self.pose(len(self) - 1)
         t = (time - self.times[k]) / (self.times[k + 1] - self.times[k])
-        places, turns = ((1.0 - t) * of[k] + t * of[k + 1] for of in (self.positions, self.rotations))
-        return solver.Pose(places, turns[:, None])
+        before = self.pose(k)
+        return mechanics.swung(before, t * before.movement_to(self.pose(k + 1)))
 
 
 def engine_installed() -> bool:
@@ -109,23 +112,45 @@ def fall_of(response: solver.Response, progress: Callable[[float], None] | None 
     Returns
     -------
     Fall or None
-        None where nothing collapses along a path (limit loads, "limit reached"), where nothing falls, in space, which
-        the engine does not know, and without the engine.
+        None where nothing collapses along a path (limit loads, "limit reached"), where nothing falls, and in the plane
+        without the engine.
     """
     path, collapse = response.path, response.collapse
     collapsed = response.stop == solver.Status.COLLAPSED and response.parameter.is_path and not response.limits
-    if not collapsed or collapse is None or not path or not collapse.mechanism.any() or not engine_installed():
+    if not collapsed or collapse is None or not path or not collapse.mechanism.any():
         return None
-    if response.assembly.dimension == 3:
+    in_space = response.assembly.dimension == 3
+    if not in_space and not engine_installed():
         return None
     push = PUSH * np.sqrt(solver.GRAVITY * response.assembly.block_size)
     for _ in range(DOUBLINGS + 1):
-        fall = _Engine(response, push).run(progress)
-        moved = np.hypot(*(fall.positions[-1] - fall.positions[0]).T)
+        fall = _in_space(response, push, progress) if in_space else _Engine(response, push).run(progress)
+        moved = np.linalg.norm(fall.positions[-1] - fall.positions[0], axis=1)
         if moved.max() > FALLEN * response.assembly.block_size:
             return fall
         push *= 2.0
     return None
+
+
+def _in_space(response: solver.Response, push: float, progress: Callable[[float], None] | None) -> Fall:
+    """Follow blocks in space until all rest or the time is over."""
+    assert response.collapse is not None
+    assembly, last = response.assembly, response.path[-1]
+    ground = ground_below(assembly, last.pose)
+    engine = Engine(response, ground, push * response.collapse.mechanism)
+    poses, calm, still = [engine.pose], 0, STILL * float(np.sqrt(solver.GRAVITY * assembly.block_size))
+    for number in range(1, round(LONGEST * RATE) + 1):
+        engine.advance(1.0 / RATE)
+        poses.append(engine.pose)
+        if progress is not None:
+            progress(number / RATE)
+        calm = calm + 1 if engine.fastest < still else 0
+        if calm >= RESTING * RATE:
+            break
+    times = np.arange(len(poses)) / RATE
+    return Fall(
+        times, np.stack([pose.positions for pose in poses]), np.stack([pose.rotations for pose in poses]), ground
+    )
 
 
 def falling_increment(response: solver.Response, pose: solver.Pose) -> solver.Increment:

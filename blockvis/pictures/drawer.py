@@ -275,6 +275,10 @@ class Drawer:
             )
             for view, seen in zip(self._views, frames, strict=True)
         ]
+        for solid in scenes:
+            # From below it would hide everything.
+            if self.fall is not None and solid.view.axes[2, 2] > 0.0:
+                solid.show_ground(self.fall.ground)
         if not several:
             return scenes[0]
         from .paired_scenes import PairedScenes

@@ -18,6 +18,8 @@ SLIDING = (126, 55, 178)
 FORCE = (20, 92, 168)
 HINGE = (17, 17, 17)
 SETTLEMENT = (0, 121, 107)
+#: The ground of a fall in space, and shadows on it.
+GROUND, SHADOW = (238, 236, 231), (214, 210, 202)
 #: Of supports that move, where their motion is not hatched.
 MOVING = (127, 187, 180)
 LIVE = (190, 24, 118)

@@ -47,6 +47,9 @@ SAME_DEPTH = 0.005
 #: Layers by how far in front of what lies at the same place they are drawn; what is in front of all hides nothing.
 IN_FRONT_OF_ALL = 1_000_000.0
 
+#: Radius of the ground of a fall, in extents of the structure.
+GROUND = 1.6
+
 #: The arrows of a mechanism are longer than the way it is drawn by, to be seen on the blocks.
 LONGER = 1.6
 
@@ -130,6 +133,7 @@ class SolidScene:
         #: (n, 2) int array: vertices at both ends of the edges that are drawn.
         self.edges = sharp_edges(assembly.polyhedra)
         self._edges = pv.PolyData(np.array(assembly.vertices), lines=_line_cells(self.edges))
+        self._shadow: tuple[pv.PolyData, float] | None = None
         width = float(np.clip(assembly.block_size / self.pixel / 40.0, 0.6, size[1] / 700.0))
         self._add("edges", self._edges, palette.OUTLINE, width=width, forward=1.0)
 
@@ -145,6 +149,12 @@ class SolidScene:
         corners = mechanics.moved_vertices(self.assembly, shown)
         self._surface.points = corners
         self._edges.points = corners
+        if self._shadow is not None:
+            mesh, height = self._shadow
+            # Supports that reach below the ground throw theirs into it.
+            flat = np.array(corners)
+            flat[:, 2] = np.minimum(corners[:, 2], height)
+            mesh.points = flat
         if block_fill is not None:
             self._fill = block_fill
             self._surface.cell_data["colour"] = block_fill[self._block]
@@ -156,6 +166,30 @@ class SolidScene:
             edges = [np.stack([face, np.roll(face, -1, axis=0)], axis=1) for face in faces]
             ends = np.concatenate([np.zeros((0, 2, 3)), *edges])
             self.lines("section edge", ends, palette.INK, max(2.0 * self._thin, 1.2), forward=2.0)
+
+    def show_ground(self, height: float) -> None:
+        """Draw the ground of a fall, with the shadows of the blocks under a light from above.
+
+        Parameters
+        ----------
+        height : float [m]
+        """
+        corners = np.array(self.assembly.vertices)
+        middle, size = corners.mean(axis=0), float(np.ptp(corners, axis=0).max())
+        plane = pv.Disc(
+            center=(middle[0], middle[1], height), inner=0.0, outer=GROUND * size, normal=(0, 0, 1), c_res=96
+        )
+        shadow = self._surface.copy()
+        shadow.clear_data()
+        shadow.points = corners * (1.0, 1.0, 0.0) + (0.0, 0.0, height)
+        self._shadow = shadow, height
+        for mesh, colour, forward in ((plane, palette.GROUND, -2.0), (shadow, palette.SHADOW, -1.0)):
+            actor = self._plotter.add_mesh(
+                mesh, color=palette.hexadecimal(colour), lighting=False, reset_camera=False, render=False
+            )
+            mapper = actor.GetMapper()
+            mapper.SetResolveCoincidentTopologyToPolygonOffset()
+            mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, -forward * 10.0)
 
     def lines(
         self,

@@ -120,9 +120,9 @@ def stored_fall(folder: Path) -> Fall | None:
         return None
     try:
         fall = from_flat(checked_arrays(file), Fall)
-        n, blocks = fall.rotations.shape
+        n, blocks, *turns = fall.rotations.shape
         shapes = (fall.times.shape, fall.positions.shape)
-        if n == 0 or shapes != ((n,), (n, blocks, 2)) or not np.isfinite(fall.positions).all():
+        if n == 0 or shapes != ((n,), (n, blocks, 3 if turns else 2)) or not np.isfinite(fall.positions).all():
             raise ValueError(f"positions have the shape {fall.positions.shape}, rotations {fall.rotations.shape}")
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"'{file}' cannot be read ({error}); remove it and draw again") from None

@@ -1,0 +1,93 @@
+"""The fall in space: energy only falls, nothing ends in another block or in the air, and all comes to rest."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import blockvis
+import solver
+from blockvis.dynamics.fall import fall_of
+from blockvis.dynamics.in_space import Engine, ground_below
+from solver import mechanics
+
+
+def box(low, high):
+    corners = [[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)]
+    return corners, [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+
+
+@cache
+def leaning():
+    """A brick on a support that goes away sideways until the brick falls off, and a brick on the fixed support."""
+    solids = [
+        box((0, 0, 0), (1, 1, 1)),
+        box((1, 0, 0), (2, 1, 1)),
+        box((0.2, 0, 1), (1.2, 1, 1.6)),
+        box((0.1, 0.1, 1.6), (0.9, 0.9, 2.2)),
+    ]
+    assembly = solver.Assembly.from_solids(solids, roles=["fixed", "moving", "free", "free"])
+    structure = solver.Structure(assembly, friction_coefficient=0.5)
+    return structure.settle(solver.Settlement((0, 0, -1), increment=0.1, limit=0.1))
+
+
+def engine_of(velocity, shift=(0.0, 0.0, 0.0)):
+    response = leaning()
+    last = response.path[-1]
+    pose = solver.Pose(last.pose.positions.copy(), last.pose.rotations.copy())
+    pose.positions[3] += shift
+    lifted = replace(response, increments=(*response.increments[:-1], last.with_arrays(pose=pose)))
+    motion = np.zeros((4, 6))
+    motion[3] = velocity
+    return Engine(lifted, ground_below(response.assembly, pose) - 1.0, motion)
+
+
+def test_a_block_in_the_air_falls_as_free_bodies_do():
+    engine = engine_of((0.0, 2.0, 0.0, 0.0, 0.0, 0.0), shift=(0.0, 0.5, 0.5))
+    start = engine.pose.positions[3].copy()
+    for _ in range(5):
+        engine.advance(0.04)
+    fell = engine.pose.positions[3] - start
+    # Implicit steps of h fall by g h t / 2 more.
+    assert fell[1] == pytest.approx(0.4, rel=1e-6)
+    assert fell[2] == pytest.approx(-solver.GRAVITY * 0.2**2 / 2.0, rel=0.06)
+    assert fell[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_energy_only_falls_and_all_comes_to_rest_without_overlap():
+    engine = engine_of((1.0, 3.0, 0.5, 0.0, 2.0, 1.0))
+    energies = [engine.energy]
+    for _ in range(80):
+        engine.advance(0.04)
+        energies.append(engine.energy)
+        if engine.fastest < 1e-3:
+            break
+    # Rotations are of second order within a step: what they add is below a hundred-thousandth.
+    assert (np.diff(energies) <= 1e-5 * abs(energies[0])).all()
+    assert engine.fastest < 1e-3
+    corners = mechanics.moved_vertices(engine.assembly, engine.place.pose)
+    deep = engine.assembly.polyhedra.overlaps(corners, 0.0)[2]
+    assert deep.max(initial=0.0) < 1e-3 * engine.assembly.block_size
+    thrown = corners[engine.assembly.block_of_vertex == 3]
+    assert thrown[:, 2].min() == pytest.approx(
+        float(corners[engine.assembly.block_of_vertex == 4][:, 2].max()), abs=1e-3
+    )
+
+
+@pytest.mark.slow
+def test_a_corner_of_walls_falls_and_its_fall_is_stored(tmp_path):
+    case = "examples/corner_of_walls.toml"
+    root = blockvis.__file__.rpartition("blockvis")[0]
+    run = blockvis.run_case(blockvis.read_case(f"{root}{case}", changes=["output.animation=false"]), tmp_path / "out")
+    fall = fall_of(run.response)
+    assert fall is not None
+    assembly = run.response.assembly
+    end = mechanics.moved_vertices(assembly, fall.pose(len(fall) - 1))
+    lowest = np.array([end[assembly.block_of_vertex == block][:, 2].min() for block in range(assembly.n_blocks)])
+    fallen = np.linalg.norm(fall.positions[-1] - fall.positions[0], axis=1) > assembly.block_size
+    assert fallen.any()
+    assert (lowest[assembly.free] > fall.ground - 1e-3 * assembly.block_size).all()
+    assert assembly.polyhedra.overlaps(end, 0.0)[2].max(initial=0.0) < 1e-3 * assembly.block_size
+    lines = (tmp_path / "out" / "fall.pvd").read_text(encoding="utf-8")
+    assert lines.count("<DataSet") == len(fall)
