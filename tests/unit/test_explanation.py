@@ -129,6 +129,11 @@ def test_a_structure_on_one_block_has_nothing_that_can_move_against_another():
         candidates(free)
 
 
+def flat(openings):
+    """Openings at the corners of all faces, of those at both ends of each joint."""
+    return openings.reshape(len(openings), -1)
+
+
 def comparison(rows):
     return Comparison(ARCH, read_observations(rows, ARCH), TRUST)
 
@@ -138,7 +143,7 @@ def test_a_width_that_fits_is_likelier_than_one_that_does_not():
     joint = int(compared.chance[0].argmax())
     openings = np.zeros((3, len(compared.joints.block_a), 2))
     openings[:, joint, 1] = [0.0, 0.004, 0.006]
-    found = compared.log_likelihood(compared.widths(openings), np.zeros((3, 0, 2)))
+    found = compared.log_likelihood(compared.widths(flat(openings)), np.zeros((3, 0, 2)))
     assert found[1] > found[2] > found[0]
     # No observation weighs more than its chance of having another cause.
     assert found[1] - found[0] < np.log(1.0 / TRUST.outliers) + 3.0
@@ -159,11 +164,11 @@ def test_a_crack_in_the_next_joint_counts_where_only_its_place_is_known():
     openings[0, own], openings[1, other] = 0.004, 0.004
     beside = []
     for compared in (placed, named):
-        found = compared.log_likelihood(compared.widths(openings), np.zeros((3, 0, 2)))
+        found = compared.log_likelihood(compared.widths(flat(openings)), np.zeros((3, 0, 2)))
         assert found[0] > found[2] + 2.0
         beside.append(found[1] - found[2])
     assert beside[0] > max(1.5, beside[1] + 0.5)
-    pairs = placed.likeliest(placed.widths(openings))[:2, 0]
+    pairs = placed.likeliest(placed.widths(flat(openings)))[:2, 0]
     assert placed.joint[pairs].tolist() == [own, other]
 
 
@@ -175,7 +180,7 @@ def test_on_which_side_a_joint_gapes_counts_where_it_was_measured():
     lower = int(np.argmin(compared.joints.ends[joint, :, 1]))
     openings = np.zeros((2, len(compared.joints.block_a), 2))
     openings[0, joint, lower] = openings[1, joint, 1 - lower] = 0.004
-    found = compared.log_likelihood(compared.widths(openings), np.zeros((2, 0, 2)))
+    found = compared.log_likelihood(compared.widths(flat(openings)), np.zeros((2, 0, 2)))
     assert found[0] > found[1] + 3.0
 
 
@@ -198,7 +203,7 @@ def test_a_wide_crack_is_not_seen_in_every_joint_beside_it():
     amounts = np.linspace(0.5, 1.5, 101)
     openings = np.zeros((len(amounts), len(compared.joints.block_a), 2))
     openings[:, compared.own[2]] = 0.006 * amounts[:, None]
-    found = compared.log_likelihood(compared.widths(openings), np.zeros((len(amounts), 0, 2)))
+    found = compared.log_likelihood(compared.widths(flat(openings)), np.zeros((len(amounts), 0, 2)))
     assert amounts[found.argmax()] == pytest.approx(1.0, abs=0.011)
 
 
