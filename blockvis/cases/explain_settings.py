@@ -91,7 +91,7 @@ EXPLAIN = Section(
         Key("directions", ValueKind("list of texts", {"type": "array", "items": {"enum": list(DIRECTIONS)}},
             _directions),
             "Ways in which they may have moved", ["down", "rotation"],
-            otherwise="down, left, right and rotation; in space outward, front and back, too, or, of more than six "
+            otherwise="down, left, right and rotation; in space outward, front and back, too, or, of more than four "
             "supports, down and outward"),
         Key("trough", TRUE_OR_FALSE, "Whether troughs and slopes of the ground are candidates", True,
             otherwise="where the structure stands on three places or more"),

@@ -21,14 +21,17 @@ WAYS = {"down": (-1, -1.0), "up": (-1, 1.0), "left": (0, -1.0), "right": (0, 1.0
 #: Level directions to and from the middle between the supports, in space: each support has its own.
 RADIAL = {"outward": 1.0, "inward": -1.0}
 
-#: In which ways supports may have moved where the case does not say: in the plane, in space, and in space where they
-#: are so many that each way costs much time, as under a dome.
+#: In which ways supports may have moved where the case does not say: in the plane, in space, and where these are many,
+#: as under a dome.
 IN_PLANE = ("down", "left", "right", "rotation")
 IN_SPACE = ("down", "outward", "left", "right", "front", "back", "rotation")
 OF_MANY = ("down", "outward")
 
 #: More supports than this in the drawing are a ground of several stones, not footings of their own.
 MOST_SUPPORTS = 6
+
+#: Supports in space that are looked at in all ways, as those of a cross vault: of more the ways cost much time.
+FEW_IN_SPACE = 4
 
 #: Ground on which at least so many blocks stand can form a trough.
 FEWEST_FEET = 3
@@ -225,7 +228,7 @@ def candidates_of(ground: Ground, settings: ExplainSettings, source: Path) -> li
 
 def _directions(ground: Ground, settings: ExplainSettings, source: Path) -> tuple[str, ...]:
     """List the ways in which supports may have moved."""
-    d, few = ground.assembly.dimension, len(ground.pieces) <= MOST_SUPPORTS
+    d, few = ground.assembly.dimension, len(ground.pieces) <= FEW_IN_SPACE
     found = settings.directions or (IN_PLANE if d == 2 else IN_SPACE if few else OF_MANY)
     strange = [direction for direction in found if direction in ("front", "back", *RADIAL)]
     if d == 2 and strange:
@@ -360,7 +363,10 @@ def refined(ground: Ground, best: Sequence[Candidate], known: Sequence[Candidate
     """
     found: list[Candidate] = []
     troughs = [one for one in known if one.is_trough]
-    names = [*WAYS][:4] if ground.assembly.dimension == 2 else [*WAYS, "outward"]
+    names = [*WAYS][:4]
+    if ground.assembly.dimension == 3:
+        # Each way costs runs: those that the case leaves out are left out between two, as well.
+        names = [way for way in (*WAYS, "outward") if any(way in one.ways for one in known)]
     for one in best:
         if one.is_trough:
             others = sorted({other.centre for other in troughs})
