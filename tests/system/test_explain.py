@@ -266,6 +266,22 @@ def test_what_is_of_the_plane_is_refused_in_space(folder, tmp_path, capsys):
 
 
 @pytest.mark.slow
+def test_the_springer_of_a_vault_that_has_sunk_comes_first(tmp_path, capsys):
+    examples = Path(__file__).parents[2] / "examples" / "explain"
+    command = ["explain", str(examples / "vault.toml"), "--observed", str(examples / "vault_cracks.csv")]
+    assert cli.main([*command, "-o", str(tmp_path / "out")]) == 0
+    assert capsys.readouterr().out.splitlines()[1].startswith("Springer 1 moves down by")
+    found = json.loads((tmp_path / "out" / "explain.json").read_text(encoding="utf-8"))
+    best = found["causes"][0]
+    assert best["amount_low"] < 0.02 < best["amount_high"]
+    assert {"x", "y", "z"} <= set(found["observations"]["widths"][0])
+    with Image.open(tmp_path / "out" / "explain.png") as picture:
+        pixels = np.asarray(picture.convert("RGB")).astype(int)
+    orange = np.abs(pixels - [226, 78, 27]).sum(axis=2) < 60
+    assert all(third.sum() > 100 for third in np.array_split(orange, 3, axis=1))
+
+
+@pytest.mark.slow
 def test_how_a_support_was_seen_to_move_is_what_has_happened(folder):
     rows = [{"block": "right springer", "dx [mm]": 0.0, "dy [mm]": -9.0}]
     found = blockvis.explain(folder / "arch.toml", rows)

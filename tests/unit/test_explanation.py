@@ -25,6 +25,7 @@ from blockvis.explanation.forward import AS_FAR, ENOUGH, FARTHEST, LEANING, Vari
 from blockvis.explanation.likelihood import Comparison, Trust
 from blockvis.explanation.observations import read_observations
 from blockvis.explanation.ranking import ranked
+from blockvis.results.joints import initial_joints
 from solver import mechanics
 
 CASE = structures.Path("case.toml")
@@ -77,6 +78,65 @@ def test_a_support_turns_about_the_middle_of_where_it_carries():
     arms = here - ARCH.centroids[block]
     speeds = np.array([dx, dy]) + angle * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
     np.testing.assert_allclose(speeds.mean(axis=0), 0.0, atol=1e-9)
+
+
+VAULT = generators.cross_vault(span=4.0, rise=1.5, thickness=0.3, voussoirs=5, stone=1.4)
+
+
+def test_supports_in_space_sink_spread_and_tilt_and_are_said_where_they_go():
+    ground, found = candidates(VAULT)
+    causes = {one.cause: one for one in found}
+    assert len(causes) == len(found) == 4 * (2 + 4 + 4) + 1
+    level = 0.5**0.5
+    assert causes["springer 1 moves down"].motions == {"springer 1": (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)}
+    assert causes["springer 1 moves to the back"].motions["springer 1"][:3] == (0.0, 1.0, 0.0)
+    np.testing.assert_allclose(causes["springer 3 moves outward"].motions["springer 3"][:3], [-level, -level, 0.0])
+    assert set(causes["all supports move outward"].motions) == {f"springer {k}" for k in range(1, 5)}
+    tilted = causes["springer 1 tilts to the right"]
+    assert tilted.motions["springer 1"][3:] == (0.0, 1.0, 0.0)
+    assert per_amount(ground.assembly, tilted)[1] == "rad"
+    # It turns about where it carries, which is above its centroid.
+    assert tilted.motions["springer 1"][0] < 0.0
+    nearer = refined(ground, [causes["springer 1 moves down"]], found)
+    assert "springer 1 moves down and to the front" in {one.cause for one in nearer}
+
+
+def test_many_supports_in_space_sink_or_move_outward():
+    _, found = candidates(generators.dome(lunes=6, courses=1))
+    assert len(found) == 2 * 6 + 1
+
+
+def test_words_of_space_are_refused_in_the_plane_and_troughs_in_space():
+    with pytest.raises(ValueError, match=r"\[explain\] directions: 'front' is of structures in space"):
+        candidates(ARCH, directions=("front",))
+    with pytest.raises(ValueError, match=r"\[explain\] centres is of structures in the plane"):
+        candidates(VAULT, centres=(1.0,))
+
+
+def test_a_width_at_a_place_in_space_is_that_of_the_two_faces_there():
+    joints = initial_joints(VAULT)
+    joint = int(np.argmax(joints.sizes))
+    names = [VAULT.names[k] for k in (joints.block_a[joint], joints.block_b[joint])]
+    ring = joints.rings.points[joints.rings.offsets[joint] : joints.rings.offsets[joint + 1]]
+    place = 0.7 * ring[0] + 0.3 * ring.mean(axis=0)
+    row = {"joint": " | ".join(names), **dict(zip("xyz", place, strict=True)), "width [mm]": 3.0}
+    compared = Comparison(VAULT, read_observations([row], VAULT), TRUST)
+    np.testing.assert_allclose(compared.observations.places[0], place, atol=1e-12)
+    # A gap that grows evenly along x, y and z has at the place what it has there.
+    gaps = (joints.rings.points - joints.rings.points.min(axis=0)) @ [1e-3, 2e-3, 3e-3]
+    there = (place - joints.rings.points.min(axis=0)) @ [1e-3, 2e-3, 3e-3]
+    pair = int(np.flatnonzero(compared.joint == joint)[0])
+    assert compared.widths(gaps[None])[0, pair] == pytest.approx(there)
+
+
+def test_a_point_in_space_turns_with_its_block():
+    row = {"block": "keystone", "x": 0.5, "y": 0.0, "z": 1.6, "dx": 0.0, "dy": 0.0, "dz": -0.01}
+    compared = Comparison(VAULT, read_observations([row], VAULT), TRUST)
+    block = VAULT.index("keystone")
+    moved = np.zeros((1, VAULT.n_blocks, 6))
+    moved[0, block] = [0.0, 0.0, -0.01, 0.0, 0.0, np.pi / 2.0]
+    x, y = np.array([0.5, 0.0]) - VAULT.centroids[block, :2]
+    np.testing.assert_allclose(compared.displacements(moved)[0, 0], [-y - x, x - y, -0.01], atol=1e-12)
 
 
 def test_supports_that_move_together_open_nothing():
