@@ -25,7 +25,6 @@ from blockvis.explanation.forward import AS_FAR, ENOUGH, FARTHEST, LEANING, Vari
 from blockvis.explanation.likelihood import Comparison, Trust
 from blockvis.explanation.observations import read_observations
 from blockvis.explanation.ranking import ranked
-from blockvis.results.joints import initial_joints
 from solver import mechanics
 
 CASE = structures.Path("case.toml")
@@ -114,7 +113,9 @@ def test_words_of_space_are_refused_in_the_plane_and_troughs_in_space():
 
 
 def test_a_width_at_a_place_in_space_is_that_of_the_two_faces_there():
-    joints = initial_joints(VAULT)
+    joints = Comparison(
+        VAULT, read_observations([{"joint": "groin 1-1 | groin 1-2", "width": 1e-3}], VAULT), TRUST
+    ).joints
     joint = int(np.argmax(joints.sizes))
     names = [VAULT.names[k] for k in (joints.block_a[joint], joints.block_b[joint])]
     ring = joints.rings.points[joints.rings.offsets[joint] : joints.rings.offsets[joint + 1]]
