@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .assembly import Assembly
-from .kinematics import Pose, composed_rotations, cross_rows, rotation_count, turned
+from .kinematics import Pose, composed_rotations, cross_rows, dimension_of, moved, rotation_count, turned
 
 #: Acceleration of gravity [m/s²], as structural codes round it.
 GRAVITY = 9.81
@@ -77,7 +77,7 @@ class Settlement:
         In space, the axis about which the supports turn, counter-clockwise seen from its tip.
     radial_from : (2,) sequence [m], optional
         In space, instead of a direction: x and y of a vertical axis from which each support moves away, level.
-    profile : mapping of str to (float, float, float), optional [m, m, rad]
+    profile : mapping of str to (n_dof,) sequence, optional [m and rad]
         Instead of one motion for all: how each support, by its name, moves and turns about its own centroid. Only the
         proportions count: s is the largest displacement of a centroid, or the largest angle where none moves.
 
@@ -150,12 +150,13 @@ class Settlement:
             )
         motions = {name: np.asarray(motion, dtype=float) for name, motion in (self.profile or {}).items()}
         for name, motion in motions.items():
-            if motion.shape != (3,) or not np.isfinite(motion).all():
-                raise ValueError(f"settlement profile of '{name}' is {motion.tolist()}; give [dx, dy, rotation]")
-        table = np.array(list(motions.values())).reshape(-1, 3)
-        largest = float(np.hypot(table[:, 0], table[:, 1]).max(initial=0.0)) or float(
-            np.abs(table[:, 2]).max(initial=0)
-        )
+            if motion.shape not in ((3,), (6,)) or not np.isfinite(motion).all():
+                wanted = "[dx, dy, rotation], in space [dx, dy, dz, rx, ry, rz]"
+                raise ValueError(f"settlement profile of '{name}' is {motion.tolist()}; give {wanted}")
+        table = np.abs(list(motions.values())).reshape(len(motions), -1 if motions else 3)
+        d = dimension_of(table.shape[1])
+        travel, turn = (np.hypot.reduce(part, axis=1) for part in (table[:, :d], table[:, d:]))
+        largest = float(travel.max(initial=0.0)) or float(turn.max(initial=0.0))
         if largest == 0.0:
             raise ValueError("the settlement profile moves no support; give one of them a displacement or a rotation")
         # What is scaled already, as when it is read from a summary, keeps its last digits.
@@ -183,14 +184,14 @@ class Settlement:
     def unit(self) -> str:
         """Unit of the parameter s: "m", or "rad" for a pure rotation."""
         if self.profile is not None:
-            return "m" if any(motion[0] or motion[1] for motion in self.profile.values()) else "rad"
+            return "m" if any(any(motion[: self.dimension]) for motion in self.profile.values()) else "rad"
         return "rad" if self.direction is None and self.radial_from is None else "m"
 
     @property
     def dimension(self) -> int:
         """2 in the plane, 3 in space."""
         if self.profile is not None:
-            return 2
+            return dimension_of(len(next(iter(self.profile.values()))))
         given = self.direction if self.direction is not None else self.rotation_centre
         return 3 if given is None else len(given)
 
@@ -211,8 +212,7 @@ class Settlement:
         part = self.taking_part(assembly)
         positions, rotations = start.positions.copy(), start.rotations.copy()
         if self.profile is not None:
-            rate = self.rate(assembly, start, s)
-            return Pose(positions + s * rate[:, :2], rotations + s * rate[:, 2:])
+            return moved(start, s * self.rate(assembly, start, s))
         travel, angle, centre = self._motion(assembly, start, part, s)
         turn = np.broadcast_to(angle, rotations[part].shape)
         positions[part] = centre + travel + turned(start.positions[part] - centre, turn)

@@ -9,7 +9,7 @@ from .key import FRACTION, NOT_NEGATIVE, NUMBERS, PAIR, POSITIVE, TEXTS, TRUE_OR
 from .toml_table import Table, shortened
 
 #: Directions in which a support may have moved, as the case file names them.
-DIRECTIONS = ("down", "up", "left", "right", "rotation")
+DIRECTIONS = ("down", "up", "left", "right", "rotation", "front", "back", "outward", "inward")
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class ExplainSettings:
     supports : tuple of tuples of str
         Supports, or groups of them that move as one; each support of the drawing by default.
     directions : tuple of str
-        Of :data:`DIRECTIONS`.
+        Of :data:`DIRECTIONS`; where empty, those that are usual in the plane or in space.
     trough : bool, optional
         Whether troughs of the ground are candidates; by default where the structure stands on three places or more.
     centres, inflections : tuple of float [m]
@@ -39,7 +39,7 @@ class ExplainSettings:
     """
 
     supports: tuple[tuple[str, ...], ...] = ()
-    directions: tuple[str, ...] = ("down", "left", "right", "rotation")
+    directions: tuple[str, ...] = ()
     trough: bool | None = None
     centres: tuple[float, ...] = ()
     inflections: tuple[float, ...] = ()
@@ -90,7 +90,9 @@ EXPLAIN = Section(
             otherwise="each support of the drawing"),
         Key("directions", ValueKind("list of texts", {"type": "array", "items": {"enum": list(DIRECTIONS)}},
             _directions),
-            "Ways in which they may have moved", ["down", "rotation"], default=_EXPLAIN.directions),
+            "Ways in which they may have moved", ["down", "rotation"],
+            otherwise="down, left, right and rotation; in space outward, front and back, too, or, of more than four "
+            "supports, down and outward"),
         Key("trough", TRUE_OR_FALSE, "Whether troughs and slopes of the ground are candidates", True,
             otherwise="where the structure stands on three places or more"),
         Key("centres", NUMBERS, "Places x at which a trough may be deepest", [1.0, 2.0], "m",

@@ -3,23 +3,35 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 import solver
-from blockvis.cases.explain_settings import ExplainSettings
+from blockvis.cases.explain_settings import DIRECTIONS, ExplainSettings
 from blockvis.cases.profiles import Profile, cut_ground
 from blockvis.text import nearest
 from solver import mechanics
 
-#: Unit vectors of directions of the case file.
-VECTORS = {"down": (0.0, -1.0), "up": (0.0, 1.0), "left": (-1.0, 0.0), "right": (1.0, 0.0)}
+#: Directions of the case file: their axis, the last one upright, and whether they go along or against it.
+WAYS = {"down": (-1, -1.0), "up": (-1, 1.0), "left": (0, -1.0), "right": (0, 1.0), "front": (1, -1.0), "back": (1, 1.0)}
+
+#: Level directions to and from the middle between the supports, in space: each support has its own.
+RADIAL = {"outward": 1.0, "inward": -1.0}
+
+#: In which ways supports may have moved where the case does not say: in the plane, in space, and where these are many,
+#: as under a dome.
+IN_PLANE = ("down", "left", "right", "rotation")
+IN_SPACE = ("down", "outward", "left", "right", "front", "back", "rotation")
+OF_MANY = ("down", "outward")
 
 #: More supports than this in the drawing are a ground of several stones, not footings of their own.
 MOST_SUPPORTS = 6
+
+#: Supports in space that are looked at in all ways, as those of a cross vault: of more the ways cost much time.
+FEW_IN_SPACE = 4
 
 #: Ground on which at least so many blocks stand can form a trough.
 FEWEST_FEET = 3
@@ -43,6 +55,10 @@ ALIKE = 1e-9
 OBLIQUE = 0.5
 
 
+#: Displacement and rotation of supports by their names, [dx, dy, rotation] or [dx, dy, dz, rx, ry, rz].
+Motions = Mapping[str, tuple[float, ...]]
+
+
 @dataclass(frozen=True)
 class Candidate:
     """A movement of supports, of which one parameter says how far it goes.
@@ -51,7 +67,7 @@ class Candidate:
     ----------
     cause : str
         In words; candidates of one cause differ in parameters that the cause leaves open.
-    motions : mapping of str to (float, float, float)
+    motions : mapping of str to (n_dof,) tuple [m and rad]
         Motion of each support that takes part, as of :class:`solver.Settlement`.
     prior : float
         Weight before anything was observed, relative to other causes; shared by the candidates of the cause.
@@ -61,6 +77,8 @@ class Candidate:
         Of a trough; nan for others.
     refines : str
         The detail of the candidate that this one was added to look at more closely; empty for those of the start.
+    ways : tuple of str
+        Directions in which supports move.
     turns : bool
         Whether supports turn as one body: its amount is the angle.
     bends : bool
@@ -68,12 +86,13 @@ class Candidate:
     """
 
     cause: str
-    motions: Mapping[str, tuple[float, float, float]]
+    motions: Motions
     prior: float = 1.0
     detail: str = ""
     centre: float = float("nan")
     inflection: float = float("nan")
     refines: str = ""
+    ways: tuple[str, ...] = ()
     turns: bool = False
     bends: bool = False
 
@@ -124,7 +143,13 @@ def ground_of(assembly: solver.Assembly, settings: ExplainSettings, source: Path
         raise ValueError(f'{source}: no block is a support; give some the role "fixed" under [roles] or [[supports]]')
     fixed = assembly.with_roles(np.where(assembly.free, mechanics.FREE, mechanics.FIXED))
     whole = {assembly.names[i]: (assembly.names[i],) for i in supports}
-    if settings.trough is False:
+    if assembly.dimension == 3:
+        given = next((key for key in ("trough", "centres", "inflections") if getattr(settings, key)), None)
+        if given is not None:
+            raise ValueError(
+                f"{source}: [explain] {given} is of structures in the plane, this one is in space; leave it out"
+            )
+    if settings.trough is False or assembly.dimension == 3:
         return Ground(fixed, whole, troughs=False)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -184,50 +209,107 @@ def candidates_of(ground: Ground, settings: ExplainSettings, source: Path) -> li
                     f"{source}: [explain] supports: '{name}' is {kind}{nearest(name, names)}; supports are "
                     f"{', '.join(names[:12])}"
                 )
-    groups = settings.supports
-    if not groups and 1 < len(names) <= MOST_SUPPORTS:
-        groups = tuple((name,) for name in names)
-    found = []
-    for group in groups:
+    found: list[Candidate] = []
+    directions = _directions(ground, settings, source)
+    for group in settings.supports or _groups(ground):
         pieces = [piece for name in group for piece in ground.pieces[name]]
         if not _bearing(ground.assembly, pieces):
             continue
-        words = " and ".join(group)
-        move, turn = ("moves", "turns") if len(group) == 1 else ("move", "turn")
-        for direction in settings.directions:
-            if direction in VECTORS:
-                found.append(Candidate(f"{words} {move} {direction}", _translation(pieces, VECTORS[direction])))
-                continue
-            for sense, way in ((1.0, "counter-clockwise"), (-1.0, "clockwise")):
-                motions = rotation_of(ground.assembly, pieces, sense)
-                found.append(Candidate(f"{words} {turn} {way}", motions, turns=True))
+        found += _movements(ground, group, pieces, directions)
     if ground.troughs:
         found += _troughs(ground, settings)
     if not found:
         raise ValueError(
-            f"{source}: there is one support, and nothing else can move; give [[supports]] as they may have moved, or "
-            "[explain] trough = true"
+            f"{source}: there is one support, and nothing else can move; give [[supports]] as they may have moved"
+            + (", or [explain] trough = true" if ground.assembly.dimension == 2 else "")
         )
     return found
 
 
-def _translation(pieces: Sequence[str], vector: tuple[float, float]) -> dict[str, tuple[float, float, float]]:
-    return {piece: (*vector, 0.0) for piece in pieces}
+def _directions(ground: Ground, settings: ExplainSettings, source: Path) -> tuple[str, ...]:
+    """List the ways in which supports may have moved."""
+    d, few = ground.assembly.dimension, len(ground.pieces) <= FEW_IN_SPACE
+    found = settings.directions or (IN_PLANE if d == 2 else IN_SPACE if few else OF_MANY)
+    strange = [direction for direction in found if direction in ("front", "back", *RADIAL)]
+    if d == 2 and strange:
+        raise ValueError(
+            f"{source}: [explain] directions: '{strange[0]}' is of structures in space, this one is in the plane; "
+            f"choose from {', '.join(DIRECTIONS[:5])}"
+        )
+    return found
+
+
+def _groups(ground: Ground) -> tuple[tuple[str, ...], ...]:
+    """List the supports that may have moved: each, and in space all of them, which may spread."""
+    names, d = tuple(ground.pieces), ground.assembly.dimension
+    if len(names) < 2 or (d == 2 and len(names) > MOST_SUPPORTS):
+        return ()
+    return (*((name,) for name in names), *((names,) if d == 3 and len(names) > 2 else ()))
+
+
+def _movements(
+    ground: Ground, group: Sequence[str], pieces: Sequence[str], directions: Sequence[str]
+) -> Iterator[Candidate]:
+    """Move and turn a group of supports as one."""
+    d = ground.assembly.dimension
+    whole = d == 3 and len(group) == len(ground.pieces) > 2
+    words = "all supports" if whole else " and ".join(group)
+    move, turn, tilt = ("moves", "turns", "tilts") if len(group) == 1 else ("move", "turn", "tilt")
+    for direction in directions:
+        if direction != "rotation":
+            # All supports that go the same way open no crack.
+            if (not whole or direction in RADIAL) and (motions := translation(ground, pieces, direction)):
+                yield Candidate(f"{words} {move} {said(direction)}", motions, ways=(direction,))
+        elif d == 2:
+            for sense, way in ((1.0, "counter-clockwise"), (-1.0, "clockwise")):
+                yield Candidate(f"{words} {turn} {way}", rotation_of(ground.assembly, pieces, (sense,)), turns=True)
+        elif not whole:
+            for way in ("left", "right", "front", "back"):
+                # The top goes there: the axis is upright × that way.
+                x, y = unit_vector(way, 3)[:2]
+                motions = rotation_of(ground.assembly, pieces, (-y + 0.0, x, 0.0))
+                yield Candidate(f"{words} {tilt} to the {way}", motions, turns=True)
+
+
+def said(way: str) -> str:
+    """Say a direction as it follows "moves"."""
+    return f"to the {way}" if way in ("front", "back") else way
+
+
+def unit_vector(way: str, d: int) -> tuple[float, ...]:
+    """Turn a direction of :data:`WAYS` into a vector of d numbers."""
+    axis, sign = WAYS[way]
+    return tuple(sign if k == axis % d else 0.0 for k in range(d))
+
+
+def translation(ground: Ground, pieces: Sequence[str], direction: str) -> dict[str, tuple[float, ...]]:
+    """Move supports in a direction of :data:`WAYS` or :data:`RADIAL`; nothing where one of them has none."""
+    assembly = ground.assembly
+    turn = (0.0,) * (1 if assembly.dimension == 2 else 3)
+    if direction in WAYS:
+        return {piece: (*unit_vector(direction, assembly.dimension), *turn) for piece in pieces}
+    supports = assembly.centroids[~assembly.free, :2]
+    away = assembly.centroids[[assembly.index(piece) for piece in pieces], :2]
+    away = away - (supports.min(axis=0) + supports.max(axis=0)) / 2.0
+    far = np.linalg.norm(away, axis=1)
+    if far.min() < 1e-6 * assembly.block_size:
+        return {}
+    rows = (RADIAL[direction] * away / far[:, None]).tolist()
+    return {piece: (*row, 0.0, *turn) for piece, row in zip(pieces, rows, strict=True)}
 
 
 def rotation_of(
-    assembly: solver.Assembly, pieces: Sequence[str], sense: float
-) -> dict[str, tuple[float, float, float]]:
-    """Turn supports as one body about the middle of where they carry something."""
+    assembly: solver.Assembly, pieces: Sequence[str], spin: tuple[float, ...]
+) -> dict[str, tuple[float, ...]]:
+    """Turn supports as one body about the middle of where they carry something, by a rotation (n_rot,)."""
     blocks = [assembly.index(piece) for piece in pieces]
     contacts = _touching(assembly)
     here = np.isin(contacts.block_a, blocks) | np.isin(contacts.block_b, blocks)
     low, high = contacts.points[here].min(axis=0), contacts.points[here].max(axis=0)
-    arms = assembly.centroids[blocks] - (low + high) / 2.0
-    return {
-        assembly.names[i]: (-sense * float(y), sense * float(x), sense)
-        for i, (x, y) in zip(blocks, arms.tolist(), strict=True)
-    }
+    middle = solver.Pose(np.broadcast_to((low + high) / 2.0, (len(blocks), assembly.dimension)), np.zeros(0))
+    rate = np.concatenate([np.zeros_like(middle.positions), np.tile(spin, (len(blocks), 1))], axis=1)
+    speeds = mechanics.point_velocities(assembly.centroids[blocks], np.arange(len(blocks)), middle, rate)
+    return {assembly.names[i]: (*row, *spin) for i, row in zip(blocks, speeds.tolist(), strict=True)}
 
 
 def _troughs(ground: Ground, settings: ExplainSettings) -> list[Candidate]:
@@ -263,7 +345,7 @@ def trough(ground: Ground, centre: float, inflection: float, refines: str = "") 
     return Candidate("a trough of the ground", motions, 1.0, detail, centre, inflection, refines, bends=True)
 
 
-def _by_profile(ground: Ground, profile: Profile) -> dict[str, tuple[float, float, float]]:
+def _by_profile(ground: Ground, profile: Profile) -> Motions:
     blocks = [ground.assembly.index(piece) for pieces in ground.pieces.values() for piece in pieces]
     return profile.motions(ground.assembly, blocks, (0.0, -1.0))
 
@@ -281,6 +363,10 @@ def refined(ground: Ground, best: Sequence[Candidate], known: Sequence[Candidate
     """
     found: list[Candidate] = []
     troughs = [one for one in known if one.is_trough]
+    names = [*WAYS][:4]
+    if ground.assembly.dimension == 3:
+        # Each way costs runs: those that the case leaves out are left out between two, as well.
+        names = [way for way in (*WAYS, "outward") if any(way in one.ways for one in known)]
     for one in best:
         if one.is_trough:
             others = sorted({other.centre for other in troughs})
@@ -290,21 +376,22 @@ def refined(ground: Ground, best: Sequence[Candidate], known: Sequence[Candidate
                     if (centre, inflection) != (one.centre, one.inflection):
                         found.append(trough(ground, float(centre), float(inflection), one.detail))
             continue
-        vectors = {motion for motion in one.motions.values()}
-        if (
-            len(vectors) != 1
-            or (only := next(iter(vectors)))[2] != 0.0
-            or " and " in one.cause.rpartition(" moves ")[2]
-        ):
+        d = ground.assembly.dimension
+        # Of supports that turn, or that go two ways already, there are no others between.
+        if len(one.ways) != 1 or len(set(one.motions.values())) != 1 or one.ways[0] not in names:
             continue
-        head, _, way = one.cause.rpartition(" ")
-        for other, vector in VECTORS.items():
-            across = abs(vector[0] * only[0] + vector[1] * only[1]) < 0.5
-            if across and other != "up" and way in VECTORS:
-                both = (only[0] + vector[0], only[1] + vector[1])
-                words = sorted((way, other), key=list(VECTORS).index)
-                motions = _translation(list(one.motions), both)
-                found.append(Candidate(f"{head} {words[0]} and {words[1]}", motions, OBLIQUE))
+        way = one.ways[0]
+        head = one.cause.removesuffix(f" {said(way)}")
+        for other in names:
+            motions = translation(ground, list(one.motions), other)
+            across = all(abs(np.dot(own[:d], motions[piece][:d])) < 0.5 for piece, own in one.motions.items())
+            # A support goes outward from where it stands: across that there is nothing but down.
+            radial = bool({way, other} & set(RADIAL)) and "down" not in (way, other)
+            if motions and across and other != "up" and not radial:
+                words = sorted((way, other), key=names.index)
+                both = {k: tuple(a + b for a, b in zip(own, motions[k], strict=True)) for k, own in one.motions.items()}
+                cause = f"{head} {said(words[0])} and {said(words[1])}"
+                found.append(Candidate(cause, both, OBLIQUE, ways=tuple(words)))
     taken = {one.cause + one.detail for one in known}
     return [
         one
@@ -323,7 +410,7 @@ class Twin:
         Number of the candidate whose run it shares.
     scale : float
         Amount of this one per amount of the other.
-    travel : (2,) array
+    travel : (d,) array
         Translation of everything, per amount of this one.
     """
 
@@ -347,17 +434,16 @@ def twins_of(assembly: solver.Assembly, candidates: Sequence[Candidate]) -> list
     """
     supports = np.flatnonzero(~assembly.free)
     bearing = _bearing(assembly, [assembly.names[i] for i in supports])
-    size = float(np.ptp(assembly.vertices, axis=0).max())
+    size, d = float(np.ptp(assembly.vertices, axis=0).max()), assembly.dimension
     shapes: list[tuple[np.ndarray, float, np.ndarray]] = []
     found: list[Twin] = []
     for number, one in enumerate(candidates):
-        full = scaled_motions(one)
-        motion = np.array([full.get(assembly.names[i], (0.0, 0.0, 0.0)) for i in bearing])
-        mean = motion[:, :2].mean(axis=0)
-        relative = np.concatenate([(motion[:, :2] - mean).ravel(), size * motion[:, 2]])
+        motion = _table(assembly, bearing, scaled_motions(one))
+        mean = motion[:, :d].mean(axis=0)
+        relative = np.concatenate([(motion[:, :d] - mean).ravel(), size * motion[:, d:].ravel()])
         length = float(np.linalg.norm(relative))
         shape = relative / length if length > 1e-9 else relative
-        twin = Twin(number, 1.0, np.zeros(2))
+        twin = Twin(number, 1.0, np.zeros(d))
         for other, (known, norm, travel) in enumerate(shapes):
             if norm > 1e-9 and length > 1e-9 and shape @ known > 1.0 - ALIKE and found[other].of == other:
                 scale = norm / length
@@ -372,8 +458,14 @@ def twins_of(assembly: solver.Assembly, candidates: Sequence[Candidate]) -> list
 def opens_cracks(assembly: solver.Assembly, candidate: Candidate) -> bool:
     """Whether supports move against each other or turn."""
     bearing = _bearing(assembly, [assembly.names[i] for i in np.flatnonzero(~assembly.free)])
-    motion = np.array([candidate.motions.get(assembly.names[i], (0.0, 0.0, 0.0)) for i in bearing])
-    return bool(np.ptp(motion[:, :2], axis=0).max() > 1e-12 or np.abs(motion[:, 2]).max() > 1e-12)
+    motion, d = _table(assembly, bearing, candidate.motions), assembly.dimension
+    return bool(np.ptp(motion[:, :d], axis=0).max() > 1e-12 or np.abs(motion[:, d:]).max() > 1e-12)
+
+
+def _table(assembly: solver.Assembly, blocks: Sequence[int], motions: Motions) -> np.ndarray:
+    """(n, n_dof) array [m and rad]: motions of blocks, 0 of those that stand still."""
+    still = (0.0,) * (3 if assembly.dimension == 2 else 6)
+    return np.array([motions.get(assembly.names[i], still) for i in blocks])
 
 
 def per_amount(assembly: solver.Assembly, candidate: Candidate) -> tuple[float, str]:
@@ -384,19 +476,19 @@ def per_amount(assembly: solver.Assembly, candidate: Candidate) -> tuple[float, 
     """
     motions = scaled_motions(candidate)
     if candidate.turns:
-        return abs(next(iter(motions.values()))[2]), "rad"
+        return float(np.linalg.norm(next(iter(motions.values()))[assembly.dimension :])), "rad"
     unit = solver.Settlement(profile=candidate.motions).unit
     return (differential(assembly, motions) if candidate.bends else 1.0), unit
 
 
-def differential(assembly: solver.Assembly, motions: Mapping[str, tuple[float, float, float]]) -> float:
+def differential(assembly: solver.Assembly, motions: Motions) -> float:
     """Difference [m] between the lowest and the highest of the supports on which something stands, moved by these."""
     bearing = _bearing(assembly, [assembly.names[i] for i in np.flatnonzero(~assembly.free)])
-    return float(np.ptp([motions.get(assembly.names[i], (0.0, 0.0, 0.0))[1] for i in bearing]))
+    return float(np.ptp(_table(assembly, bearing, motions)[:, assembly.dimension - 1]))
 
 
-def scaled_motions(candidate: Candidate) -> Mapping[str, tuple[float, float, float]]:
+def scaled_motions(candidate: Candidate) -> Motions:
     """Scale the motions of a candidate as its settlement does."""
     profile = solver.Settlement(profile=candidate.motions).profile
     assert profile is not None
-    return {name: (float(dx), float(dy), float(turn)) for name, (dx, dy, turn) in profile.items()}
+    return {name: tuple(map(float, motion)) for name, motion in profile.items()}

@@ -31,6 +31,7 @@ from .candidates import (
     refined,
     scaled_motions,
     twins_of,
+    unit_vector,
 )
 from .forward import Order, Run, Variant, all_followed, ordered, reach_of, workers_for
 from .likelihood import Comparison, Trial, Trust, tried
@@ -105,11 +106,6 @@ def explain(
             case = read_explained(case)
         case = replace(case, settlements=(), profiles=())
         drawn = case_assembly(case)
-        if drawn.dimension != 2:
-            raise ValueError(
-                f"{case.source}: explain follows structures in the plane, and this one is in space; explain a section "
-                "of it that is drawn in the plane, or follow each settlement that may be the cause with blockvis run"
-            )
         needs_dry_joints(case)
         mechanics.check_settlement(*_any_settlement(drawn), case.controls)
         observations = read_observations(observed, drawn)
@@ -167,7 +163,8 @@ def read_explained(path: str | Path) -> Case:
 def _any_settlement(assembly: solver.Assembly) -> tuple[solver.Assembly, tuple[solver.Settlement, ...]]:
     """Make a settlement of every support, with which the blocks are checked."""
     roles = np.where(assembly.free, mechanics.FREE, mechanics.MOVING)
-    return assembly.with_roles(roles), (solver.Settlement(direction=(0.0, -1.0)),) if not assembly.free.all() else ()
+    down = solver.Settlement(direction=unit_vector("down", assembly.dimension))
+    return assembly.with_roles(roles), () if assembly.free.all() else (down,)
 
 
 def _likeliest(causes: Sequence[Cause]) -> list[Trial]:

@@ -96,7 +96,7 @@ class Run:
     ----------
     amounts : (n,) array [m or rad]
         Of the increments in equilibrium, from 0; empty where there is none.
-    moved : (n, n_blocks, 3) array [m, m, rad]
+    moved : (n, n_blocks, n_dof) array [m and rad]
         Displacement and rotation of each block.
     collapsed : bool
         Whether the structure falls beyond the last amount.
@@ -134,9 +134,15 @@ def reach_of(observations: Observations, limit: float | None) -> tuple[float, fl
         return float(2.0 ** np.ceil(np.log2(length))) if length > 0.0 else 0.0
 
     widest = rounded(observations.widths.max(initial=0.0))
-    moved = rounded(np.hypot(*observations.displacements.T).max(initial=0.0)) if len(observations.points) else 0.0
+    moved = rounded(np.linalg.norm(observations.displacements, axis=1).max(initial=0.0))
     farthest = max(FARTHEST * widest, AS_FAR * moved) if limit is None else limit
     return farthest, ENOUGH * widest if widest > 0.0 else np.inf
+
+
+def pose_of(assembly: solver.Assembly, moved: np.ndarray) -> solver.Pose:
+    """Move blocks from the drawing by displacements and rotations (n_blocks, n_dof) [m and rad]."""
+    d = assembly.dimension
+    return solver.Pose(assembly.centroids + moved[:, :d], moved[:, d:])
 
 
 def lever_of(assembly: solver.Assembly, settlement: solver.Settlement) -> float:
@@ -166,7 +172,7 @@ def ordered(
     case : Case
     assembly : solver.Assembly
         Every support fixed.
-    motions : mapping of str to (float, float, float)
+    motions : mapping of str to (n_dof,) tuple
     variant : Variant
     reach : (float, float) [m]
         Largest displacement of a support, and opening of a joint at which the run may stop.
@@ -194,7 +200,8 @@ def ordered(
         controls=replace(case.controls, falling_frames=0),
     )
     loads = case_loads(case, moving)
-    x = moving.centroids[:, 0]
+    # In space towards the left and, half as much, the front: one that is alike about both axes has its paths, too.
+    x = moving.centroids[:, :-1] @ (1.0, 0.5)[: moving.dimension - 1]
     middle, half = (x.max() + x.min()) / 2.0, max(float(np.ptp(x)) / 2.0, 1e-300)
     heavier = 1.0 + LEANING * variant.heavier_side * (x - middle) / half
     loads = replace(loads, dead=loads.dead * heavier[:, None])
@@ -222,7 +229,8 @@ def followed(order: Order) -> Run:
             message = steps.ending.message
     except solver.SolveError as error:
         message = str(error)
-    return Run(np.array(amounts), np.array(moved).reshape(-1, assembly.n_blocks, 3), collapsed, message)
+    shape = solver.Pose.initial(assembly).displacements(assembly).shape
+    return Run(np.array(amounts), np.array(moved).reshape(-1, *shape), collapsed, message)
 
 
 @contextmanager

@@ -9,11 +9,13 @@ import numpy as np
 from scipy.special import logsumexp
 
 import solver
-from blockvis.results.joints import InitialJoints, end_openings, initial_joints
+from blockvis.results.joints import InitialJoints, carried_faces, initial_joints
+from solver import mechanics
 
 from .candidates import Candidate, Twin
-from .forward import Run, Variant
-from .observations import Observations, block_at
+from .forward import Run, Variant, pose_of
+from .observations import Observations
+from .places import block_at, corners_of, on_faces
 
 #: Amounts at which the likelihood is worked out, each larger than the one before by the same factor: from this fraction
 #: of the largest on.
@@ -73,7 +75,7 @@ class Comparison:
         self.assembly, self.observations, self.trust = assembly, observations, trust
         self.joints: InitialJoints = initial_joints(assembly)
         given = observations
-        away, along = _projected(given.places, self.joints.ends)
+        away, weights = on_faces(given.places, self.joints)
         certain = np.where(given.named, 0.0, trust.place)
         beyond = np.maximum(away - certain[:, None], 0.0) / (NEIGHBOURHOOD * assembly.block_size)
         chance = np.exp(-0.5 * beyond**2)
@@ -89,10 +91,12 @@ class Comparison:
         self.seen, self.joint = np.nonzero(chance)
         self.first = np.searchsorted(self.seen, np.arange(n))
         self.log_chance = np.log(chance[self.seen, self.joint])
-        # Of a joint that is only named the largest width counts, wherever along it that is.
-        along[given.whole] = np.nan
-        #: (n_pairs,) array: where along the joint, from 0 to 1; nan where its largest width counts.
-        self.along = along[self.seen, self.joint]
+        #: (n_joints, k) int array: corners of each face.
+        self.corners = corners_of(self.joints)
+        #: (n_pairs, k) array: of these, where on the face of the joint the place lies.
+        self.weights = weights[self.seen, self.joint]
+        #: (n_pairs,) bool array: whether the largest width of the joint counts, wherever on its face that is.
+        self.whole = given.whole[self.seen]
         names = {name: i for i, name in enumerate(assembly.names)}
         self.blocks = np.array(
             [
@@ -107,24 +111,27 @@ class Comparison:
         self.scales[1][~assembly.free[self.blocks]] = 0.0
 
     def openings(self, moved: np.ndarray) -> np.ndarray:
-        """(n, n_joints, 2) array [m]: at both ends of the joints, where blocks move by (n, n_blocks, 3)."""
-        start = self.assembly.centroids
-        poses = (solver.Pose(start + one[:, :2], one[:, 2:]) for one in moved)
-        found = [end_openings(self.assembly, self.joints, pose) for pose in poses]
-        return np.maximum(np.array(found).reshape(len(moved), -1, 2), 0.0)
+        """(n, n_corners) array [m]: at the corners of the faces, where blocks move by (n, n_blocks, n_dof)."""
+        poses = (pose_of(self.assembly, one) for one in moved)
+        found = [carried_faces(self.assembly, self.joints, pose).gaps for pose in poses]
+        return np.maximum(np.array(found).reshape(len(moved), -1), 0.0)
 
     def widths(self, openings: np.ndarray) -> np.ndarray:
-        """(n, n_pairs) array [m]: what openings (n, n_joints, 2) show at the places, in each joint near these."""
-        first, last = openings[:, self.joint, 0], openings[:, self.joint, 1]
-        return np.where(np.isnan(self.along), np.maximum(first, last), first + (last - first) * self.along)
+        """(n, n_pairs) array [m]: what openings (n, n_corners) show at the places, in each joint near these."""
+        around = openings[:, self.corners[self.joint]]
+        first = around[..., 0]
+        there = first + ((around - first[..., None]) * self.weights).sum(axis=2)
+        return np.where(self.whole, around.max(axis=2, initial=0.0), np.maximum(there, 0.0))
+
+    def largest_openings(self, openings: np.ndarray) -> np.ndarray:
+        """(n, n_joints) array [m]: the largest of openings (n, n_corners) of each joint."""
+        return np.asarray(openings[:, self.corners].max(axis=2, initial=0.0))
 
     def displacements(self, moved: np.ndarray) -> np.ndarray:
-        """(n, n_points, 2) array [m]: of the observed points, where blocks move by (n, n_blocks, 3)."""
-        arms = self.observations.points - self.assembly.centroids[self.blocks]
-        turn = moved[:, self.blocks, 2]
-        cosine, sine = np.cos(turn) - 1.0, np.sin(turn)
-        across = np.stack([cosine * arms[:, 0] - sine * arms[:, 1], sine * arms[:, 0] + cosine * arms[:, 1]], axis=2)
-        return np.asarray(moved[:, self.blocks, :2] + across)
+        """(n, n_points, d) array [m]: of the observed points, where blocks move by (n, n_blocks, n_dof)."""
+        points, drawn = self.observations.points, solver.Pose.initial(self.assembly)
+        found = [mechanics.carried(points, self.blocks, drawn, pose_of(self.assembly, one)) for one in moved]
+        return np.array(found).reshape(len(moved), *points.shape) - points
 
     def log_likelihood(self, widths: np.ndarray, displacements: np.ndarray) -> np.ndarray:
         """(n,) array: logarithm of the probability density of the observations.
@@ -132,7 +139,7 @@ class Comparison:
         Parameters
         ----------
         widths : (n, n_pairs) array [m]
-        displacements : (n, n_points, 2) array [m]
+        displacements : (n, n_points, d) array [m]
 
         Notes
         -----
@@ -141,7 +148,7 @@ class Comparison:
         Observations beyond :data:`INDEPENDENT` sharpen nothing: all of them weigh less.
         """
         given = self.observations
-        count = len(given.widths) + 2 * len(given.points)
+        count = len(given.widths) + given.points.size
         weight = min(1.0, INDEPENDENT / count)
         span = 2.0 * given.largest
         strays = np.log(self.trust.outliers / span)
@@ -158,7 +165,7 @@ class Comparison:
 
     @property
     def deviations(self) -> tuple[np.ndarray, np.ndarray]:
-        """Standard deviations of observed minus computed widths (n_widths,) and displacements (n_points, 2) [m]."""
+        """Standard deviations of observed minus computed widths (n_widths,) and displacements (n_points, d) [m]."""
         given, model = self.observations, self.trust.model
         # By the observed sizes, not the computed ones: else a smaller amount would always look more certain.
         sigma = np.hypot(given.uncertainties, model * self.scales[0])
@@ -180,7 +187,7 @@ class Comparison:
         Parameters
         ----------
         widths : (n, n_widths) array [m]
-        displacements : (n, n_points, 2) array [m]
+        displacements : (n, n_points, d) array [m]
         """
         given = self.observations
         opened = given.widths > 0.0
@@ -194,11 +201,11 @@ class Comparison:
         Parameters
         ----------
         widths : (n, n_widths) array [m]
-        displacements : (n, n_points, 2) array [m]
+        displacements : (n, n_points, d) array [m]
         """
         sigma, spread = self.deviations
         over = (displacements - self.observations.displacements) / spread
-        return (widths - self.observations.widths) / sigma, np.hypot(over[..., 0], over[..., 1])
+        return (widths - self.observations.widths) / sigma, np.linalg.norm(over, axis=-1)
 
 
 def _error_scales(observed: np.ndarray) -> np.ndarray:
@@ -220,15 +227,6 @@ def _log_sums(terms: np.ndarray, first: np.ndarray) -> np.ndarray:
     lengths = np.diff([*first, terms.shape[1]])
     sums = np.add.reduceat(np.exp(terms - np.repeat(top, lengths, axis=1)), first, axis=1)
     return np.asarray(top + np.log(sums))
-
-
-def _projected(points: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distances of points (n, 2) from lines (m, 2, 2) [m], and where along these, from 0 to 1: (n, m) arrays."""
-    start, line = ends[:, 0], ends[:, 1] - ends[:, 0]
-    squared = np.maximum((line**2).sum(axis=1), 1e-300)
-    along = np.clip(((points[:, None] - start) * line).sum(axis=2) / squared, 0.0, 1.0)
-    apart = points[:, None] - (start + along[..., None] * line)
-    return np.hypot(apart[..., 0], apart[..., 1]), along
 
 
 @dataclass(frozen=True)
@@ -255,8 +253,8 @@ class Trial:
         What it shows of the observations: in the joint near each of them that fits best.
     pairs : (n, n_widths) int array
         Which joint that is, as a pair of the comparison.
-    ends : (n_increments, n_joints, 2) array [m]
-        Openings of the joints at their ends, at the increments of the run.
+    gaps : (n_increments, n_corners) array [m]
+        Openings at the corners of the faces, at the increments of the run.
     """
 
     candidate: Candidate
@@ -269,7 +267,7 @@ class Trial:
     log_likelihood: np.ndarray
     widths: np.ndarray
     pairs: np.ndarray
-    ends: np.ndarray
+    gaps: np.ndarray
 
     @property
     def friction(self) -> float:
@@ -293,13 +291,13 @@ class Trial:
         return int(np.argmax(self.log_likelihood))
 
     def openings(self, chosen: np.ndarray) -> np.ndarray:
-        """(n, n_joints, 2) array [m]: at both ends of the joints, at the amounts of these numbers (n,)."""
-        return self.run.at(self.amounts[chosen] / self.twin.scale, self.ends)
+        """(n, n_corners) array [m]: at the corners of the faces, at the amounts of these numbers (n,)."""
+        return self.run.at(self.amounts[chosen] / self.twin.scale, self.gaps)
 
     def moved(self, k: int) -> np.ndarray:
-        """(n_blocks, 3) array [m, m, rad]: at amount k."""
+        """(n_blocks, n_dof) array [m and rad]: at amount k."""
         moved = self.run.at(self.amounts[[k]] / self.twin.scale, self.run.moved)[0].copy()
-        moved[:, :2] += self.amounts[k] * self.twin.travel
+        moved[:, : len(self.twin.travel)] += self.amounts[k] * self.twin.travel
         return moved
 
 
@@ -332,17 +330,17 @@ def tried(
     amounts = largest * np.geomspace(LEAST_AMOUNT, 1.0, AMOUNTS)
     if len(run.amounts) < 2:
         widths = np.zeros((AMOUNTS, len(comparison.observations.widths)))
-        ends = np.zeros((1, len(comparison.joints.ends), 2))
+        gaps = np.zeros((1, len(comparison.joints.rings.points)))
         none = np.full(AMOUNTS, -np.inf)
-        return Trial(candidate, variant, run, twin, shared, unit, amounts, none, widths, widths.astype(int), ends)
+        return Trial(candidate, variant, run, twin, shared, unit, amounts, none, widths, widths.astype(int), gaps)
     own = amounts / twin.scale
     # At the increments the pictures are exact; between them joints open evenly.
-    ends = comparison.openings(run.moved)
-    pairs = run.at(own, comparison.widths(ends))
+    gaps = comparison.openings(run.moved)
+    pairs = run.at(own, comparison.widths(gaps))
     displacements = run.at(own, comparison.displacements(run.moved)) + (amounts[:, None] * twin.travel)[:, None, :]
     found = comparison.log_likelihood(pairs, displacements)
     found[own > run.amounts[-1] * (1.0 + 1e-9)] = -np.inf
     chosen = comparison.likeliest(pairs)
     widths = np.take_along_axis(pairs, chosen, axis=1)
     found[~comparison.made(widths, displacements)] = -np.inf
-    return Trial(candidate, variant, run, twin, shared, unit, amounts, found, widths, chosen, ends)
+    return Trial(candidate, variant, run, twin, shared, unit, amounts, found, widths, chosen, gaps)

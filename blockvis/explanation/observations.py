@@ -23,6 +23,8 @@ from blockvis.formats.read import read_layout
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
 from blockvis.text import files_like, nearest
 
+from .places import block_at, corners_of, on_faces, place_text
+
 #: Uncertainty of a width, as a fraction of it, and the least [m], where the observations give none.
 WIDTH_UNCERTAINTY, LEAST_UNCERTAINTY = 0.2, 2e-4
 
@@ -46,14 +48,15 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
 #: Columns, by the words that tables have for them.
 COLUMNS = {
-    "joint": "joint", "block_a": "block_a", "block_b": "block_b", "block": "block", "x": "x", "y": "y",
+    "joint": "joint", "block_a": "block_a", "block_b": "block_b", "block": "block", "x": "x", "y": "y", "z": "z",
     "width": "width", "opening": "width", "crack_width": "width",
     "uncertainty": "uncertainty", "sigma": "uncertainty", "error": "uncertainty",
-    "dx": "dx", "dy": "dy", "displaced_x": "displaced_x", "displaced_y": "displaced_y",
+    "dx": "dx", "dy": "dy", "dz": "dz",
+    "displaced_x": "displaced_x", "displaced_y": "displaced_y", "displaced_z": "displaced_z",
 }  # fmt: skip
 
 #: Columns that hold lengths.
-LENGTHS = ("x", "y", "width", "uncertainty", "dx", "dy", "displaced_x", "displaced_y")
+LENGTHS = ("width", "uncertainty", *(f"{of}{axis}" for of in ("", "d", "displaced_") for axis in "xyz"))
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ class Observations:
 
     Attributes
     ----------
-    places : (n, 2) array [m]
+    places : (n, d) array [m]
         Of the widths, in the drawing.
     named : (n,) bool array
         Whether the joint itself is known, not only a place.
@@ -72,11 +75,11 @@ class Observations:
         A width of 0 is a closed joint.
     labels : tuple of str
         Of the widths, in words.
-    points : (m, 2) array [m]
+    points : (m, d) array [m]
         Of the displacements, in the drawing.
     blocks : tuple of str
         On which the points lie.
-    displacements : (m, 2) array [m]
+    displacements : (m, d) array [m]
     point_uncertainties : (m,) array [m]
         Of each coordinate.
     source : str
@@ -97,7 +100,7 @@ class Observations:
     @property
     def largest(self) -> float:
         """The largest width or displacement [m]."""
-        moved = np.hypot(*self.displacements.T) if len(self.points) else np.zeros(0)
+        moved = np.linalg.norm(self.displacements, axis=1)
         return float(max(self.widths.max(initial=0.0), moved.max(initial=0.0)))
 
 
@@ -167,7 +170,7 @@ class _Column:
     factor: float
 
 
-def _columns(header: Sequence[str], where: str) -> dict[str, _Column]:
+def _columns(header: Sequence[str], where: str, axes: str) -> dict[str, _Column]:
     found: dict[str, _Column] = {}
     unused = []
     for name in header:
@@ -183,6 +186,8 @@ def _columns(header: Sequence[str], where: str) -> dict[str, _Column]:
                 raise ValueError(f"{where}: column '{name}' is not known{hint}; rename or remove it")
             unused.append(name)
             continue
+        if known in ("z", "dz", "displaced_z") and "z" not in axes:
+            raise ValueError(f"{where}: column '{name}' is of structures in space, this one is in the plane; remove it")
         if known in found:
             raise ValueError(f"{where}: columns '{found[known].name}' and '{name}' hold the same; remove one")
         if unit is not None and (unit.lower() not in UNITS or known not in LENGTHS):
@@ -190,22 +195,34 @@ def _columns(header: Sequence[str], where: str) -> dict[str, _Column]:
         found[known] = _Column(name, UNITS[unit.lower()] if unit else 1.0)
     if unused:
         warnings.warn(f"{where}: columns left out: {', '.join(unused)}", stacklevel=4)
-    where_given = "joint" in found or {"block_a", "block_b"} <= set(found) or {"x", "y"} <= set(found)
-    moved = {"dx", "dy"} <= set(found) or {"displaced_x", "displaced_y"} <= set(found)
+    _check_columns(found, header, where, axes)
+    return found
+
+
+def _check_columns(found: Mapping[str, _Column], header: Sequence[str], where: str, axes: str) -> None:
+    """Refuse a table in which a width or displacement, or its place, has no column."""
+    where_given = "joint" in found or {"block_a", "block_b"} <= set(found) or set(axes) <= set(found)
+    moved = any({f"{of}{axis}" for axis in axes} <= set(found) for of in ("d", "displaced_"))
     if not moved and "width" not in found:
         missing = "width"
     elif not moved and not where_given:
         missing = next((f"block_{k}" for k in "ab" if f"block_{'ba'[k == 'b']}" in found), "joint")
-        missing = next((k for k, o in (("x", "y"), ("y", "x")) if o in found and k not in found), missing)
+        if any(axis in found for axis in axes):
+            missing = next(axis for axis in axes if axis not in found)
     elif not where_given and "block" not in found:
         missing = "block"
     else:
-        return found
+        return
     there = shortened(", ".join(header)) if any(header) else "none"
     raise ValueError(
         f"{where}: has no column '{missing}'; its columns are {there}. Give width and joint "
-        '("A | B"), block_a and block_b, or x and y; or block and dx, dy; with units as in: width [mm]'
+        f'("A | B"), block_a and block_b, or {_listed(axes)}; or block and {", ".join(f"d{axis}" for axis in axes)}; '
+        "with units as in: width [mm]"
     )
+
+
+def _listed(words: Sequence[str]) -> str:
+    return f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _of_rows(
@@ -215,7 +232,7 @@ def _of_rows(
     where: str,
     counted: str,
 ) -> Observations:
-    columns = _columns(header, where)
+    columns = _columns(header, where, "xyz"[: assembly.dimension])
     joints = initial_joints(assembly)
     widths: list[tuple[np.ndarray, bool, bool, float, float, str]] = []
     points: list[tuple[np.ndarray, str, np.ndarray, float]] = []
@@ -235,24 +252,25 @@ def _of_rows(
             raise cells.error("width", 'is missing; give a width, 0 or "closed", or a displacement')
     if not widths and not points:
         raise ValueError(f"{where}: has no observation; give a row for each crack or displaced point")
-    return _observations(widths, points, where)
+    return _observations(widths, points, where, assembly.dimension)
 
 
 def _observations(
     widths: Sequence[tuple[np.ndarray, bool, bool, float, float, str]],
     points: Sequence[tuple[np.ndarray, str, np.ndarray, float]],
     where: str,
+    d: int,
 ) -> Observations:
     found = Observations(
-        places=np.array([place for place, *_ in widths], dtype=float).reshape(-1, 2),
+        places=np.array([place for place, *_ in widths], dtype=float).reshape(-1, d),
         named=np.array([named for _, named, *_ in widths], dtype=bool),
         whole=np.array([whole for _, _, whole, *_ in widths], dtype=bool),
         widths=np.array([width for _, _, _, width, *_ in widths], dtype=float),
         uncertainties=np.array([sigma for *_, sigma, _ in widths], dtype=float),
         labels=tuple(label for *_, label in widths),
-        points=np.array([point for point, *_ in points], dtype=float).reshape(-1, 2),
+        points=np.array([point for point, *_ in points], dtype=float).reshape(-1, d),
         blocks=tuple(block for _, block, *_ in points),
-        displacements=np.array([moved for _, _, moved, _ in points], dtype=float).reshape(-1, 2),
+        displacements=np.array([moved for _, _, moved, _ in points], dtype=float).reshape(-1, d),
         point_uncertainties=np.array([sigma for *_, sigma in points], dtype=float),
         source=where,
     )
@@ -316,18 +334,18 @@ def _check_width(width: float, cells: _Cells, assembly: solver.Assembly) -> None
 
 
 def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> tuple[np.ndarray, bool, bool, str]:
-    """Find where a width was measured: somewhere in the joint between two blocks, or at x and y.
+    """Find where a width was measured: somewhere in the joint between two blocks, or at its coordinates.
 
     Returns
     -------
-    place : (2,) array [m]
+    place : (d,) array [m]
     named : bool
         Whether the joint is known.
     whole : bool
         Whether the place along the joint is not.
     label : str
     """
-    x, y = cells.number("x"), cells.number("y")
+    axes = "xyz"[: assembly.dimension]
     if cells.text("joint"):
         names = [name.strip() for name in re.split(r"\s*\|\s*", cells.text("joint"))]
         if len(names) != 2:
@@ -349,26 +367,27 @@ def _place(cells: _Cells, assembly: solver.Assembly, joints: InitialJoints) -> t
                 keys[1], f"names '{names[0]}' and '{names[1]}', which do not touch; '{names[0]}' touches {others}"
             )
         label = f"{names[0]} | {names[1]}"
-        ends = joints.ends[between]
-        if x is not None and y is not None:
-            lines = shapely.linestrings(ends)
-            line = lines[int(np.argmin(shapely.distance(lines, shapely.Point(x, y))))]
-            place = line.interpolate(line.project(shapely.Point(x, y)))
-            return np.array(place.coords[0]), True, False, f"{label} at ({x:.4g}, {y:.4g})"
-        length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
-        return length @ ends.mean(axis=1) / length.sum(), True, True, label
-    if x is None or y is None:
-        raise cells.error("x" if x is None else "y", "is missing; give the place of the crack, or the joint")
-    place = np.array([x, y])
-    distance = shapely.distance(shapely.Point(place), shapely.linestrings(joints.ends))
-    if distance.min(initial=np.inf) > FARTHEST * assembly.block_size:
+        if all(cells.number(axis) is not None for axis in axes):
+            place = np.array([cells.number(axis) for axis in axes], dtype=float)
+            away, weights = on_faces(place[None], joints)
+            joint = int(np.argmin(np.where(between, away[0], np.inf)))
+            nearest_place = weights[0, joint] @ joints.rings.points[corners_of(joints)[joint]]
+            return nearest_place, True, False, f"{label} at {place_text(place)}"
+        sizes = joints.sizes[between]
+        return sizes @ joints.rings.middles()[between] / sizes.sum(), True, True, label
+    missing = next((axis for axis in axes if cells.number(axis) is None), None)
+    if missing is not None:
+        raise cells.error(missing, "is missing; give the place of the crack, or the joint")
+    place = np.array([cells.number(axis) for axis in axes], dtype=float)
+    away = on_faces(place[None], joints)[0].min(initial=np.inf)
+    if away > FARTHEST * assembly.block_size:
         low, high = assembly.vertices.min(axis=0), assembly.vertices.max(axis=0)
         raise cells.error(
             "x",
-            f"and y are ({x:g}, {y:g}) m, {distance.min():.3g} m from any joint; the blocks lie between "
-            f"({low[0]:.4g}, {low[1]:.4g}) and ({high[0]:.4g}, {high[1]:.4g}) m: check the unit",
+            f"and {_listed(axes[1:])} are {place_text(place, 6)} m, {away:.3g} m from any joint; the blocks lie "
+            f"between {place_text(low)} and {place_text(high)} m: check the unit",
         )
-    return place, False, False, f"({x:.4g}, {y:.4g})"
+    return place, False, False, place_text(place)
 
 
 def _block(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> int:
@@ -380,44 +399,42 @@ def _block(name: str, key: str, cells: _Cells, assembly: solver.Assembly) -> int
 
 def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray, str, np.ndarray, float] | None:
     """Read the displacement of a point."""
-    moved = [cells.number("dx"), cells.number("dy")]
-    there = [cells.number("displaced_x"), cells.number("displaced_y")]
+    axes = "xyz"[: assembly.dimension]
+    there = [cells.number(f"displaced_{axis}") for axis in axes]
+    moved = [cells.number(f"d{axis}") for axis in axes]
     if all(value is None for value in (*moved, *there)):
         return None
-    x, y, name = cells.number("x"), cells.number("y"), cells.text("block")
+    place, name = [cells.number(axis) for axis in axes], cells.text("block")
     if name:
         block = _block(name, "block", cells, assembly)
-        point = assembly.centroids[block] if x is None or y is None else np.array([x, y])
-    elif x is not None and y is not None:
-        point = np.array([x, y])
+        point = assembly.centroids[block] if None in place else np.array(place, dtype=float)
+    elif None not in place:
+        point = np.array(place, dtype=float)
         block = block_at(assembly, point)
     else:
-        raise cells.error("block", "is missing; give the block, or x and y, of the displaced point")
+        raise cells.error("block", f"is missing; give the block, or {_listed(axes)}, of the displaced point")
     if None not in there:
         displaced = np.array(there, dtype=float) - point
     elif None not in moved:
         displaced = np.array(moved, dtype=float)
     else:
-        raise cells.error("dy" if moved[1] is None else "dx", "is missing; give both coordinates")
-    extent = float(np.ptp(assembly.vertices, axis=0).max())
-    if np.hypot(*displaced) > FARTHEST_POINT * extent:
+        missing = f"d{axes[moved.index(None)]}"
+        raise cells.error(missing, f"is missing; give {'both' if len(axes) == 2 else 'all three'} coordinates")
+    extent, far = float(np.ptp(assembly.vertices, axis=0).max()), float(np.linalg.norm(displaced))
+    if far > FARTHEST_POINT * extent:
         raise cells.error(
             "displaced_x" if None not in there else "dx",
-            f"puts '{assembly.names[block]}' {np.hypot(*displaced):.3g} m from where it is drawn, in a structure of "
+            f"puts '{assembly.names[block]}' {far:.3g} m from where it is drawn, in a structure of "
             f"{extent:.3g} m; is it in mm? name the column so, as in: dx [mm]",
         )
     uncertainty = cells.uncertainty()
     return point, assembly.names[block], displaced, POINT_UNCERTAINTY if uncertainty is None else uncertainty
 
 
-def block_at(assembly: solver.Assembly, point: np.ndarray) -> int:
-    """Find the block in which a point lies, or the nearest."""
-    outlines = [shapely.Polygon(assembly.outline(i)) for i in range(assembly.n_blocks)]
-    return int(np.argmin(shapely.distance(shapely.Point(point), outlines)))
-
-
 def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
     """Compare a drawing of the damaged state with the undamaged one, block by block."""
+    if assembly.dimension == 3:
+        raise ValueError(f"{path}: a drawing of the damaged state is read in the plane; in space give a table (.csv)")
     layout = read_layout(path)
     if layout.dimension == 3:
         raise ValueError(f"{path}: draws blocks in space; give a drawing in the plane, as the case is")
@@ -451,7 +468,7 @@ def _of_drawing(path: Path, assembly: solver.Assembly) -> Observations:
         (assembly.centroids[i], assembly.names[i], pose.positions[i] - assembly.centroids[i], sigma)
         for i in sorted(partner)
     ]
-    return _observations(widths, points, str(path))
+    return _observations(widths, points, str(path), 2)
 
 
 def _partners(names: Sequence[str], outlines: Sequence[np.ndarray], assembly: solver.Assembly) -> dict[int, int]:

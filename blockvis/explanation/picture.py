@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,13 +17,16 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import solver
 from blockvis.pictures import palette
-from blockvis.pictures.frame import framed
+from blockvis.pictures.drawer import WHOLE
+from blockvis.pictures.frame import Frame, framed
+from blockvis.pictures.solid_view import ABOVE, AROUND, View
 from blockvis.results.cracks import SMALLEST_OPENING
-from blockvis.results.joints import faces_at
+from blockvis.results.joints import carried_faces
 from blockvis.system.atomic_files import atomic_file
 from blockvis.text import rounded_length
 from solver import mechanics
 
+from .forward import pose_of
 from .words import amount_text, percent, width_text
 
 if TYPE_CHECKING:
@@ -37,6 +41,12 @@ TEXT, PANEL, HEAD = 12.0, 5.4, 0.7
 
 #: Structures wider than this for their height have their panels below each other.
 WIDE = 4.0
+
+#: Pixels of matplotlib per inch, and of the blocks in space.
+DPI, FINE = 130, 260
+
+#: Views in which the cracks are as near to the eye as in the best, within this part of the structure, are equal.
+ALIKE = 0.02
 
 #: Most widths that are written in a panel.
 MOST_LABELS = 24
@@ -57,14 +67,18 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     """
     assembly, causes = found.assembly, found.causes[:2]
     drawn = solver.Pose.initial(assembly)
-    poses = [_pose(assembly, cause) for cause in causes]
+    poses = [pose_of(assembly, cause.best.moved(cause.at)) for cause in causes]
     free = assembly.free
-    largest = [float(np.hypot(*pose.displacements(assembly)[:, :2].T).max()) for pose in poses]
+    largest = [float(np.linalg.norm(pose.positions - assembly.centroids, axis=1).max()) for pose in poses]
     extent = float(np.ptp(assembly.vertices[free[assembly.block_of_vertex]], axis=0).max())
     # Each cause by its own: what one makes by going far, another may make by going a little.
     factors = [max(1.0, rounded_length(SHOWN * extent / most)) if most > 0.0 else 1.0 for most in largest]
     shown = [_magnified(assembly, pose, factor) for pose, factor in zip(poses, factors, strict=True)]
-    frame = framed(assembly, [drawn, *shown])
+    view = None if assembly.dimension == 2 else _view_of(found)
+    if view is None:
+        frame = framed(assembly, [drawn, *shown])
+    else:
+        frame = framed(assembly, [drawn, *shown], margin=0.05, supports=0.3, axes=view.axes[:2], whole=WHOLE)
     count = 1 + len(causes)
     aspect = float(frame.size[0] / frame.size[1])
     rows, columns = (count, 1) if aspect > WIDE else (1, count)
@@ -73,11 +87,12 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
     figure = Figure(figsize=(width * columns, height * rows), layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06))
     FigureCanvasAgg(figure)
     axes = np.atleast_1d(figure.subplots(rows, columns, squeeze=False).ravel())
-    _observed(axes[0], found)
-    for number, (panel, cause, pose, there, factor) in enumerate(
-        zip(axes[1:], causes, poses, shown, factors, strict=True), start=1
+    canvases = [_Canvas(panel, assembly, frame, view) for panel in axes]
+    _observed(canvases[0], found)
+    for number, (canvas, cause, pose, there, factor) in enumerate(
+        zip(canvases[1:], causes, poses, shown, factors, strict=True), start=1
     ):
-        _computed(panel, found, cause, pose, there, number, factor)
+        _computed(canvas, found, cause, pose, there, number, factor)
     for panel in axes:
         panel.set_xlim(frame.low[0], frame.high[0])
         panel.set_ylim(frame.low[1], frame.high[1])
@@ -85,13 +100,8 @@ def draw_explanation(found: Explanation, path: str | os.PathLike[str]) -> Path:
         panel.set_axis_off()
     path = Path(path)
     with atomic_file(path) as partial:
-        figure.savefig(partial, dpi=130, facecolor="white")
+        figure.savefig(partial, dpi=DPI, facecolor="white")
     return path
-
-
-def _pose(assembly: solver.Assembly, cause: Cause) -> solver.Pose:
-    moved = cause.best.moved(cause.at)
-    return solver.Pose(assembly.centroids + moved[:, :2], moved[:, 2:])
 
 
 def _magnified(assembly: solver.Assembly, pose: solver.Pose, factor: float) -> solver.Pose:
@@ -99,38 +109,114 @@ def _magnified(assembly: solver.Assembly, pose: solver.Pose, factor: float) -> s
     return solver.Pose(start + factor * (pose.positions - start), factor * pose.rotations)
 
 
-def _blocks(panel: Axes, assembly: solver.Assembly, pose: solver.Pose) -> None:
-    corners = mechanics.moved_vertices(assembly, pose)
-    outlines = np.split(corners, assembly.offsets[1:-1])
-    fill = palette.block_colours(assembly.materials, assembly.free) / 255.0
-    colours = [tuple(colour) for colour in fill.tolist()]
-    panel.add_collection(
-        PolyCollection(
-            outlines,
-            facecolors=colours,
-            edgecolors=_rgb(palette.OUTLINE),
-            linewidths=0.6,
-            zorder=2,
+def _view_of(found: Explanation) -> View:
+    """Choose from where the wide cracks, and what has moved far, are in front."""
+    given, middle = found.observations, found.assembly.centroids.mean(axis=0)
+    places = np.concatenate([given.places, given.points]) - middle
+    sizes = np.concatenate([given.widths, np.linalg.norm(given.displacements, axis=1)])
+    size = float(np.ptp(found.assembly.vertices, axis=0).max())
+    views = [View(around, ABOVE) for around in AROUND]
+    near = [float(sizes @ view.depth(places) / (sizes.sum() * size)) for view in views]
+    return next(view for view, value in zip(views, near, strict=True) if value >= max(near) - ALIKE)
+
+
+@dataclass(frozen=True)
+class _Canvas:
+    """A panel on which blocks are drawn, in the plane or as they are seen in space.
+
+    Attributes
+    ----------
+    panel : matplotlib.axes.Axes
+    assembly : solver.Assembly
+    frame : Frame
+    view : View, optional
+        Of blocks in space.
+    """
+
+    panel: Axes
+    assembly: solver.Assembly
+    frame: Frame
+    view: View | None
+
+    def placed(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2) array [m]: where points, or arrows, (n, d) [m] are drawn."""
+        return points if self.view is None else self.view.projected(points)
+
+    def blocks(self, pose: solver.Pose, lines: Sequence[np.ndarray], thick: Sequence[float], filled: Any) -> None:
+        """Draw the blocks, and open joints as lines (n, 2, d) [m] so thick [points], or as polygons (n, 4, d) [m]."""
+        colour, fill = _rgb(palette.OPEN), palette.block_colours(self.assembly.materials, self.assembly.free)
+        if self.view is not None:
+            self._solid_blocks(pose, lines, thick, filled)
+            return
+        corners = mechanics.moved_vertices(self.assembly, pose)
+        self.panel.add_collection(
+            PolyCollection(
+                np.split(corners, self.assembly.offsets[1:-1]),
+                facecolors=[tuple(one) for one in (fill / 255.0).tolist()],
+                edgecolors=_rgb(palette.OUTLINE),
+                linewidths=0.6,
+                zorder=2,
+            )
         )
-    )
+        self.panel.add_collection(LineCollection(lines, colors=[colour], linewidths=thick, zorder=3))
+        self.panel.add_collection(
+            PolyCollection(list(filled), facecolors=[colour], edgecolors=[colour], linewidths=0.8, zorder=3)
+        )
+
+    def compass(self) -> None:
+        """Show where the right and the back are, in a corner of the panel."""
+        if self.view is None:
+            return
+        (across, high), corner = self.frame.size, self.frame.low
+        arms = 0.07 * across * self.view.projected(np.eye(3)[:2])
+        centre = corner + np.array([0.1 * across, 0.0]) + 0.05 * high
+        for word, arm in zip(("right", "back"), arms, strict=True):
+            arrow = {"arrowstyle": "-|>", "color": _rgb(palette.FAINT)}
+            self.panel.annotate("", centre + arm, xytext=centre, arrowprops=arrow)
+            x, y = centre + 1.35 * arm
+            self.panel.text(x, y, word, ha="center", va="center", fontsize=TEXT - 3, color=_rgb(palette.FAINT))
+
+    def _solid_blocks(
+        self, pose: solver.Pose, lines: Sequence[np.ndarray], thick: Sequence[float], filled: Any
+    ) -> None:
+        assert self.view is not None
+        # VTK takes seconds to import, and pictures in the plane need none.
+        from blockvis.pictures.solid_scene import SolidScene
+
+        across, high = self.frame.size
+        size = (round(PANEL * FINE), round(PANEL * FINE * float(high / across)))
+        scene = SolidScene(self.assembly, self.view, self.frame, size, palette.role_colours(self.assembly))
+        scene.pose(pose)
+        for k, (line, points) in enumerate(zip(lines, thick, strict=True)):
+            scene.lines(f"crack {k}", line[None], palette.OPEN, points * FINE / 72.0)
+        scene.polygons("crack", filled, palette.OPEN)
+        edges = np.asarray(filled).reshape(-1, 4, 3)
+        scene.lines("crack edge", edges[:, [[0, 1], [2, 3]]].reshape(-1, 2, 3), palette.OPEN, 0.8 * FINE / 72.0)
+        picture, seen = scene.image(), scene.frame
+        scene.close()
+        extent = (seen.low[0], seen.high[0], seen.low[1], seen.high[1])
+        self.panel.imshow(np.asarray(picture), extent=extent, zorder=2)
 
 
-def _observed(panel: Axes, found: Explanation) -> None:
-    given, assembly = found.observations, found.assembly
-    pose = solver.Pose.initial(assembly)
-    _blocks(panel, assembly, pose)
-    joints = found.comparison.joints
-    opened = given.widths > 0.0
-    lines = joints.ends[found.comparison.own[opened]]
-    thick = 1.5 + 4.0 * given.widths[opened] / max(given.largest, 1e-300)
-    panel.add_collection(LineCollection(lines, colors=[_rgb(palette.OPEN)], linewidths=thick, zorder=3))
-    closed = given.places[~opened]
-    panel.plot(*closed.T, "o", ms=4.5, mfc="white", mec=_rgb(palette.FAINT), zorder=4)
-    _labels(panel, given.places, given.widths, found, given.places, sizes=given.widths)
-    strange = given.places[list(found.unexplained)]
+def _observed(canvas: _Canvas, found: Explanation) -> None:
+    given, assembly, panel = found.observations, found.assembly, canvas.panel
+    rings, opened = found.comparison.joints.rings, given.widths > 0.0
+    lines, thick = [], []
+    for joint, width in zip(found.comparison.own[opened], given.widths[opened], strict=True):
+        corner = np.arange(*rings.offsets[joint : joint + 2])
+        # In the plane both ends of the joint, in space all around it.
+        around = [corner] if len(corner) == 2 else np.stack([corner, rings.following[corner]], axis=1)
+        lines += [rings.points[both] for both in around]
+        thick += [1.5 + 4.0 * width / max(given.largest, 1e-300)] * len(around)
+    canvas.blocks(solver.Pose.initial(assembly), lines, thick, [])
+    canvas.compass()
+    places = canvas.placed(given.places)
+    panel.plot(*places[~opened].T, "o", ms=4.5, mfc="white", mec=_rgb(palette.FAINT), zorder=4)
+    _labels(panel, places, given.widths, found, sizes=given.widths)
+    strange = places[list(found.unexplained)]
     panel.plot(*strange.T, "o", ms=17, mfc="none", mec=_rgb(palette.WARNING), mew=1.6, zorder=6)
     if len(given.points):
-        _arrows(panel, given.points, given.displacements, assembly)
+        _arrows(panel, canvas.placed(given.points), canvas.placed(given.displacements), assembly)
     what = "Observed" + (": open joints [mm], ○ closed" if len(given.widths) else ": displaced points")
     panel.set_title(what, loc="left", fontsize=TEXT + 1, color=_rgb(palette.INK))
     if len(strange):
@@ -140,7 +226,7 @@ def _observed(panel: Axes, found: Explanation) -> None:
 
 
 def _computed(
-    panel: Axes,
+    canvas: _Canvas,
     found: Explanation,
     cause: Cause,
     pose: solver.Pose,
@@ -148,29 +234,25 @@ def _computed(
     number: int,
     factor: float,
 ) -> None:
-    assembly, joints, given = found.assembly, found.comparison.joints, found.observations
-    _blocks(panel, assembly, shown)
-    ends = cause.best.openings(np.array([cause.at]))[0]
-    opening = ends.max(axis=1)
-    on_a, on_b, _ = faces_at(assembly, joints, shown)
-    is_open = opening > SMALLEST_OPENING * assembly.block_size
-    filled = np.concatenate([on_a, on_b[:, ::-1]], axis=1)[is_open]
-    panel.add_collection(
-        PolyCollection(
-            list(filled), facecolors=[_rgb(palette.OPEN)], edgecolors=[_rgb(palette.OPEN)], linewidths=0.8, zorder=3
-        )
-    )
-    middles = (on_a + on_b).mean(axis=1) / 2.0
+    assembly, compared, given, panel = found.assembly, found.comparison, found.observations, canvas.panel
+    rings = compared.joints.rings
+    opening = compared.largest_openings(cause.best.openings(np.array([cause.at])))[0]
+    faces = carried_faces(assembly, compared.joints, shown)
+    start = np.flatnonzero((opening > SMALLEST_OPENING * assembly.block_size)[rings.ring])
+    if assembly.dimension == 2:
+        start = start[::2]
+    stop = rings.following[start]
+    filled = np.stack([faces.on_a[start], faces.on_a[stop], faces.on_b[stop], faces.on_b[start]], axis=1)
+    canvas.blocks(shown, [], [], filled)
+    between = rings.at((faces.on_a + faces.on_b) / 2.0)
     if len(given.widths):
         pairs = cause.best.pairs[cause.at]
-        joint = found.comparison.joint[pairs]
-        share = np.nan_to_num(found.comparison.along[pairs], nan=0.5)[:, None]
-        faces = (on_a + on_b)[joint] / 2.0
-        places = faces[:, 0] * (1.0 - share) + faces[:, 1] * share
-        _labels(panel, places, cause.best.widths[cause.at], found, given.places, sizes=given.widths)
+        corners = between.points[compared.corners[compared.joint[pairs]]]
+        places = canvas.placed((corners * compared.weights[pairs][..., None]).sum(axis=1))
+        _labels(panel, places, cause.best.widths[cause.at], found, sizes=given.widths)
     measurement = found.next_measurement
     if measurement is not None:
-        x, y = middles[measurement.joint]
+        x, y = canvas.placed(between.middles()[[measurement.joint]])[0]
         panel.plot(x, y, "D", ms=8, mfc="white", mec=_rgb(palette.FORCE), mew=1.8, zorder=7)
         panel.annotate(
             f"measure here: {width_text(float(opening[measurement.joint]))}",
@@ -179,12 +261,14 @@ def _computed(
             textcoords="offset points",
             fontsize=TEXT - 1,
             color=_rgb(palette.FORCE),
+            # In space the blocks below are of many shades, and widths stand close.
+            bbox=None if canvas.view is None else {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none"},
             zorder=8,
         )
     moving = [assembly.index(name) for name in cause.best.candidate.motions]
-    moved = pose.displacements(assembly)[moving, :2]
+    moved = canvas.placed((pose.positions - assembly.centroids)[moving])
     if np.hypot(*moved.T).max(initial=0.0) > 0.0 and not cause.best.candidate.turns:
-        _arrows(panel, _tops(assembly, moving, shown), moved, assembly)
+        _arrows(panel, canvas.placed(_tops(assembly, moving, shown)), moved, assembly)
     amount = amount_text(float(cause.best.amounts[cause.at]), cause.unit)
     panel.set_title(
         f"{number}  {cause.name}, {percent(cause.probability)}\n"
@@ -196,14 +280,13 @@ def _computed(
 
 
 def _tops(assembly: solver.Assembly, blocks: Sequence[int], pose: solver.Pose) -> np.ndarray:
-    """(n, 2) array [m]: a little below the middle of the top of each support, where the picture shows it."""
+    """(n, d) array [m]: a little below the middle of the top of each support, where the picture shows it."""
     corners = mechanics.moved_vertices(assembly, pose)
     places = []
     for block in blocks:
-        ring = corners[assembly.offsets[block] : assembly.offsets[block + 1]]
-        low, high = ring.min(axis=0), ring.max(axis=0)
-        depth = min(0.5 * (high[1] - low[1]), 0.3 * assembly.block_size)
-        places.append([pose.positions[block, 0], high[1] - depth])
+        height = corners[assembly.block_of_vertex == block, -1]
+        depth = min(0.5 * np.ptp(height), 0.3 * assembly.block_size)
+        places.append([*pose.positions[block, :-1], height.max() - depth])
     return np.array(places)
 
 
@@ -226,11 +309,10 @@ def _labels(
     places: np.ndarray,
     widths: np.ndarray,
     found: Explanation,
-    observed_at: np.ndarray,
     *,
     sizes: np.ndarray,
 ) -> None:
-    """Write widths in mm at the places of open joints, the widest first, and where one opens that was closed."""
+    """Write widths in mm at places (n, 2) of open joints, the widest first, and where one opens that was closed."""
     least = 0.05 * found.observations.largest
     order = np.argsort(-np.maximum(sizes, widths), kind="stable")
     written: list[np.ndarray] = []

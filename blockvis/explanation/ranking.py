@@ -79,7 +79,7 @@ class Measurement:
         Number of the joint of the layout.
     name : str
         Its two blocks.
-    place : (float, float) [m]
+    place : tuple of d floats [m]
     widths : tuple of (str, float) [m]
         What the causes have there.
     deviations : float
@@ -88,7 +88,7 @@ class Measurement:
 
     joint: int
     name: str
-    place: tuple[float, float]
+    place: tuple[float, ...]
     widths: tuple[tuple[str, float], ...]
     deviations: float
 
@@ -231,7 +231,7 @@ def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measure
     if len(causes) < 2:
         return None
     chosen = [cause for k, cause in enumerate(causes[:4]) if k < 2 or cause.probability > WORTH_A_WORD]
-    table = np.array([_expected(cause) for cause in chosen])
+    table = np.array([_expected(comparison, cause) for cause in chosen])
     mean, spread = table[:, 0], table[:, 1]
     sigma = np.sqrt(spread**2 + (comparison.trust.model * mean) ** 2 + LEAST_UNCERTAINTY**2)
     weights = np.array([max(cause.probability, WORTH_A_WORD) for cause in chosen])
@@ -248,17 +248,16 @@ def next_measurement(comparison: Comparison, causes: Sequence[Cause]) -> Measure
     if gain[best] <= 0.0 or apart[best] < DECISIVE:
         return None
     assembly, joints = comparison.assembly, comparison.joints
-    x, y = joints.ends[best].mean(axis=0)
     return Measurement(
         joint=best,
         name=f"{assembly.names[joints.block_a[best]]} | {assembly.names[joints.block_b[best]]}",
-        place=(float(x), float(y)),
+        place=tuple(joints.rings.middles()[best].tolist()),
         widths=tuple((cause.name, float(mean[k, best])) for k, cause in enumerate(chosen)),
         deviations=float(apart[best]),
     )
 
 
-def _expected(cause: Cause) -> tuple[np.ndarray, np.ndarray]:
+def _expected(comparison: Comparison, cause: Cause) -> tuple[np.ndarray, np.ndarray]:
     """Mean and standard deviation (n_joints,) [m] of the openings under a cause, over all it leaves open."""
     mean = square = np.zeros(0)
     for trial, share in zip(cause.trials, cause.weights, strict=True):
@@ -266,7 +265,7 @@ def _expected(cause: Cause) -> tuple[np.ndarray, np.ndarray]:
             continue
         mass = share * np.exp(trial.log_mass - logsumexp(trial.log_mass))
         heavy = np.flatnonzero(mass > 1e-3 * mass.max())
-        openings = trial.openings(heavy).max(axis=2)
+        openings = comparison.largest_openings(trial.openings(heavy))
         first, second = mass[heavy] @ openings, mass[heavy] @ openings**2
         mean, square = (first, second) if len(mean) == 0 else (mean + first, square + second)
     return mean, np.sqrt(np.maximum(square - mean**2, 0.0))

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from .places import place_text
 
 if TYPE_CHECKING:
     from .ranking import Cause, Measurement
@@ -77,9 +80,8 @@ def cause_text(cause: Cause) -> str:
 
 def measurement_text(measurement: Measurement) -> str:
     """Say which joint to measure next, and what each cause has there."""
-    x, y = measurement.place
     there = "; ".join(f"{width_text(width)} mm if {name}" for name, width in measurement.widths)
-    return f"the joint {measurement.name} at ({x:.3g}, {y:.3g}) m: {there}"
+    return f"the joint {measurement.name} at {place_text(measurement.place, 3)} m: {there}"
 
 
 def verdict(found: Explanation) -> str:
@@ -154,8 +156,7 @@ def values_of(found: Explanation) -> dict[str, Any]:
             "widths": [
                 {
                     "place": given.labels[k],
-                    "x": float(given.places[k, 0]),
-                    "y": float(given.places[k, 1]),
+                    **_coordinates(given.places[k]),
                     "width_mm": _mm(given.widths[k]),
                     "uncertainty_mm": _mm(given.uncertainties[k]),
                     "computed_mm": [_mm(widths[k]) for widths in computed],
@@ -165,8 +166,7 @@ def values_of(found: Explanation) -> dict[str, Any]:
             "points": [
                 {
                     "block": given.blocks[k],
-                    "x": float(given.points[k, 0]),
-                    "y": float(given.points[k, 1]),
+                    **_coordinates(given.points[k]),
                     "displacement_mm": [_mm(value) for value in given.displacements[k]],
                     "computed_mm": [
                         [_mm(value) for value in found.comparison.displacements(c.best.moved(c.at)[None])[0, k]]
@@ -217,11 +217,14 @@ def _measurement_values(measurement: Measurement | None) -> dict[str, Any] | Non
         return None
     return {
         "joint": measurement.name,
-        "x": measurement.place[0],
-        "y": measurement.place[1],
+        **_coordinates(measurement.place),
         "expected_mm": {name: _mm(width) for name, width in measurement.widths},
         "deviations": round(measurement.deviations, 3),
     }
+
+
+def _coordinates(place: Iterable[float]) -> dict[str, float]:
+    return {axis: float(value) for axis, value in zip("xyz", place, strict=False)}
 
 
 def _mm(length: float | np.floating[Any]) -> float:

@@ -18,6 +18,7 @@ from blockvis.system.atomic_files import make_folder, write_atomic
 from .forward import LEANING
 from .likelihood import ELSEWHERE, INDEPENDENT
 from .picture import draw_explanation
+from .places import place_text
 from .words import (
     amount_text,
     cause_text,
@@ -167,7 +168,7 @@ def _points(found: Explanation) -> str:
     computed = [found.comparison.displacements(c.best.moved(c.at)[None])[0] for c in best]
     rows = [
         (
-            f"{given.blocks[k]} at ({given.points[k, 0]:.3g}, {given.points[k, 1]:.3g}) m",
+            f"{given.blocks[k]} at {place_text(given.points[k], 3)} m",
             _vector(given.displacements[k]),
             *(_vector(there[k]) for there in computed),
         )
@@ -178,7 +179,7 @@ def _points(found: Explanation) -> str:
 
 
 def _vector(value: Sequence[float]) -> str:
-    return f"({1e3 * value[0]:.3g}, {1e3 * value[1]:.3g})"
+    return place_text((1e3 * part for part in value), 3)
 
 
 def _assumed(found: Explanation) -> list[str]:

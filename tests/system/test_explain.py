@@ -250,14 +250,35 @@ def test_a_folder_is_no_table(folder, capsys):
     assert "is a folder, no table" in capsys.readouterr().err
 
 
-def test_blocks_in_space_are_refused_with_what_to_do_instead(folder, tmp_path, capsys):
+def test_what_is_of_the_plane_is_refused_in_space(folder, tmp_path, capsys):
     case = '[geometry]\nlayout = "dome"\n[geometry.parameters]\ncourses = 3\n'
     (tmp_path / "dome.toml").write_text(case, encoding="utf-8")
     command = ["explain", str(tmp_path / "dome.toml"), "--observed", str(folder / "cracks.csv")]
     assert cli.main([*command, "-o", str(tmp_path / "out")]) == cli.BAD_INPUT
+    assert "cracks.csv: has no column 'z'; its columns are" in capsys.readouterr().err
+    (tmp_path / "dome.toml").write_text(case + "[explain]\ntrough = true\n", encoding="utf-8")
+    (tmp_path / "cracks.csv").write_text("joint,width [mm]\nstone 1-1 | springer 1,3\n", encoding="utf-8")
+    command = ["explain", str(tmp_path / "dome.toml"), "--observed", str(tmp_path / "cracks.csv")]
+    assert cli.main([*command, "-o", str(tmp_path / "out")]) == cli.BAD_INPUT
     said = capsys.readouterr().err
     assert len(said.splitlines()) == 1
-    assert "dome.toml: explain follows structures in the plane, and this one is in space; explain a section" in said
+    assert "dome.toml: [explain] trough is of structures in the plane, this one is in space; leave it out" in said
+
+
+@pytest.mark.slow
+def test_the_springer_of_a_vault_that_has_sunk_comes_first(tmp_path, capsys):
+    examples = Path(__file__).parents[2] / "examples" / "explain"
+    command = ["explain", str(examples / "vault.toml"), "--observed", str(examples / "vault_cracks.csv")]
+    assert cli.main([*command, "-o", str(tmp_path / "out")]) == 0
+    assert capsys.readouterr().out.splitlines()[1].startswith("Springer 1 moves down by")
+    found = json.loads((tmp_path / "out" / "explain.json").read_text(encoding="utf-8"))
+    best = found["causes"][0]
+    assert best["amount_low"] < 0.02 < best["amount_high"]
+    assert {"x", "y", "z"} <= set(found["observations"]["widths"][0])
+    with Image.open(tmp_path / "out" / "explain.png") as picture:
+        pixels = np.asarray(picture.convert("RGB")).astype(int)
+    orange = np.abs(pixels - [226, 78, 27]).sum(axis=2) < 60
+    assert all(third.sum() > 100 for third in np.array_split(orange, 3, axis=1))
 
 
 @pytest.mark.slow

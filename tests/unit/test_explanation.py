@@ -79,6 +79,67 @@ def test_a_support_turns_about_the_middle_of_where_it_carries():
     np.testing.assert_allclose(speeds.mean(axis=0), 0.0, atol=1e-9)
 
 
+VAULT = generators.cross_vault(span=4.0, rise=1.5, thickness=0.3, voussoirs=5, stone=1.4)
+
+
+def test_supports_in_space_sink_spread_and_tilt_and_are_said_where_they_go():
+    ground, found = candidates(VAULT)
+    causes = {one.cause: one for one in found}
+    assert len(causes) == len(found) == 4 * (2 + 4 + 4) + 1
+    level = 0.5**0.5
+    assert causes["springer 1 moves down"].motions == {"springer 1": (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)}
+    assert causes["springer 1 moves to the back"].motions["springer 1"][:3] == (0.0, 1.0, 0.0)
+    np.testing.assert_allclose(causes["springer 3 moves outward"].motions["springer 3"][:3], [-level, -level, 0.0])
+    assert set(causes["all supports move outward"].motions) == {f"springer {k}" for k in range(1, 5)}
+    tilted = causes["springer 1 tilts to the right"]
+    assert tilted.motions["springer 1"][3:] == (0.0, 1.0, 0.0)
+    assert per_amount(ground.assembly, tilted)[1] == "rad"
+    # It turns about where it carries, which is above its centroid.
+    assert tilted.motions["springer 1"][0] < 0.0
+    nearer = refined(ground, [causes["springer 1 moves down"]], found)
+    assert "springer 1 moves down and to the front" in {one.cause for one in nearer}
+
+
+def test_many_supports_in_space_sink_or_move_outward():
+    _, found = candidates(generators.dome(lunes=6, courses=1))
+    assert len(found) == 2 * 6 + 1
+
+
+def test_words_of_space_are_refused_in_the_plane_and_troughs_in_space():
+    with pytest.raises(ValueError, match=r"\[explain\] directions: 'front' is of structures in space"):
+        candidates(ARCH, directions=("front",))
+    with pytest.raises(ValueError, match=r"\[explain\] centres is of structures in the plane"):
+        candidates(VAULT, centres=(1.0,))
+
+
+def test_a_width_at_a_place_in_space_is_that_of_the_two_faces_there():
+    joints = Comparison(
+        VAULT, read_observations([{"joint": "groin 1-1 | groin 1-2", "width": 1e-3}], VAULT), TRUST
+    ).joints
+    joint = int(np.argmax(joints.sizes))
+    names = [VAULT.names[k] for k in (joints.block_a[joint], joints.block_b[joint])]
+    ring = joints.rings.points[joints.rings.offsets[joint] : joints.rings.offsets[joint + 1]]
+    place = 0.7 * ring[0] + 0.3 * ring.mean(axis=0)
+    row = {"joint": " | ".join(names), **dict(zip("xyz", place, strict=True)), "width [mm]": 3.0}
+    compared = Comparison(VAULT, read_observations([row], VAULT), TRUST)
+    np.testing.assert_allclose(compared.observations.places[0], place, atol=1e-12)
+    # A gap that grows evenly along x, y and z has at the place what it has there.
+    gaps = (joints.rings.points - joints.rings.points.min(axis=0)) @ [1e-3, 2e-3, 3e-3]
+    there = (place - joints.rings.points.min(axis=0)) @ [1e-3, 2e-3, 3e-3]
+    pair = int(np.flatnonzero(compared.joint == joint)[0])
+    assert compared.widths(gaps[None])[0, pair] == pytest.approx(there)
+
+
+def test_a_point_in_space_turns_with_its_block():
+    row = {"block": "keystone", "x": 0.5, "y": 0.0, "z": 1.6, "dx": 0.0, "dy": 0.0, "dz": -0.01}
+    compared = Comparison(VAULT, read_observations([row], VAULT), TRUST)
+    block = VAULT.index("keystone")
+    moved = np.zeros((1, VAULT.n_blocks, 6))
+    moved[0, block] = [0.0, 0.0, -0.01, 0.0, 0.0, np.pi / 2.0]
+    x, y = np.array([0.5, 0.0]) - VAULT.centroids[block, :2]
+    np.testing.assert_allclose(compared.displacements(moved)[0, 0], [-y - x, x - y, -0.01], atol=1e-12)
+
+
 def test_supports_that_move_together_open_nothing():
     ground, found = candidates(ARCH, supports=(("left springer", "right springer"),), directions=("down",))
     assert not opens_cracks(ground.assembly, found[0])
@@ -129,6 +190,11 @@ def test_a_structure_on_one_block_has_nothing_that_can_move_against_another():
         candidates(free)
 
 
+def flat(openings):
+    """Openings at the corners of all faces, of those at both ends of each joint."""
+    return openings.reshape(len(openings), -1)
+
+
 def comparison(rows):
     return Comparison(ARCH, read_observations(rows, ARCH), TRUST)
 
@@ -138,7 +204,7 @@ def test_a_width_that_fits_is_likelier_than_one_that_does_not():
     joint = int(compared.chance[0].argmax())
     openings = np.zeros((3, len(compared.joints.block_a), 2))
     openings[:, joint, 1] = [0.0, 0.004, 0.006]
-    found = compared.log_likelihood(compared.widths(openings), np.zeros((3, 0, 2)))
+    found = compared.log_likelihood(compared.widths(flat(openings)), np.zeros((3, 0, 2)))
     assert found[1] > found[2] > found[0]
     # No observation weighs more than its chance of having another cause.
     assert found[1] - found[0] < np.log(1.0 / TRUST.outliers) + 3.0
@@ -159,11 +225,11 @@ def test_a_crack_in_the_next_joint_counts_where_only_its_place_is_known():
     openings[0, own], openings[1, other] = 0.004, 0.004
     beside = []
     for compared in (placed, named):
-        found = compared.log_likelihood(compared.widths(openings), np.zeros((3, 0, 2)))
+        found = compared.log_likelihood(compared.widths(flat(openings)), np.zeros((3, 0, 2)))
         assert found[0] > found[2] + 2.0
         beside.append(found[1] - found[2])
     assert beside[0] > max(1.5, beside[1] + 0.5)
-    pairs = placed.likeliest(placed.widths(openings))[:2, 0]
+    pairs = placed.likeliest(placed.widths(flat(openings)))[:2, 0]
     assert placed.joint[pairs].tolist() == [own, other]
 
 
@@ -175,7 +241,7 @@ def test_on_which_side_a_joint_gapes_counts_where_it_was_measured():
     lower = int(np.argmin(compared.joints.ends[joint, :, 1]))
     openings = np.zeros((2, len(compared.joints.block_a), 2))
     openings[0, joint, lower] = openings[1, joint, 1 - lower] = 0.004
-    found = compared.log_likelihood(compared.widths(openings), np.zeros((2, 0, 2)))
+    found = compared.log_likelihood(compared.widths(flat(openings)), np.zeros((2, 0, 2)))
     assert found[0] > found[1] + 3.0
 
 
@@ -198,7 +264,7 @@ def test_a_wide_crack_is_not_seen_in_every_joint_beside_it():
     amounts = np.linspace(0.5, 1.5, 101)
     openings = np.zeros((len(amounts), len(compared.joints.block_a), 2))
     openings[:, compared.own[2]] = 0.006 * amounts[:, None]
-    found = compared.log_likelihood(compared.widths(openings), np.zeros((len(amounts), 0, 2)))
+    found = compared.log_likelihood(compared.widths(flat(openings)), np.zeros((len(amounts), 0, 2)))
     assert amounts[found.argmax()] == pytest.approx(1.0, abs=0.011)
 
 

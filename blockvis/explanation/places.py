@@ -1,0 +1,82 @@
+"""Places on the faces of joints, lines in the plane and polygons in space, and what the corners say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import shapely
+
+import solver
+from blockvis.results.joint_faces import InitialJoints
+
+
+def corners_of(joints: InitialJoints) -> np.ndarray:
+    """(n_joints, k) int array: corners of each face, in ``joints.rings``; where it has fewer than k its first again."""
+    first, counts = joints.rings.offsets[:-1], np.diff(joints.rings.offsets)
+    number = np.arange(counts.max(initial=2))
+    return np.asarray(first[:, None] + np.where(number < counts[:, None], number, 0))
+
+
+def on_faces(points: np.ndarray, joints: InitialJoints) -> tuple[np.ndarray, np.ndarray]:
+    """Find the place on each face that is nearest to each point.
+
+    Parameters
+    ----------
+    points : (n, d) array [m]
+    joints : InitialJoints
+
+    Returns
+    -------
+    away : (n, n_joints) array [m]
+        Its distance.
+    weights : (n, n_joints, k) array
+        With sum 1, for the corners of :func:`corners_of`: what is linear over a face, its corners or the gap between
+        two plane faces, has there the mean of its values at the corners with these weights.
+    """
+    if joints.rings.points.shape[1] == 2:
+        return _on_lines(points, joints.ends)
+    corners = corners_of(joints)
+    away, weights = np.zeros((len(points), len(joints))), np.zeros((len(points), *corners.shape))
+    for joint, (first, stop) in enumerate(zip(joints.rings.offsets[:-1], joints.rings.offsets[1:], strict=True)):
+        ring = joints.rings.points[first:stop]
+        middle = ring.mean(axis=0)
+        # Rows along the face, and across it.
+        axes = np.linalg.svd(ring - middle)[2]
+        flat, own = (ring - middle) @ axes[:2].T, (points - middle) @ axes.T
+        near = shapely.get_coordinates(shapely.shortest_line(shapely.Polygon(flat), shapely.points(own[:, :2])))[::2]
+        away[:, joint] = np.hypot(np.linalg.norm(own[:, :2] - near, axis=1), own[:, 2])
+        known, there = (np.column_stack([np.ones(len(some)), some]) for some in (flat, near))
+        weights[:, joint, : stop - first] = there @ np.linalg.pinv(known)
+    return away, weights
+
+
+def _on_lines(points: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    start, line = ends[:, 0], ends[:, 1] - ends[:, 0]
+    squared = np.maximum((line**2).sum(axis=1), 1e-300)
+    along = np.clip(((points[:, None] - start) * line).sum(axis=2) / squared, 0.0, 1.0)
+    apart = points[:, None] - (start + along[..., None] * line)
+    return np.hypot(apart[..., 0], apart[..., 1]), np.stack([1.0 - along, along], axis=2)
+
+
+def block_at(assembly: solver.Assembly, point: np.ndarray) -> int:
+    """Find the block in which a point lies, or the nearest; in space by the planes of its faces."""
+    if assembly.dimension == 2:
+        outlines = [shapely.Polygon(assembly.outline(i)) for i in range(assembly.n_blocks)]
+        return int(np.argmin(shapely.distance(shapely.Point(point), outlines)))
+    solids = assembly.polyhedra
+    faces = solids.faces(assembly.vertices)
+    above = np.full(assembly.n_blocks, -np.inf)
+    np.maximum.at(above, solids.block_of_face, ((point - faces.middles) * faces.normals).sum(axis=1))
+    return int(np.argmin(above))
+
+
+def place_text(place: Iterable[float], digits: int = 4) -> str:
+    """Write a place.
+
+    Examples
+    --------
+    >>> place_text((0.12345, 2.0))
+    '(0.1235, 2)'
+    """
+    return f"({', '.join(f'{value:.{digits}g}' for value in place)})"
