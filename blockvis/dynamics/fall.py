@@ -49,6 +49,9 @@ STILL, RESTING = 4e-3, 0.2
 #: Something has fallen where a block has moved by more than this part of the block size.
 FALLEN = 0.25
 
+#: In space so much of the mass that the mechanism takes has to have fallen: by a small push a dome jams again.
+MOST = 0.5
+
 #: Faces of supports steeper than 1 in this are walls, not places to lie on; the ground lies no deeper below the
 #: structure than this part of its height, however far supports reach down.
 STEEP, DEEPEST = 0.3, 0.25
@@ -125,11 +128,19 @@ def fall_of(response: solver.Response, progress: Callable[[float], None] | None 
     push = PUSH * np.sqrt(solver.GRAVITY * response.assembly.block_size)
     for _ in range(DOUBLINGS + 1):
         fall = _in_space(response, push, progress) if in_space else _Engine(response, push).run(progress)
-        moved = np.linalg.norm(fall.positions[-1] - fall.positions[0], axis=1)
-        if moved.max() > FALLEN * response.assembly.block_size:
+        fallen = np.linalg.norm(fall.positions[-1] - fall.positions[0], axis=1) > FALLEN * response.assembly.block_size
+        if fallen.any() and (not in_space or response.assembly.masses[fallen].sum() > MOST * _falling_mass(response)):
             return fall
         push *= 2.0
     return None
+
+
+def _falling_mass(response: solver.Response) -> float:
+    """Mass of the blocks that the collapse mechanism takes with it [kg]."""
+    assert response.collapse is not None
+    falling = mechanics.with_motion(response.path[-1], response.collapse.mechanism)
+    takes = mechanics.rigid_parts(response.assembly, falling) >= 0
+    return float(response.assembly.masses[takes & response.assembly.free].sum())
 
 
 def _in_space(response: solver.Response, push: float, progress: Callable[[float], None] | None) -> Fall:
