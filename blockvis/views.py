@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 import solver
 
 if TYPE_CHECKING:
@@ -54,21 +56,30 @@ def blocks(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid
     """Make a dataset of the blocks of increment k."""
     from .results.datasets import block_dataset
 
-    return block_dataset(response.assembly, response.increments[k], shape=shape)
+    return block_dataset(response.assembly, _increment(response, k), shape=shape)
 
 
 def joints(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid:
     """Make a dataset of the joints of increment k."""
     from .results.datasets import joint_dataset
 
-    return joint_dataset(response.assembly, response.increments[k], shape=shape)
+    return joint_dataset(response.assembly, _increment(response, k), shape=shape)
 
 
 def contacts(response: solver.Response, k: int, shape: str) -> pv.UnstructuredGrid:
     """Make a dataset of the contact points of increment k."""
     from .results.datasets import contact_dataset
 
-    return contact_dataset(response.assembly, response.increments[k], shape=shape)
+    return contact_dataset(response.assembly, _increment(response, k), shape=shape)
+
+
+def _increment(response: solver.Response, k: int) -> solver.Increment:
+    n = len(response.increments)
+    if not isinstance(k, (int, np.integer)):
+        raise TypeError(f"k is {k!r}; it is the number of an increment, 0 to {n - 1}, or -1 for the last")
+    if not -n <= k < n:
+        raise IndexError(f"there is no increment {k}; the response has {n}, 0 to {n - 1}, or -1 for the last")
+    return response.increments[k]
 
 
 def animate(response: solver.Response, path: str | os.PathLike[str], **options: Any) -> Path:
