@@ -28,6 +28,7 @@ from .layout.sights import SIGHTS
 from .layout.views import VIEWS
 from .system.extras import MissingExtra
 from .system.processes import is_broken_pipe
+from .text import nearest
 
 if TYPE_CHECKING:
     from .cases.contents import Case
@@ -129,8 +130,21 @@ def entry() -> None:
     sys.exit(code)
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose words for a verb that does not exist name the nearest one."""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        # Python before 3.12 has no other place for a hint.
+        if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
+            verbs = list(action.choices)
+            raise argparse.ArgumentError(
+                None, f"there is no verb '{value}'{nearest(str(value), verbs)}; there are {', '.join(verbs)}"
+            )
+        super()._check_value(action, value)
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="blockvis",
         description="How dry-jointed masonry cracks on settling supports, and how far it can go.",
         epilog=EXIT_CODES,

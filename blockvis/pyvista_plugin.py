@@ -11,9 +11,10 @@ Importing this module registers everything. Suffixes that PyVista reads or write
 from __future__ import annotations
 
 import contextlib
+import inspect
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from .pictures import palette
 from .pictures.solid_scene import drawn_forward
 from .pictures.solid_view import ABOVE, AROUND, View, showing_faces
 from .results.datasets import block_dataset
+from .text import nearest
 
 
 def _reader(path: str, **options: Any) -> pv.UnstructuredGrid:
@@ -160,6 +162,7 @@ class BlockvisAccessor:
         **options
             As of :meth:`assembly`.
         """
+        _check_options(options)
         if interfaces is None and friction_coefficient is None:
             friction_coefficient = solver.InterfaceLaw.friction_coefficient
         return solver.Structure(
@@ -321,6 +324,23 @@ class BlockvisAccessor:
             width, height = 2.0 * np.abs(view.projected(assembly.vertices - (low + high) / 2.0)).max(axis=0)
         plotter.camera.parallel_scale = 0.55 * max(height, width * window_size[1] / window_size[0])
         return plotter.show(screenshot=False if screenshot is None else str(screenshot))
+
+
+def _check_options(options: Mapping[str, Any]) -> None:
+    """Refuse what is no option of an assembly or a structure; what describes a settlement is told where it goes."""
+    of = BlockvisAccessor
+    known = {*inspect.signature(of.assembly).parameters, *inspect.signature(of.structure).parameters}
+    known -= {"self", "roles", "options"}
+    settlements = [field.name for field in fields(solver.Settlement)]
+    for name in options:
+        if name in settlements:
+            raise TypeError(
+                f"{name} is part of a solver.Settlement: give phases = [solver.Settlement({name}=..., ...)] to settle()"
+            )
+        if name not in known:
+            raise TypeError(
+                f"there is no option '{name}'{nearest(name, sorted(known))}; there are {', '.join(sorted(known))}"
+            )
 
 
 pv.register_dataset_accessor("blockvis", pv.DataObject)(BlockvisAccessor)

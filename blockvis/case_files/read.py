@@ -26,6 +26,7 @@ from blockvis.text import files_like
 from solver import mechanics
 
 from . import case_keys as keys
+from .decimal_comma import decimal_comma
 
 
 def read_case(path: str | Path, changes: Sequence[str] = ()) -> Case:
@@ -116,6 +117,9 @@ def parsed_toml(text: str, source: Path) -> dict[str, Any]:
     except RecursionError:
         raise ValueError(f"{source}: nests lists or tables without end; a case file has a handful of them") from None
     except ValueError as error:
+        comma = decimal_comma(text, str(error))
+        if comma:
+            raise ValueError(f"{source}: {comma}") from None
         hint = "; write paths with / or in single quotes" if "\\" in text else ""
         raise ValueError(f'{source}: {error}; a case file is TOML, for instance: file = "arch.msh"{hint}') from None
 

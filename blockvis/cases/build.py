@@ -39,6 +39,9 @@ STEEPEST, LIGHTEST_STONE = 3.0, 100.0
 #: A settlement of more than this fraction of a block in one step passes over what happens within it.
 LONGEST_STEP = 0.1
 
+#: A settlement that ends further than so many times the size of the structure is probably in mm.
+FARTHEST_LIMIT = 5.0
+
 #: Defaults of blocks for which neither file nor case has a value [kg/m³, m].
 DENSITY, THICKNESS = 2000.0, 1.0
 
@@ -89,11 +92,33 @@ def case_assembly(case: Case) -> solver.Assembly:
             f'{case.source}: no block is a moving support; give one of these the role "moving" under [roles] or add '
             f"[[supports]]: {', '.join(groups)}"
         )
+    _refuse_idle_settlements(case, assembly)
     check_coordinates(case, assembly)
     _note_numbers(assembly, case.source)
     _note_units(case, assembly)
     assembly = cut_ground(assembly, case.profiles)
     return imperfect(assembly, case.imperfections)
+
+
+def _refuse_idle_settlements(case: Case, assembly: solver.Assembly) -> None:
+    """Refuse a settlement whose ``blocks`` are none of the moving supports."""
+    for number, phase in enumerate(case.settlements, start=1):
+        if phase.blocks is None:
+            continue
+        moving = [name for name, moves in zip(assembly.names, assembly.moving, strict=True) if moves]
+        where = f"{case.source}: [settlement{f' {number}' if len(case.settlements) > 1 else ''}] blocks"
+        unknown = [name for name in phase.blocks if name not in assembly.names]
+        if unknown:
+            raise ValueError(
+                f"{where}: no block is named '{unknown[0]}'{nearest(unknown[0], moving)}; "
+                f"the moving supports are {', '.join(moving[:12])}"
+            )
+        if not set(moving) & set(phase.blocks):
+            named = ", ".join(phase.blocks[:6]) or "none"
+            raise ValueError(
+                f"{where} ({named}) are no moving supports, so that nothing would move; "
+                f"those of the case are {', '.join(moving[:12])}"
+            )
 
 
 def _refuse_unknown_materials(case: Case, assembly: solver.Assembly) -> None:
@@ -165,6 +190,13 @@ def _note_units(case: Case, assembly: solver.Assembly) -> None:
             f"[settlement] increment = {max(steps):g} m is {max(steps) / block:.3g} of the median block, "
             f"{block:.3g} m across: a step passes over what happens within it; at most {LONGEST_STEP * block:.2g} m"
             + (f", or is it in mm? {1e-3 * max(steps):g} m" if max(steps) > block else "")
+        )
+    limits = [s.limit for s in case.settlements if s.unit == "m"]
+    whole = float(np.ptp(assembly.vertices, axis=0).max())
+    if limits and max(limits) > max(FARTHEST_LIMIT * whole, solver.Settlement.limit):
+        notes.append(
+            f"[settlement] limit = {max(limits):g} m is {max(limits) / whole:.3g} times the size of the structure, "
+            f"{whole:.3g} m: is it in mm? {1e-3 * max(limits):g} m"
         )
     for note in notes:
         if note:

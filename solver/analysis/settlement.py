@@ -132,8 +132,8 @@ def check_settlement(assembly: Assembly, phases: Sequence[Settlement], controls:
         phase.check_dimension(assembly)
         if not phase.taking_part(assembly).any():
             which = f"settlement phase {number + 1}" if len(phases) > 1 else "the settlement"
+            named = ", ".join(f"'{name}'" for name in (assembly.names if phase.blocks is None else phase.blocks)[:6])
             if phase.blocks is not None and assembly.moving.any():
-                named = ", ".join(f"'{name}'" for name in phase.blocks[:6])
                 raise ValueError(f"{which} moves no support: of its blocks ({named}) none has the role 'moving'")
-            raise ValueError(f"{which} moves no support: give at least one block the role 'moving'")
+            raise ValueError(f"{which} moves no support: give one of the blocks the role 'moving': {named}")
     check_blocks(assembly, controls.overlap_tolerance)
