@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from blockvis.case_files import case_keys
-from blockvis.cases.distributions import CUT_OFF, KINDS
-from blockvis.cases.key import Key, Section
+from blockvis.cases.key import Forms, Key, Section
 from blockvis.generators import LAYOUTS, parameters_of
 from blockvis.generators.catalogue import described
 from blockvis.studies import study_keys
@@ -39,8 +38,6 @@ def case_page() -> str:
         parts += _section(section)
         if section is case_keys.PARAMETERS:
             parts += [_layout(name) for name in LAYOUTS]
-        if section is case_keys.IMPERFECTIONS_SECTION:
-            parts.append(_distributions())
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
@@ -49,7 +46,6 @@ def study_page() -> str:
     parts = ["# Keys of the study file", _STUDY_INTRODUCTION]
     for section in study_keys.SECTIONS:
         parts += _section(section)
-    parts.append(_distributions())
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
@@ -80,7 +76,8 @@ def _section(section: Section) -> list[str]:
         choices = ", ".join(f"`{word}`" for word in section.names.schema.get("enum", ()))
         return [*parts, f"Values: {choices or section.names.words}.", _code(lines)]
     rows = [_row(key) for key in section.keys]
-    return [*parts, "\n".join([_HEAD, *rows])]
+    parts.append("\n".join([_HEAD, *rows]))
+    return parts if section.forms is None else [*parts, _forms(section.forms)]
 
 
 def _row(key: Key) -> str:
@@ -111,12 +108,13 @@ def _default(value: Any) -> str:
     return "" if value is None else f"`{as_toml(value)}`"
 
 
-def _distributions() -> str:
+def _forms(forms: Forms) -> str:
     rows = []
-    for kind, numbers in KINDS.items():
-        also = ", perhaps `lower`, `upper`" if kind in CUT_OFF else ""
-        rows.append(_cells(f"`{kind}`", ", ".join(f"`{number}`" for number in numbers) + also))
-    return "\n".join(["### Distributions", "", "| distribution | its numbers |", "|---|---|", *rows])
+    for form, needed in forms.needed.items():
+        possible = [f"`{name}`" for name in forms.possible.get(form, ())]
+        also = f", perhaps {', '.join(possible)}" if possible else ""
+        rows.append(_cells(f"`{form}`", ", ".join(f"`{name}`" for name in needed) + also))
+    return "\n".join([f"### Its keys, by `{forms.by}`", "", f"| {forms.by} | keys |", "|---|---|", *rows])
 
 
 def main(arguments: list[str]) -> int:
