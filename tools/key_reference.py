@@ -1,4 +1,4 @@
-"""Write the reference of case and study files into a folder: python tools/key_reference.py docs/reference."""
+"""Write the reference of what case, study and observation files hold: python tools/key_reference.py docs/reference."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 from blockvis.case_files import case_keys
 from blockvis.cases.key import Forms, Key, Section
+from blockvis.explanation.observation_keys import ALSO_CALLED, OBSERVATION
 from blockvis.generators import LAYOUTS, parameters_of
 from blockvis.generators.catalogue import described
 from blockvis.studies import study_keys
@@ -31,6 +32,13 @@ these tables is refused. `blockvis schema study` prints the same tables as a JSO
 """
 
 
+_OBSERVATION_INTRODUCTION = """\
+An observation file, for [`blockvis explain`](../explain.md), is a table in CSV: a crack or a displaced point in each
+row. Lengths are in the unit that stands behind the name of their column, `width [mm]`, `[cm]` or `[m]`; without one in
+m. Other columns are left out with a note; a line that begins with `#` is a remark.
+"""
+
+
 def case_page() -> str:
     """Write the page of the case file: Markdown with a table of keys, and an example, for every table of the file."""
     parts = ["# Keys of the case file", _CASE_INTRODUCTION]
@@ -49,8 +57,22 @@ def study_page() -> str:
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
+def observation_page() -> str:
+    """Write the page of the observation file: Markdown with a table of its columns."""
+    head = "| column | value | unit | if empty | meaning | example |\n|---|---|---|---|---|---|"
+    rows = []
+    for key in OBSERVATION.keys:
+        names = [key.name, *(word for word, name in ALSO_CALLED.items() if name == key.name)]
+        shown = ", ".join(f"`{name}`" for name in names)
+        rows.append(_cells(shown, key.kind.words, key.unit, key.otherwise, f"{key.meaning}.", f"`{key.example}`"))
+    return (
+        "\n\n".join(["# Columns of the observation file", _OBSERVATION_INTRODUCTION.strip(), "\n".join([head, *rows])])
+        + "\n"
+    )
+
+
 #: Every page by the name of its file.
-PAGES = {"case_keys.md": case_page, "study_keys.md": study_page}
+PAGES = {"case_keys.md": case_page, "study_keys.md": study_page, "observation_keys.md": observation_page}
 
 
 def write_pages(folder: str | Path) -> list[Path]:

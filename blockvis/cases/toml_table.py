@@ -45,7 +45,7 @@ class Table:
         if value is None:
             return None
         if not is_number(value):
-            raise self.error(key, f"is {shortened(value)}; give a number")
+            raise self.error(key, f"is {shortened(value)}; give a {'finite ' * isinstance(value, float)}number")
         if positive and value <= 0.0:
             raise self.error(key, f"is {value:g}; give a positive number")
         return float(value)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,11 +16,13 @@ import shapely
 from scipy.optimize import linear_sum_assignment
 
 import solver
-from blockvis.cases.toml_table import shortened
+from blockvis.cases.toml_table import Table, shortened
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
 from blockvis.text import files_like, nearest
+
+from .observation_keys import COLUMNS, LENGTHS, OBSERVATION
 
 #: Uncertainty of a width, as a fraction of it, and the least [m], where the observations give none.
 WIDTH_UNCERTAINTY, LEAST_UNCERTAINTY = 0.2, 2e-4
@@ -43,17 +44,6 @@ FARTHEST_BLOCK = 1.5
 
 #: Metres per unit of a column.
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-
-#: Columns, by the words that tables have for them.
-COLUMNS = {
-    "joint": "joint", "block_a": "block_a", "block_b": "block_b", "block": "block", "x": "x", "y": "y",
-    "width": "width", "opening": "width", "crack_width": "width",
-    "uncertainty": "uncertainty", "sigma": "uncertainty", "error": "uncertainty",
-    "dx": "dx", "dy": "dy", "displaced_x": "displaced_x", "displaced_y": "displaced_y",
-}  # fmt: skip
-
-#: Columns that hold lengths.
-LENGTHS = ("x", "y", "width", "uncertainty", "dx", "dy", "displaced_x", "displaced_y")
 
 
 @dataclass(frozen=True)
@@ -221,11 +211,11 @@ def _of_rows(
     points: list[tuple[np.ndarray, str, np.ndarray, float]] = []
     for number, row in rows:
         cells = _Cells(row, columns, f"{where}, {counted} {number}")
-        width = cells.width()
+        width = cells.number("width")
         if width is not None:
             place, named, whole, label = _place(cells, assembly, joints)
             _check_width(width, cells, assembly)
-            uncertainty = cells.uncertainty()
+            uncertainty = cells.number("uncertainty")
             usual = max(WIDTH_UNCERTAINTY * width, LEAST_UNCERTAINTY)
             widths.append((place, named, whole, width, usual if uncertainty is None else uncertainty, label))
         moved = _displacement(cells, assembly)
@@ -261,42 +251,23 @@ def _observations(
     return found
 
 
-class _Cells:
-    """The cells of a row, by the known columns."""
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+class _Row(Table):
+    """The cells of a row that are filled, as numbers and texts in the units of the table."""
 
     def __init__(self, row: Mapping[str, Any], columns: Mapping[str, _Column], where: str) -> None:
-        self.row, self.columns, self.where = row, columns, where
-
-    def text(self, key: str) -> str:
-        """Text of a cell; empty where there is none."""
-        if key not in self.columns:
-            return ""
-        value = self.row.get(self.columns[key].name)
-        return "" if value is None or (isinstance(value, float) and math.isnan(value)) else str(value).strip()
-
-    def number(self, key: str) -> float | None:
-        """Length [m] in a cell; None where it is empty."""
-        text = self.text(key)
-        if not text:
-            return None
-        try:
-            value = float(text)
-        except ValueError:
-            raise self.error(key, f"is '{text}'; give a number") from None
-        if not math.isfinite(value):
-            raise self.error(key, f"is {text}; give a finite number")
-        return value * self.columns[key].factor
-
-    def width(self) -> float | None:
-        """Width [m]; 0 for a closed joint, None where there is none."""
-        return 0.0 if self.text("width").lower() == "closed" else self.number("width")
-
-    def uncertainty(self) -> float | None:
-        """Read the standard deviation [m]; None where there is none."""
-        found = self.number("uncertainty")
-        if found is not None and found <= 0.0:
-            raise self.error("uncertainty", f"is {self.text('uncertainty')}; give a length above 0")
-        return found
+        self.columns = columns
+        given = {key: row.get(column.name) for key, column in columns.items()}
+        # Tables that programs make have nan where a cell is empty.
+        texts = {key: str(value).strip() for key, value in given.items() if value is not None and value == value}
+        cells = {key: _number(text) if key in LENGTHS else text for key, text in texts.items() if text}
+        super().__init__(cells, where, Path())
 
     def error(self, key: str, problem: str) -> ValueError:
         """Make an error that names the file, the line and the column."""
@@ -304,9 +275,25 @@ class _Cells:
         return ValueError(f"{self.where}: {name} {problem}")
 
 
+class _Cells:
+    """What a row says, checked by the table of columns."""
+
+    def __init__(self, row: Mapping[str, Any], columns: Mapping[str, _Column], where: str) -> None:
+        cells = _Row(row, columns, where)
+        self.columns, self.error = columns, cells.error
+        self.values = OBSERVATION.read(cells)
+
+    def text(self, key: str) -> str:
+        """Text of a cell; empty where there is none."""
+        return self.values[key] or ""
+
+    def number(self, key: str) -> float | None:
+        """Length [m] in a cell; None where it is empty."""
+        value: float | None = self.values[key]
+        return None if value is None else value * self.columns[key].factor
+
+
 def _check_width(width: float, cells: _Cells, assembly: solver.Assembly) -> None:
-    if width < 0.0:
-        raise cells.error("width", f'is {cells.text("width")}; give a width of at least 0, or "closed"')
     if width > WIDEST * assembly.block_size:
         raise cells.error(
             "width",
@@ -406,7 +393,7 @@ def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray,
             f"puts '{assembly.names[block]}' {np.hypot(*displaced):.3g} m from where it is drawn, in a structure of "
             f"{extent:.3g} m; is it in mm? name the column so, as in: dx [mm]",
         )
-    uncertainty = cells.uncertainty()
+    uncertainty = cells.number("uncertainty")
     return point, assembly.names[block], displaced, POINT_UNCERTAINTY if uncertainty is None else uncertainty
 
 
