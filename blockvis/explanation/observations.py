@@ -119,6 +119,12 @@ def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly
     known = FORMATS.get(path.suffix.lower())
     if known is not None and not known.alone:
         return _of_drawing(path, assembly)
+    table = csv.reader(io.StringIO(text := _table_text(path)), delimiter=_mark_of(text))
+    header = [cell.strip() for cell in next(table)]
+    return _of_rows(_numbered(table, header, path), header, assembly, str(path), "line")
+
+
+def _table_text(path: Path) -> str:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -126,27 +132,30 @@ def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly
             f"{path}: is no table in UTF-8 ({error.reason} at byte {error.start}), and '{path.suffix}' is no layout "
             "format; save it as CSV in UTF-8"
         ) from None
-    lines = [line for line in text.splitlines() if line.strip()]
-    if not lines:
+    if not text.strip():
         raise ValueError(f"{path}: is empty; its first line names the columns, for instance: joint,width [mm]")
-    # Tables of some countries have a semicolon between columns, and a comma in their numbers.
-    mark = max(",;\t", key=lines[0].count)
-    table = csv.reader(io.StringIO(text), delimiter=mark)
-    header = [cell.strip() for cell in next(table)]
+    return text
 
-    def numbered() -> Iterator[tuple[int, dict[str, Any]]]:
-        for cells in table:
-            if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
-                if mark != ",":
-                    cells = [re.sub(r"^(\s*[-+]?\d*),(\d+\s*)$", r"\1.\2", cell) for cell in cells]
-                if any(cell.strip() for cell in cells[len(header) :]):
-                    raise ValueError(
-                        f"{path}, line {table.line_num}: has {len(cells)} cells, and the first line {len(header)}; "
-                        "where numbers have a decimal comma, put semicolons between the columns"
-                    )
-                yield table.line_num, dict(zip(header, cells, strict=False))
 
-    return _of_rows(numbered(), header, assembly, str(path), "line")
+def _mark_of(text: str) -> str:
+    """Find the mark between columns: tables of some countries have a semicolon, and a comma in their numbers."""
+    first = next(line for line in text.splitlines() if line.strip())
+    return max(",;\t", key=first.count)
+
+
+def _numbered(table: Any, header: Sequence[str], path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Read the rows of a table with their lines, but empty ones and remarks."""
+    for cells in table:
+        if not any(cell.strip() for cell in cells) or cells[0].lstrip().startswith("#"):
+            continue
+        if table.dialect.delimiter != ",":
+            cells = [re.sub(r"^(\s*[-+]?\d*),(\d+\s*)$", r"\1.\2", cell) for cell in cells]
+        if any(cell.strip() for cell in cells[len(header) :]):
+            raise ValueError(
+                f"{path}, line {table.line_num}: has {len(cells)} cells, and the first line {len(header)}; "
+                "where numbers have a decimal comma, put semicolons between the columns"
+            )
+        yield table.line_num, dict(zip(header, cells, strict=False))
 
 
 @dataclass(frozen=True)
