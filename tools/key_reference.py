@@ -1,4 +1,4 @@
-"""Write the reference of case and study files into a folder: python tools/key_reference.py docs/reference."""
+"""Write the reference of what case, study and observation files hold: python tools/key_reference.py docs/reference."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from blockvis.case_files import case_keys
-from blockvis.cases.distributions import CUT_OFF, KINDS
-from blockvis.cases.key import Key, Section
+from blockvis.cases.key import Forms, Key, Section
+from blockvis.explanation.observation_keys import ALSO_CALLED, OBSERVATION
 from blockvis.generators import LAYOUTS, parameters_of
 from blockvis.generators.catalogue import described
 from blockvis.studies import study_keys
@@ -32,6 +32,13 @@ these tables is refused. `blockvis schema study` prints the same tables as a JSO
 """
 
 
+_OBSERVATION_INTRODUCTION = """\
+An observation file, for [`blockvis explain`](../explain.md), is a table in CSV: a crack or a displaced point in each
+row. Lengths are in the unit that stands behind the name of their column, `width [mm]`, `[cm]` or `[m]`; without one in
+m. Other columns are left out with a note; a line that begins with `#` is a remark.
+"""
+
+
 def case_page() -> str:
     """Write the page of the case file: Markdown with a table of keys, and an example, for every table of the file."""
     parts = ["# Keys of the case file", _CASE_INTRODUCTION]
@@ -39,8 +46,6 @@ def case_page() -> str:
         parts += _section(section)
         if section is case_keys.PARAMETERS:
             parts += [_layout(name) for name in LAYOUTS]
-        if section is case_keys.IMPERFECTIONS_SECTION:
-            parts.append(_distributions())
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
@@ -49,12 +54,25 @@ def study_page() -> str:
     parts = ["# Keys of the study file", _STUDY_INTRODUCTION]
     for section in study_keys.SECTIONS:
         parts += _section(section)
-    parts.append(_distributions())
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
+def observation_page() -> str:
+    """Write the page of the observation file: Markdown with a table of its columns."""
+    head = "| column | value | unit | if empty | meaning | example |\n|---|---|---|---|---|---|"
+    rows = []
+    for key in OBSERVATION.keys:
+        names = [key.name, *(word for word, name in ALSO_CALLED.items() if name == key.name)]
+        shown = ", ".join(f"`{name}`" for name in names)
+        rows.append(_cells(shown, key.kind.words, key.unit, key.otherwise, f"{key.meaning}.", f"`{key.example}`"))
+    return (
+        "\n\n".join(["# Columns of the observation file", _OBSERVATION_INTRODUCTION.strip(), "\n".join([head, *rows])])
+        + "\n"
+    )
+
+
 #: Every page by the name of its file.
-PAGES = {"case_keys.md": case_page, "study_keys.md": study_page}
+PAGES = {"case_keys.md": case_page, "study_keys.md": study_page, "observation_keys.md": observation_page}
 
 
 def write_pages(folder: str | Path) -> list[Path]:
@@ -80,7 +98,9 @@ def _section(section: Section) -> list[str]:
         choices = ", ".join(f"`{word}`" for word in section.names.schema.get("enum", ()))
         parts += [f"Values: {choices or section.names.words}.", _code(lines)]
     rows = [_row(key) for key in section.keys]
-    return [*parts, "\n".join([_HEAD, *rows])] if rows else parts
+    if rows:
+        parts.append("\n".join([_HEAD, *rows]))
+    return parts if section.forms is None else [*parts, _forms(section.forms)]
 
 
 def _row(key: Key) -> str:
@@ -111,12 +131,13 @@ def _default(value: Any) -> str:
     return "" if value is None else f"`{as_toml(value)}`"
 
 
-def _distributions() -> str:
+def _forms(forms: Forms) -> str:
     rows = []
-    for kind, numbers in KINDS.items():
-        also = ", perhaps `lower`, `upper`" if kind in CUT_OFF else ""
-        rows.append(_cells(f"`{kind}`", ", ".join(f"`{number}`" for number in numbers) + also))
-    return "\n".join(["### Distributions", "", "| distribution | its numbers |", "|---|---|", *rows])
+    for form, needed in forms.needed.items():
+        possible = [f"`{name}`" for name in forms.possible.get(form, ())]
+        also = f", perhaps {', '.join(possible)}" if possible else ""
+        rows.append(_cells(f"`{form}`", ", ".join(f"`{name}`" for name in needed) + also))
+    return "\n".join([f"### Its keys, by `{forms.by}`", "", f"| {forms.by} | keys |", "|---|---|", *rows])
 
 
 def main(arguments: list[str]) -> int:

@@ -13,7 +13,6 @@ import numpy as np
 import solver
 from blockvis.cases.bonds import BOND
 from blockvis.cases.build import DENSITY, THICKNESS
-from blockvis.cases.distributions import KINDS as DISTRIBUTIONS
 from blockvis.cases.explain_settings import EXPLAIN
 from blockvis.cases.imperfections import IMPERFECTIONS
 from blockvis.cases.key import (
@@ -35,7 +34,7 @@ from blockvis.cases.key import (
     one_of,
     whole,
 )
-from blockvis.cases.profiles import read_profile
+from blockvis.cases.profiles import PROFILE, PROFILES
 from blockvis.cases.toml_table import Table, is_number, shortened
 from blockvis.generators import LAYOUTS
 from blockvis.kinds.kinds import KINDS
@@ -173,27 +172,6 @@ def _read_by(read: Callable[[Any], _Read], table: Table, key: Key) -> _Read | No
         raise table.error(key.name, str(error)) from None
 
 
-_PROFILE = ValueKind(
-    "table: kind, centre, inflection, depth; points; or supports",
-    {
-        "type": "object",
-        "properties": {
-            "kind": {"enum": ["gaussian", "points", "supports"]},
-            "centre": NUMBER.schema,
-            "inflection": POSITIVE.schema,
-            "depth": NUMBER.schema,
-            "points": {"type": "array", "items": PAIR.schema, "minItems": 2},
-            "supports": {
-                "type": "object",
-                "additionalProperties": {
-                    "type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3
-                },
-            },
-        },
-        "additionalProperties": False,
-    },
-    lambda table, _: read_profile(table),
-)  # fmt: skip
 _LAYOUT = ValueKind(
     "text",
     {"anyOf": [{"enum": list(LAYOUTS)}, {"type": "string", "pattern": f"^({_in_any_letters(tuple(LAYOUTS))})$"}]},
@@ -225,7 +203,6 @@ _PLACES = ValueKind(
 _LEVELS = replace(PAIR, read=lambda table, key: table.pair(key.name, words="[bottom, top]"))
 # Of the kinds that there are when a case is read.
 _KIND = replace(one_of(tuple(KINDS)), read=lambda table, key: table.text(key.name, among=tuple(KINDS)))
-_TABLE = ValueKind("table", {"type": "object"}, lambda table, key: table.table(key.name).values)
 _PUSHES = replace(PAIR, read=_direction_of_pressure)
 _WINDOW = ValueKind(
     "four numbers", {"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4}, _read_window
@@ -265,32 +242,6 @@ _CUT = ValueKind(
     _cut,
 )
 
-_NEEDED, _UNLIMITED = "required where the distribution has it", "; normal and lognormal have none"
-
-#: Numbers of the distributions; :data:`blockvis.cases.distributions.KINDS` says which of them each one takes.
-DISTRIBUTION_KEYS = (
-    Key(
-        "distribution",
-        one_of(tuple(DISTRIBUTIONS)),
-        "Probability distribution; normal and lognormal may be cut off by lower and upper",
-        "normal",
-        required=True,
-    ),
-    Key("mean", NUMBER, "Mean of normal and lognormal, before they are cut off", 0.6, otherwise=_NEEDED),
-    Key(
-        "deviation",
-        POSITIVE,
-        "Standard deviation of normal and lognormal, before they are cut off",
-        0.1,
-        otherwise=_NEEDED,
-    ),
-    Key("lower", NUMBER, "Lower limit", 0.2, otherwise=_NEEDED + _UNLIMITED),
-    Key("upper", NUMBER, "Upper limit", 1.0, otherwise=_NEEDED + _UNLIMITED),
-    Key("mode", NUMBER, "Most probable value of triangular", 0.6, otherwise=_NEEDED),
-    Key("alpha", POSITIVE, "First shape parameter of beta", 2.0, otherwise=_NEEDED),
-    Key("beta", POSITIVE, "Second shape parameter of beta", 3.0, otherwise=_NEEDED),
-)
-
 
 def _strength() -> tuple[Key, ...]:
     return (
@@ -313,6 +264,15 @@ def _strength() -> tuple[Key, ...]:
     )
 
 
+PARAMETERS = Section(
+    "geometry.parameters",
+    "Parameters of the layout; blockvis layout takes the same",
+    names=ValueKind("number, text, list or table", {}),
+    example={"span": 4.0, "rise": 1.0, "voussoirs": 15},
+)
+
+_PARAMETERS = ValueKind("table", PARAMETERS.schema, lambda table, key: table.table(key.name).values)
+
 GEOMETRY = Section(
     "geometry",
     "Where the blocks are: a file, or a layout by its parameters",
@@ -327,7 +287,7 @@ GEOMETRY = Section(
         Key("layout", _LAYOUT, "Name of a parametric layout", "segmental arch", otherwise="file is given instead"),
         Key(
             "parameters",
-            _TABLE,
+            _PARAMETERS,
             "Parameters of the layout, see [geometry.parameters]",
             {"span": 4.0},
             otherwise="each parameter at its default",
@@ -373,13 +333,6 @@ GEOMETRY = Section(
 
 #: Keys of [geometry] of an image.
 OF_IMAGES = ("width", "height", "pixel", "background", "smallest")
-
-PARAMETERS = Section(
-    "geometry.parameters",
-    "Parameters of the layout; blockvis layout takes the same",
-    names=ValueKind("number, text, list or table", {}),
-    example={"span": 4.0, "rise": 1.0, "voussoirs": 15},
-)
 
 _ROLE = {"role": {"enum": list(mechanics.ROLES)}}
 
@@ -455,25 +408,6 @@ INTERFACES = Section(
     several=True,
 )  # fmt: skip
 
-IMPERFECTION_KEYS = (
-    Key("kind", one_of(tuple(IMPERFECTIONS)),
-        "What scatters: corners (each coordinate, m), friction of each joint, density of each block (both as factors)",
-        "vertices", required=True),
-    *(replace(key, otherwise="0 for vertices, 1 for friction and density") if key.name == "mean" else key
-      for key in DISTRIBUTION_KEYS),
-)  # fmt: skip
-
-IMPERFECTIONS_SECTION = Section(
-    "imperfections",
-    "Random scatter, one table of each kind; joints stay closed and faces plane",
-    (
-        IMPERFECTION_KEYS[0],
-        Key("seed", whole(0), "Of the random numbers; the same seed gives the same blocks", 1, default=0),
-        *IMPERFECTION_KEYS[1:],
-    ),
-    several=True,
-)
-
 SETTLEMENT = Section(
     "settlement",
     "How moving supports move; several tables [[settlement]] are phases, one after another",
@@ -498,7 +432,7 @@ SETTLEMENT = Section(
             "holds", 0.002, default=_CONTROLS.step_tolerance, elsewhere=True),
         Key("local_loss", SHARE, "Share of the weight up to which blocks that leave for good are let go and the path "
             "goes on without them; 0 ends it at the first", 0.0, default=_CONTROLS.local_loss, elsewhere=True),
-        Key("profile", _PROFILE, "How far each support goes, in proportion: a Gaussian trough or heave along x, points "
+        Key("profile", PROFILES, "How far each support goes, in proportion: a Gaussian trough or heave along x, points "
             "of a table, or one vector and rotation per support; s is the largest displacement of a support's centroid",
             {"kind": "gaussian", "centre": 1.5, "inflection": 0.8}, "m", otherwise="all go as far"),
         Key("blocks", _SUPPORT_NAMES, "Names of the moving supports that take part; the others stand still",
@@ -581,8 +515,9 @@ SECTIONS = (
     MATERIAL,
     MATERIALS,
     INTERFACES,
-    IMPERFECTIONS_SECTION,
+    IMPERFECTIONS,
     SETTLEMENT,
+    PROFILE,
     LOADS,
     ANALYSIS,
     *(section for kind in KINDS.values() for section in kind.sections),

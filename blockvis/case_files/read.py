@@ -261,9 +261,9 @@ def _interface(table: Table) -> tuple[tuple[str, str], solver.InterfaceLaw]:
 def _imperfections(top: Table) -> tuple[Imperfection, ...]:
     found: dict[str, Imperfection] = {}
     for entry in top.tables("imperfections"):
-        one = read_imperfection(entry.values, f"{top.source}: [{entry.where}]")
+        one = read_imperfection(entry)
         if one.kind in found:
-            raise ValueError(f"{top.source}: [{entry.where}] kind '{one.kind}' is there twice; give one of each kind")
+            raise entry.error("kind", f"'{one.kind}' is there twice; give one of each kind")
         found[one.kind] = one
     return tuple(found.values())
 

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from blockvis.text import nearest, refuse_unknown
-
-from .toml_table import is_number
+from .key import NUMBER, POSITIVE, Forms, Key, one_of
+from .toml_table import Table
 
 #: The numbers that each distribution needs, by its name; "normal" and "lognormal" may be truncated by lower and upper.
 KINDS: dict[str, tuple[str, ...]] = {
@@ -27,13 +26,32 @@ KINDS: dict[str, tuple[str, ...]] = {
 #: Distributions that may be cut off by lower and upper.
 CUT_OFF = ("normal", "lognormal")
 
+#: Which numbers a table with a distribution has.
+FORMS = Forms("distribution", KINDS, dict.fromkeys(CUT_OFF, ("lower", "upper")))
+
+_NEEDED, _UNLIMITED = "required where the distribution has it", "; normal and lognormal have none"
+
+#: Keys of a table with a distribution.
+DISTRIBUTION_KEYS = (
+    Key("distribution", one_of(tuple(KINDS)),
+        "Probability distribution; normal and lognormal may be cut off by lower and upper", "normal", required=True),
+    Key("mean", NUMBER, "Mean of normal and lognormal, before they are cut off", 0.6, otherwise=_NEEDED),
+    Key("deviation", POSITIVE, "Standard deviation of normal and lognormal, before they are cut off", 0.1,
+        otherwise=_NEEDED),
+    Key("lower", NUMBER, "Lower limit", 0.2, otherwise=_NEEDED + _UNLIMITED),
+    Key("upper", NUMBER, "Upper limit", 1.0, otherwise=_NEEDED + _UNLIMITED),
+    Key("mode", NUMBER, "Most probable value of triangular", 0.6, otherwise=_NEEDED),
+    Key("alpha", POSITIVE, "First shape parameter of beta", 2.0, otherwise=_NEEDED),
+    Key("beta", POSITIVE, "Second shape parameter of beta", 3.0, otherwise=_NEEDED),
+)  # fmt: skip
+
 #: Least probability that a truncated distribution must have between its limits; less is taken for a mistake.
 LEAST_INSIDE = 1e-6
 
 
 @dataclass(frozen=True)
 class Distribution:
-    """A distribution with its numbers; made by :func:`read_distribution`, which checks them.
+    """A distribution with its numbers; made by :func:`distribution_of`, which checks them.
 
     Attributes
     ----------
@@ -104,68 +122,37 @@ class Distribution:
         return low, high - low
 
 
-def read_distribution(
-    values: Mapping[str, Any], where: str, defaults: Mapping[str, float] | None = None
-) -> Distribution:
-    """Read and check the distribution of a table.
+def distribution_of(values: Mapping[str, Any], table: Table) -> Distribution:
+    """Make the distribution of a table, and check that its numbers go together.
 
     Parameters
     ----------
     values : mapping
-        ``distribution``, its name, and its numbers.
-    where : str
-        Beginning of the messages.
-    defaults : mapping of str to float, optional
-        Numbers that may be missing.
-
-    Returns
-    -------
-    Distribution
+        As a section with :data:`DISTRIBUTION_KEYS` and :data:`FORMS` reads them.
+    table : Table
+        For messages.
 
     Raises
     ------
     ValueError
-        For an unknown name (with the most similar one), a missing or invalid number, limits in the wrong order, and
-        limits between which the variable almost never is.
-
-    Examples
-    --------
-    >>> read_distribution({"distribution": "normal", "mean": 0.6, "deviation": -0.1}, "friction")
-    Traceback (most recent call last):
-        ...
-    ValueError: friction: deviation is -0.1; give a number above 0
+        For a number that must be above 0, limits in the wrong order, and limits between which the variable almost never
+        is.
     """
-    values = dict(values)
-    kind = values.pop("distribution", None)
-    if not isinstance(kind, str) or kind not in KINDS:
-        hint = nearest(kind, list(KINDS)) if isinstance(kind, str) else ""
-        problem = f"distribution is {kind!r}{hint}" if kind is not None else "names no distribution"
-        raise ValueError(f"{where}: {problem}; choose from {', '.join(KINDS)}")
-    needed = KINDS[kind]
-    refuse_unknown(
-        values, [*needed, *(("lower", "upper") if kind in CUT_OFF else ())], f"{where}: distribution '{kind}'"
-    )
-    numbers = {key: float(value) for key, value in (defaults or {}).items() if key in needed}
-    for key, value in values.items():
-        if not is_number(value):
-            raise ValueError(f"{where}: {key} is {value!r}; give a number")
-        numbers[key] = float(value)
-    for key in needed:
-        if key not in numbers:
-            raise ValueError(f"{where}: distribution '{kind}' needs {' and '.join(needed)}; {key} is missing")
-    positive = {"lognormal": ("mean", "deviation"), "normal": ("deviation",), "loguniform": ("lower",)}
-    for key in (*positive.get(kind, ()), *(("alpha", "beta") if kind == "beta" else ())):
+    kind = values["distribution"]
+    numbers = {key: float(values[key]) for key in FORMS.keys(kind) if values[key] is not None}
+    for key in {"lognormal": ("mean",), "loguniform": ("lower",)}.get(kind, ()):
         if numbers[key] <= 0.0:
-            raise ValueError(f"{where}: {key} is {numbers[key]:g}; give a number above 0")
+            raise table.error(key, f"is {numbers[key]:g}; give a number above 0: it is one of a {kind} variable")
     low, high = numbers.get("lower", -math.inf), numbers.get("upper", math.inf)
     if low >= high:
-        raise ValueError(f"{where}: lower is {low:g} and upper is {high:g}; lower must be the smaller")
+        raise table.error("lower", f"is {low:g} and upper is {high:g}; lower must be the smaller")
     if kind == "triangular" and not low <= numbers["mode"] <= high:
-        raise ValueError(f"{where}: mode is {numbers['mode']:g}; it must lie between {low:g} and {high:g}")
+        raise table.error("mode", f"is {numbers['mode']:g}; it must lie between {low:g} and {high:g}")
     found = Distribution(kind, numbers)
     if kind in CUT_OFF and found._inside()[1] < LEAST_INSIDE:
-        raise ValueError(
-            f"{where}: of a {kind} variable with mean {numbers['mean']:g} and deviation {numbers['deviation']:g} "
-            f"nothing lies between {low:g} and {high:g}; move the limits"
+        raise table.error(
+            "distribution",
+            f"is {kind} with mean {numbers['mean']:g} and deviation {numbers['deviation']:g}: nothing lies between "
+            f"{low:g} and {high:g}; move the limits",
         )
     return found

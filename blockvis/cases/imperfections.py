@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,16 +12,27 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
 import solver
-from blockvis.text import nearest
 
-from .distributions import Distribution, read_distribution
+from .distributions import DISTRIBUTION_KEYS, FORMS, Distribution, distribution_of
+from .key import Key, Section, one_of, whole
+from .toml_table import Table
 
-#: The kinds of imperfections, and default numbers of their distributions.
-IMPERFECTIONS: dict[str, dict[str, float]] = {
-    "vertices": {"mean": 0.0},
-    "friction": {"mean": 1.0},
-    "density": {"mean": 1.0},
-}
+#: The kinds of imperfections, and the means of their distributions where none is given.
+MEANS: dict[str, float] = {"vertices": 0.0, "friction": 1.0, "density": 1.0}
+
+IMPERFECTIONS = Section(
+    "imperfections",
+    "Random scatter, one table of each kind; joints stay closed and faces plane",
+    (
+        Key("kind", one_of(tuple(MEANS)), "What scatters: corners (each coordinate, m), friction of each joint, "
+            "density of each block (both as factors)", "vertices", required=True),
+        Key("seed", whole(0, 2**63 - 1), "Of the random numbers; the same seed gives the same blocks", 1, default=0),
+        *(replace(key, otherwise="0 for vertices, 1 for friction and density") if key.name == "mean" else key
+          for key in DISTRIBUTION_KEYS),
+    ),
+    several=True,
+    forms=FORMS.with_default("mean"),
+)  # fmt: skip
 
 #: Corners closer than this fraction of the width of the thinnest block are one corner of several blocks: the overlap
 #: that an assembly accepts.
@@ -62,43 +72,27 @@ class Imperfection:
     seed: int = 0
 
 
-def read_imperfection(values: Mapping[str, Any], where: str) -> Imperfection:
-    """Read and check the imperfection of a table.
-
-    Parameters
-    ----------
-    values : mapping
-        ``kind``, ``seed`` and the keys of :func:`blockvis.cases.distributions.read_distribution`.
-    where : str
-        Beginning of the messages.
-
-    Returns
-    -------
-    Imperfection
+def read_imperfection(table: Table, section: Section = IMPERFECTIONS) -> Imperfection:
+    """Read and check the imperfection of a table, of a case or, without a seed, of a study.
 
     Raises
     ------
     ValueError
-        For an unknown kind, a seed that is no whole number, and a factor that may become negative or 0.
+        For a value that is not as the table says, and a factor that may become negative or 0.
     """
-    values = dict(values)
-    kind, seed = values.pop("kind", None), values.pop("seed", 0)
-    if not isinstance(kind, str) or kind not in IMPERFECTIONS:
-        hint = nearest(kind, list(IMPERFECTIONS)) if isinstance(kind, str) else ""
-        raise ValueError(f"{where} kind is {kind!r}{hint}; choose from {', '.join(IMPERFECTIONS)}")
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
-        raise ValueError(f"{where} seed is {seed!r}; give a whole number of at least 0")
-    distribution = read_distribution(values, f"{where} kind '{kind}'", IMPERFECTIONS[kind])
+    values = section.read(table)
+    kind = values["kind"]
+    if values.get("mean", 0.0) is None:
+        values["mean"] = MEANS[kind]
+    distribution = distribution_of(values, table)
     if kind != "vertices" and distribution.lowest < 0.0:
-        raise ValueError(
-            f"{where} kind '{kind}': a factor may become negative; give lower, for instance lower = 0.2, or take "
-            "'lognormal'"
+        raise table.error(
+            "kind",
+            f"is '{kind}': a factor may become negative; give lower, for instance lower = 0.2, or take 'lognormal'",
         )
     if kind == "density" and distribution.lowest == 0.0 and distribution.kind != "lognormal":
-        raise ValueError(
-            f"{where} kind 'density': a factor may become 0, but blocks have a weight; give a larger lower"
-        )
-    return Imperfection(kind, distribution, seed)
+        raise table.error("kind", "is 'density': a factor may become 0, but blocks have a weight; give a larger lower")
+    return Imperfection(kind, distribution, values.get("seed", 0))
 
 
 def joint_scatter(imperfections: Sequence[Imperfection]) -> solver.JointScatter | None:
@@ -134,7 +128,7 @@ def imperfect(assembly: solver.Assembly, imperfections: Sequence[Imperfection]) 
 
 def _uniform(imperfection: Imperfection, *shape: int) -> np.ndarray:
     # Each kind has its own stream of random numbers: two kinds with the same seed must not be correlated.
-    stream = list(IMPERFECTIONS).index(imperfection.kind)
+    stream = list(MEANS).index(imperfection.kind)
     return np.random.default_rng([imperfection.seed, stream]).uniform(2.0**-54, 1.0 - 2.0**-53, size=shape)
 
 

@@ -8,7 +8,7 @@ kind of analysis in :attr:`blockvis.kinds.kind.AnalysisKind.keys`, and :data:`bl
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from .toml_table import Table, is_number, shortened
@@ -108,17 +108,12 @@ OUTLINE = ValueKind("list of at least three corners", _list_of(_list_of({"type":
 
 def whole(least: int, most: int | None = None) -> ValueKind:
     """Make the kind of whole numbers of at least ``least``, and at most ``most``."""
-
-    def read(table: Table, key: Key) -> int | None:
-        if most is None:
-            return table.whole(key.name, least)
-        value = table.number(key.name)
-        if value is not None and not (value == int(value) and least <= value <= most):
-            raise table.error(key.name, f"is {value:g}; give a whole number from {least} to {most}")
-        return None if value is None else int(value)
-
     limit = {} if most is None else {"maximum": most}
-    return ValueKind(f"whole number of at least {least}", {"type": "integer", "minimum": least} | limit, read)
+    return ValueKind(
+        f"whole number of at least {least}",
+        {"type": "integer", "minimum": least} | limit,
+        lambda table, key: table.whole(key.name, least, most),
+    )
 
 
 def one_of(choices: Sequence[str]) -> ValueKind:
@@ -168,13 +163,94 @@ class Key:
         """Read and check its value; where it is missing the default, or None where it may stand elsewhere."""
         value = self.kind.read(table, self)
         if value is None and self.required:
-            raise table.error(self.name, f"is missing{f'; {self.remedy}' if self.remedy else ''}")
+            remedy = self.remedy or (f"choose from {', '.join(self.choices)}" if self.choices else "")
+            raise table.error(self.name, f"is missing{f'; {remedy}' if remedy else ''}")
         return self.default if value is None and not self.elsewhere else value
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """What its value may be, as JSON schema has it."""
+        unit = f" [{self.unit}]" if self.unit else ""
+        missing = f". If missing: {self.otherwise}" if self.otherwise else ""
+        value = dict(self.kind.schema) | {"description": f"{self.meaning}{unit}{missing}", "examples": [self.example]}
+        if self.default is not None:
+            value["default"] = list(self.default) if isinstance(self.default, tuple) else self.default
+        return value
 
     @property
     def choices(self) -> tuple[str, ...]:
         """The texts among which the value must be; empty for other keys."""
         return tuple(self.kind.schema.get("enum", ()))
+
+
+@dataclass(frozen=True)
+class Forms:
+    """The forms of a table: which keys it has beside those that every form has.
+
+    Attributes
+    ----------
+    by : str
+        The key that names the form; where it is missing and not required, the keys that are there tell.
+    needed : mapping of str to tuple of str
+        Keys that each form must have, by its name.
+    possible : mapping of str to tuple of str
+        Keys that it may have beside these.
+    """
+
+    by: str
+    needed: Mapping[str, tuple[str, ...]]
+    possible: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def keys(self, form: str) -> tuple[str, ...]:
+        """Names of the keys that are those of a form."""
+        return (*self.needed[form], *self.possible.get(form, ()))
+
+    def with_default(self, name: str) -> Forms:
+        """Make the forms in which a key may be missing."""
+        needed = {form: tuple(key for key in keys if key != name) for form, keys in self.needed.items()}
+        possible = {form: tuple(key for key in self.keys(form) if key not in needed[form]) for form in needed}
+        return Forms(self.by, needed, possible)
+
+    @property
+    def every(self) -> tuple[str, ...]:
+        """Names of the keys that not every table has."""
+        return tuple(dict.fromkeys(name for form in self.needed for name in self.keys(form)))
+
+    def form_of(self, table: Table, named: str | None) -> str:
+        """Find the form of a table, the one that is named or the first whose keys are there; refuse keys of others."""
+        given = [form for form in self.needed if any(name in table.values for name in self.keys(form))]
+        form = named or (given or list(self.needed))[0]
+        for name in table.values:
+            if name in self.every and name not in self.keys(form):
+                others = " or ".join(f"'{other}'" for other in self.needed if name in self.keys(other))
+                raise table.error(
+                    name, f"is of {self.by} {others}, and '{form}' has {', '.join(self.keys(form))}; give one {self.by}"
+                )
+        return form
+
+    def as_of(self, form: str, key: Key) -> Key:
+        """Make the key as a table of this form has it: required where the form needs it."""
+        if key.name not in self.needed[form]:
+            return key
+        return replace(
+            key,
+            required=True,
+            remedy=key.remedy or f"{self.by} '{form}' needs {' and '.join(self.needed[form])}",
+        )
+
+    def schemas(self, names: Sequence[str]) -> list[dict[str, Any]]:
+        """Say, as JSON schema has it, which of the keys of a table with these ``names`` go with each form."""
+        return [
+            {
+                "if": {"properties": {self.by: {"const": form}}, "required": [self.by]},
+                "then": {
+                    "propertyNames": {
+                        "enum": [name for name in names if name in self.keys(form) or name not in self.every]
+                    }
+                },
+            }
+            for form in self.needed
+        ]
 
 
 @dataclass(frozen=True)
@@ -193,6 +269,8 @@ class Section:
         Of the values, where the user chooses the names of the keys.
     required : bool
         Whether the table must be there.
+    forms : Forms, optional
+        Which of the keys a table has, where this depends on one of them.
     example : mapping
         Keys of the user's choice, where there are such.
     """
@@ -203,6 +281,7 @@ class Section:
     several: bool = False
     names: ValueKind | None = None
     required: bool = False
+    forms: Forms | None = None
     example: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -214,11 +293,33 @@ class Section:
         """Find the key of this name."""
         return next(key for key in self.keys if key.name == name)
 
+    @property
+    def schema(self) -> dict[str, Any]:
+        """What one table may hold, as JSON schema has it."""
+        table: dict[str, Any] = {"type": "object", "description": self.meaning}
+        if self.keys or self.names is None:
+            table["properties"] = {key.name: key.schema for key in self.keys}
+        table["additionalProperties"] = False if self.names is None else dict(self.names.schema)
+        required = [key.name for key in self.keys if key.required]
+        if required:
+            table["required"] = required
+        if self.forms is not None:
+            table["allOf"] = self.forms.schemas([key.name for key in self.keys])
+        return table
+
     def read(self, table: Table) -> dict[str, Any]:
-        """Read and check the values of its keys, each at its default where it is missing; refuse other keys."""
-        values = read_keys(self.keys, table)
-        table.finish()
-        return values
+        """Read and check the values of its keys, each at its default where it is missing; refuse other keys.
+
+        Of a table that has forms, the values of the keys of its form.
+        """
+        # A misspelt key is named before the one that it was to be is missing.
+        table.finish([key.name for key in self.keys])
+        if self.forms is None:
+            return read_keys(self.keys, table)
+        values = read_keys([key for key in self.keys if key.name not in self.forms.every], table)
+        form = self.forms.form_of(table, values[self.forms.by])
+        own = [self.forms.as_of(form, key) for key in self.keys if key.name in self.forms.keys(form)]
+        return values | read_keys(own, table)
 
 
 def read_keys(keys: Iterable[Key], table: Table) -> dict[str, Any]:

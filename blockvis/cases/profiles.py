@@ -16,6 +16,7 @@ import solver
 from blockvis.text import nearest
 from solver import mechanics
 
+from .key import NUMBER, PAIR, POSITIVE, Forms, Key, Section, ValueKind, one_of
 from .toml_table import Table, is_number, shortened
 
 #: Pieces of a support narrower than this fraction of the block size are not cut off.
@@ -97,66 +98,99 @@ class Profile:
         }
 
 
-def read_profile(table: Table) -> Profile | dict[str, tuple[float, float, float]] | None:
-    """Read ``profile`` of a settlement; the motions of supports where it gives these."""
-    given = table.take("profile")
+def _depth(table: Table, key: Key) -> float | None:
+    depth: float | None = table.number(key.name)
+    if depth == 0.0:
+        raise table.error(key.name, "is 0; give 1, or -1 for a heave: the settlement scales it")
+    return depth
+
+
+def _points(table: Table, key: Key) -> tuple[tuple[float, float], ...] | None:
+    given = table.take(key.name)
+    if given is None:
+        return None
+    right = isinstance(given, list) and len(given) > 1
+    if not right or not all(isinstance(p, list) and len(p) == 2 and all(map(is_number, p)) for p in given):
+        raise table.error(key.name, f"is {shortened(given)}; give at least two pairs [[x, s], ...]")
+    points = tuple(sorted((float(x), float(s)) for x, s in given))
+    for (x, _), (following, _) in pairwise(points):
+        if x == following:
+            raise table.error(key.name, f"has two values at x = {x:g}; give one for each x")
+    if not any(s for _, s in points):
+        raise table.error(key.name, "are all 0; give a value other than 0")
+    return points
+
+
+def _motions(table: Table, key: Key) -> dict[str, tuple[float, float, float]] | None:
+    given = table.take(key.name)
+    if given is None:
+        return None
+    if not isinstance(given, dict) or not given:
+        raise table.error(key.name, f'is {shortened(given)}; give {{ "name" = [dx, dy, rotation], ... }}')
+    for name, motion in given.items():
+        if not isinstance(motion, list) or len(motion) not in (2, 3) or not all(map(is_number, motion)):
+            raise table.error(key.name, f'"{name}" is {shortened(motion)}; give [dx, dy] or [dx, dy, rotation]')
+    padded = {str(name): (*map(float, motion), 0.0)[:3] for name, motion in given.items()}
+    return {name: (dx, dy, rotation) for name, (dx, dy, rotation) in padded.items()}
+
+
+_DEPTH = ValueKind("number other than 0", dict(NUMBER.schema) | {"not": {"const": 0}}, _depth)
+_POINTS = ValueKind("list of at least two pairs", {"type": "array", "items": PAIR.schema, "minItems": 2}, _points)
+_MOTIONS = ValueKind(
+    "table of two or three numbers by the name of a support",
+    {
+        "type": "object",
+        "additionalProperties": {"type": "array", "items": NUMBER.schema, "minItems": 2, "maxItems": 3},
+        "minProperties": 1,
+    },
+    _motions,
+)
+
+PROFILE = Section(
+    "settlement.profile",
+    "How far each support goes, in proportion, by one of three kinds of profile",
+    (
+        Key("kind", one_of(("gaussian", "points", "supports")), "A Gaussian trough or heave along x, points of a "
+            "table, or the motion of each support", "gaussian", otherwise="the kind whose keys are there"),
+        Key("centre", NUMBER, "Of a Gaussian trough, the x where it is deepest", 1.5, "m",
+            otherwise="required for gaussian", remedy="give the x where it is deepest, in m"),
+        Key("inflection", POSITIVE, "Of a Gaussian trough, how far from its centre it is steepest", 0.8, "m",
+            otherwise="required for gaussian",
+            remedy="give the distance from the centre to where it is steepest, in m"),
+        Key("depth", _DEPTH, "Of a Gaussian trough, 1, or -1 for a heave: the settlement scales it", -1.0, default=1.0),
+        Key("points", _POINTS, "Places x [m] and how far the ground goes there, straight between them and level beyond",
+            [[0.0, 0.0], [2.0, 1.0]], otherwise="required for points"),
+        Key("supports", _MOTIONS, "Displacement of each support in proportion, and its rotation [rad/m]",
+            {"pier": [0.2, -0.5, 0.01]}, otherwise="required for supports"),
+    ),
+    forms=Forms(
+        "kind",
+        {"gaussian": ("centre", "inflection"), "points": ("points",), "supports": ("supports",)},
+        {"gaussian": ("depth",)},
+    ),
+)  # fmt: skip
+
+
+def read_profile(table: Table, key: Key) -> Profile | dict[str, tuple[float, float, float]] | None:
+    """Read the profile of a settlement; the motions of supports where it gives these."""
+    given = table.take(key.name)
     if given is None:
         return None
     if not isinstance(given, dict):
         raise table.error(
-            "profile",
+            key.name,
             f'is {shortened(given)}; give {{ kind = "gaussian", centre = x, inflection = i }}, '
             '{ points = [[x, s], ...] } or { supports = { "name" = [dx, dy, rotation] } }',
         )
-    inner = Table(given, f"{table.where}.profile", table.source)
-    choices = [key for key in ("points", "supports") if key in given]
-    kind = inner.text("kind", choices[0] if choices else "gaussian", among=("gaussian", "points", "supports"))
-    if choices not in ([], [kind]):
-        raise inner.error("kind", f"is '{kind}', but {' and '.join(choices)} are given; give one kind of profile")
-    found: Profile | dict[str, tuple[float, float, float]]
-    if kind == "gaussian":
-        centre, inflection = inner.number("centre"), inner.number("inflection", positive=True)
-        depth = inner.number("depth", 1.0)
-        for key, value, what in (
-            ("centre", centre, "the x where it is deepest"),
-            ("inflection", inflection, "the distance from there to where it is steepest"),
-        ):
-            if value is None:
-                raise inner.error(key, f"is missing; give {what}, in m")
-        if depth == 0.0:
-            raise inner.error("depth", "is 0; give 1, or -1 for a heave: the settlement scales it")
-        found = Profile("gaussian", centre, inflection, depth)
-    elif kind == "points":
-        found = Profile("points", points=_points(inner))
-    else:
-        found = _motions(inner)
-    inner.finish()
-    return found
+    values = PROFILE.read(table.table(key.name))
+    motions: dict[str, tuple[float, float, float]] | None = values.pop("supports", None)
+    if motions is not None:
+        return motions
+    return Profile(**values | {"kind": "points" if "points" in values else "gaussian"})
 
 
-def _points(table: Table) -> tuple[tuple[float, float], ...]:
-    given = table.take("points")
-    right = isinstance(given, list) and len(given) > 1
-    if not right or not all(isinstance(p, list) and len(p) == 2 and all(map(is_number, p)) for p in given):
-        raise table.error("points", f"is {shortened(given)}; give at least two pairs [[x, s], ...]")
-    points = tuple(sorted((float(x), float(s)) for x, s in given))
-    for (x, _), (following, _) in pairwise(points):
-        if x == following:
-            raise table.error("points", f"has two values at x = {x:g}; give one for each x")
-    if not any(s for _, s in points):
-        raise table.error("points", "are all 0; give a value other than 0")
-    return points
-
-
-def _motions(table: Table) -> dict[str, tuple[float, float, float]]:
-    given = table.take("supports")
-    if not isinstance(given, dict) or not given:
-        raise table.error("supports", f'is {shortened(given)}; give {{ "name" = [dx, dy, rotation], ... }}')
-    for name, motion in given.items():
-        if not isinstance(motion, list) or len(motion) not in (2, 3) or not all(map(is_number, motion)):
-            raise table.error("supports", f'"{name}" is {shortened(motion)}; give [dx, dy] or [dx, dy, rotation]')
-    padded = {str(name): (*map(float, motion), 0.0)[:3] for name, motion in given.items()}
-    return {name: (dx, dy, rotation) for name, (dx, dy, rotation) in padded.items()}
+#: Profiles as values of a key.
+PROFILES = ValueKind("table, see [settlement.profile]", PROFILE.schema, read_profile)
 
 
 def with_profiles(

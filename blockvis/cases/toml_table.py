@@ -45,7 +45,7 @@ class Table:
         if value is None:
             return None
         if not is_number(value):
-            raise self.error(key, f"is {shortened(value)}; give a number")
+            raise self.error(key, f"is {shortened(value)}; give a {'finite ' * isinstance(value, float)}number")
         if positive and value <= 0.0:
             raise self.error(key, f"is {value:g}; give a positive number")
         return float(value)
@@ -120,12 +120,14 @@ class Table:
             raise self.error(key, f'is {shortened(value)}; give texts in quotes, ["first", "second *"]')
         return tuple(words)
 
-    def whole(self, key: str, least: int) -> int | None:
-        """Read a whole number of at least ``least``."""
+    def whole(self, key: str, least: int, most: int | None = None) -> int | None:
+        """Read a whole number of at least ``least``, and at most ``most``."""
         value = self.number(key)
-        if value is not None and (value < least or value != int(value)):
-            raise self.error(key, f"is {value:g}; give a whole number of at least {least}")
-        return None if value is None else int(value)
+        if value is not None and (value != int(value) or value < least or (most is not None and value > most)):
+            limits = f"of at least {least}" if most is None else f"from {least} to {most}"
+            raise self.error(key, f"is {value:g}; give a whole number {limits}")
+        # A double has not every large whole number, and a seed must not become another one.
+        return None if value is None else int(self.values[key])
 
     def table(self, key: str) -> Table:
         """Read a table; a missing one is empty."""
@@ -146,8 +148,9 @@ class Table:
         where = f"[{self.where}] {key}" if self.where else f"[{key}]"
         return ValueError(f"{self.source}: {where} {problem}")
 
-    def finish(self) -> None:
-        """Refuse keys that were not read, naming the most similar one that was."""
+    def finish(self, known: Sequence[str] = ()) -> None:
+        """Refuse keys that were not read and are not known, naming the most similar one of these."""
+        self.known += known
         for key in self.values:
             if key not in self.known:
                 keys = ", ".join(dict.fromkeys(self.known))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,12 +16,13 @@ import shapely
 from scipy.optimize import linear_sum_assignment
 
 import solver
-from blockvis.cases.toml_table import shortened
+from blockvis.cases.toml_table import Table, shortened
 from blockvis.formats import FORMATS
 from blockvis.formats.read import read_layout
 from blockvis.results.joints import InitialJoints, initial_joints, opening_and_slip
 from blockvis.text import files_like, nearest
 
+from .observation_keys import COLUMNS, LENGTHS, OBSERVATION
 from .places import block_at, corners_of, on_faces, place_text
 
 #: Uncertainty of a width, as a fraction of it, and the least [m], where the observations give none.
@@ -45,18 +45,6 @@ FARTHEST_BLOCK = 1.5
 
 #: Metres per unit of a column.
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-
-#: Columns, by the words that tables have for them.
-COLUMNS = {
-    "joint": "joint", "block_a": "block_a", "block_b": "block_b", "block": "block", "x": "x", "y": "y", "z": "z",
-    "width": "width", "opening": "width", "crack_width": "width",
-    "uncertainty": "uncertainty", "sigma": "uncertainty", "error": "uncertainty",
-    "dx": "dx", "dy": "dy", "dz": "dz",
-    "displaced_x": "displaced_x", "displaced_y": "displaced_y", "displaced_z": "displaced_z",
-}  # fmt: skip
-
-#: Columns that hold lengths.
-LENGTHS = ("width", "uncertainty", *(f"{of}{axis}" for of in ("", "d", "displaced_") for axis in "xyz"))
 
 
 @dataclass(frozen=True)
@@ -132,6 +120,12 @@ def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly
     known = FORMATS.get(path.suffix.lower())
     if known is not None and not known.alone:
         return _of_drawing(path, assembly)
+    table = csv.reader(io.StringIO(text := _table_text(path)), delimiter=_mark_of(text))
+    header = [cell.strip() for cell in next(table)]
+    return _of_rows(_numbered(table, header, path), header, assembly, str(path), "line")
+
+
+def _table_text(path: Path) -> str:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -139,27 +133,30 @@ def read_observations(source: str | Path | Sequence[Mapping[str, Any]], assembly
             f"{path}: is no table in UTF-8 ({error.reason} at byte {error.start}), and '{path.suffix}' is no layout "
             "format; save it as CSV in UTF-8"
         ) from None
-    lines = [line for line in text.splitlines() if line.strip()]
-    if not lines:
+    if not text.strip():
         raise ValueError(f"{path}: is empty; its first line names the columns, for instance: joint,width [mm]")
-    # Tables of some countries have a semicolon between columns, and a comma in their numbers.
-    mark = max(",;\t", key=lines[0].count)
-    table = csv.reader(io.StringIO(text), delimiter=mark)
-    header = [cell.strip() for cell in next(table)]
+    return text
 
-    def numbered() -> Iterator[tuple[int, dict[str, Any]]]:
-        for cells in table:
-            if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
-                if mark != ",":
-                    cells = [re.sub(r"^(\s*[-+]?\d*),(\d+\s*)$", r"\1.\2", cell) for cell in cells]
-                if any(cell.strip() for cell in cells[len(header) :]):
-                    raise ValueError(
-                        f"{path}, line {table.line_num}: has {len(cells)} cells, and the first line {len(header)}; "
-                        "where numbers have a decimal comma, put semicolons between the columns"
-                    )
-                yield table.line_num, dict(zip(header, cells, strict=False))
 
-    return _of_rows(numbered(), header, assembly, str(path), "line")
+def _mark_of(text: str) -> str:
+    """Find the mark between columns: tables of some countries have a semicolon, and a comma in their numbers."""
+    first = next(line for line in text.splitlines() if line.strip())
+    return max(",;\t", key=first.count)
+
+
+def _numbered(table: Any, header: Sequence[str], path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Read the rows of a table with their lines, but empty ones and remarks."""
+    for cells in table:
+        if not any(cell.strip() for cell in cells) or cells[0].lstrip().startswith("#"):
+            continue
+        if table.dialect.delimiter != ",":
+            cells = [re.sub(r"^(\s*[-+]?\d*),(\d+\s*)$", r"\1.\2", cell) for cell in cells]
+        if any(cell.strip() for cell in cells[len(header) :]):
+            raise ValueError(
+                f"{path}, line {table.line_num}: has {len(cells)} cells, and the first line {len(header)}; "
+                "where numbers have a decimal comma, put semicolons between the columns"
+            )
+        yield table.line_num, dict(zip(header, cells, strict=False))
 
 
 @dataclass(frozen=True)
@@ -238,11 +235,11 @@ def _of_rows(
     points: list[tuple[np.ndarray, str, np.ndarray, float]] = []
     for number, row in rows:
         cells = _Cells(row, columns, f"{where}, {counted} {number}")
-        width = cells.width()
+        width = cells.number("width")
         if width is not None:
             place, named, whole, label = _place(cells, assembly, joints)
             _check_width(width, cells, assembly)
-            uncertainty = cells.uncertainty()
+            uncertainty = cells.number("uncertainty")
             usual = max(WIDTH_UNCERTAINTY * width, LEAST_UNCERTAINTY)
             widths.append((place, named, whole, width, usual if uncertainty is None else uncertainty, label))
         moved = _displacement(cells, assembly)
@@ -279,42 +276,23 @@ def _observations(
     return found
 
 
-class _Cells:
-    """The cells of a row, by the known columns."""
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+class _Row(Table):
+    """The cells of a row that are filled, as numbers and texts in the units of the table."""
 
     def __init__(self, row: Mapping[str, Any], columns: Mapping[str, _Column], where: str) -> None:
-        self.row, self.columns, self.where = row, columns, where
-
-    def text(self, key: str) -> str:
-        """Text of a cell; empty where there is none."""
-        if key not in self.columns:
-            return ""
-        value = self.row.get(self.columns[key].name)
-        return "" if value is None or (isinstance(value, float) and math.isnan(value)) else str(value).strip()
-
-    def number(self, key: str) -> float | None:
-        """Length [m] in a cell; None where it is empty."""
-        text = self.text(key)
-        if not text:
-            return None
-        try:
-            value = float(text)
-        except ValueError:
-            raise self.error(key, f"is '{text}'; give a number") from None
-        if not math.isfinite(value):
-            raise self.error(key, f"is {text}; give a finite number")
-        return value * self.columns[key].factor
-
-    def width(self) -> float | None:
-        """Width [m]; 0 for a closed joint, None where there is none."""
-        return 0.0 if self.text("width").lower() == "closed" else self.number("width")
-
-    def uncertainty(self) -> float | None:
-        """Read the standard deviation [m]; None where there is none."""
-        found = self.number("uncertainty")
-        if found is not None and found <= 0.0:
-            raise self.error("uncertainty", f"is {self.text('uncertainty')}; give a length above 0")
-        return found
+        self.columns = columns
+        given = {key: row.get(column.name) for key, column in columns.items()}
+        # Tables that programs make have nan where a cell is empty.
+        texts = {key: str(value).strip() for key, value in given.items() if value is not None and value == value}
+        cells = {key: _number(text) if key in LENGTHS else text for key, text in texts.items() if text}
+        super().__init__(cells, where, Path())
 
     def error(self, key: str, problem: str) -> ValueError:
         """Make an error that names the file, the line and the column."""
@@ -322,9 +300,25 @@ class _Cells:
         return ValueError(f"{self.where}: {name} {problem}")
 
 
+class _Cells:
+    """What a row says, checked by the table of columns."""
+
+    def __init__(self, row: Mapping[str, Any], columns: Mapping[str, _Column], where: str) -> None:
+        cells = _Row(row, columns, where)
+        self.columns, self.error = columns, cells.error
+        self.values = OBSERVATION.read(cells)
+
+    def text(self, key: str) -> str:
+        """Text of a cell; empty where there is none."""
+        return self.values[key] or ""
+
+    def number(self, key: str) -> float | None:
+        """Length [m] in a cell; None where it is empty."""
+        value: float | None = self.values[key]
+        return None if value is None else value * self.columns[key].factor
+
+
 def _check_width(width: float, cells: _Cells, assembly: solver.Assembly) -> None:
-    if width < 0.0:
-        raise cells.error("width", f'is {cells.text("width")}; give a width of at least 0, or "closed"')
     if width > WIDEST * assembly.block_size:
         raise cells.error(
             "width",
@@ -427,7 +421,7 @@ def _displacement(cells: _Cells, assembly: solver.Assembly) -> tuple[np.ndarray,
             f"puts '{assembly.names[block]}' {far:.3g} m from where it is drawn, in a structure of "
             f"{extent:.3g} m; is it in mm? name the column so, as in: dx [mm]",
         )
-    uncertainty = cells.uncertainty()
+    uncertainty = cells.number("uncertainty")
     return point, assembly.names[block], displaced, POINT_UNCERTAINTY if uncertainty is None else uncertainty
 
 

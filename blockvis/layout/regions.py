@@ -105,10 +105,36 @@ def regions_of(
         Where no closed outline is on a layer, and for an opening outside of the walls; names the drawing, layer and
         place.
     """
-    source = f"'{layout.source}'"
     drawn = _drawn(layout)
     role = roles_of(layout, roles or {}, all_match=False)
     free = [k for k, one in enumerate(drawn) if one.block < 0 or role[one.block] == mechanics.FREE]
+    walls = _walls_of(layout, drawn, free, choices)
+    regions = [_nested([drawn[k] for k, n in walls.items() if n == number]) for number in range(len(choices))]
+    every = [(region, number) for number, group in enumerate(regions) for region in group]
+    for region, number in every:
+        region.taken.extend(
+            other.wall for other, n in every
+            if n != number and other.wall.area < region.wall.area and _share(other.wall, region.wall) > OUTSIDE
+        )  # fmt: skip
+    others = [k for k in free if k not in walls]
+    opened = {k: _opened_by(drawn[k], every, choices, layout.source) for k in others}
+    for k, around in opened.items():
+        for region in around:
+            region.openings.append(drawn[k].shape)
+    left = [k for k in others if not opened[k] and drawn[k].block >= 0]
+    notes = [*layout.notes, *_reaching_out(drawn, every), *_left_in(drawn, left, every)]
+    used = [drawn[k] for k in (*walls, *(k for k in others if opened[k]))]
+    blocks, items = {one.block for one in used}, {one.item for one in used}
+    rest = layout.chosen([i for i in range(layout.n_blocks) if i not in blocks])
+    left_out = tuple(one for i, one in enumerate(layout.left_out) if i not in items)
+    return regions, replace(rest, left_out=left_out, notes=tuple(notes))
+
+
+def _walls_of(
+    layout: Layout, drawn: Sequence[_Drawn], free: Sequence[int], choices: Sequence[Choice]
+) -> dict[int, int]:
+    """Find which outlines are walls, and the number of the choice of each; the first that names it has it."""
+    source = f"'{layout.source}'"
     walls: dict[int, int] = {}
     for number, choice in enumerate(choices):
         for key, patterns in (("walls", choice.walls), ("openings", choice.openings)):
@@ -122,44 +148,30 @@ def regions_of(
                 f"{source}: bond: walls = {listed} are filled by another [[bond]]; give each its own layers"
             )
         walls |= dict.fromkeys(mine, number)
-    regions: list[list[Region]] = [[] for _ in choices]
-    used = set(walls)
-    for number in range(len(choices)):
-        mine = [k for k, n in walls.items() if n == number]
-        regions[number] = _nested([drawn[k] for k in mine])
-    every = [(region, number) for number, group in enumerate(regions) for region in group]
-    for region, number in every:
-        region.taken.extend(
-            other.wall for other, n in every
-            if n != number and other.wall.area < region.wall.area and _share(other.wall, region.wall) > OUTSIDE
-        )  # fmt: skip
-    notes: list[str] = list(layout.notes)
-    others = [k for k in free if k not in walls]
-    for k in others:
-        asked = [number for number, choice in enumerate(choices) if matches(drawn[k].labels, choice.openings)]
-        holding = [
-            (region, number) for region, number in every
-            if (number in asked or not choices[number].openings)
-            and _share(drawn[k].shape, region.wall) > (OUTSIDE if asked else INSIDE)
-            and (asked or (drawn[k].shape.area < region.wall.area and not _is_beside(drawn[k])))
-        ]  # fmt: skip
-        if asked and not holding:
-            x, y = drawn[k].shape.centroid.coords[0]
-            raise ValueError(
-                f"{source}: the opening '{drawn[k].labels[-1]}' on layer '{drawn[k].labels[0]}' around ({x:.6g}, "
-                f"{y:.6g}) lies outside of the walls; move it into one, or leave it out (ignore)"
-            )
-        for region, _ in holding:
-            region.openings.append(drawn[k].shape)
-        if holding:
-            used.add(k)
-    notes += _reaching_out(drawn, every)
-    notes += _left_in(drawn, [k for k in others if k not in used and drawn[k].block >= 0], every)
-    blocks = {drawn[k].block for k in used}
-    items = {drawn[k].item for k in used}
-    rest = layout.chosen([i for i in range(layout.n_blocks) if i not in blocks])
-    left_out = tuple(one for i, one in enumerate(layout.left_out) if i not in items)
-    return regions, replace(rest, left_out=left_out, notes=tuple(notes))
+    return walls
+
+
+def _opened_by(
+    one: _Drawn, every: Sequence[tuple[Region, int]], choices: Sequence[Choice], source: str
+) -> list[Region]:
+    """Find the walls of which an outline is an opening.
+
+    One that a choice asks for may reach beyond a wall; of a choice that asks for none, those within it are openings.
+    """
+    asked = [number for number, choice in enumerate(choices) if matches(one.labels, choice.openings)]
+    opened = [
+        region for region, number in every
+        if (number in asked or not choices[number].openings)
+        and (asked or (one.shape.area < region.wall.area and not _is_beside(one)))
+        and _share(one.shape, region.wall) > (OUTSIDE if asked else INSIDE)
+    ]  # fmt: skip
+    if asked and not opened:
+        x, y = one.shape.centroid.coords[0]
+        raise ValueError(
+            f"'{source}': the opening '{one.labels[-1]}' on layer '{one.labels[0]}' around ({x:.6g}, {y:.6g}) lies "
+            "outside of the walls; move it into one, or leave it out (ignore)"
+        )
+    return opened
 
 
 def _drawn(layout: Layout) -> list[_Drawn]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,17 +15,15 @@ import numpy as np
 
 from blockvis.case_files.read import case_of, read_case
 from blockvis.cases.build import case_assembly
-from blockvis.cases.distributions import Distribution, read_distribution
+from blockvis.cases.distributions import Distribution, distribution_of
 from blockvis.cases.imperfections import read_imperfection
-from blockvis.cases.key import read_keys
-from blockvis.cases.toml_table import Table, is_number
+from blockvis.cases.toml_table import Table, shortened
 from blockvis.cases.value_paths import parse_path, put
 from blockvis.formats.files import checksum_of_files
 from blockvis.kinds.kinds import KINDS
-from blockvis.text import refuse_unknown
 
+from . import study_keys as keys
 from .sampling import Design, designed
-from .study_keys import COMMON_KEYS, LIST_KEYS, SECTIONS, STUDY
 
 #: Columns of the table besides the parameters.
 RESERVED = (
@@ -237,26 +235,22 @@ def read_study(source: str | Path | Mapping[str, Any]) -> Study:
 
 def _study(given: Mapping[str, Any], source: Path) -> Study:
     where = f"{source}: "
-    refuse_unknown(given, [section.name.removesuffix(".*") for section in SECTIONS], f"{source}")
-    head = given.get("study")
-    if not isinstance(head, Mapping):
-        raise ValueError(f"{where}[study] is missing; name the case and the number of runs there")
-    refuse_unknown(head, [key.name for key in STUDY.keys], f"{where}[study]")
-    asked = read_keys(STUDY.keys, Table(head, "study", source))
+    top = Table(given, "", source)
+    top.finish([section.name.removesuffix(".*") for section in keys.SECTIONS])
+    head = top.table("study")
+    asked = keys.STUDY.read(head)
     values, case_source = _base_case(asked["case"], source)
-    parameters = _parameters(given.get("parameters", {}), where)
-    imperfections = _imperfections(given.get("imperfections", []), where)
+    parameters = _parameters(top.table("parameters"))
+    imperfections = _imperfections(top)
     if not parameters and not imperfections:
         raise ValueError(f"{where}nothing is varied; give [parameters] or [[imperfections]]")
     if imperfections:
         values["imperfections"] = [*imperfections, *_as_list(values.get("imperfections", []))]
     method = asked["method"]
-    if method == "grid" and "runs" in head:
-        raise ValueError(
-            f"{where}[study] runs is given, but a grid has as many as its values make; give repeats instead"
-        )
-    if method != "grid" and "repeats" in head:
-        raise ValueError(f"{where}[study] repeats belong to a grid; give runs")
+    if method == "grid" and "runs" in head.values:
+        raise head.error("runs", "is given, but a grid has as many as its values make; give repeats instead")
+    if method != "grid" and "repeats" in head.values:
+        raise head.error("repeats", "belong to a grid; give runs")
     study = Study(
         source=source,
         case_source=case_source,
@@ -268,7 +262,7 @@ def _study(given: Mapping[str, Any], source: Path) -> Study:
         repeats=asked["repeats"],
         seed=asked["seed"],
         seconds=asked["seconds"],
-        keep=tuple(_as_list(asked["keep"])),
+        keep=asked["keep"],
     )
     _check(study, where)
     return study
@@ -287,8 +281,8 @@ def _check(study: Study, where: str) -> None:
     if n > MOST_RUNS:
         raise ValueError(f"{where}the study has {n:,} runs; at most {MOST_RUNS:,} make one study")
     for run in study.keep:
-        if isinstance(run, bool) or not isinstance(run, int) or not 0 <= run < n:
-            raise ValueError(f"{where}[study] keep names run {run!r}; runs are numbered from 0 to {n - 1}")
+        if run >= n:
+            raise ValueError(f"{where}[study] keep names run {run}; runs are numbered from 0 to {n - 1}")
     _check_paths(study, where)
     _check_runs(study, where)
 
@@ -332,76 +326,59 @@ def _check_runs(study: Study, where: str) -> None:
 def _base_case(given: Any, source: Path) -> tuple[dict[str, Any], Path]:
     if isinstance(given, Mapping):
         return copy.deepcopy(dict(given)), source.absolute()
-    if not isinstance(given, (str, Path)):
-        raise ValueError(f"{source}: [study] case is {given!r}; name a case file, relative to the study file")
     path = (source.parent / given).absolute()
     text = read_case(path).text
     return tomllib.loads(text), path
 
 
-def _parameters(given: Any, where: str) -> tuple[Parameter, ...]:
-    if not isinstance(given, Mapping):
-        raise ValueError(f'{where}[parameters] must be a table, "material.friction_coefficient" = ...')
-    found = [_parameter(path, value, f'{where}[parameters] "{path}"') for path, value in given.items()]
+def _parameters(table: Table) -> tuple[Parameter, ...]:
+    found = []
+    for path, given in table.values.items():
+        if not isinstance(given, list | Mapping):
+            raise table.error(
+                f'"{path}"', f"is {shortened(given)}; give a list of values, or a table with a distribution"
+            )
+        values = given if isinstance(given, Mapping) else {"values": given}
+        found.append(_parameter(path, Table(values, f'parameters."{path}"', table.source)))
     names = [p.name for p in found]
     for name in names:
         if name in RESERVED:
-            raise ValueError(f"{where}[parameters] name '{name}' is a column of the table already; choose another")
+            raise table.error("name", f"'{name}' is a column of the table already; choose another")
         if names.count(name) > 1:
-            raise ValueError(f"{where}[parameters] two parameters are named '{name}'; choose another name for one")
+            raise table.error("name", f"'{name}' is that of two parameters; choose another name for one")
     paths = [path for p in found for path in (p.path, *p.also)]
     for path in paths:
         if paths.count(path) > 1:
-            raise ValueError(f'{where}[parameters] "{path}" is varied twice')
+            raise table.error(f'"{path}"', "is varied twice")
     return tuple(found)
 
 
-def _parameter(path: str, given: Any, where: str) -> Parameter:
-    if isinstance(given, list):
-        given = {"values": given}
-    if not isinstance(given, Mapping):
-        raise ValueError(f"{where} is {given!r}; give a list of values, or a table with a distribution")
-    table = dict(given)
-    name, also, points = table.pop("name", path), table.pop("also", []), table.pop("points", 0)
-    if not isinstance(name, str) or not name:
-        raise ValueError(f"{where}: name is {name!r}; give a text in quotes")
-    if isinstance(points, bool) or not isinstance(points, int) or points < 0:
-        raise ValueError(f"{where}: points is {points!r}; give a whole number")
-    also = tuple(_as_list(also))
-    for one in (path, *also):
+def _parameter(path: str, table: Table) -> Parameter:
+    listed = "values" in table.values
+    given = (keys.LISTED if listed else keys.DRAWN).read(table)
+    for key, one in (("path", path), *(("also", one) for one in given["also"])):
         try:
-            parse_path(str(one))
+            parse_path(one)
         except ValueError as error:
-            raise ValueError(f"{where}: {error}") from None
-    if "values" not in table:
-        return Parameter(path, name, also, read_distribution(table, where), (), np.zeros(0), points)
-    values = table.pop("values")
-    weights = table.pop("weights", None)
-    refuse_unknown(table, [key.name for key in (*LIST_KEYS, *COMMON_KEYS)], where)
-    if not isinstance(values, Sequence) or isinstance(values, str) or len(values) == 0:
-        raise ValueError(f"{where}: values is {values!r}; give a list of at least one")
-    share = np.ones(len(values))
-    if weights is not None:
-        if not (isinstance(weights, Sequence) and len(weights) == len(values) and all(map(is_number, weights))):
-            raise ValueError(f"{where}: weights is {weights!r}; give a number for each of the {len(values)} values")
-        share = np.array(weights, dtype=float)
-        if (share < 0.0).any() or share.sum() <= 0.0:
-            raise ValueError(f"{where}: weights is {weights!r}; give numbers of at least 0, not all 0")
-    return Parameter(path, name, also, None, tuple(values), share / share.sum(), 0)
+            raise table.error(key, str(error)) from None
+    name = given["name"] or path
+    if not listed:
+        drawn = distribution_of(given, table)
+        return Parameter(path, name, given["also"], drawn, (), np.zeros(0), given["points"])
+    values = given["values"]
+    weights = np.ones(len(values)) if given["weights"] is None else np.array(given["weights"])
+    if len(weights) != len(values):
+        raise table.error("weights", f"has {len(weights)} numbers; give one for each of the {len(values)} values")
+    return Parameter(path, name, given["also"], None, values, weights / weights.sum(), 0)
 
 
-def _imperfections(given: Any, where: str) -> list[dict[str, Any]]:
+def _imperfections(top: Table) -> list[dict[str, Any]]:
     found = []
-    for number, table in enumerate(_as_list(given)):
-        if not isinstance(table, Mapping):
-            raise ValueError(f"{where}[[imperfections]] must be tables, not {table!r}")
-        if "seed" in table:
-            raise ValueError(
-                f"{where}[imperfections {number + 1}] seed: the study gives every run its own; "
-                "a fixed one belongs in the case"
-            )
-        read_imperfection(table, f"{where}[imperfections {number + 1}]")
-        found.append(dict(table))
+    for table in top.tables("imperfections"):
+        if "seed" in table.values:
+            raise table.error("seed", "is given, but the study gives every run its own; a fixed one is of the case")
+        read_imperfection(table, keys.IMPERFECTIONS)
+        found.append(dict(table.values))
     return found
 
 

@@ -2,18 +2,67 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
-from blockvis.case_files.case_keys import DISTRIBUTION_KEYS, IMPERFECTION_KEYS
+import numpy as np
+
+from blockvis.cases import imperfections
+from blockvis.cases.distributions import DISTRIBUTION_KEYS, FORMS, KINDS
 from blockvis.cases.key import NUMBERS, POSITIVE, TEXT, TEXTS, Key, Section, ValueKind, one_of, whole
+from blockvis.cases.toml_table import Table, shortened
 
 from .sampling import METHODS
+
+
+def _case(table: Table, key: Key) -> Any:
+    given = table.take(key.name)
+    if given is not None and not isinstance(given, (str, Path, Mapping)):
+        raise table.error(key.name, f"is {shortened(given)}; {key.remedy}")
+    return given
+
+
+def _runs(table: Table, key: Key) -> tuple[int, ...] | None:
+    given = table.take(key.name)
+    if given is None:
+        return None
+    runs = tuple(given) if isinstance(given, list | tuple) else (given,)
+    for run in runs:
+        if isinstance(run, bool) or not isinstance(run, int) or run < 0:
+            raise table.error(key.name, f"names run {shortened(run)}; runs are whole numbers from 0")
+    return runs
+
+
+def _values(table: Table, key: Key) -> tuple[Any, ...] | None:
+    given = table.take(key.name)
+    if given is None:
+        return None
+    if not isinstance(given, list | tuple) or len(given) == 0:
+        raise table.error(key.name, f"is {shortened(given)}; give a list of at least one")
+    return tuple(given)
+
+
+def _name(table: Table, key: Key) -> str | None:
+    given: str | None = table.text(key.name)
+    if given == "":
+        raise table.error(key.name, "is empty; give a text in quotes")
+    return given
+
+
+def _weights(table: Table, key: Key) -> tuple[float, ...] | None:
+    given = table.numbers(key.name)
+    if given is not None and (min(given) < 0.0 or not np.any(given)):
+        raise table.error(key.name, f"is {list(given)}; give numbers of at least 0, not all 0")
+    return given
+
 
 STUDY = Section(
     "study",
     "The case and its runs",
     (
-        Key("case", ValueKind("name of a case file, or a table with its keys", {"type": ["string", "object"]}),
+        Key("case", ValueKind("name of a case file, or a table with its keys", {"type": ["string", "object"]}, _case),
             "Base case, relative to the study file", "../semicircular_arch.toml", required=True,
             remedy="name a case file, relative to the study file"),
         Key("method", one_of(METHODS), 'How values are chosen; "saltelli" is for Sobol\' indices', "sobol",
@@ -25,23 +74,42 @@ STUDY = Section(
         Key("seconds", POSITIVE, "Longest time of one run", 600, "s", otherwise="no limit"),
         Key("keep", ValueKind("whole number, or list of them",
             {"anyOf": [{"type": "integer", "minimum": 0},
-                       {"type": "array", "items": {"type": "integer", "minimum": 0}}]}),
+                       {"type": "array", "items": {"type": "integer", "minimum": 0}}]}, _runs),
             "Numbers of the runs, from 0, whose whole results folder is written", [3, 17], default=()),
     ),
     required=True,
 )  # fmt: skip
 
-#: Keys of a parameter that chooses from a list of values.
-LIST_KEYS = (
-    Key("values", ValueKind("list", {"type": "array", "minItems": 1}), "Values to choose from", [0.3, 0.5, 0.7],
-        otherwise="a distribution is given"),
-    Key("weights", NUMBERS, "Their probabilities, up to a common factor", [1, 2, 1], otherwise="all alike"),
+_COMMON_KEYS = (
+    Key("name", replace(TEXT, read=_name), "Column of the table and label of the pictures", "friction",
+        otherwise="the path"),
+    Key("also", TEXTS, "Further paths that take the same value", ["supports[1].outline"], default=()),
 )  # fmt: skip
 
-#: Keys of every parameter.
-COMMON_KEYS = (
-    Key("name", TEXT, "Column of the table and label of the pictures", "friction", otherwise="the path"),
-    Key("also", TEXTS, "Further paths that take the same value", ["supports[1].outline"], default=()),
+#: What a parameter has that chooses from a list of values.
+LISTED = Section(
+    "parameters.*",
+    "A value of the case that takes those of a list",
+    (
+        *_COMMON_KEYS,
+        Key("values", ValueKind("list", {"type": "array", "minItems": 1}, _values), "Values to choose from",
+            [0.3, 0.5, 0.7], otherwise="a distribution is given"),
+        Key("weights", replace(NUMBERS, read=_weights), "Their probabilities, up to a common factor", [1, 2, 1],
+            otherwise="all alike"),
+    ),
+)  # fmt: skip
+
+#: What a parameter has that is drawn from a distribution.
+DRAWN = Section(
+    "parameters.*",
+    "A value of the case that has a distribution",
+    (
+        *_COMMON_KEYS,
+        replace(DISTRIBUTION_KEYS[0], remedy=f"choose from {', '.join(KINDS)}, or give values"),
+        *DISTRIBUTION_KEYS[1:],
+        Key("points", whole(0), "Number of values of the distribution that a grid takes", 5, default=0),
+    ),
+    forms=FORMS,
 )
 
 PARAMETER = Section(
@@ -49,21 +117,20 @@ PARAMETER = Section(
     "A value of the case that varies, by its path as material.friction_coefficient or supports[0].outline: a list of "
     "values, or a table with values or a distribution",
     (
-        *COMMON_KEYS,
-        *LIST_KEYS,
+        *LISTED.keys,
         *(
             replace(key, required=False, otherwise="values is given" if key.required else key.otherwise)
-            for key in DISTRIBUTION_KEYS
+            for key in DRAWN.keys
+            if key not in LISTED.keys
         ),
-        Key("points", whole(0), "Number of values of the distribution that a grid takes", 5, default=0),
     ),
+    forms=FORMS,
 )
 
-IMPERFECTIONS = Section(
-    "imperfections",
-    "Random scatter that every run draws for itself, one table of each kind",
-    IMPERFECTION_KEYS,
-    several=True,
+IMPERFECTIONS = replace(
+    imperfections.IMPERFECTIONS,
+    meaning="Random scatter that every run draws for itself, one table of each kind",
+    keys=tuple(key for key in imperfections.IMPERFECTIONS.keys if key.name != "seed"),
 )
 
 #: Every table of the study file with its keys.

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from blockvis.case_files.schema import (
-    DRAFT,
-    case_values,
-    distributions,
-    one_or_several,
-    scattered,
-    table_schema,
-    without_distribution,
-)
+from blockvis.case_files.schema import DRAFT, case_values, one_or_several
 
 from . import study_keys
 
@@ -20,16 +12,13 @@ from . import study_keys
 def study_schema() -> dict[str, Any]:
     """Make the JSON schema of the study file."""
     study, parameter, imperfections = study_keys.SECTIONS
-    head = table_schema(study)
+    head = study.schema
     head["properties"]["case"] = {
         "anyOf": [{"type": "string"}, case_values()],
         "description": head["properties"]["case"]["description"],
     }
-    varied = table_schema(parameter)
-    varied["allOf"] = [
-        {"anyOf": [{"required": ["values"]}, {"required": ["distribution"]}]},
-        *distributions(also=without_distribution(parameter)),
-    ]
+    varied = parameter.schema
+    varied["allOf"].append({"anyOf": [{"required": ["values"]}, {"required": ["distribution"]}]})
     return {
         "$schema": DRAFT,
         "title": "blockvis study file",
@@ -41,7 +30,7 @@ def study_schema() -> dict[str, Any]:
                 "description": parameter.meaning,
                 "additionalProperties": {"anyOf": [{"type": "array", "minItems": 1}, varied]},
             },
-            "imperfections": one_or_several(imperfections, scattered(imperfections)),
+            "imperfections": one_or_several(imperfections),
         },
         "required": ["study"],
         "additionalProperties": False,

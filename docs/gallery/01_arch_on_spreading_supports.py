@@ -8,9 +8,8 @@ radii: exact three-hinge kinematics give 0.14104982.
 
 import blockvis
 import solver
-from blockvis import generators
 
-arch = generators.arch(radius=1.0, thickness_ratio=0.15, embrace=180.0, voussoirs=12)
+arch = blockvis.generators.arch(radius=1.0, thickness_ratio=0.15, embrace=180.0, voussoirs=12)
 spread = solver.Settlement(direction=(1, 0), increment=0.01, limit=0.5, tolerance=1e-5)
 response = solver.Structure(arch, friction_coefficient=2.0).settle(spread)  # no sliding: the arch hinges only
 print(response.collapse)

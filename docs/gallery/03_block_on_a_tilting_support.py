@@ -11,11 +11,8 @@ import math
 import blockvis
 import solver
 
-assembly = solver.Assembly.from_outlines(
-    [[[-2, -0.5], [2, -0.5], [2, 0], [-2, 0]], [[-0.5, 0], [0.5, 0], [0.5, 2], [-0.5, 2]]],
-    roles=["moving", "free"],
-    names=["plate", "block"],
-)
+plate, block = [[-2, -0.5], [2, -0.5], [2, 0], [-2, 0]], [[-0.5, 0], [0.5, 0], [0.5, 2], [-0.5, 2]]
+assembly = solver.Assembly.from_outlines([plate, block], roles=["moving", "free"], names=["plate", "block"])
 tilt = solver.Settlement(rotation_centre=(0, 0), rotation=1.0, increment=0.02, limit=1.0, tolerance=1e-5)
 response = solver.Structure(assembly, friction_coefficient=0.7).settle(tilt)
 print(response.collapse)

@@ -8,9 +8,8 @@ sliding joints lift, gives both bounds; without lift the wall carries less.
 
 import blockvis
 import solver
-from blockvis import generators
 
-wall = generators.wall(
+wall = blockvis.generators.wall(
     bricks=6, courses=12, openings=[{"x": 0.5, "y": 0.3, "width": 0.5, "height": 0.5, "head": "lintel"}]
 )
 structure = solver.Structure(wall, friction_coefficient=0.6)

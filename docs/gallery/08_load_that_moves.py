@@ -23,7 +23,6 @@ assert abs(abs(places[worst]) - 1.15) < 1e-9
 # %%
 figure, axes = plt.subplots()
 axes.semilogy(places, envelope.multipliers, "o-")
-axes.set_xlabel("place of the force [m]")
-axes.set_ylabel("limit load [kN]")
+axes.set(xlabel="place of the force [m]", ylabel="limit load [kN]")
 figure.savefig("envelope.png")
 plt.close(figure)

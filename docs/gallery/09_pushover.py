@@ -13,8 +13,7 @@ import solver
 
 outlines = [[[0, 0.2 * k], [0.2, 0.2 * k], [0.2, 0.2 * k + 0.2], [0, 0.2 * k + 0.2]] for k in range(5)]
 ground = [[-0.5, -0.1], [0.7, -0.1], [0.7, 0], [-0.5, 0]]
-names = [*(f"block {k + 1}" for k in range(5)), "ground"]
-stack = solver.Assembly.from_outlines([*outlines, ground], roles=["free"] * 5 + ["fixed"], names=names)
+stack = solver.Assembly.from_outlines([ground, *outlines], roles=["fixed", *["free"] * 5])
 structure = solver.Structure(stack, friction_coefficient=0.7).with_live(acceleration=(1, 0))
 control = solver.ControlDisplacement("block 5", (1, 0), point=(0.2, 1.0), increment=0.02, limit=0.5)
 response = structure.pushover(control)

@@ -17,9 +17,7 @@ block = [[0, 0], [2, 0], [2, 1], [0, 1]]
 assembly = solver.Assembly.from_outlines(
     [ground, block], roles=["fixed", "free"], names=["ground", "block"], materials=["rock", "marble"]
 )
-weight = mechanics.total_weight(assembly)
-area = 2.0 * 1.0  # m², width times thickness
-cohesion = 0.2 * weight / area  # Pa
+cohesion = 0.2 * mechanics.total_weight(assembly) / 2.0  # Pa, of a joint of 2 m²
 joints = solver.Interfaces(
     solver.InterfaceLaw(friction_coefficient=0.6),
     {("rock", "marble"): solver.InterfaceLaw(friction_coefficient=0.3, cohesion=cohesion)},

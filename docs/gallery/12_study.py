@@ -15,27 +15,19 @@ from pathlib import Path
 import pandas as pd
 
 folder = Path(tempfile.mkdtemp())
-(folder / "arch.toml").write_text("""
-[geometry]
-layout = "arch"
-[settlement]
-direction = [1.0, 0.0]
-increment = 0.05
-tolerance = 0.002
-limit = 0.5
-""")
 (folder / "study.toml").write_text("""
+[study.case]
+geometry = { layout = "arch" }
+settlement = { direction = [1.0, 0.0], increment = 0.05, tolerance = 0.002, limit = 0.5 }
 [study]
-case = "arch.toml"
 method = "latin hypercube"
 runs = 6
 seed = 1
 [parameters]
 "material.friction_coefficient" = { distribution = "normal", mean = 0.5, deviation = 0.1, lower = 0.38 }
 """)
-command = [sys.executable, "-m", "blockvis", "sweep", str(folder / "study.toml"), "-o", str(folder / "study")]
-said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-print(said.splitlines()[0])
+command = [sys.executable, "-m", "blockvis", "sweep", "study.toml", "-o", "study"]
+print(subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder).stdout.splitlines()[0])
 
 # %%
 # The table has a row for each run; a run is given by the study and its number alone.

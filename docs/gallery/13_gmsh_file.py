@@ -11,14 +11,12 @@ import blockvis
 import solver
 
 mesh = Path("../../assets/semicircular_arch.msh")
-found = blockvis.inspect(mesh)
-print(found)
+print(blockvis.inspect(mesh))
 
 # %%
 arch = blockvis.read(mesh, roles={"left springer": "fixed", "right springer": "moving"})
 print(arch)
-sink = solver.Settlement(direction=(0, -1), increment=0.02, limit=0.6, tolerance=1e-4)
-response = solver.Structure(arch, friction_coefficient=2.0).settle(sink)
+response = solver.Structure(arch, friction_coefficient=2.0).settle((0, -1))
 print(response.collapse)
 assert abs(response.collapse.displacement - 0.33003942) < 1e-3
 blockvis.draw_mechanism(response, "arch.png")

@@ -12,15 +12,14 @@ from pathlib import Path
 
 import blockvis
 
-# The gallery runs in docs/gallery; a script has no file name there.
-here = next(folder for folder in (Path.cwd(), *Path.cwd().parents) if (folder / "examples" / "explain").is_dir())
-case, cracks = (here / "examples" / "explain" / name for name in ("arch.toml", "cracks.csv"))
-print(cracks.read_text())
+examples = Path("../../examples/explain")
+print((examples / "cracks.csv").read_text())
 
 # %%
 # Every movement is followed once, for all of its amounts, and compared with what was seen.
-folder = Path(tempfile.mkdtemp())
-found = blockvis.explain(case, cracks, folder / "explain")
+with tempfile.TemporaryDirectory() as folder:
+    found = blockvis.explain(examples / "arch.toml", examples / "cracks.csv", f"{folder}/out")
+    shutil.copy(f"{folder}/out/explain.png", "explain.png")
 print(found)
 
 # %%
@@ -29,5 +28,3 @@ print(found)
 best = found.causes[0]
 assert best.name == "right springer moves down"
 assert best.amount[0] < 0.018 < best.amount[2]
-shutil.copy(folder / "explain" / "explain.png", "explain.png")
-shutil.rmtree(folder)

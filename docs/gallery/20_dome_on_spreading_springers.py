@@ -9,9 +9,8 @@ one lune in the plane.
 
 import blockvis
 import solver
-from blockvis import generators
 
-dome = generators.dome(lunes=8, courses=6, thickness_ratio=0.12, cap=15.0)
+dome = blockvis.generators.dome(lunes=8, courses=6, thickness_ratio=0.12, cap=15.0)
 spread = solver.Settlement(radial_from=(0, 0), increment=0.04, limit=0.5, tolerance=1e-4)
 response = solver.Structure(dome, friction_coefficient=0.7).settle(spread)
 print(response.collapse)

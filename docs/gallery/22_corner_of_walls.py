@@ -8,9 +8,8 @@ friction until the joints between them open: no section of this is plane.
 
 import blockvis
 import solver
-from blockvis import generators
 
-corner = generators.l_corner(bricks=2, across=2, courses=4)
+corner = blockvis.generators.l_corner(bricks=2, across=2, courses=4)
 sink = solver.Settlement(direction=(0, 0, -1), increment=0.02, limit=0.06)
 response = solver.Structure(corner, friction_coefficient=0.6).settle(sink)
 print(response)
@@ -19,4 +18,4 @@ for increment in response.path:
     print(f"{increment.parameter:.2f} m  {increment.reaction / response.total_weight:.3f} W")
 assert abs(response.initial_reaction / response.total_weight - 0.164516) < 1e-5
 
-blockvis.draw_still(response, len(response.path) - 1, "corner.png")
+blockvis.draw_still(response, -1, "corner.png")

@@ -15,31 +15,23 @@ import solver
 from blockvis import generators
 
 door = {"x": 0.8, "y": 0.0, "width": 0.8, "height": 1.0, "head": "lintel", "bearing": 0.2, "depth": 0.2}
-panel = {"bricks": 6, "courses": 8, "brick_length": 0.4, "brick_height": 0.2, "depth": 0.4, "openings": [door]}
-structures = {
-    "arch": (
-        generators.arch(radius=1.0, thickness_ratio=0.15, embrace=180.0, voussoirs=12),
-        solver.Settlement(direction=(1, 0), increment=0.01, limit=0.5, tolerance=1e-5),
-        2.0,
-    ),
-    "portal": (
-        generators.portal(span=2.0, height=2.4, column_width=0.5, column_blocks=4, lintel_height=0.5),
-        solver.Settlement(direction=(0, -1), increment=0.05, limit=2.5, tolerance=1e-3),
-        0.6,
-    ),
-    "panel with a door": (
-        generators.build("wall", panel | {"settling": [1.2, 2.4]}),
-        solver.Settlement(direction=(0, -1), increment=0.01, limit=0.1),
-        0.6,
-    ),
+arch = generators.arch(radius=1.0, thickness_ratio=0.15, embrace=180.0, voussoirs=12)
+portal = generators.portal(span=2.0, height=2.4, column_width=0.5, column_blocks=4, lintel_height=0.5)
+panel = generators.wall(
+    bricks=6, courses=8, brick_length=0.4, brick_height=0.2, depth=0.4, openings=[door], settling=[1.2, 2.4]
+)
+settlements = {
+    "arch": (arch, 2.0, solver.Settlement(direction=(1, 0), increment=0.01, limit=0.5, tolerance=1e-5)),
+    "portal": (portal, 0.6, solver.Settlement(direction=(0, -1), increment=0.05, limit=2.5, tolerance=1e-3)),
+    "panel with a door": (panel, 0.6, solver.Settlement(direction=(0, -1), increment=0.01, limit=0.1)),
 }
 paths = {}
-for name, (assembly, settlement, friction) in structures.items():
+for name, (assembly, friction, settlement) in settlements.items():
+    structure = solver.Structure(assembly, friction_coefficient=friction)
     for increments in ("coulomb", "linear program"):
         controls = solver.Controls(increments=increments, falling_frames=1)
-        response = solver.settle(assembly, settlement, friction_coefficient=friction, controls=controls)
-        paths[name, increments] = response
-        print(f"{name}, {increments}: {response.message}")
+        paths[name, increments] = structure.settle(settlement, controls=controls)
+        print(f"{name}, {increments}: {paths[name, increments].message}")
 
 # %%
 # The arch hinges only: both fall where exact kinematics do, at 0.14104982 radii.
@@ -66,7 +58,7 @@ assert 1e-3 < apart < 0.1
 
 # %%
 figure, axes = plt.subplots(1, 3, figsize=(12, 3.5), layout="constrained")
-for axis, name in zip(axes, structures, strict=True):
+for axis, name in zip(axes, settlements, strict=True):
     for increments, line in (("coulomb", "-"), ("linear program", "--")):
         response = paths[name, increments]
         axis.plot(response.settlement, response.reaction / response.total_weight, line, label=increments)

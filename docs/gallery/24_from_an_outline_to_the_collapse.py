@@ -6,14 +6,14 @@ An elevation as architects draw it: the outline of a wall, its openings, no ston
 bond and puts rings of voussoirs around the arched tops; the ground under its right half sinks.
 """
 
-import shutil
 import tempfile
 from pathlib import Path
 
 import blockvis
 import solver
 
-folder = Path(tempfile.mkdtemp())
+temporary = tempfile.TemporaryDirectory()
+folder = Path(temporary.name)
 (folder / "facade.svg").write_text("""
 <svg xmlns="http://www.w3.org/2000/svg" width="480cm" height="460cm" viewBox="0 0 480 460">
   <g id="wall"><path d="M 0 460 L 480 460 L 480 130 L 240 0 L 0 130 Z"/></g>
@@ -32,6 +32,10 @@ print(blockvis.inspect(folder / "facade.svg"))
 # %%
 # The case names the layers and the size of the bricks.
 (folder / "case.toml").write_text("""
+supports = [
+  { name = "ground left", outline = [[-0.5, -5.0], [2.4, -5.0], [2.4, -4.6], [-0.5, -4.6]] },
+  { name = "ground right", role = "moving", outline = [[2.4, -5.0], [5.3, -5.0], [5.3, -4.6], [2.4, -4.6]] },
+]
 [geometry]
 file = "facade.svg"
 thickness = 0.4
@@ -40,24 +44,15 @@ walls = ["wall"]
 openings = ["openings"]
 bond = "running"
 brick = [0.5, 0.25]
-[[supports]]
-name = "ground left"
-outline = [[-0.5, -5.0], [2.4, -5.0], [2.4, -4.6], [-0.5, -4.6]]
-[[supports]]
-name = "ground right"
-role = "moving"
-outline = [[2.4, -5.0], [5.3, -5.0], [5.3, -4.6], [2.4, -4.6]]
 [settlement]
 direction = [0.0, -1.0]
 increment = 0.01
 limit = 0.4
 """)
-run = blockvis.run_case(folder / "case.toml", folder / "out", outputs=())
-response = run.response
+response = blockvis.run_case(folder / "case.toml", folder / "out", outputs=()).response
 print(response)
 # The area of the drawing's wall, less its openings, is that of the stones.
-assembly = response.assembly
-assert abs(assembly.areas[assembly.free].sum() - 14.587) < 0.001
+assert abs(response.assembly.areas[response.assembly.free].sum() - 14.587) < 0.001
 assert response.stop is solver.Status.COLLAPSED
 # Where so many joints slide, rounding decides among paths: 0.2 to 0.3 m were found.
 assert 0.15 < response.path[-1].parameter < 0.4
@@ -65,4 +60,4 @@ assert 0.15 < response.path[-1].parameter < 0.4
 # %%
 # Most of the right half turns outwards over the pier beside the window.
 blockvis.draw_mechanism(response, "outline.png")
-shutil.rmtree(folder)
+temporary.cleanup()

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from key_reference import case_page, study_page
+from key_reference import case_page, observation_page, study_page
 
 from blockvis.case_files import case_keys
 from blockvis.cases.toml_table import is_number
@@ -61,4 +61,5 @@ def test_the_tool_writes_the_pages(tmp_path):
     done = subprocess.run([sys.executable, tool, tmp_path / "new" / "reference"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "new" / "reference" / "case_keys.md").read_text(encoding="utf-8") == case_page()
+    assert (tmp_path / "new" / "reference" / "observation_keys.md").read_text(encoding="utf-8") == observation_page()
     assert (tmp_path / "new" / "reference" / "study_keys.md").read_text(encoding="utf-8") == study_page()

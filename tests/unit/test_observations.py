@@ -89,7 +89,7 @@ def test_rows_of_a_table_in_python():
         (f"joint,width\n{CROWN},nan\n", "line 2: width is nan; give a finite number"),
         (f"joint,width\n{CROWN},\n", "line 2: width is missing"),
         (f"joint,width\n{CROWN},4.5\n", "is it in mm"),
-        (f"joint,width,uncertainty\n{CROWN},0.004,0\n", "uncertainty is 0; give a length above 0"),
+        (f"joint,width,uncertainty\n{CROWN},0.004,0\n", "uncertainty is 0; give a positive number"),
         (f"joint,width\n{CROWN},0\n", "nothing has opened or moved"),
         ("joint,width\nvoussoir 3,0.004\n", 'name two blocks as "A | B"'),
         ("joint,width\nvousoir 3 | voussoir 4,0.004\n", r"'vousoir 3' is no block \(did you mean 'voussoir \d'\?\)"),

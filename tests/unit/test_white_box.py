@@ -47,7 +47,7 @@ WHITE_BOX = {
     "unit/test_atomic_files.py": 6,
     "unit/test_band.py": 8,
     "unit/test_bonds.py": 2,
-    "unit/test_case_keys.py": 6,
+    "unit/test_case_keys.py": 5,
     "unit/test_cases_in_space.py": 3,
     "unit/test_closed_joints.py": 4,
     "unit/test_cones.py": 6,
