@@ -94,8 +94,11 @@ class Fall:
         if len(self) == 1 or time >= self.times[-1]:
             return self.pose(len(self) - 1)
         t = (time - self.times[k]) / (self.times[k + 1] - self.times[k])
-        before = self.pose(k)
-        return mechanics.swung(before, t * before.movement_to(self.pose(k + 1)))
+        before, after = self.pose(k), self.pose(k + 1)
+        turn = before.movement_to(after)
+        turn[:, : before.positions.shape[1]] = 0.0
+        places = before.positions + t * (after.positions - before.positions)
+        return solver.Pose(places, mechanics.swung(before, t * turn).rotations)
 
 
 def engine_installed() -> bool:
